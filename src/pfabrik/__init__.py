@@ -1,0 +1,64 @@
+"""pfabrik: the kinematics of parallel mechanisms, from a small file to exact, honest answers."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+# Where each public name lives. Modules are imported when a name is first used, so that `import pfabrik` is quick.
+_HOMES = {
+    "Cone": "mechanism",
+    "Joint": "mechanism",
+    "Mechanism": "mechanism",
+    "load": "files",
+    "save": "files",
+    "catalog": "catalog",
+    "pose": "poses",
+    "Options": "options",
+    "Solution": "solution",
+    "Status": "solution",
+    "ActiveLimit": "solution",
+    "SubChain": "decompose",
+    "decompose": "decompose",
+    "solve_ik": "ik",
+    "track": "track",
+}
+
+__all__ = ["__version__", "errors", *_HOMES]
+
+if TYPE_CHECKING:
+    from . import errors
+    from .catalog import catalog
+    from .decompose import SubChain, decompose
+    from .files import load, save
+    from .ik import solve_ik
+    from .mechanism import Cone, Joint, Mechanism
+    from .options import Options
+    from .poses import pose
+    from .solution import ActiveLimit, Solution, Status
+    from .track import track
+
+
+def __getattr__(name: str) -> Any:
+    if name == "errors":
+        return importlib.import_module(".errors", __name__)
+    if name not in _HOMES:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    value = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+class _Package(ModuleType):
+    """Keeps a function from being hidden by the module of the same name when that module is imported."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in _HOMES and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

@@ -1,0 +1,39 @@
+"""The `pfabrik` command. Each subcommand is the module of its name and is loaded when it is asked for."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+
+import click
+
+from .group import CommandGroup
+
+__all__ = ["main"]
+
+
+def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    """Say which version this is, and leave."""
+    if not wanted:
+        return
+    try:
+        click.echo(f"pfabrik {version('pfabrik')}")
+    except PackageNotFoundError:
+        click.echo("pfabrik (running from its source folder, not installed)")
+    context.exit()
+
+
+@click.command(
+    cls=CommandGroup, subcommands=("catalog", "info", "check", "ik", "track", "demo"), invoke_without_command=True
+)
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=print_version, help="Show the version.")
+@click.pass_context
+def main(context: click.Context) -> int:
+    """Kinematics of parallel mechanisms, with every limit kept.
+
+    MECH is a name from `pfabrik catalog` or the path of a mechanism file.
+
+    Exit codes: 0 reached or ok, 1 projected or anything else not reached, 2 wrong input.
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+    return 0

@@ -1,0 +1,119 @@
+"""``pfabrik demo``: three mechanisms follow circles that leave their workspaces."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+import pfabrik as pf
+
+from .progress import progress
+from .table import aligned
+from .track import count_statuses
+from .whole import whole_folder
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ..solution import Solution
+
+QUICK_STEPS = 36
+
+
+@dataclass(frozen=True)
+class Run:
+    """One mechanism's circle, followed."""
+
+    key: str
+    targets: NDArray[np.float64]
+    solution: Solution
+    seconds: float
+
+
+@click.command()
+@click.option("--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True, help="Folder to write.")
+@click.option("--steps", type=click.IntRange(min=3), default=360, show_default=True, help="Targets on each circle.")
+@click.option("--quick", is_flag=True, help=f"{QUICK_STEPS} targets on each circle.")
+def demo(out: Path, steps: int, quick: bool) -> int:
+    """Follow circles that leave the workspace.
+
+    Three mechanisms track the circles of the P-FABRIK paper; pictures and CSV files go to a folder.
+
+    The upper arc of each circle is out of reach: there the answer is the feasible pose that the mechanism can take
+    near the target, and every limit is still kept.
+    """
+    from .circles import CIRCLES
+
+    if find_spec("matplotlib") is None:
+        raise click.UsageError("the pictures need matplotlib; install it with: pip install 'pfabrik[view]'")
+    with whole_folder(out) as folder:
+        runs = [follow(key, QUICK_STEPS if quick else steps) for key in CIRCLES]
+        for run in runs:
+            write(run, folder)
+        names = sorted(item.name for item in folder.iterdir())
+    click.echo(table(runs))
+    click.echo(f"\nwrote {', '.join(names)} to {out}/")
+    return 0 if all(holds(run.solution) for run in runs) else 1
+
+
+def follow(key: str, steps: int) -> Run:
+    """Track one circle, and time it without the compilation of the kernels."""
+    from .circles import CIRCLES
+
+    mechanism = pf.load(key)
+    targets = pf.pose(CIRCLES[key].points(steps))
+    pf.track(mechanism, targets[:2])
+    with progress(f"{mechanism.name}: {steps} steps") as on_progress:
+        start = time.perf_counter()
+        solution = pf.track(mechanism, targets, on_progress=on_progress)
+        seconds = time.perf_counter() - start
+    return Run(key, targets, solution, seconds)
+
+
+def write(run: Run, folder: Path) -> None:
+    """The picture and the CSV file of one run."""
+    from ..view.tracking import draw_tracking
+    from .pathfile import write_track
+
+    draw_tracking(run.targets, run.solution, folder / f"{run.key}.png")
+    with (folder / f"{run.key}.csv").open("w", newline="", encoding="utf-8") as handle:
+        write_track(handle, run.targets, run.solution)
+
+
+def table(runs: list[Run]) -> str:
+    """What the runs came to."""
+    header = ("mechanism", "reached", "projected", "failed", "farthest", "loop gap", "limit excess", "per step")
+    return aligned(header, [row(run) for run in runs])
+
+
+def row(run: Run) -> tuple[str, ...]:
+    """One line of the table; the worst of the run in every column."""
+    solution = run.solution
+    unit = solution.mechanism.length_unit
+    counts = count_statuses(solution)
+    return (
+        solution.mechanism.name,
+        str(counts["reached"]),
+        str(counts["projected"]),
+        str(counts["failed"] + counts["invalid"]),
+        f"{solution.position_error.max():.3g} {unit}",
+        f"{solution.residual.max():.1e} {unit}",
+        f"{solution.limit_excess.max():.1e}",
+        f"{1e3 * run.seconds / len(solution):.3f} ms",
+    )
+
+
+def holds(solution: Solution) -> bool:
+    """Whether every step has an answer with its loops closed and its limits kept."""
+    from ..tolerances import TOLERANCES
+
+    counts = count_statuses(solution)
+    closed = solution.residual.max() <= TOLERANCES.position * solution.mechanism.characteristic_length
+    kept = solution.limit_excess.max() <= TOLERANCES.limit
+    return bool(closed and kept and not counts["failed"] and not counts["invalid"])

@@ -1,0 +1,110 @@
+"""The group of subcommands: loads them on demand, and turns every failure into one readable line and an exit code."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+import click
+
+from ..errors import PfabrikError, near_miss
+
+WRONG_INPUT = 2
+INTERRUPTED = 130
+PIPE_CLOSED = 141
+
+
+class CommandGroup(click.Group):
+    """A group whose subcommand ``name`` is the object ``name`` of the module ``pfabrik.cli.name``."""
+
+    def __init__(self, *args: Any, subcommands: Sequence[str] = (), **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.subcommands = tuple(subcommands)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the subcommands, in the order of the help."""
+        return list(self.subcommands)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Load one subcommand."""
+        if cmd_name not in self.subcommands:
+            return None
+        module = importlib.import_module(f".{cmd_name}", __package__)
+        command: click.Command = getattr(module, cmd_name)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click does, but an unknown subcommand comes with the nearest known one."""
+        if args and args[0] not in self.subcommands and not args[0].startswith("-"):
+            hint = near_miss(args[0], self.subcommands) or f" (known: {', '.join(self.subcommands)})"
+            ctx.fail(f"no command '{args[0]}'{hint}")
+        return super().resolve_command(ctx, args)
+
+    def main(self, *args: Any, standalone_mode: bool = True, **kwargs: Any) -> Any:
+        """Run a command line; in standalone mode, exit with the code that the subcommand returned."""
+
+        def run() -> Any:
+            return super(CommandGroup, self).main(*args, standalone_mode=False, **kwargs)
+
+        if not standalone_mode:
+            return run()
+        kwargs["prog_name"] = kwargs.get("prog_name") or "pfabrik"
+        leave(exit_code(run))
+
+
+def exit_code(run: Callable[[], Any]) -> int:
+    """Run, and say how it went: the returned integer, or the code of the failure, which is told on stderr."""
+    try:
+        with plain_warnings():
+            result = run()
+        return result if isinstance(result, int) else 0
+    except click.UsageError as error:
+        place = error.ctx.command_path if error.ctx else "pfabrik"
+        complain(f"{error.format_message().rstrip('.')} (see '{place} --help')")
+    except click.ClickException as error:
+        complain(error.format_message())
+    except PfabrikError as error:
+        complain(str(error))
+    except SystemExit:  # click leaves this way when the reader of a pipe has gone
+        return PIPE_CLOSED
+    except (KeyboardInterrupt, click.Abort):
+        complain("interrupted")
+        return INTERRUPTED
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        complain(f"{where}{error.strerror or error}")
+    return WRONG_INPUT
+
+
+def complain(message: str) -> None:
+    """Each line of `message` on stderr, marked as ours."""
+    for line in message.splitlines() or ["failed without a message"]:
+        click.echo(f"pfabrik: {line}", err=True)
+
+
+@contextmanager
+def plain_warnings() -> Iterator[None]:
+    """Show warnings as one line for people, without the place in the code that raised them."""
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        complain(f"warning: {message}")
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
+
+
+def leave(code: int) -> NoReturn:
+    """Exit; what stdout can no longer take (a full disk, say) was already told and is dropped."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(code)

@@ -1,0 +1,25 @@
+"""The option ``--hold`` of the commands that solve."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+import pfabrik as pf
+
+if TYPE_CHECKING:
+    from ..options import Options
+
+hold_option = click.option(
+    "--hold",
+    type=click.Choice(["orientation", "position", "none"]),
+    default="orientation",
+    show_default=True,
+    help="What an answer to a target out of reach keeps exactly.",
+)
+
+
+def options_holding(hold: str) -> Options:
+    """Solver options for a value of ``--hold``."""
+    return pf.Options(hold=None if hold == "none" else hold)

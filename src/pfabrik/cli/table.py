@@ -1,0 +1,30 @@
+"""Aligned text: looks the same on a terminal, in a pipe and in a file; never cut, never coloured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+
+def aligned(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """The rows under their header, columns two spaces apart; columns of numbers are aligned to the right."""
+    body = [tuple(map(str, row)) for row in rows]
+    columns = list(zip(header, *body, strict=True))
+    padded = [pad(column) for column in columns]
+    return "\n".join("  ".join(cells).rstrip() for cells in zip(*padded, strict=True))
+
+
+def pad(column: Sequence[str]) -> list[str]:
+    """All cells of a column (its header first) at one width."""
+    width = max(map(len, column))
+    numeric = len(column) > 1 and all(starts_like_a_number(cell) for cell in column[1:])
+    return [cell.rjust(width) if numeric else cell.ljust(width) for cell in column]
+
+
+def starts_like_a_number(cell: str) -> bool:
+    """Whether a cell reads as a number, perhaps with a unit; ``-`` stands for a missing one."""
+    head = cell.split(" ")[0]
+    try:
+        float(head)
+    except ValueError:
+        return head in ("", "-")
+    return True

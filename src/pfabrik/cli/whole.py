@@ -1,0 +1,53 @@
+"""Output that appears whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[TextIO]:
+    """A text file for writing that takes the name `path` only when the block ends without an error.
+
+    It is opened at once, so an unwritable place is found before the work begins. A device or pipe is written directly.
+    """
+    path = path.resolve()  # a link keeps pointing where it points
+    if path.exists() and not path.is_file():
+        with path.open("w", newline="", encoding="utf-8") as handle:
+            yield handle
+        return
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with open_new(part, path) as handle:
+            yield handle
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def open_new(part: Path, path: Path) -> TextIO:
+    """Open `part` for writing; a failure speaks of `path`, the name that the user knows."""
+    try:
+        return part.open("x", newline="", encoding="utf-8")
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """A folder to fill; its files move into `path` only when the block ends without an error."""
+    path = path.resolve()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.exists() and not path.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(path))
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as part:
+        yield Path(part)
+        path.mkdir(exist_ok=True)
+        for item in sorted(Path(part).iterdir()):
+            item.replace(path / item.name)

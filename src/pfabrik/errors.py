@@ -1,0 +1,90 @@
+"""What can go wrong, as exceptions that name the culprit, what was found and what was expected."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+def near_miss(name: str, known: Iterable[str]) -> str:
+    """``"; did you mean 'platform'?"`` when a known name is close to `name`, else an empty string."""
+    close = difflib.get_close_matches(str(name), list(known), n=1)
+    return f"; did you mean '{close[0]}'?" if close else ""
+
+
+class PfabrikError(Exception):
+    """Root of every error this library raises on purpose."""
+
+
+class MobilityWarning(UserWarning):
+    """The actuators of a mechanism do not hold its end effector: locked, they leave it freedoms at home."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with a description: where, what was found there, what was expected."""
+
+    place: str
+    found: str
+    expected: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: found {self.found}; expected {self.expected}"
+
+
+class InvalidMechanism(PfabrikError, ValueError):
+    """A description that does not make a mechanism; carries every fault found, not only the first.
+
+    Attributes
+    ----------
+    faults : the faults, in the order of the description.
+    source : the file they were found in, or None for a mechanism built in Python.
+    """
+
+    def __init__(self, faults: Sequence[Fault], source: str | None = None) -> None:
+        self.faults = tuple(faults)
+        self.source = source
+        prefix = f"{source}: " if source else ""
+        super().__init__("\n".join(f"{prefix}{fault}" for fault in self.faults))
+
+
+class UnsupportedMechanism(PfabrikError, ValueError):
+    """A valid mechanism that no engine of this version can solve; names the sub-chain and the reason."""
+
+    def __init__(self, mechanism: str, reasons: Sequence[str]) -> None:
+        self.mechanism = mechanism
+        self.reasons = tuple(reasons)
+        super().__init__(f"'{mechanism}' cannot be solved: " + "; ".join(self.reasons))
+
+
+class InvalidArgument(PfabrikError, ValueError):
+    """A call with an argument of the wrong shape, type or value.
+
+    Attributes
+    ----------
+    argument, found, expected : the argument's name, and both sides of the disagreement, as text.
+    rows : indices of the first offending rows of a batch, or an empty tuple.
+    """
+
+    def __init__(self, argument: str, found: str, expected: str, rows: Sequence[int] = ()) -> None:
+        self.argument = argument
+        self.found = found
+        self.expected = expected
+        self.rows = tuple(rows)
+        where = f" (first bad rows: {', '.join(map(str, self.rows))})" if self.rows else ""
+        super().__init__(f"{argument}: found {found}; expected {expected}{where}")
+
+
+class UnknownName(PfabrikError, KeyError):
+    """A name that is not known here; the alternatives are listed on `known`."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        self.kind = kind
+        self.name = name
+        self.known = tuple(known)
+        self._text = f"no {kind} named '{name}'{near_miss(name, self.known)} (known: {', '.join(self.known)})"
+        super().__init__(self._text)
+
+    def __str__(self) -> str:
+        return self._text

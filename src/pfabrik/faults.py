@@ -1,0 +1,75 @@
+"""Everything that can be wrong with a description, found in one go."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from .errors import Fault
+from .form_faults import is_name, joint_faults, name_faults, number_faults, shown
+from .graph_faults import graph_faults
+from .home_faults import home_faults
+
+if TYPE_CHECKING:
+    from .mechanism import Mechanism
+
+_JOINT = re.compile(r"joint\[(\d+)\]")
+
+
+def find_faults(mechanism: Mechanism) -> list[Fault]:
+    """Every fault of a description, in its order; an empty list for a mechanism that can be built.
+
+    Places are written as in a file: `joint[3].cone.half_angle`, with the index counted in `mechanism.joints`.
+    """
+    joints: Any = mechanism.joints
+    if not isinstance(joints, tuple) or not all(map(_is_joint, joints)) or not joints:
+        return [*_head_faults(mechanism), Fault("joint", _not_joints(joints), "at least one Joint")]
+    form = [list(joint_faults(f"joint[{index}]", joint)) for index, joint in enumerate(joints)]
+    sound = {joint.name: joint for joint, faults in zip(joints, form, strict=True) if not faults}
+    faults = [*_head_faults(mechanism), *(fault for each in form for fault in each)]
+    return in_order([*faults, *_point_faults(mechanism), *graph_faults(mechanism), *home_faults(mechanism, sound)])
+
+
+def in_order(faults: Sequence[Fault]) -> list[Fault]:
+    """The faults in the order of a description: the head first, then joint by joint."""
+    return sorted(faults, key=lambda fault: joint_index(fault.place))
+
+
+def joint_index(place: str) -> int:
+    """The index of the joint that a place is in, or -1 for the head."""
+    match = _JOINT.match(place)
+    return int(match[1]) if match else -1
+
+
+def _is_joint(value: object) -> bool:
+    return all(hasattr(value, field) for field in ("name", "type", "connects", "cone", "along"))
+
+
+def _not_joints(joints: Any) -> str:
+    if not isinstance(joints, tuple):
+        return shown(joints)
+    return next((shown(joint) for joint in joints if not _is_joint(joint)), "no joints")
+
+
+def _head_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    for field in ("name", "base", "end_effector"):
+        yield from name_faults(field, getattr(mechanism, field))
+    yield from name_faults("units.length", mechanism.length_unit)
+    if mechanism.angle_unit not in ("deg", "rad"):
+        yield Fault("units.angle", shown(mechanism.angle_unit), "'deg' or 'rad'")
+
+
+def _point_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    """Faults of the reference point: needed for a body, given by the joint for a joint."""
+    point = mechanism.reference_point
+    tip = next((joint for joint in mechanism.joints if joint.name == mechanism.end_effector), None)
+    if not is_name(mechanism.end_effector):
+        return
+    if tip is not None:
+        if point != tip.at:
+            yield Fault("reference_point", shown(point), f"nothing: it is the centre of the joint '{tip.name}'")
+    elif point is None:
+        yield Fault("reference_point", "nothing", "three numbers, the point of the end effector that targets place")
+    else:
+        yield from number_faults("reference_point", point, 3)

@@ -1,0 +1,237 @@
+"""Mechanism files: TOML text to a mechanism and back, with every fault of a file reported in one go."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import tomllib
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from .catalog import catalog, catalog_file
+from .copies import Copy, Layout, Pattern, count_of
+from .errors import Fault, InvalidArgument, InvalidMechanism, UnknownName
+from .faults import in_order, joint_index
+from .form_faults import direction_faults, joint_faults, shown
+from .mechanism import Cone, Joint, Mechanism
+from .schema import MOST_JOINTS, HeadTable, JointTable, read_table
+from .units import in_radians
+from .writing import dumps
+
+__all__ = ["LARGEST_FILE", "dumps", "load", "loads", "save"]
+
+LARGEST_FILE = 1_000_000
+"""Largest file read [bytes]: a hundred times any machine, and quickly refused when it is something else."""
+
+
+def load(source: str | os.PathLike[str]) -> Mechanism:
+    """The mechanism of a file.
+
+    Parameters
+    ----------
+    source : a catalogue name (a text equal to one of `catalog()`), or the path of a mechanism file.
+
+    Raises
+    ------
+    UnknownName : neither a file nor a catalogue name.
+    InvalidMechanism : the file does not describe a mechanism; carries every fault found.
+    """
+    if isinstance(source, str) and source in catalog():
+        return loads(catalog_file(source).read_text(encoding="utf-8"), source)
+    if not isinstance(source, str | os.PathLike):
+        raise InvalidArgument("source", shown(source), "a path or a catalogue name")
+    path = Path(source)
+    try:
+        return loads(_text(path), str(path))
+    except (FileNotFoundError, NotADirectoryError, ValueError) as error:
+        if isinstance(error, InvalidMechanism):
+            raise
+        raise UnknownName("mechanism file or catalogue name", str(path), catalog()) from None
+
+
+def loads(text: str, source: str | None = None) -> Mechanism:
+    """The mechanism that a text in the format of a mechanism file describes.
+
+    Parameters
+    ----------
+    source : what to call the text in an error, usually the name of its file.
+
+    Raises
+    ------
+    InvalidMechanism : the text does not describe a mechanism; carries every fault found.
+    """
+    if not isinstance(text, str):
+        raise InvalidArgument("text", shown(text), "the text of a mechanism file")
+    try:
+        return _mechanism(_parsed(text))
+    except InvalidMechanism as error:
+        raise InvalidMechanism(error.faults, source) from None
+
+
+def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
+    """Write a mechanism to a file that `load` turns into an equal one.
+
+    The file is replaced as a whole or not at all. Copies and shorthands of a file it came from are not kept.
+    """
+    target = Path(path).resolve()
+    draft = target.with_name(f".{secrets.token_hex(8)}.tmp")
+    try:
+        draft.write_bytes(dumps(mechanism).encode())
+        if target.exists():
+            shutil.copymode(target, draft)
+        os.replace(draft, target)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def _text(path: Path) -> str:
+    """The text of a file that could be a mechanism file; a fault when it cannot be one."""
+    if path.exists() and not path.is_file():
+        raise InvalidMechanism([Fault("file", "a directory or device", "a mechanism file")], str(path))
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+        if len(content) > LARGEST_FILE:
+            fault = Fault("file", f"more than {LARGEST_FILE} bytes", f"at most {LARGEST_FILE}")
+            raise InvalidMechanism([fault], str(path))
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        fault = Fault("file", f"no UTF-8 text at byte {error.start}", "a text file in UTF-8")
+    except (FileNotFoundError, NotADirectoryError):
+        raise
+    except OSError as error:
+        fault = Fault("file", f"a file that cannot be read ({error.strerror})", "a readable file")
+    raise InvalidMechanism([fault], str(path))
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    if len(text) > LARGEST_FILE:
+        raise InvalidMechanism([Fault("file", f"{len(text)} characters", f"at most {LARGEST_FILE}")])
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        fault = Fault("file", "values nested too deeply", "tables and lists a few levels deep")
+    except ValueError as error:
+        fault = Fault("file", f"no TOML: {error}", "TOML")
+    raise InvalidMechanism([fault])
+
+
+def _mechanism(table: dict[str, Any]) -> Mechanism:
+    """The mechanism of a parsed file. Faults of single tables are found first, then those of the whole."""
+    head, faults = read_table(HeadTable, table, "")
+    if len(head.joint) > MOST_JOINTS:
+        fault = Fault("joint", f"{len(head.joint)} joints", f"at most {MOST_JOINTS}")
+        raise InvalidMechanism([*faults, fault])
+    patterns = []
+    for index, joint in enumerate(head.joint):
+        pattern, found = _pattern(joint, f"joint[{index}]", head.units.angle)
+        patterns.append(pattern)
+        faults += found
+    return _expanded(head, patterns, faults)
+
+
+def _pattern(table: Any, place: str, angle_unit: str) -> tuple[Pattern, list[Fault]]:
+    """The joint that a table describes, as far as it can be read, and the faults of the table."""
+    if not isinstance(table, dict):
+        return Pattern(_joint(JointTable(), angle_unit)), [Fault(place, shown(table), "a [[joint]] table")]
+    read, faults = read_table(JointTable, table, place)
+    joint = _joint(read, angle_unit)
+    if read.copies is None:
+        return Pattern(joint), faults
+    axis = Cone(cast(Any, read.copies.axis), 0.0, "").axis
+    misdirected = list(direction_faults(f"{place}.copies.axis", axis))
+    if misdirected:
+        return Pattern(joint), faults + misdirected
+    return Pattern(joint, read.copies.count, axis), faults
+
+
+def _joint(read: JointTable, angle_unit: str) -> Joint:
+    values: dict[str, Any] = {name: getattr(read, name) for name in JointTable.model_fields if name != "copies"}
+    for name in ("home", "range"):
+        values[name] = in_radians(values[name], read.type, angle_unit)
+    if read.cone is not None:
+        half_angle = in_radians(read.cone.half_angle, "revolute", angle_unit)
+        values["cone"] = Cone(cast(Any, read.cone.axis), half_angle, cast(Any, read.cone.fixed_to))
+    return Joint(**values)
+
+
+def _expanded(head: HeadTable, patterns: Sequence[Pattern], faults: list[Fault]) -> Mechanism:
+    """The mechanism of all copies. When it is not clear what is copied, only the joints' own faults are looked for."""
+    layout = Layout(tuple(patterns), head.base, cast(str, head.end_effector))
+    if count_of(patterns) > MOST_JOINTS:
+        faults.append(Fault("joint", f"{count_of(patterns)} joints with their copies", f"at most {MOST_JOINTS}"))
+    elif not any(map(_hides_copies, faults)) and head.end_effector is not None:
+        faults += layout.faults()
+    if head.end_effector is None or any(map(_hides_copies, faults)):
+        alone = [
+            fault for index, each in enumerate(patterns) for fault in joint_faults(f"joint[{index}]", each.joint)
+        ]
+        raise InvalidMechanism(_merged(faults, [*_missing(head), *alone]))
+    return _built(head, layout, faults)
+
+
+def _hides_copies(fault: Fault) -> bool:
+    """Whether a fault leaves open which joints and bodies there are, or what their numbers mean."""
+    root = fault.place.partition(".")[0]
+    whole = fault.place in ("joint", "file") or root in ("base", "end_effector", "units")
+    return whole or ".copies" in fault.place or "which has" in fault.found
+
+
+def _missing(head: HeadTable) -> Iterator[Fault]:
+    if head.name is None:
+        yield Fault("name", "nothing", "a text that is not empty")
+    if head.end_effector is None:
+        yield Fault("end_effector", "nothing", "a text that is not empty")
+
+
+def _built(head: HeadTable, layout: Layout, faults: list[Fault]) -> Mechanism:
+    copies = layout.expanded()
+    try:
+        with warnings.catch_warnings():
+            if faults:
+                warnings.simplefilter("ignore")
+            mechanism = Mechanism(
+                name=cast(str, head.name),
+                joints=tuple(copy.joint for copy in copies),
+                end_effector=layout.end_effector,
+                reference_point=cast(Any, head.reference_point),
+                base=head.base,
+                length_unit=head.units.length,
+                angle_unit=head.units.angle,
+            )
+    except InvalidMechanism as error:
+        faults = _merged(faults, _as_written(error.faults, layout, copies))
+    if faults:
+        raise InvalidMechanism(in_order(faults))
+    return mechanism
+
+
+def _as_written(faults: Sequence[Fault], layout: Layout, copies: Sequence[Copy]) -> list[Fault]:
+    """The faults of expanded joints at the places of their file, each place reported from one copy only."""
+    written: list[Fault] = []
+    reporter: dict[str, int] = {}
+    for fault in faults:
+        copy = copies[joint_index(fault.place)]
+        if joint_index(fault.place) < 0:
+            written.append(fault)
+            continue
+        place = f"joint[{copy.index}]{fault.place.partition(']')[2]}"
+        if reporter.setdefault(place, copy.number) == copy.number:
+            written.append(Fault(place, layout.as_written(fault.found, copy), layout.as_written(fault.expected, copy)))
+    return written
+
+
+def _merged(first: Sequence[Fault], second: Sequence[Fault]) -> list[Fault]:
+    """All faults in order, without those of the second list that only follow from one of the first."""
+    places = [fault.place for fault in first]
+    own = [fault for fault in second if not any(_same_place(fault.place, place) for place in places)]
+    return in_order([*first, *own])
+
+
+def _same_place(one: str, other: str) -> bool:
+    """Whether one place is the other, or within it."""
+    short, long = sorted((one, other), key=len)
+    return long == short or long.startswith(f"{short}.") or (short != "joint" and long.startswith(f"{short}["))

@@ -1,0 +1,85 @@
+"""Faults of the home configuration: it must have a size, and lie within its own limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .cones import next_joints, opposite
+from .enclosing import enclosing_radius
+from .errors import Fault
+from .form_faults import is_pair_of_names, is_point, kind_of
+from .tolerances import TOLERANCES
+
+if TYPE_CHECKING:
+    from .mechanism import Joint, Mechanism
+
+SMALLEST_LENGTH = 1e-9
+"""Smallest characteristic length accepted: below it, a unit is wrong or joints are meant to coincide."""
+
+
+def home_faults(mechanism: Mechanism, sound: dict[str, Joint]) -> Iterator[Fault]:
+    """All faults of the home configuration that can be seen in the joints that have no other fault.
+
+    Parameters
+    ----------
+    sound : the joints without a fault of their own, by name; only they are looked at.
+    """
+    radius = enclosing_radius([joint.at for joint in sound.values() if is_point(joint.at)])
+    if 0.0 < radius < SMALLEST_LENGTH:
+        yield Fault("joint", f"joint centres within {radius:.3g} of each other", f"at least {SMALLEST_LENGTH:g}")
+        return
+    for index, joint in enumerate(mechanism.joints):
+        if sound.get(joint.name) is joint:
+            yield from _stroke_faults(f"joint[{index}]", joint, sound, radius or 1.0)
+            yield from _angle_faults(f"joint[{index}].cone", joint, mechanism, sound)
+
+
+def _stroke_faults(place: str, joint: Joint, sound: dict[str, Joint], scale: float) -> Iterator[Fault]:
+    """Home outside the joint's range; two joints at one place, which leave `along` without a direction."""
+    home: Any = joint.home
+    if joint.along is not None:
+        if not all(name in sound and is_point(sound[name].at) for name in joint.along):
+            return
+        home = math.dist(*(sound[name].at or () for name in joint.along))
+        if home <= TOLERANCES.home_slack * scale:
+            yield Fault(f"{place}.along", "two joints at the same place", "two joints at some distance")
+            return
+    kind = kind_of(joint)
+    if joint.range is None or kind is None:
+        return
+    if len(kind.coordinates) == 1:
+        yield from _outside(f"{place}.range", home, joint.range, scale if kind.coordinates[0] == "length" else 1.0)
+        return
+    for number, (value, bounds, coordinate) in enumerate(zip(home, joint.range, kind.coordinates, strict=True)):
+        yield from _outside(f"{place}.range[{number}]", value, bounds, scale if coordinate == "length" else 1.0)
+
+
+def _outside(place: str, value: float, bounds: Any, scale: float) -> Iterator[Fault]:
+    slack = TOLERANCES.home_slack * scale
+    if not bounds[0] - slack <= value <= bounds[1] + slack:
+        yield Fault(place, f"({bounds[0]:.10g}, {bounds[1]:.10g})", f"a range that contains home, {value:.10g}")
+
+
+def _angle_faults(place: str, joint: Joint, mechanism: Mechanism, sound: dict[str, Joint]) -> Iterator[Fault]:
+    """Home outside the joint's cone, or no line to measure."""
+    if joint.cone is None or not all(is_pair_of_names(each.connects) for each in mechanism.joints):
+        return
+    ends = next_joints(mechanism.joints, joint, opposite(joint))
+    if len(ends) != 1 or sound.get(ends[0].name) is not ends[0]:
+        return
+    line = np.subtract(ends[0].at, joint.at)
+    if not line.any():
+        yield Fault(place, f"'{ends[0].name}' at the same place", "a next joint at some distance")
+        return
+    angle = _angle(np.asarray(joint.cone.axis), line)
+    if angle > joint.cone.half_angle + TOLERANCES.home_slack:
+        found = f"{joint.cone.half_angle:.10g} rad"
+        yield Fault(f"{place}.half_angle", found, f"at least the angle at home to '{ends[0].name}', {angle:.10g} rad")
+
+
+def _angle(axis: Any, line: Any) -> float:
+    return math.atan2(float(np.linalg.norm(np.cross(axis, line))), float(axis @ line))

@@ -1,0 +1,41 @@
+"""The joint types, and for each what describes it, what its coordinates are and what may limit it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+JointType: TypeAlias = Literal["revolute", "prismatic", "universal", "spherical", "cylindrical", "fixed"]
+JOINT_TYPES: tuple[JointType, ...] = get_args(JointType)
+
+Coordinate: TypeAlias = Literal["angle", "length"]
+
+
+@dataclass(frozen=True)
+class JointKind:
+    """What a description of one joint type contains.
+
+    Attributes
+    ----------
+    letter : the short name in chains such as `U-P*-S`.
+    coordinates : whether each coordinate is an angle [rad] or a length; as many as the joint has freedoms.
+    direction : the field that holds its direction: `axis`, `axes`, or None.
+    ranged, coned, actuatable : whether it may have a range or a cone, and whether it may be actuated.
+    """
+
+    letter: str
+    coordinates: tuple[Coordinate, ...]
+    direction: Literal["axis", "axes"] | None = None
+    ranged: bool = False
+    coned: bool = False
+    actuatable: bool = False
+
+
+KINDS: dict[JointType, JointKind] = {
+    "revolute": JointKind("R", ("angle",), "axis", ranged=True, actuatable=True),
+    "prismatic": JointKind("P", ("length",), "axis", ranged=True, actuatable=True),
+    "universal": JointKind("U", ("angle", "angle"), "axes", ranged=True, coned=True),
+    "spherical": JointKind("S", ("angle", "angle", "angle"), coned=True),
+    "cylindrical": JointKind("C", ("angle", "length"), "axis", ranged=True),
+    "fixed": JointKind("fixed", ()),
+}

@@ -1,0 +1,1 @@
+"""The reaching engine, compiled: positions in, positions out. Imports NumPy and Numba only."""

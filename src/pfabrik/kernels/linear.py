@@ -1,0 +1,46 @@
+"""Small dense algebra, in place."""
+
+from __future__ import annotations
+
+import math
+
+from ._jit import routine
+from .plan import Floats
+
+
+@routine
+def solve_spd(A: Floats, n: int, damping: float) -> bool:
+    """Solve the symmetric positive system A[:n, :n] x = A[:n, n] by Cholesky; x replaces A[:n, n].
+
+    `damping` times the largest diagonal entry is added to the diagonal first. False, with x zero, when the matrix is
+    not positive all the same. The lower triangle of A is overwritten.
+    """
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, A[i, i])
+    shift = damping * largest
+    for j in range(n):
+        pivot = A[j, j] + shift
+        for k in range(j):
+            pivot -= A[j, k] * A[j, k]
+        if not pivot > 0.0:
+            for i in range(n):
+                A[i, n] = 0.0
+            return False
+        pivot = math.sqrt(pivot)
+        A[j, j] = pivot
+        for i in range(j + 1, n):
+            entry = A[i, j]
+            for k in range(j):
+                entry -= A[i, k] * A[j, k]
+            A[i, j] = entry / pivot
+        entry = A[j, n]
+        for k in range(j):
+            entry -= A[j, k] * A[k, n]
+        A[j, n] = entry / pivot
+    for j in range(n - 1, -1, -1):
+        entry = A[j, n]
+        for k in range(j + 1, n):
+            entry -= A[k, j] * A[k, n]
+        A[j, n] = entry / A[j, j]
+    return True

@@ -1,0 +1,170 @@
+"""Reaching a given pose: every chain for itself, by closed form, by passes, and from other starts before giving up."""
+
+from __future__ import annotations
+
+import math
+
+from ._jit import routine
+from .frames import move_carriers
+from .plan import LENGTH, PASSES, TURN, Configuration, Plan, Settings, Work
+from .reach import chain_is_reached, reach_by_passes, try_directly
+from .settle import note_violations, settle
+from .vectors import add, along, copy_row, copy_table, dot, move, put, scale, sub, turn, vec
+
+# Passes bring a chain within this share of L before the exact step takes over.
+NEAR = 1e-3
+# Other starts tried before a target is called out of reach; for trunks, each is the best of so many samples.
+RESTARTS = 8
+SAMPLES = 24
+# Generators of an additive recurrence that fills a box evenly (powers of the inverse of the plastic number).
+_SPREAD = (0.7548776662466927, 0.5698402909980532, 0.4301597090019468, 0.3247179572447460)
+
+
+@routine
+def place_ends(plan: Plan, c: int, now: Configuration) -> None:
+    """Put the first and last nodes of a chain where carrier and platform have them."""
+    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+        branch = plan.branches[b]
+        first, last = branch["first"], branch["last"]
+        if branch["rail"] == 0:
+            put(now.nodes[first], move(now.carriers[branch["carrier"]], vec(plan.nodes[first]["home"])))
+        put(now.nodes[last], move(now.pose, vec(branch["end"])))
+
+
+@routine
+def has_closed_form(plan: Plan, c: int) -> bool:
+    """Whether the closed forms decide alone if a chain reaches: no trunk, and no branch that needs passes."""
+    if plan.chains[c]["trunk"] >= 0:
+        return False
+    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+        if plan.branches[b]["kind"] == PASSES:
+            return False
+    return True
+
+
+@routine
+def start_anew(plan: Plan, c: int, attempt: int, now: Configuration, work: Work) -> None:
+    """A new start for one chain: home, then the present one mirrored, then bends and trunk values spread evenly."""
+    chain = plan.chains[c]
+    for b in range(chain["first"], chain["last"]):
+        branch = plan.branches[b]
+        first, last = branch["first"], branch["last"]
+        if attempt == 1:
+            mirror_branch(plan, b, now)
+        else:
+            for k in range(first, last + 1):
+                put(now.nodes[k], move(now.carriers[branch["carrier"]], vec(plan.nodes[k]["home"])))
+        if attempt >= 2:
+            for k in range(first + 1, last):
+                size = 0.0
+                for s in range(first + 1, last + 1):
+                    size += 0.5 * (min(plan.nodes[s]["hi"], plan.scalars[LENGTH]) + plan.nodes[s]["lo"])
+                for i in range(3):
+                    spread = (attempt + 0.37 * k) * _SPREAD[i]
+                    now.nodes[k, i] += size * (spread - math.floor(spread) - 0.5)
+    if chain["trunk"] >= 0:
+        sample_trunk(plan, c, attempt, now, work)
+
+
+@routine
+def mirror_branch(plan: Plan, b: int, now: Configuration) -> None:
+    """Turn the inner nodes half around the line from base to target: a planar chain's other bend."""
+    branch = plan.branches[b]
+    base = vec(now.nodes[branch["first"]])
+    line = sub(move(now.pose, vec(branch["end"])), base)
+    size = dot(line, line)
+    if size > 0.0:
+        for k in range(branch["first"] + 1, branch["last"]):
+            d = sub(vec(now.nodes[k]), base)
+            put(now.nodes[k], add(base, along(scale(-1.0, d), 2.0 * dot(d, line) / size, line)))
+
+
+@routine
+def sample_trunk(plan: Plan, c: int, attempt: int, now: Configuration, work: Work) -> None:
+    """Set a trunk to the best of some values spread over its ranges."""
+    span = plan.trunks[plan.chains[c]["trunk"]]
+    best = math.inf
+    for sample in range(SAMPLES):
+        for j in range(span["first"], span["last"]):
+            joint = plan.trunk_joints[j]
+            reach = math.pi if joint["kind"] == TURN else 2.0 * plan.scalars[LENGTH]
+            spread = (1.0 + sample + attempt * SAMPLES) * _SPREAD[(j - span["first"]) % 4]
+            lo, hi = max(joint["lo"], -reach), min(joint["hi"], reach)
+            now.trunks[j] = lo + (hi - lo) * (spread - math.floor(spread))
+        move_carriers(plan, now)
+        place_ends(plan, c, now)
+        note_violations(plan, c, c + 1, now, work)
+        if work.totals[0] < best:
+            best = work.totals[0]
+            for j in range(span["first"], span["last"]):
+                work.start_trunks[j] = now.trunks[j]
+    for j in range(span["first"], span["last"]):
+        now.trunks[j] = work.start_trunks[j]
+    move_carriers(plan, now)
+    place_ends(plan, c, now)
+
+
+@routine
+def reach_from_here(plan: Plan, c: int, now: Configuration, work: Work, settings: Settings) -> tuple[bool, int]:
+    """One chain by passes from the present nodes, finished by closed form or by the exact step."""
+    if settings.exact == 0:
+        gap, iterations = reach_by_passes(plan, c, now, work.wanted, work.system, settings.tolerance, settings)
+        return gap <= settings.tolerance, iterations
+    near = NEAR * plan.scalars[LENGTH]
+    _gap, iterations = reach_by_passes(plan, c, now, work.wanted, work.system, near, settings)
+    if try_directly(plan, c, now, work.modes, settings):
+        return True, iterations
+    place_ends(plan, c, now)
+    settle(plan, c, c + 1, 0, now, work)
+    return chain_is_reached(plan, c, now, settings.slack), iterations
+
+
+@routine
+def reach_chain(plan: Plan, c: int, now: Configuration, work: Work, settings: Settings) -> tuple[bool, int]:
+    """One chain to the present pose; False leaves the chain as it was, or bent toward its target.
+
+    A chain whose closed forms decide is not searched further; any other is tried from several starts.
+    """
+    if settings.exact == 1:
+        if try_directly(plan, c, now, work.modes, settings):
+            return True, 1
+        if has_closed_form(plan, c):
+            return False, 1
+    keep_start(plan, c, now, work)
+    reached, iterations = reach_from_here(plan, c, now, work, settings)
+    if reached or settings.exact == 0:
+        return reached, iterations
+    if settings.any_mode == 1:
+        for attempt in range(RESTARTS):
+            start_anew(plan, c, attempt, now, work)
+            reached, more = reach_from_here(plan, c, now, work, settings)
+            iterations += more
+            if reached:
+                return True, iterations
+    return_to_start(plan, c, now, work)
+    return False, iterations
+
+
+@routine
+def keep_start(plan: Plan, c: int, now: Configuration, work: Work) -> None:
+    copy_table(now.nodes, work.start_nodes)
+    copy_row(now.trunks, work.start_trunks)
+
+
+@routine
+def return_to_start(plan: Plan, c: int, now: Configuration, work: Work) -> None:
+    copy_table(work.start_nodes, now.nodes)
+    copy_row(work.start_trunks, now.trunks)
+    move_carriers(plan, now)
+
+
+@routine
+def reach_pose(plan: Plan, now: Configuration, work: Work, settings: Settings) -> tuple[bool, int]:
+    """Every chain to the present pose; stops at the first that cannot."""
+    iterations = 0
+    for c in range(plan.chains.shape[0]):
+        reached, chain_iterations = reach_chain(plan, c, now, work, settings)
+        iterations = max(iterations, chain_iterations)
+        if not reached:
+            return False, iterations
+    return True, iterations

@@ -1,0 +1,313 @@
+"""The two kernels of inverse kinematics: rows that are reached directly, and rows that need the iterations."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ._jit import allocator, inlined, kernel, routine
+from .exact import branch_mode
+from .frames import identity_pose, move_carriers, orthonormalise
+from .measure import measure_all, measure_configuration, pose_errors, read_coordinate
+from .plan import (
+    FAILED,
+    HOLD_NOTHING,
+    HOLD_ORIENTATION,
+    HOME_X,
+    INVALID,
+    LENGTH,
+    PENDING,
+    POINT_END,
+    PROJECTED,
+    REACHED,
+    Configuration,
+    Floats,
+    Plan,
+    Rows,
+    Seeds,
+    Settings,
+    Work,
+)
+from .project import copy_configuration, project_target, step_back
+from .reach import reach_chain_directly
+from .search import place_ends, reach_pose
+from .settle import TRANSLATES, TURNS, settle
+from .vectors import copy_row, copy_table
+
+# Largest deviation of R^T R from I in a target, and below which it is machine noise.
+NOT_A_ROTATION, ROUNDED = 1e-6, 1e-15
+# Targets farther than this many L are solved for as if they lay there, in the same direction: no square overflows.
+HORIZON = 1e9
+
+
+@allocator
+def new_configuration(plan: Plan) -> Configuration:
+    return Configuration(
+        np.zeros((4, 4)),
+        np.zeros((plan.nodes.shape[0], 3)),
+        np.zeros(plan.trunk_joints.shape[0]),
+        np.zeros((plan.trunks.shape[0] + 1, 3, 4)),
+        np.zeros((plan.trunk_joints.shape[0], 2, 3)),
+    )
+
+
+@allocator
+def new_work(plan: Plan) -> Work:
+    n_nodes, n_branches, n_trunks = plan.nodes.shape[0], plan.branches.shape[0], plan.trunk_joints.shape[0]
+    n = 6 + 3 * n_nodes + n_branches + n_trunks
+    return Work(
+        np.zeros((4, 4)),
+        np.zeros((n_nodes, 3)),
+        np.zeros(n_trunks),
+        np.zeros((n_nodes, 3)),
+        np.zeros(n_trunks),
+        np.zeros((n_nodes, 3)),
+        np.zeros(n_trunks),
+        np.zeros(n_branches),
+        np.zeros((n_branches, 3)),
+        np.zeros((n + 1, n + 1)),
+        np.zeros((n + 1, n + 1)),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(3),
+        np.zeros((4 * n_nodes + plan.cones.shape[0] + 12 * n_branches, 14)),
+        np.zeros(n_nodes + n_branches + n_trunks, np.int64),
+    )
+
+
+@inlined
+def load_target(plan: Plan, target: Floats, pose: Floats) -> bool:
+    """Copy a target into `pose`, made orthonormal; False when it is not a pose."""
+    worst = 0.0
+    for i in range(3):
+        for j in range(4):
+            if not math.isfinite(target[i, j]):
+                return False
+            pose[i, j] = target[i, j]
+        for j in range(i, 3):
+            product = target[0, i] * target[0, j] + target[1, i] * target[1, j] + target[2, i] * target[2, j]
+            worst = max(worst, abs(product - (1.0 if i == j else 0.0)))
+    determinant = (
+        target[0, 0] * (target[1, 1] * target[2, 2] - target[1, 2] * target[2, 1])
+        - target[0, 1] * (target[1, 0] * target[2, 2] - target[1, 2] * target[2, 0])
+        + target[0, 2] * (target[1, 0] * target[2, 1] - target[1, 1] * target[2, 0])
+    )
+    last_row = abs(target[3, 0]) + abs(target[3, 1]) + abs(target[3, 2]) + abs(target[3, 3] - 1.0)
+    if not (worst <= NOT_A_ROTATION and determinant > 0.0 and last_row <= NOT_A_ROTATION):
+        return False
+    pose[3, 0] = pose[3, 1] = pose[3, 2] = 0.0
+    pose[3, 3] = 1.0
+    farthest = max(abs(target[0, 3]), abs(target[1, 3]), abs(target[2, 3]))
+    horizon = HORIZON * plan.scalars[LENGTH]
+    if farthest > horizon:
+        for i in range(3):
+            pose[i, 3] = target[i, 3] / farthest * horizon
+    if plan.scalars[POINT_END] == 1.0:  # a point has no orientation: home's
+        for i in range(3):
+            for j in range(3):
+                pose[i, j] = 1.0 if i == j else 0.0
+    elif worst > ROUNDED:
+        orthonormalise(pose)
+    return True
+
+
+@inlined
+def load_seed(plan: Plan, seeds: Seeds, i: int, now: Configuration, modes: Floats) -> None:
+    """Take up seed `i` (or the only one), and the working mode of each branch; home's where the seed has none."""
+    row = i if seeds.poses.shape[0] > 1 else 0
+    for k in range(plan.nodes.shape[0]):
+        for j in range(3):
+            now.nodes[k, j] = seeds.nodes[row, k, j]
+    for j in range(plan.trunk_joints.shape[0]):
+        now.trunks[j] = seeds.trunks[row, j]
+    move_carriers(plan, now)
+    read_modes(plan, now, modes)
+
+
+@inlined
+def read_modes(plan: Plan, now: Configuration, modes: Floats) -> None:
+    """Update the working mode of each branch; a branch that is stretched keeps the one it had."""
+    for b in range(plan.branches.shape[0]):
+        mode = branch_mode(plan, b, now)
+        if mode != 0.0:
+            modes[b] = mode
+
+
+@routine
+def home_modes(plan: Plan, now: Configuration, modes: Floats) -> None:
+    """The working modes of home; +1 for a branch that is stretched even there. `now` becomes home."""
+    for k in range(plan.nodes.shape[0]):
+        for j in range(3):
+            now.nodes[k, j] = plan.nodes[k]["home"][j]
+    for j in range(plan.trunk_joints.shape[0]):
+        now.trunks[j] = 0.0
+    move_carriers(plan, now)
+    for b in range(plan.branches.shape[0]):
+        modes[b] = 1.0
+    read_modes(plan, now, modes)
+
+
+@inlined
+def write_row(plan: Plan, i: int, status: int, now: Configuration, wanted: Floats, target: Floats, rows: Rows) -> None:
+    """The answer of row `i`: the configuration, measured."""
+    rows.status[i] = status
+    for k in range(4):
+        for j in range(4):
+            rows.poses[i, k, j] = now.pose[k, j]
+    for k in range(plan.nodes.shape[0]):
+        for j in range(3):
+            rows.nodes[i, k, j] = now.nodes[k, j]
+    for j in range(plan.trunk_joints.shape[0]):
+        rows.trunks[i, j] = now.trunks[j]
+    for j in range(rows.actuators.shape[1]):
+        rows.actuators[i, j] = read_coordinate(plan, j, now)
+    gap, excess = measure_all(plan, now)
+    distance, angle = pose_errors(plan, now.pose, wanted, target)
+    rows.measures[i, 0] = distance
+    rows.measures[i, 1] = angle
+    rows.measures[i, 2] = gap
+    rows.measures[i, 3] = excess
+
+
+@kernel
+def solve_directly(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, rows: Rows) -> int:
+    """Answer every row whose chains all reach by closed form; returns how many rows are left pending.
+
+    A row that is not a pose becomes INVALID and keeps its arrays untouched.
+    """
+    now = new_configuration(plan)
+    modes = np.ones(plan.branches.shape[0])
+    first_modes = np.ones(plan.branches.shape[0])
+    home_modes(plan, now, first_modes)
+    wanted = np.zeros((4, 4))
+    pending = 0
+    for i in range(targets.shape[0]):
+        if not load_target(plan, targets[i], wanted):
+            rows.status[i] = INVALID
+            continue
+        for b in range(modes.shape[0]):
+            modes[b] = first_modes[b]
+        load_seed(plan, seeds, i, now, modes)
+        for k in range(4):
+            for j in range(4):
+                now.pose[k, j] = wanted[k, j]
+        reached = settings.exact == 1
+        for c in range(plan.chains.shape[0]):
+            reached = reached and reach_chain_directly(plan, c, now, modes, settings)
+        if reached:
+            rows.counters[i, 0] = 1
+            rows.counters[i, 1] = 0
+            write_row(plan, i, REACHED, now, wanted, targets[i], rows)
+        else:
+            rows.status[i] = PENDING
+            pending += 1
+    return pending
+
+
+@routine
+def write_answer(
+    plan: Plan, i: int, status: int, now: Configuration, wanted: Floats, target: Floats, rows: Rows
+) -> None:
+    """`write_row`, compiled once for the iterations to call."""
+    write_row(plan, i, status, now, wanted, target, rows)
+
+
+@routine
+def solve_row(
+    plan: Plan, i: int, targets: Floats, wanted: Floats, safe: Configuration, now: Configuration, work: Work, settings: Settings, rows: Rows
+) -> None:
+    """One target by every means: reach it, or project it, or walk back to where it was feasible."""
+    copy_table(wanted, now.pose)
+    copy_table(now.nodes, work.seed_nodes)
+    copy_row(now.trunks, work.seed_trunks)
+    reached, iterations = reach_pose(plan, now, work, settings)
+    rounds = 0
+    if reached and settings.exact == 0:
+        reached = close_loops(plan, now, work, settings)
+    if not reached:
+        hold = settings.hold
+        for _hold in range(2):
+            copy_table(wanted, now.pose)
+            copy_table(work.seed_nodes, now.nodes)
+            copy_row(work.seed_trunks, now.trunks)
+            move_carriers(plan, now)
+            staying = Settings(
+                settings.tolerance,
+                settings.rotation_tolerance,
+                settings.slack,
+                settings.max_iterations,
+                settings.max_rounds,
+                settings.exact,
+                0,
+                settings.hold,
+                settings.chained,
+            )
+            reached, more, more_rounds = project_target(plan, wanted, hold, now, work, staying)
+            iterations += more
+            rounds += more_rounds
+            if reached or hold == HOLD_NOTHING or plan.scalars[POINT_END] == 1.0:
+                break
+            hold = HOLD_NOTHING
+        if not reached:
+            step_back(plan, safe, wanted, now, work, settings)
+    rows.counters[i, 0] = iterations
+    rows.counters[i, 1] = rounds
+    write_answer(plan, i, REACHED, now, wanted, targets[i], rows)
+    rows.status[i] = judge_row(plan, i, settings, rows)
+
+
+@routine
+def close_loops(plan: Plan, now: Configuration, work: Work, settings: Settings) -> bool:
+    """After passes that end within a coarse tolerance: move the platform the little it takes to close all loops."""
+    for c in range(plan.chains.shape[0]):
+        place_ends(plan, c, now)
+    free = TRANSLATES | TURNS
+    if settings.hold == HOLD_ORIENTATION or plan.scalars[POINT_END] == 1.0:
+        free = TRANSLATES
+    return settle(plan, 0, plan.chains.shape[0], free, now, work)
+
+
+@routine
+def judge_row(plan: Plan, i: int, settings: Settings, rows: Rows) -> int:
+    """The status a row has earned by its measures."""
+    if rows.measures[i, 2] > 10.0 * settings.slack or rows.measures[i, 3] * plan.scalars[LENGTH] > 10.0 * settings.slack:
+        return FAILED
+    if rows.measures[i, 0] <= settings.tolerance and rows.measures[i, 1] <= settings.rotation_tolerance:
+        return REACHED
+    return PROJECTED
+
+
+@kernel
+def solve_by_iteration(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, rows: Rows) -> int:
+    """Answer every pending row; with `settings.chained`, all rows in turn, each from the answer before it.
+
+    Returns how many rows it answered.
+    """
+    now, safe, home = new_configuration(plan), new_configuration(plan), new_configuration(plan)
+    work = new_work(plan)
+    first_modes = np.ones(plan.branches.shape[0])
+    home_modes(plan, home, first_modes)
+    identity_pose(home.pose)
+    for i in range(3):
+        home.pose[i, 3] = plan.scalars[HOME_X + i]
+    wanted = np.zeros((4, 4))
+    answered = 0
+    for i in range(targets.shape[0]):
+        if settings.chained == 0 and rows.status[i] != PENDING:
+            continue
+        if not load_target(plan, targets[i], wanted):
+            rows.status[i] = INVALID
+            continue
+        if settings.chained == 0 or answered == 0:
+            copy_row(first_modes, work.modes)
+            load_seed(plan, seeds, i, now, work.modes)
+            copy_table(seeds.poses[i if seeds.poses.shape[0] > 1 else 0], now.pose)
+        else:
+            read_modes(plan, now, work.modes)
+        gap, excess = measure_configuration(plan, now)
+        feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack
+        copy_configuration(plan, now if feasible else home, safe)
+        solve_row(plan, i, targets, wanted, safe, now, work, settings, rows)
+        answered += 1
+    return answered

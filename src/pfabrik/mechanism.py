@@ -1,0 +1,331 @@
+"""The description of a mechanism: bodies joined by joints, in the assembled home configuration, in base coordinates."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import sys
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from numbers import Real
+from typing import Any, Literal, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .enclosing import enclosing_radius
+from .errors import InvalidMechanism, MobilityWarning, UnknownName
+from .faults import find_faults
+from .freedom import end_effector_freedom
+from .joint_types import JOINT_TYPES, KINDS, JointType
+
+__all__ = ["JOINT_TYPES", "Cone", "Joint", "JointType", "Limit", "Mechanism", "Range", "Vector"]
+
+Vector: TypeAlias = tuple[float, float, float]
+Range: TypeAlias = tuple[float, float]
+
+UNIT_SLACK = 4 * sys.float_info.epsilon
+"""How far the norm of a vector may be from 1 and still count as 1: the rounding of one division by the norm. Dividing
+again would move the last digit, and a saved mechanism would not load as its equal."""
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A limit on a universal or spherical joint: a line of one body stays near an axis of the other.
+
+    The angle between `axis` (a unit vector, given at home, fixed to the body `fixed_to`) and the line from this joint
+    to the next joint of the *other* body is at most `half_angle` [rad].
+    """
+
+    axis: Vector
+    half_angle: float
+    fixed_to: str
+
+    def __post_init__(self) -> None:
+        _set(self, axis=_unit(self.axis), half_angle=_numbers(self.half_angle), fixed_to=_text(self.fixed_to))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint between two bodies, at home, in base coordinates. Angles in radians.
+
+    Vectors and pairs may be any sequence or array; they become tuples of floats, and directions become unit vectors.
+
+    Attributes
+    ----------
+    connects : the two bodies; coordinates move the second relative to the first.
+    at : the joint's centre [length]; None only for a prismatic joint, which has no centre of its own.
+    axis : the axis of R, P and C.
+    axes : the two axes of U, optional; the first is fixed in the first body.
+    along : the two joints whose distance is the coordinate of a prismatic joint.
+    home : value of the coordinate in the home configuration; two values for C (angle, displacement) and U.
+    range : (lo, hi) for R and P; two such pairs for C (angle, displacement) and U.
+    """
+
+    name: str
+    type: JointType
+    connects: tuple[str, str]
+    at: Vector | None = None
+    axis: Vector | None = None
+    axes: tuple[Vector, Vector] | None = None
+    along: tuple[str, str] | None = None
+    actuated: bool = False
+    home: float | tuple[float, float] = 0.0
+    range: Range | tuple[Range, Range] | None = None
+    cone: Cone | None = None
+
+    def __post_init__(self) -> None:
+        _set(
+            self,
+            name=_text(self.name),
+            type=_text(self.type),
+            connects=_texts(self.connects),
+            at=_numbers(self.at),
+            axis=_unit(self.axis),
+            axes=_units(self.axes),
+            along=_texts(self.along),
+            actuated=bool(self.actuated) if isinstance(self.actuated, np.bool_) else self.actuated,
+            home=_home(self.home, self.type),
+            range=_numbers(self.range),
+        )
+
+
+Limit: TypeAlias = Range | tuple[Range, Range] | Cone | None
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A closed-loop machine: joints between named bodies, one body fixed, one body (or joint) to be placed.
+
+    Construction checks everything and raises `InvalidMechanism` with every fault; afterwards nothing changes. A
+    `MobilityWarning` says when the actuators do not hold the end effector.
+
+    Attributes
+    ----------
+    end_effector : a body, or the name of a joint (a 5-bar's tip).
+    reference_point : the point of the end-effector body that targets place, at home [length]; the centre of the joint
+        when the end effector is a joint, and then left out.
+    length_unit, angle_unit : labels for people and files; nothing is ever converted by them.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    end_effector: str
+    reference_point: Vector = cast(Vector, None)  # never None once constructed
+    base: str = "base"
+    length_unit: str = "mm"
+    angle_unit: Literal["deg", "rad"] = field(default="deg", compare=False)
+
+    def __post_init__(self) -> None:
+        joints = tuple(self.joints) if isinstance(self.joints, Iterable) else self.joints
+        _set(self, joints=joints, reference_point=_numbers(self.reference_point))
+        _set(self, **{name: _text(getattr(self, name)) for name in _TEXT_FIELDS})
+        if self.reference_point is None:
+            _set(self, reference_point=_centre_of(joints, self.end_effector))
+        self._check()
+        self._warn_of_freedom()
+
+    def _check(self) -> None:
+        faults = find_faults(self)
+        if faults:
+            raise InvalidMechanism(faults)
+
+    def _warn_of_freedom(self) -> None:
+        left = end_effector_freedom(self, frozenset(self.actuators))
+        if left > 0:
+            text = f"'{self.name}': {len(self.actuators)} actuators leave the end effector {left} freedoms at home"
+            warnings.warn(text, MobilityWarning, stacklevel=4)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(tuple(getattr(self, each.name) for each in dataclasses.fields(self) if each.compare))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The description alone: what is derived is computed again, read-only again."""
+        return {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
+
+    @cached_property
+    def actuators(self) -> tuple[str, ...]:
+        """Names of the actuated joints, in the order of `joints`."""
+        return tuple(joint.name for joint in self.joints if joint.actuated)
+
+    @cached_property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies, in the order in which the joints mention them."""
+        return tuple(dict.fromkeys(body for joint in self.joints for body in joint.connects))
+
+    @cached_property
+    def end_effector_is_joint(self) -> bool:
+        """Whether `end_effector` names a joint rather than a body."""
+        return self.end_effector not in self.bodies
+
+    @cached_property
+    def task(self) -> tuple[str, ...]:
+        """What a target sets: the position of the reference point and, for a body, its rotation."""
+        return ("x", "y", "z") if self.end_effector_is_joint else ("x", "y", "z", "rotation")
+
+    @cached_property
+    def home_pose(self) -> NDArray[np.float64]:
+        """Pose of the end effector at home, T_base_platform, shape (4, 4) [length]: the reference point, unrotated."""
+        T_base_platform = np.eye(4)
+        T_base_platform[:3, 3] = self.reference_point
+        T_base_platform.setflags(write=False)
+        return T_base_platform
+
+    @cached_property
+    def characteristic_length(self) -> float:
+        """Radius of the smallest sphere around the home joint centres [length].
+
+        Where all centres coincide (a spherical wrist), the reference point is included. Where that coincides too, the
+        description contains no length, nothing scales with it, and 1 stands for "the unit".
+        """
+        centres = [joint.at for joint in self.joints if joint.at is not None]
+        return enclosing_radius(centres) or enclosing_radius([*centres, self.reference_point]) or 1.0
+
+    @cached_property
+    def _by_name(self) -> dict[str, Joint]:
+        return {joint.name: joint for joint in self.joints}
+
+    def joint(self, name: str) -> Joint:
+        """The joint of that name; `UnknownName` if there is none."""
+        if name not in self._by_name:
+            raise UnknownName("joint", name, self._by_name)
+        return self._by_name[name]
+
+    def home_coordinate(self, name: str) -> float | tuple[float, ...]:
+        """Value of a joint's coordinate in the home configuration [rad or length].
+
+        One number for R and P (the distance of the two joints, for a P with `along`), two for U and C, the zero
+        rotation vector for S, nothing for a fixed joint.
+        """
+        joint = self.joint(name)
+        if joint.along is not None:
+            return math.dist(*self._centres_along(joint))
+        return (0.0,) * len(KINDS[joint.type].coordinates) if joint.type in ("spherical", "fixed") else joint.home
+
+    def home_axis(self, name: str) -> Vector:
+        """Unit vector of the axis of an R, P or C at home, in base coordinates.
+
+        For a P with `along`, it points from the joint on its first body to the joint on its second, so that a growing
+        coordinate moves the second body forward.
+        """
+        joint = self.joint(name)
+        if joint.along is None:
+            return cast(Vector, joint.axis)
+        start, end = self._centres_along(joint)
+        return cast(Vector, _unit(tuple(b - a for a, b in zip(start, end, strict=True))))
+
+    def _centres_along(self, joint: Joint) -> tuple[Vector, Vector]:
+        """Centres of the two joints of `along`: of the one on the first body, then of the one on the second."""
+        first, second = (self.joint(name) for name in joint.along or ())
+        if joint.connects[0] not in first.connects or joint.connects[1] not in second.connects:
+            first, second = second, first
+        return cast(Vector, first.at), cast(Vector, second.at)
+
+    def with_limits(self, limits: Mapping[str, Limit] | None = None, /, **by_name: Limit) -> Mechanism:
+        """A copy with other limits.
+
+        Parameters
+        ----------
+        limits, by_name : joint name to its new range, its new cone, or None to drop both. What is not named stays.
+
+        Raises
+        ------
+        UnknownName : no joint of that name.
+        InvalidMechanism : a limit that does not fit its joint, or that home exceeds.
+        """
+        changes = {**(limits or {}), **by_name}
+        for name in changes:
+            self.joint(name)
+        return self._with_joints(
+            _limited(joint, changes[joint.name]) if joint.name in changes else joint for joint in self.joints
+        )
+
+    def without_limits(self) -> Mechanism:
+        """A copy in which no joint has a range or a cone."""
+        return self._with_joints(_limited(joint, None) for joint in self.joints)
+
+    def _with_joints(self, joints: Iterable[Joint]) -> Mechanism:
+        """A checked copy; freedoms do not depend on limits, so it does not warn of them again."""
+        copy = object.__new__(Mechanism)
+        _set(copy, **(self.__getstate__() | {"joints": tuple(joints)}))
+        copy._check()
+        return copy
+
+
+_TEXT_FIELDS = ("name", "end_effector", "base", "length_unit", "angle_unit")
+
+
+def _limited(joint: Joint, limit: Limit) -> Joint:
+    if limit is None:
+        return dataclasses.replace(joint, range=None, cone=None)
+    if isinstance(limit, Cone):
+        return dataclasses.replace(joint, cone=limit)
+    return dataclasses.replace(joint, range=limit)
+
+
+def _centre_of(joints: Any, name: str) -> Vector | None:
+    joints = joints if isinstance(joints, tuple) else ()
+    return next((joint.at for joint in joints if isinstance(joint, Joint) and joint.name == name), None)
+
+
+def _set(frozen: object, **values: object) -> None:
+    for name, value in values.items():
+        object.__setattr__(frozen, name, value)
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray)
+
+
+def _text(value: Any) -> Any:
+    return str.__str__(value) if isinstance(value, str) else value
+
+
+def _texts(value: Any) -> Any:
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    return tuple(map(_text, value)) if _is_list(value) else value
+
+
+def _numbers(value: Any, depth: int = 2) -> Any:
+    """Numbers as floats, sequences and arrays of them as tuples; anything else as it is, for `find_faults` to name."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if _is_list(value) and depth > 0:
+        return tuple(_numbers(item, depth - 1) for item in value)
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return value
+    try:
+        return float(value)
+    except OverflowError:
+        return value
+
+
+def _unit(value: Any) -> Any:
+    """The direction as a unit vector; a unit vector, a zero one, or what is no vector, as it is."""
+    vector = _numbers(value)
+    if not (isinstance(vector, tuple) and len(vector) == 3 and all(isinstance(part, float) for part in vector)):
+        return vector
+    if not all(map(math.isfinite, vector)) or abs(math.hypot(*vector) - 1.0) <= UNIT_SLACK:
+        return vector
+    largest = max(map(abs, vector)) or 1.0
+    scaled = [part / largest for part in vector]  # so that no square over- or underflows
+    norm = math.hypot(*scaled) or 1.0
+    return tuple(part / norm for part in scaled)
+
+
+def _units(value: Any) -> Any:
+    vectors = _numbers(value)
+    return tuple(map(_unit, vectors)) if isinstance(vectors, tuple) else vectors
+
+
+def _home(value: Any, type_: Any) -> Any:
+    """The home coordinate; the default 0 stands for (0, 0) where there are two coordinates."""
+    home = _numbers(value)
+    two = type_ in ("universal", "cylindrical")
+    return (home, home) if two and home == 0.0 else home

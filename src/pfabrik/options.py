@@ -1,0 +1,66 @@
+"""How a question is to be answered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from .errors import InvalidArgument
+from .tolerances import TOLERANCES
+
+_CHOICES: dict[str, tuple[object, ...]] = {
+    "working_mode": (None, "any", "keep"),
+    "hold": (None, "orientation", "position"),
+    "projection": ("centroid",),
+    "on_invalid": ("raise", "mark"),
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """How `solve_ik` and `track` work.
+
+    Attributes
+    ----------
+    tolerance : E, how close the end effector must come to be REACHED [length]; None is 1e-9 of the mechanism's
+        characteristic length.
+    rotation_tolerance : the same for the orientation [rad].
+    max_iterations : K, forward and backward passes a chain may take for one target.
+    max_rounds : how often a projection may revise its target before the exact step is tried.
+    working_mode : "keep" stays in the seed's working mode (home's without a seed), "any" may change it to reach; None
+        keeps it if there is a seed.
+    hold : what a projection keeps: "orientation" (the paper's choice) or "position" if any feasible pose has it, None
+        nothing.
+    projection : how the projected pose is chosen; "centroid" is the paper's.
+    exact : closed forms and exact steps where they apply; False for the paper's passes alone, which end within
+        `tolerance` and then only close the loops.
+    on_invalid : what a row of a batch that is no pose does: "raise", or "mark" the row INVALID.
+    """
+
+    tolerance: float | None = None
+    rotation_tolerance: float = TOLERANCES.rotation
+    max_iterations: int = 100
+    max_rounds: int = 100
+    working_mode: Literal["any", "keep"] | None = None
+    hold: Literal["orientation", "position"] | None = "orientation"
+    projection: Literal["centroid"] = "centroid"
+    exact: bool = True
+    on_invalid: Literal["raise", "mark"] = "raise"
+
+    def __post_init__(self) -> None:
+        for name, choices in _CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise InvalidArgument(f"options.{name}", repr(getattr(self, name)), f"one of {choices}")
+        for name in ("tolerance", "rotation_tolerance"):
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, int | float) and 0.0 < value < float("inf")):
+                raise InvalidArgument(f"options.{name}", repr(value), "a positive number")
+        for name in ("max_iterations", "max_rounds"):
+            value = getattr(self, name)
+            if not (isinstance(value, int) and 1 <= value <= 1_000_000):
+                raise InvalidArgument(f"options.{name}", repr(value), "an integer from 1 to 1000000")
+
+    @classmethod
+    def paper(cls) -> Options:
+        """The paper's K = 100 and E = 1e-2 [length], by passes alone."""
+        return cls(tolerance=1e-2, max_iterations=100, exact=False)

@@ -1,0 +1,47 @@
+"""Batches on all cores: blocks of rows, each a kernel call that has released the GIL."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernels import plan as P
+
+Kernel = Callable[[P.Plan, NDArray[np.float64], P.Seeds, P.Settings, P.Rows], int]
+
+
+def n_cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@lru_cache(maxsize=1)
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(n_cores(), thread_name_prefix="pfabrik")
+
+
+def run_in_blocks(
+    kernel: Kernel,
+    plan: P.Plan,
+    targets: NDArray[np.float64],
+    seeds: P.Seeds,
+    settings: P.Settings,
+    rows: P.Rows,
+    rows_a_block: int,
+) -> int:
+    """The kernel over all rows, in blocks spread over the cores; the sum of what it returns."""
+
+    def run(start: int) -> int:
+        block = slice(start, start + rows_a_block)
+        own = seeds if len(seeds.poses) == 1 else P.Seeds(*(array[block] for array in seeds))
+        return kernel(plan, targets[block], own, settings, P.Rows(*(array[block] for array in rows)))
+
+    starts = range(0, len(targets), rows_a_block)
+    if len(starts) <= 1 or n_cores() == 1:
+        return sum(map(run, starts))
+    return sum(_pool().map(run, starts))

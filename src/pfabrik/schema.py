@@ -1,0 +1,150 @@
+"""The tables of a mechanism file: which keys there are and what each holds. Only types are checked here."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .errors import Fault, near_miss
+from .form_faults import shown
+
+MOST_COPIES = 100
+"""Most copies of one joint: a typing error beyond it, and a file of one line must not ask for a million joints."""
+
+MOST_JOINTS = 1000
+"""Most joints of one mechanism, copies included: far above any machine, low enough to be checked in seconds."""
+
+MOST_FAULTS = 50
+"""Most faults of one table that are listed one by one: nobody reads on, and a hostile file may have 100 000."""
+
+
+class Table(BaseModel):
+    """A TOML table: no unknown keys, and no value taken for another type."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+
+Three = Annotated[list[float], Field(min_length=3, max_length=3)]
+Two = Annotated[list[float], Field(min_length=2, max_length=2)]
+TwoNames = Annotated[list[str], Field(min_length=2, max_length=2)]
+
+
+class ConeTable(Table):
+    """`cone = { axis, half_angle, fixed_to }`."""
+
+    axis: Three | None = Field(None, description="three numbers")
+    half_angle: float | None = Field(None, description="a number")
+    fixed_to: str | None = Field(None, description="the name of a body")
+
+
+class CopiesTable(Table):
+    """`copies = { count, axis }`."""
+
+    count: int = Field(ge=1, le=MOST_COPIES, description=f"a whole number from 1 to {MOST_COPIES}")
+    axis: Three = Field(description="three numbers")
+
+
+class UnitsTable(Table):
+    """`units = { length, angle }`."""
+
+    length: str = Field("mm", description="the name of a unit")
+    angle: Literal["deg", "rad"] = Field("deg", description="'deg' or 'rad'")
+
+
+class JointTable(Table):
+    """`[[joint]]`. What a joint of its type lacks is found with the mechanism's other faults."""
+
+    name: str | None = Field(None, description="a text")
+    type: str | None = Field(None, description="the name of a joint type")
+    connects: TwoNames | None = Field(None, description="the names of two bodies")
+    at: Three | None = Field(None, description="three numbers")
+    axis: Three | None = Field(None, description="three numbers")
+    axes: Annotated[list[Three], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="two directions of three numbers each"
+    )
+    along: TwoNames | None = Field(None, description="the names of two joints")
+    actuated: bool = Field(False, description="true or false")
+    home: float | Two = Field(0.0, description="a number, or two for a joint with two coordinates")
+    range: Two | Annotated[list[Two], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="two numbers, or two pairs of them for a joint with two coordinates"
+    )
+    cone: ConeTable | None = Field(None, description="a table: axis, half_angle, fixed_to")
+    copies: CopiesTable | None = Field(None, description="a table: count, axis")
+
+
+class HeadTable(Table):
+    """All of a file but its joints."""
+
+    version: int = Field(alias="schema", ge=1, le=1, description="1")
+    name: str | None = Field(None, description="a text")
+    units: UnitsTable = Field(default_factory=lambda: UnitsTable.model_validate({}), description="length, angle")
+    base: str = Field("base", description="the name of a body")
+    end_effector: str | None = Field(None, description="the name of a body or joint")
+    reference_point: Three | None = Field(None, description="three numbers")
+    joint: list[Any] = Field(default_factory=list, description="[[joint]] tables")
+
+
+AnyTable = TypeVar("AnyTable", bound=Table)
+_NESTED: dict[str, type[Table]] = {"cone": ConeTable, "copies": CopiesTable, "units": UnitsTable}
+
+
+def read_table(model: type[AnyTable], table: dict[str, Any], place: str) -> tuple[AnyTable, list[Fault]]:
+    """The table as its model, and its faults; what is faulty is left out of the model.
+
+    Parameters
+    ----------
+    place : where the table is in its file, empty for the file itself.
+    """
+    try:
+        return model.model_validate(table), []
+    except ValidationError as error:
+        details = error.errors(include_url=False, include_context=False, include_input=False)
+    paths = dict.fromkeys(_path(table, detail["loc"]) for detail in details)
+    faults = [_fault(model, table, place, path) for path in list(paths)[:MOST_FAULTS]]
+    if len(paths) > MOST_FAULTS:
+        faults.append(Fault(place or "file", f"{len(paths) - MOST_FAULTS} more faults", "none"))
+    return model.model_validate(_DEFAULTS.get(model, {}) | _without(table, list(paths))), faults
+
+
+_DEFAULTS: dict[type[Table], dict[str, Any]] = {HeadTable: {"schema": 1}}
+
+
+def _path(table: Any, location: tuple[int | str, ...]) -> tuple[str, ...]:
+    """The keys that lead to a fault; not further than a value that is no table, nor than a key that is missing."""
+    path: list[str] = []
+    for key in location:
+        if not isinstance(table, dict) or not isinstance(key, str):
+            break
+        path.append(key)
+        table = table.get(key)
+    return tuple(path)
+
+
+def _fault(model: type[Table], table: dict[str, Any], place: str, path: tuple[str, ...]) -> Fault:
+    for key in path[:-1]:
+        model, table = _NESTED[key], table[key]
+    expected = {field.alias or name: str(field.description) for name, field in model.model_fields.items()}
+    where = ".".join([place] * bool(place) + [_shown_key(key) for key in path])
+    key = path[-1]
+    if key not in expected:
+        return Fault(where, f"an unknown key{near_miss(key, expected)}", f"one of {', '.join(expected)}")
+    return Fault(where, shown(table.get(key)), expected[key])
+
+
+def _shown_key(key: str) -> str:
+    return key if re.fullmatch(r"[\w-]{1,40}", key) else shown(key)
+
+
+def _without(table: Mapping[str, Any], paths: list[tuple[str, ...]]) -> dict[str, Any]:
+    """The table without the keys that the paths lead to, and without the tables that lack a key of theirs."""
+    dropped = {path[0] for path in paths if len(path) == 1 or path[-1] not in table[path[0]]}
+    nested = {key: [path[1:] for path in paths if path[0] == key and key not in dropped] for key in table}
+    dropped |= {"copies"} & {path[0] for path in paths}
+    return {
+        key: _without(value, nested[key]) if nested[key] else value
+        for key, value in table.items()
+        if key not in dropped
+    }

@@ -1,0 +1,91 @@
+"""Tracking: a path of targets, each answered from the answer before it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .errors import InvalidArgument
+from .flatten import Flat, flatten
+from .ik import _DEFAULT, _settings, handle_invalid, new_rows, seeds_of
+from .kernels import plan as P
+from .mechanism import Mechanism
+from .options import Options
+from .poses import as_targets
+from .solution import Solution
+
+_STEPS_A_REPORT = 16
+
+
+def track(
+    mechanism: Mechanism,
+    targets: Any,
+    seed: Solution | None = None,
+    options: Options | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> Solution:
+    """Follow a path: warm-started from step to step, in the working mode it starts in.
+
+    Parameters
+    ----------
+    targets : poses (n, 4, 4) in the base frame [length], or positions (n, 3) at home orientation.
+    seed : a single answer to start from; default home.
+    on_progress : called with (steps done, steps in all) every few steps.
+
+    Returns
+    -------
+    Solution : batch shape (n,). Revolute actuators without limits are counted on through full turns.
+
+    Raises
+    ------
+    As `solve_ik`; also InvalidArgument for targets that are no path, and for options that change the working mode.
+    """
+    poses, shape = as_targets(targets)
+    options = options or _DEFAULT
+    if len(shape) != 1:
+        raise InvalidArgument("targets", f"batch shape {shape}", "a path: shape (n, 4, 4) or (n, 3)")
+    if options.working_mode == "any":
+        raise InvalidArgument("options.working_mode", "'any'", "'keep' or None: a machine cannot change it on its way")
+    flat = flatten(mechanism)
+    rows = new_rows(flat, len(poses))
+    seeds = seeds_of(mechanism, flat, seed, ())
+    settings = _settings(mechanism, options, seeded=True, chained=True)
+    _follow(flat, poses, seeds, settings, rows, on_progress)
+    handle_invalid(poses, rows, options)
+    _count_turns(flat, rows)
+    return Solution(mechanism, flat, rows, shape)
+
+
+def _follow(
+    flat: Flat,
+    poses: P.Floats,
+    seeds: P.Seeds,
+    settings: P.Settings,
+    rows: P.Rows,
+    on_progress: Callable[[int, int], None] | None,
+) -> None:
+    """Run the chained kernel, in pieces where progress is reported."""
+    from .kernels.solve import solve_by_iteration
+
+    piece = _STEPS_A_REPORT if on_progress is not None else max(len(poses), 1)
+    for start in range(0, len(poses), piece):
+        block = slice(start, start + piece)
+        own = P.Rows(*(array[block] for array in rows))
+        solve_by_iteration(flat.plan, poses[block], seeds, settings, own)
+        answered = np.flatnonzero(own.status != P.INVALID)
+        if len(answered):
+            last = slice(answered[-1], answered[-1] + 1)
+            seeds = P.Seeds(own.poses[last], own.nodes[last], own.trunks[last])
+        if on_progress is not None:
+            on_progress(min(start + piece, len(poses)), len(poses))
+
+
+def _count_turns(flat: Flat, rows: P.Rows) -> None:
+    """Make the angles of unlimited revolute actuators continuous along the path."""
+    known = rows.status != P.INVALID
+    for j in range(flat.n_actuators):
+        coordinate = flat.plan.coordinates[j]
+        if coordinate["kind"] in (P.HINGE, P.END_HINGE) and np.isinf(coordinate["hi"]):
+            rows.actuators[known, j] = np.unwrap(rows.actuators[known, j])

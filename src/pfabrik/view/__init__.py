@@ -1,0 +1,1 @@
+"""Pictures. Needs the extra ``view``: ``pip install 'pfabrik[view]'``."""
