@@ -53,7 +53,9 @@ class Layout:
 
     def copied_joints(self) -> frozenset[str]:
         """The names of the joints that have copies."""
-        return frozenset(each.joint.name for each in self.patterns if each.count is not None and is_name(each.joint.name))
+        return frozenset(
+            each.joint.name for each in self.patterns if each.count is not None and is_name(each.joint.name)
+        )
 
     def _own_bodies(self, pattern: Pattern) -> list[str]:
         bodies = pattern.joint.connects if is_pair_of_names(pattern.joint.connects) else ()

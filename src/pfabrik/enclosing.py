@@ -69,4 +69,5 @@ def _circumcentre(carriers: NDArray[np.float64]) -> NDArray[np.float64]:
     edges = carriers[1:] - carriers[0]
     halves = 0.5 * np.einsum("ij,ij->i", edges, edges)
     offset: NDArray[np.float64] = np.linalg.lstsq(edges, halves, rcond=None)[0]
-    return carriers[0] + offset
+    centre: NDArray[np.float64] = carriers[0] + offset
+    return centre

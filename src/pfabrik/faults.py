@@ -14,6 +14,8 @@ from .home_faults import home_faults
 if TYPE_CHECKING:
     from .mechanism import Mechanism
 
+_FIELDS = ("name", "type", "connects", "at", "axis", "axes", "along", "actuated", "home", "range", "cone")
+_FIELD = re.compile(r"joint\[\d+\]\.(\w+)")
 _JOINT = re.compile(r"joint\[(\d+)\]")
 
 
@@ -32,14 +34,19 @@ def find_faults(mechanism: Mechanism) -> list[Fault]:
 
 
 def in_order(faults: Sequence[Fault]) -> list[Fault]:
-    """The faults in the order of a description: the head first, then joint by joint."""
-    return sorted(faults, key=lambda fault: joint_index(fault.place))
+    """The faults in the order of a description: the head first, then joint by joint, field by field."""
+    return sorted(faults, key=lambda fault: (joint_index(fault.place), _field_rank(fault.place)))
 
 
 def joint_index(place: str) -> int:
     """The index of the joint that a place is in, or -1 for the head."""
     match = _JOINT.match(place)
     return int(match[1]) if match else -1
+
+
+def _field_rank(place: str) -> int:
+    field = _FIELD.match(place)
+    return _FIELDS.index(field[1]) if field and field[1] in _FIELDS else len(_FIELDS)
 
 
 def _is_joint(value: object) -> bool:
@@ -49,7 +56,8 @@ def _is_joint(value: object) -> bool:
 def _not_joints(joints: Any) -> str:
     if not isinstance(joints, tuple):
         return shown(joints)
-    return next((shown(joint) for joint in joints if not _is_joint(joint)), "no joints")
+    strangers = [shown(joint) for joint in joints if not _is_joint(joint)]
+    return strangers[0] if strangers else "no joints"
 
 
 def _head_faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -62,14 +70,21 @@ def _head_faults(mechanism: Mechanism) -> Iterator[Fault]:
 
 def _point_faults(mechanism: Mechanism) -> Iterator[Fault]:
     """Faults of the reference point: needed for a body, given by the joint for a joint."""
-    point = mechanism.reference_point
+    point: Any = mechanism.reference_point
     tip = next((joint for joint in mechanism.joints if joint.name == mechanism.end_effector), None)
     if not is_name(mechanism.end_effector):
         return
     if tip is not None:
         if point != tip.at:
             yield Fault("reference_point", shown(point), f"nothing: it is the centre of the joint '{tip.name}'")
-    elif point is None:
+    elif point is None and _moves(mechanism, mechanism.end_effector):
         yield Fault("reference_point", "nothing", "three numbers, the point of the end effector that targets place")
-    else:
+    elif point is not None:
         yield from number_faults("reference_point", point, 3)
+
+
+def _moves(mechanism: Mechanism, name: str) -> bool:
+    """Whether the name is that of a body other than the base."""
+    return name != mechanism.base and any(
+        isinstance(joint.connects, tuple) and name in joint.connects for joint in mechanism.joints
+    )

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from .catalog import catalog, catalog_file
+from .coercion import unit_vector
 from .copies import Copy, Layout, Pattern, count_of
 from .errors import Fault, InvalidArgument, InvalidMechanism, UnknownName
 from .faults import in_order, joint_index
@@ -25,6 +26,9 @@ __all__ = ["LARGEST_FILE", "dumps", "load", "loads", "save"]
 
 LARGEST_FILE = 1_000_000
 """Largest file read [bytes]: a hundred times any machine, and quickly refused when it is something else."""
+
+MOST_DOTS = 200
+"""Most dots in one line: no line needs more than a few, and a key of many parts takes the parser quadratic time."""
 
 
 def load(source: str | os.PathLike[str]) -> Mechanism:
@@ -44,12 +48,12 @@ def load(source: str | os.PathLike[str]) -> Mechanism:
     if not isinstance(source, str | os.PathLike):
         raise InvalidArgument("source", shown(source), "a path or a catalogue name")
     path = Path(source)
+    if not os.path.exists(path):  # unlike Path.exists, it also answers for paths that no system could have
+        raise UnknownName("mechanism file or catalogue name", str(path), catalog())
     try:
         return loads(_text(path), str(path))
-    except (FileNotFoundError, NotADirectoryError, ValueError) as error:
-        if isinstance(error, InvalidMechanism):
-            raise
-        raise UnknownName("mechanism file or catalogue name", str(path), catalog()) from None
+    except InvalidMechanism as error:
+        raise InvalidMechanism(error.faults, str(path)) from None
 
 
 def loads(text: str, source: str | None = None) -> Mechanism:
@@ -89,34 +93,38 @@ def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
 
 def _text(path: Path) -> str:
     """The text of a file that could be a mechanism file; a fault when it cannot be one."""
-    if path.exists() and not path.is_file():
-        raise InvalidMechanism([Fault("file", "a directory or device", "a mechanism file")], str(path))
+    if not path.is_file():
+        raise _unusable("a directory or device", "a mechanism file")
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
-        if len(content) > LARGEST_FILE:
-            fault = Fault("file", f"more than {LARGEST_FILE} bytes", f"at most {LARGEST_FILE}")
-            raise InvalidMechanism([fault], str(path))
+        _refuse_large(content)
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        fault = Fault("file", f"no UTF-8 text at byte {error.start}", "a text file in UTF-8")
-    except (FileNotFoundError, NotADirectoryError):
-        raise
+        raise _unusable(f"no UTF-8 text at byte {error.start}", "a text file in UTF-8") from None
     except OSError as error:
-        fault = Fault("file", f"a file that cannot be read ({error.strerror})", "a readable file")
-    raise InvalidMechanism([fault], str(path))
+        raise _unusable(f"a file that cannot be read ({error.strerror})", "a readable file") from None
 
 
 def _parsed(text: str) -> dict[str, Any]:
-    if len(text) > LARGEST_FILE:
-        raise InvalidMechanism([Fault("file", f"{len(text)} characters", f"at most {LARGEST_FILE}")])
+    _refuse_large(text)
     try:
+        if max(line.count(".") for line in text.split("\n") if not line.startswith("#")) > MOST_DOTS:
+            raise RecursionError
         return tomllib.loads(text)
     except RecursionError:
-        fault = Fault("file", "values nested too deeply", "tables and lists a few levels deep")
-    except ValueError as error:
-        fault = Fault("file", f"no TOML: {error}", "TOML")
-    raise InvalidMechanism([fault])
+        raise _unusable("values nested too deeply", "tables and lists a few levels deep") from None
+    except ValueError as error:  # a syntax error with its line and column, or a number of too many digits
+        raise _unusable(f"no TOML: {error}", "TOML") from None
+
+
+def _refuse_large(content: str | bytes) -> None:
+    if len(content) > LARGEST_FILE:
+        raise _unusable(f"more than {LARGEST_FILE} bytes", f"at most {LARGEST_FILE}")
+
+
+def _unusable(found: str, expected: str) -> InvalidMechanism:
+    return InvalidMechanism([Fault("file", found, expected)])
 
 
 def _mechanism(table: dict[str, Any]) -> Mechanism:
@@ -136,12 +144,14 @@ def _mechanism(table: dict[str, Any]) -> Mechanism:
 def _pattern(table: Any, place: str, angle_unit: str) -> tuple[Pattern, list[Fault]]:
     """The joint that a table describes, as far as it can be read, and the faults of the table."""
     if not isinstance(table, dict):
-        return Pattern(_joint(JointTable(), angle_unit)), [Fault(place, shown(table), "a [[joint]] table")]
+        return Pattern(_joint(JointTable.model_validate({}), angle_unit)), [
+            Fault(place, shown(table), "a [[joint]] table")
+        ]
     read, faults = read_table(JointTable, table, place)
     joint = _joint(read, angle_unit)
     if read.copies is None:
         return Pattern(joint), faults
-    axis = Cone(cast(Any, read.copies.axis), 0.0, "").axis
+    axis = unit_vector(read.copies.axis)
     misdirected = list(direction_faults(f"{place}.copies.axis", axis))
     if misdirected:
         return Pattern(joint), faults + misdirected
@@ -161,23 +171,28 @@ def _joint(read: JointTable, angle_unit: str) -> Joint:
 def _expanded(head: HeadTable, patterns: Sequence[Pattern], faults: list[Fault]) -> Mechanism:
     """The mechanism of all copies. When it is not clear what is copied, only the joints' own faults are looked for."""
     layout = Layout(tuple(patterns), head.base, cast(str, head.end_effector))
-    if count_of(patterns) > MOST_JOINTS:
-        faults.append(Fault("joint", f"{count_of(patterns)} joints with their copies", f"at most {MOST_JOINTS}"))
-    elif not any(map(_hides_copies, faults)) and head.end_effector is not None:
-        faults += layout.faults()
-    if head.end_effector is None or any(map(_hides_copies, faults)):
-        alone = [
-            fault for index, each in enumerate(patterns) for fault in joint_faults(f"joint[{index}]", each.joint)
-        ]
+    unclear = head.end_effector is None or any(map(_hides_copies, faults))
+    if not unclear:
+        misfits = list(_misfits(layout))
+        unclear, faults = bool(misfits), [*faults, *misfits]
+    if unclear:
+        alone = [fault for index, each in enumerate(patterns) for fault in joint_faults(f"joint[{index}]", each.joint)]
         raise InvalidMechanism(_merged(faults, [*_missing(head), *alone]))
     return _built(head, layout, faults)
+
+
+def _misfits(layout: Layout) -> Iterator[Fault]:
+    count = count_of(layout.patterns)
+    if count > MOST_JOINTS:
+        yield Fault("joint", f"{count} joints with their copies", f"at most {MOST_JOINTS}")
+    else:
+        yield from layout.faults()
 
 
 def _hides_copies(fault: Fault) -> bool:
     """Whether a fault leaves open which joints and bodies there are, or what their numbers mean."""
     root = fault.place.partition(".")[0]
-    whole = fault.place in ("joint", "file") or root in ("base", "end_effector", "units")
-    return whole or ".copies" in fault.place or "which has" in fault.found
+    return root in ("base", "end_effector", "units", "joint") or ".copies" in fault.place
 
 
 def _missing(head: HeadTable) -> Iterator[Fault]:

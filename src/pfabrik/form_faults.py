@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import reprlib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from .errors import Fault, near_miss
-from .joint_types import JOINT_TYPES, KINDS, JointKind
+from .joint_types import JOINT_TYPES, KINDS, Coordinate, JointKind
 from .tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -29,6 +29,21 @@ def shown(value: object) -> str:
         return _SHORT.repr(value)
     except Exception:  # a value with a broken repr is still to be reported
         return f"a {type(value).__name__}"
+
+
+def angle_text(angle: float) -> str:
+    """An angle [rad] as a fault shows it, in both units that a description may be written in."""
+    return f"{angle:.10g} rad ({math.degrees(angle):.10g} deg)"
+
+
+def coordinate_text(value: float, coordinate: Coordinate) -> str:
+    """The value of a coordinate as a fault shows it."""
+    return angle_text(value) if coordinate == "angle" else f"{value:.10g}"
+
+
+def range_text(bounds: tuple[float, float], coordinate: Coordinate) -> str:
+    """A range as a fault shows it."""
+    return f"{coordinate_text(bounds[0], coordinate)} to {coordinate_text(bounds[1], coordinate)}"
 
 
 def is_name(value: object) -> bool:
@@ -130,8 +145,9 @@ def _axis_faults(place: str, joint: Joint) -> Iterator[Fault]:
     if kind is None:
         return
     for field in ("axis", "axes"):
-        if getattr(joint, field) is not None and kind.direction != field:
-            yield Fault(f"{place}.{field}", shown(getattr(joint, field)), f"nothing: a {joint.type} joint has no {field}")
+        value = getattr(joint, field)
+        if value is not None and kind.direction != field:
+            yield Fault(f"{place}.{field}", shown(value), f"nothing: a {joint.type} joint has no {field}")
     if kind.direction == "axis" and joint.axis is None and joint.along is None:
         yield Fault(f"{place}.axis", "nothing", f"three numbers, the direction of the {joint.type} joint's axis")
 
@@ -164,10 +180,10 @@ def _along_faults(place: str, joint: Joint) -> Iterator[Fault]:
 
 
 def _actuated_faults(place: str, joint: Joint) -> Iterator[Fault]:
-    kind = kind_of(joint)
-    if not isinstance(joint.actuated, bool):
-        yield Fault(place, shown(joint.actuated), "true or false")
-    elif joint.actuated and kind is not None and not kind.actuatable:
+    kind, actuated = kind_of(joint), cast(Any, joint.actuated)
+    if not isinstance(actuated, bool):
+        yield Fault(place, shown(actuated), "true or false")
+    elif actuated and kind is not None and not kind.actuatable:
         yield Fault(place, f"an actuated {joint.type} joint", "an actuator on a revolute or prismatic joint")
 
 
@@ -184,28 +200,28 @@ def _home_faults(place: str, joint: Joint) -> Iterator[Fault]:
 
 
 def _range_faults(place: str, joint: Joint) -> Iterator[Fault]:
-    kind = kind_of(joint)
-    if joint.range is None or kind is None:
+    kind, limits = kind_of(joint), cast(Any, joint.range)
+    if limits is None or kind is None:
         return
     if not kind.ranged:
         limit = "its limit is a cone" if kind.coned else "it does not move"
-        yield Fault(place, shown(joint.range), f"nothing: a {joint.type} joint has no range, {limit}")
+        yield Fault(place, shown(limits), f"nothing: a {joint.type} joint has no range, {limit}")
     elif joint.type == "universal" and joint.axes is None:
-        yield Fault(place, shown(joint.range), "`axes` as well: a range counts the angles about them")
+        yield Fault(place, shown(limits), "`axes` as well: a range counts the angles about them")
     elif len(kind.coordinates) == 1:
-        yield from _bounds_faults(place, joint.range)
-    elif not (isinstance(joint.range, tuple) and len(joint.range) == 2):
-        yield Fault(place, shown(joint.range), f"two pairs (lowest, highest), {' and '.join(kind.coordinates)}")
+        yield from _bounds_faults(place, limits, kind.coordinates[0])
+    elif not (isinstance(limits, tuple) and len(limits) == 2):
+        yield Fault(place, shown(limits), f"two pairs (lowest, highest), {' and '.join(kind.coordinates)}")
     else:
-        for index, bounds in enumerate(joint.range):
-            yield from _bounds_faults(f"{place}[{index}]", bounds)
+        for index, (bounds, coordinate) in enumerate(zip(limits, kind.coordinates, strict=True)):
+            yield from _bounds_faults(f"{place}[{index}]", bounds, coordinate)
 
 
-def _bounds_faults(place: str, bounds: Any) -> Iterator[Fault]:
+def _bounds_faults(place: str, bounds: Any, coordinate: Coordinate) -> Iterator[Fault]:
     faults = list(number_faults(place, bounds, 2))
     yield from faults
     if not faults and bounds[0] > bounds[1]:
-        yield Fault(place, shown(bounds), "the lowest value first, then the highest")
+        yield Fault(place, range_text(bounds, coordinate), "the lowest value first, then the highest")
 
 
 def _cone_faults(place: str, joint: Joint) -> Iterator[Fault]:
@@ -226,13 +242,12 @@ def _half_angle_faults(place: str, half_angle: Any) -> Iterator[Fault]:
     faults = list(number_faults(place, half_angle, 1))
     yield from faults
     if not faults and not 0.0 < half_angle <= math.pi:
-        yield Fault(place, f"{shown(half_angle)} rad", "more than 0 and at most half a turn")
+        yield Fault(place, angle_text(half_angle), "more than 0 and at most half a turn")
 
 
 def _fixed_to_faults(place: str, joint: Joint, cone: Cone) -> Iterator[Fault]:
     if not is_pair_of_names(joint.connects) and is_name(cone.fixed_to):
         return
     if not is_name(cone.fixed_to) or cone.fixed_to not in joint.connects:
-        hint = near_miss(cone.fixed_to, joint.connects) if is_name(cone.fixed_to) else ""
         one_of = " or ".join(map(shown, joint.connects)) if is_pair_of_names(joint.connects) else "a body"
-        yield Fault(place, f"{shown(cone.fixed_to)}{hint}", one_of)
+        yield Fault(place, shown(cone.fixed_to), one_of)

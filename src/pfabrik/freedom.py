@@ -1,13 +1,14 @@
 """How a mechanism can move at home, to first order: freedoms of the whole and of its end effector.
 
-Unknown are the twists (angular velocity, velocity of the point at the origin) of all bodies but the base. A joint lets
-its two bodies differ by the screws of its freedoms, so their difference is orthogonal to the wrenches that the joint
-transmits; the null space of all these conditions holds every motion.
+Unknown are the rates of all joint coordinates. A tree of joints from the base gives the twist (angular velocity, and
+velocity at the origin) of every body as a sum of screws times rates; every other joint closes a loop, and asks that
+the twists of its two bodies differ by its own screws only. The null space of these conditions holds every motion.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 
 def instantaneous_mobility(mechanism: Mechanism) -> int:
     """Number of independent motions of the whole mechanism at home, passive ones included (a strut's own spin)."""
-    return _motions(mechanism, frozenset()).shape[1]
+    _, closure = _twists_and_closure(mechanism, frozenset())
+    return int(_null_space(closure).shape[1])
 
 
 def end_effector_freedom(mechanism: Mechanism, locked: frozenset[str]) -> int:
@@ -35,13 +37,13 @@ def end_effector_freedom(mechanism: Mechanism, locked: frozenset[str]) -> int:
     -------
     0 to 6 for a body, 0 to 3 for a joint (of whose centre only the velocity counts).
     """
-    motions = _motions(mechanism, locked)
+    twists, closure = _twists_and_closure(mechanism, locked)
+    motions = _null_space(closure)
     if not mechanism.end_effector_is_joint:
-        return _rank(_twists_of(mechanism, mechanism.end_effector, motions))
-    body = mechanism.joint(mechanism.end_effector).connects[0]
-    twists = _twists_of(mechanism, body, motions)
+        return _rank(twists[mechanism.end_effector] @ motions)
+    twist = twists[mechanism.joint(mechanism.end_effector).connects[0]] @ motions
     centre = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
-    return _rank(twists[3:] + np.cross(twists[:3], centre, axisa=0, axisc=0))
+    return _rank(twist[3:] + np.cross(twist[:3], centre, axisa=0, axisc=0))
 
 
 def universal_axes(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
@@ -53,13 +55,15 @@ def universal_axes(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
     if joint.axes is not None:
         return np.asarray(joint.axes)
     sides = [next_joints(mechanism.joints, joint, body) for body in reversed(joint.connects)]
-    lines = [np.subtract(ends[0].at, joint.at) for ends in sides if len(ends) == 1 and ends[0].at != joint.at]
+    lines = [
+        np.asarray(ends[0].at) - np.asarray(joint.at) for ends in sides if len(ends) == 1 and ends[0].at != joint.at
+    ]
     normals = np.linalg.svd(lines[0].reshape(1, 3))[2][1:] if lines else np.eye(3)[:2]
     return np.asarray(normals)
 
 
 def joint_screws(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
-    """Screws of a joint's freedoms at home, shape (freedoms, 6): angular velocity, velocity at the origin [L]."""
+    """Screws that span a joint's freedoms at home, shape (freedoms, 6): angular velocity, velocity at the origin [L]."""
     if joint.type == "prismatic":
         return np.concatenate([np.zeros(3), mechanism.home_axis(joint.name)]).reshape(1, 6)
     if joint.type == "fixed":
@@ -68,7 +72,8 @@ def joint_screws(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
     if joint.type == "spherical":
         return _rotations(np.eye(3), centre)
     if joint.type == "universal":
-        return _rotations(universal_axes(mechanism, joint), centre)
+        plane = np.linalg.qr(universal_axes(mechanism, joint).T)[0].T  # also for axes that are far from normal
+        return _rotations(plane, centre)
     turn = _rotations([mechanism.home_axis(joint.name)], centre)
     if joint.type == "revolute":
         return turn
@@ -80,44 +85,54 @@ def _rotations(axes: ArrayLike, centre: NDArray[np.float64]) -> NDArray[np.float
     return np.hstack([directions, np.cross(centre, directions)])
 
 
-def _motions(mechanism: Mechanism, locked: frozenset[str]) -> NDArray[np.float64]:
-    """Basis of all motions: the twists of the bodies of `_moving`, stacked, one motion per column."""
-    moving = _moving(mechanism)
-    blocks = []
-    for joint in mechanism.joints:
-        screws = np.empty((0, 6)) if joint.name in locked else joint_screws(mechanism, joint)
-        wrenches = _null_space(screws).T
-        block = np.zeros((len(wrenches), 6 * len(moving)))
-        for body, sign in zip(joint.connects, (-1.0, 1.0), strict=True):
-            if body in moving:
-                block[:, 6 * moving[body] : 6 * moving[body] + 6] = sign * wrenches
-        blocks.append(block)
-    return _null_space(np.vstack(blocks))
+def _twists_and_closure(
+    mechanism: Mechanism, locked: frozenset[str]
+) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+    """The twist of every body, shape (6, rates), and the loop conditions, shape (6 loops, rates), per joint rate."""
+    differences = _differences(mechanism, locked)
+    twists = {mechanism.base: np.zeros((6, differences[0].shape[1]))}
+    waiting = list(zip(mechanism.joints, differences, strict=True))
+    conditions = [twists[mechanism.base]]  # no loop asks for nothing
+    while waiting:
+        joint, difference = waiting.pop(_next_reached(waiting, twists))
+        first, second = joint.connects
+        if first in twists and second in twists:
+            conditions.append(twists[second] - twists[first] - difference)
+        elif first in twists:
+            twists[second] = twists[first] + difference
+        else:
+            twists[first] = twists[second] - difference
+    return twists, np.vstack(conditions)
 
 
-def _moving(mechanism: Mechanism) -> dict[str, int]:
-    bodies = [body for body in mechanism.bodies if body != mechanism.base]
-    return {body: index for index, body in enumerate(bodies)}
+def _next_reached(waiting: list[tuple[Joint, NDArray[np.float64]]], twists: Mapping[str, NDArray[np.float64]]) -> int:
+    """Index of the first joint of a body whose twist is known."""
+    return next(index for index, (joint, _) in enumerate(waiting) if any(body in twists for body in joint.connects))
 
 
-def _twists_of(mechanism: Mechanism, body: str, motions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The twists of one body in all motions, shape (6, motions); zero for the base."""
-    index = _moving(mechanism).get(body)
-    return np.zeros((6, motions.shape[1])) if index is None else motions[6 * index : 6 * index + 6]
+def _differences(mechanism: Mechanism, locked: frozenset[str]) -> list[NDArray[np.float64]]:
+    """Twist of the second body of every joint relative to its first, shape (6, rates), per joint rate."""
+    none = np.empty((0, 6))
+    screws = [none if joint.name in locked else joint_screws(mechanism, joint) for joint in mechanism.joints]
+    ends = np.cumsum([len(each) for each in screws])
+    differences = [np.zeros((6, ends[-1])) for _ in screws]
+    for difference, own, end in zip(differences, screws, ends, strict=True):
+        difference[:, end - len(own) : end] = own.T
+    return differences
 
 
 def _null_space(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Orthonormal basis, one vector per column, of what the rows of the matrix are blind to."""
-    if len(matrix) == 0:
+    if matrix.size == 0:
         return np.eye(matrix.shape[1])
     _, values, rows = np.linalg.svd(matrix)
     return np.asarray(rows[_count(values) :].T)
 
 
 def _rank(matrix: NDArray[np.float64]) -> int:
-    return _count(np.linalg.svd(matrix, compute_uv=False)) if matrix.size else 0
+    return _count(np.asarray(np.linalg.svd(matrix, compute_uv=False))) if matrix.size else 0
 
 
-def _count(values: NDArray[np.float64]) -> int:
+def _count(values: NDArray[Any]) -> int:
     """How many singular values are not zero. All matrices here have entries of order 1, so the scale is absolute."""
     return int(np.count_nonzero(values > TOLERANCES.alignment))

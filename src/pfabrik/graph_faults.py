@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from string import digits
 from typing import TYPE_CHECKING
 
 from .cones import next_joints, opposite
@@ -24,6 +25,8 @@ def graph_faults(mechanism: Mechanism) -> Iterator[Fault]:
     if all(is_name(joint.name) for joint in mechanism.joints):
         yield from _along_faults(mechanism)
     if not all(is_pair_of_names(joint.connects) for joint in mechanism.joints):
+        return
+    if not (is_name(mechanism.base) and is_name(mechanism.end_effector)):
         return
     names = list(_base_faults(mechanism)) + list(_end_effector_faults(mechanism)) + list(_dangling_faults(mechanism))
     yield from names
@@ -54,7 +57,7 @@ def _bodies(mechanism: Mechanism) -> Counter[str]:
 
 def _base_faults(mechanism: Mechanism) -> Iterator[Fault]:
     bodies = _bodies(mechanism)
-    if bodies and is_name(mechanism.base) and mechanism.base not in bodies:
+    if mechanism.base not in bodies:
         hint = near_miss(mechanism.base, bodies)
         yield Fault("base", f"'{mechanism.base}', which no joint connects{hint}", "a body that a joint connects")
 
@@ -62,8 +65,6 @@ def _base_faults(mechanism: Mechanism) -> Iterator[Fault]:
 def _end_effector_faults(mechanism: Mechanism) -> Iterator[Fault]:
     bodies, name = _bodies(mechanism), mechanism.end_effector
     joints = {joint.name: joint for joint in mechanism.joints if is_name(joint.name)}
-    if not bodies or not is_name(name):
-        return
     if name == mechanism.base:
         yield Fault("end_effector", f"'{name}', which is the base", "a body that moves, or a joint")
     elif name in bodies and name in joints:
@@ -89,8 +90,14 @@ def _dangling_faults(mechanism: Mechanism) -> Iterator[Fault]:
             continue  # what hangs on the end effector alone is the tool
         for body in joint.connects:
             if body not in sound and body not in allowed:
-                found = f"'{body}', which no other joint connects{near_miss(body, sound | allowed - set(joint.connects))}"
+                found = f"'{body}', which no other joint connects{_meant(body, joint, [*sound, *allowed], counts)}"
                 yield Fault(f"joint[{index}].connects", found, "a body that other joints connect too")
+
+
+def _meant(body: str, joint: Joint, sound: Iterable[str], bodies: Iterable[str]) -> str:
+    """The body that was probably meant: a sound one, or one that is as lonely but not merely another copy."""
+    lonely = [each for each in bodies if each.rstrip(digits) != body.rstrip(digits)]
+    return near_miss(body, [each for each in (*sound, *lonely) if each not in joint.connects])
 
 
 def _connection_faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -129,7 +136,12 @@ def _connected(mechanism: Mechanism, start: str) -> set[str]:
 def _along_faults(mechanism: Mechanism) -> Iterator[Fault]:
     joints = {joint.name: joint for joint in mechanism.joints}
     for index, joint in enumerate(mechanism.joints):
-        if joint.type != "prismatic" or not is_pair_of_names(joint.along) or joint.along is None:
+        if (
+            joint.type != "prismatic"
+            or not is_pair_of_names(joint.along)
+            or joint.along is None
+            or joint.along[0] == joint.along[1]
+        ):
             continue
         faults = [fault for name in joint.along for fault in _end_faults(f"joint[{index}].along", joint, name, joints)]
         yield from faults

@@ -11,7 +11,8 @@ import numpy as np
 from .cones import next_joints, opposite
 from .enclosing import enclosing_radius
 from .errors import Fault
-from .form_faults import is_pair_of_names, is_point, kind_of
+from .form_faults import angle_text, coordinate_text, is_pair_of_names, is_point, kind_of, range_text
+from .joint_types import Coordinate
 from .tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -28,14 +29,18 @@ def home_faults(mechanism: Mechanism, sound: dict[str, Joint]) -> Iterator[Fault
     ----------
     sound : the joints without a fault of their own, by name; only they are looked at.
     """
-    radius = enclosing_radius([joint.at for joint in sound.values() if is_point(joint.at)])
+    radius = enclosing_radius([joint.at for joint in sound.values() if joint.at is not None])
     if 0.0 < radius < SMALLEST_LENGTH:
         yield Fault("joint", f"joint centres within {radius:.3g} of each other", f"at least {SMALLEST_LENGTH:g}")
         return
     for index, joint in enumerate(mechanism.joints):
-        if sound.get(joint.name) is joint:
+        if _is_one_of(joint, sound):
             yield from _stroke_faults(f"joint[{index}]", joint, sound, radius or 1.0)
             yield from _angle_faults(f"joint[{index}].cone", joint, mechanism, sound)
+
+
+def _is_one_of(joint: Joint, sound: dict[str, Joint]) -> bool:
+    return any(joint is each for each in sound.values())
 
 
 def _stroke_faults(place: str, joint: Joint, sound: dict[str, Joint], scale: float) -> Iterator[Fault]:
@@ -52,16 +57,17 @@ def _stroke_faults(place: str, joint: Joint, sound: dict[str, Joint], scale: flo
     if joint.range is None or kind is None:
         return
     if len(kind.coordinates) == 1:
-        yield from _outside(f"{place}.range", home, joint.range, scale if kind.coordinates[0] == "length" else 1.0)
+        yield from _outside(f"{place}.range", home, joint.range, kind.coordinates[0], scale)
         return
     for number, (value, bounds, coordinate) in enumerate(zip(home, joint.range, kind.coordinates, strict=True)):
-        yield from _outside(f"{place}.range[{number}]", value, bounds, scale if coordinate == "length" else 1.0)
+        yield from _outside(f"{place}.range[{number}]", value, bounds, coordinate, scale)
 
 
-def _outside(place: str, value: float, bounds: Any, scale: float) -> Iterator[Fault]:
-    slack = TOLERANCES.home_slack * scale
+def _outside(place: str, value: float, bounds: Any, coordinate: Coordinate, scale: float) -> Iterator[Fault]:
+    slack = TOLERANCES.home_slack * (scale if coordinate == "length" else 1.0)
     if not bounds[0] - slack <= value <= bounds[1] + slack:
-        yield Fault(place, f"({bounds[0]:.10g}, {bounds[1]:.10g})", f"a range that contains home, {value:.10g}")
+        expected = f"a range that contains home, {coordinate_text(value, coordinate)}"
+        yield Fault(place, range_text(bounds, coordinate), expected)
 
 
 def _angle_faults(place: str, joint: Joint, mechanism: Mechanism, sound: dict[str, Joint]) -> Iterator[Fault]:
@@ -69,16 +75,16 @@ def _angle_faults(place: str, joint: Joint, mechanism: Mechanism, sound: dict[st
     if joint.cone is None or not all(is_pair_of_names(each.connects) for each in mechanism.joints):
         return
     ends = next_joints(mechanism.joints, joint, opposite(joint))
-    if len(ends) != 1 or sound.get(ends[0].name) is not ends[0]:
+    if len(ends) != 1 or not _is_one_of(ends[0], sound):
         return
-    line = np.subtract(ends[0].at, joint.at)
+    line = np.asarray(ends[0].at) - np.asarray(joint.at)
     if not line.any():
         yield Fault(place, f"'{ends[0].name}' at the same place", "a next joint at some distance")
         return
     angle = _angle(np.asarray(joint.cone.axis), line)
     if angle > joint.cone.half_angle + TOLERANCES.home_slack:
-        found = f"{joint.cone.half_angle:.10g} rad"
-        yield Fault(f"{place}.half_angle", found, f"at least the angle at home to '{ends[0].name}', {angle:.10g} rad")
+        expected = f"at least the angle at home to '{ends[0].name}', {angle_text(angle)}"
+        yield Fault(f"{place}.half_angle", angle_text(joint.cone.half_angle), expected)
 
 
 def _angle(axis: Any, line: Any) -> float:

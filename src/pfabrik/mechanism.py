@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from numbers import Real
 from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .coercion import home_value, items, numbers, text, texts, truth, unit_vector, unit_vectors
 from .enclosing import enclosing_radius
 from .errors import InvalidMechanism, MobilityWarning, UnknownName
 from .faults import find_faults
@@ -26,9 +25,8 @@ __all__ = ["JOINT_TYPES", "Cone", "Joint", "JointType", "Limit", "Mechanism", "R
 Vector: TypeAlias = tuple[float, float, float]
 Range: TypeAlias = tuple[float, float]
 
-UNIT_SLACK = 4 * sys.float_info.epsilon
-"""How far the norm of a vector may be from 1 and still count as 1: the rounding of one division by the norm. Dividing
-again would move the last digit, and a saved mechanism would not load as its equal."""
+MOST_JOINTS_FOR_FREEDOM = 200
+"""Most joints for which construction counts freedoms: the cost grows with the cube, and reaches a second here."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class Cone:
     fixed_to: str
 
     def __post_init__(self) -> None:
-        _set(self, axis=_unit(self.axis), half_angle=_numbers(self.half_angle), fixed_to=_text(self.fixed_to))
+        _set(self, axis=unit_vector(self.axis), half_angle=numbers(self.half_angle), fixed_to=text(self.fixed_to))
 
 
 @dataclass(frozen=True)
@@ -79,16 +77,16 @@ class Joint:
     def __post_init__(self) -> None:
         _set(
             self,
-            name=_text(self.name),
-            type=_text(self.type),
-            connects=_texts(self.connects),
-            at=_numbers(self.at),
-            axis=_unit(self.axis),
-            axes=_units(self.axes),
-            along=_texts(self.along),
-            actuated=bool(self.actuated) if isinstance(self.actuated, np.bool_) else self.actuated,
-            home=_home(self.home, self.type),
-            range=_numbers(self.range),
+            name=text(self.name),
+            type=text(self.type),
+            connects=texts(self.connects),
+            at=numbers(self.at),
+            axis=unit_vector(self.axis),
+            axes=unit_vectors(self.axes),
+            along=texts(self.along),
+            actuated=truth(self.actuated),
+            home=home_value(self.home, self.type),
+            range=numbers(self.range),
         )
 
 
@@ -113,16 +111,16 @@ class Mechanism:
     name: str
     joints: tuple[Joint, ...]
     end_effector: str
-    reference_point: Vector = cast(Vector, None)  # never None once constructed
+    reference_point: Vector = None  # type: ignore[assignment]  # never None once constructed
     base: str = "base"
     length_unit: str = "mm"
     angle_unit: Literal["deg", "rad"] = field(default="deg", compare=False)
 
     def __post_init__(self) -> None:
-        joints = tuple(self.joints) if isinstance(self.joints, Iterable) else self.joints
-        _set(self, joints=joints, reference_point=_numbers(self.reference_point))
-        _set(self, **{name: _text(getattr(self, name)) for name in _TEXT_FIELDS})
-        if self.reference_point is None:
+        joints = items(self.joints)
+        _set(self, joints=joints, reference_point=numbers(self.reference_point))
+        _set(self, **{name: text(getattr(self, name)) for name in _TEXT_FIELDS})
+        if cast(Any, self.reference_point) is None:
             _set(self, reference_point=_centre_of(joints, self.end_effector))
         self._check()
         self._warn_of_freedom()
@@ -133,10 +131,12 @@ class Mechanism:
             raise InvalidMechanism(faults)
 
     def _warn_of_freedom(self) -> None:
+        if len(self.joints) > MOST_JOINTS_FOR_FREEDOM:
+            return
         left = end_effector_freedom(self, frozenset(self.actuators))
         if left > 0:
-            text = f"'{self.name}': {len(self.actuators)} actuators leave the end effector {left} freedoms at home"
-            warnings.warn(text, MobilityWarning, stacklevel=4)
+            message = f"'{self.name}': {len(self.actuators)} actuators leave the end effector {left} freedoms at home"
+            warnings.warn(message, MobilityWarning, stacklevel=4)
 
     def __hash__(self) -> int:
         return self._hash
@@ -218,7 +218,7 @@ class Mechanism:
         if joint.along is None:
             return cast(Vector, joint.axis)
         start, end = self._centres_along(joint)
-        return cast(Vector, _unit(tuple(b - a for a, b in zip(start, end, strict=True))))
+        return cast(Vector, unit_vector(tuple(b - a for a, b in zip(start, end, strict=True))))
 
     def _centres_along(self, joint: Joint) -> tuple[Vector, Vector]:
         """Centres of the two joints of `along`: of the one on the first body, then of the one on the second."""
@@ -277,55 +277,3 @@ def _centre_of(joints: Any, name: str) -> Vector | None:
 def _set(frozen: object, **values: object) -> None:
     for name, value in values.items():
         object.__setattr__(frozen, name, value)
-
-
-def _is_list(value: object) -> bool:
-    return isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray)
-
-
-def _text(value: Any) -> Any:
-    return str.__str__(value) if isinstance(value, str) else value
-
-
-def _texts(value: Any) -> Any:
-    value = value.tolist() if isinstance(value, np.ndarray) else value
-    return tuple(map(_text, value)) if _is_list(value) else value
-
-
-def _numbers(value: Any, depth: int = 2) -> Any:
-    """Numbers as floats, sequences and arrays of them as tuples; anything else as it is, for `find_faults` to name."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if _is_list(value) and depth > 0:
-        return tuple(_numbers(item, depth - 1) for item in value)
-    if not isinstance(value, Real) or isinstance(value, bool):
-        return value
-    try:
-        return float(value)
-    except OverflowError:
-        return value
-
-
-def _unit(value: Any) -> Any:
-    """The direction as a unit vector; a unit vector, a zero one, or what is no vector, as it is."""
-    vector = _numbers(value)
-    if not (isinstance(vector, tuple) and len(vector) == 3 and all(isinstance(part, float) for part in vector)):
-        return vector
-    if not all(map(math.isfinite, vector)) or abs(math.hypot(*vector) - 1.0) <= UNIT_SLACK:
-        return vector
-    largest = max(map(abs, vector)) or 1.0
-    scaled = [part / largest for part in vector]  # so that no square over- or underflows
-    norm = math.hypot(*scaled) or 1.0
-    return tuple(part / norm for part in scaled)
-
-
-def _units(value: Any) -> Any:
-    vectors = _numbers(value)
-    return tuple(map(_unit, vectors)) if isinstance(vectors, tuple) else vectors
-
-
-def _home(value: Any, type_: Any) -> Any:
-    """The home coordinate; the default 0 stands for (0, 0) where there are two coordinates."""
-    home = _numbers(value)
-    two = type_ in ("universal", "cylindrical")
-    return (home, home) if two and home == 0.0 else home

@@ -26,7 +26,8 @@ class Options:
         characteristic length.
     rotation_tolerance : the same for the orientation [rad].
     max_iterations : K, forward and backward passes a chain may take for one target.
-    max_rounds : how often a projection may revise its target before the exact step is tried.
+    max_rounds : how often a projection may revise its target before the exact step closes the loops; more brings the
+        answer no nearer.
     working_mode : "keep" stays in the seed's working mode (home's without a seed), "any" may change it to reach; None
         keeps it if there is a seed.
     hold : what a projection keeps: "orientation" (the paper's choice) or "position" if any feasible pose has it, None
@@ -40,7 +41,7 @@ class Options:
     tolerance: float | None = None
     rotation_tolerance: float = TOLERANCES.rotation
     max_iterations: int = 100
-    max_rounds: int = 100
+    max_rounds: int = 12
     working_mode: Literal["any", "keep"] | None = None
     hold: Literal["orientation", "position"] | None = "orientation"
     projection: Literal["centroid"] = "centroid"
@@ -63,4 +64,4 @@ class Options:
     @classmethod
     def paper(cls) -> Options:
         """The paper's K = 100 and E = 1e-2 [length], by passes alone."""
-        return cls(tolerance=1e-2, max_iterations=100, exact=False)
+        return cls(tolerance=1e-2, max_iterations=100, max_rounds=1000, exact=False)

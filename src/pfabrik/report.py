@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -103,23 +103,34 @@ def distance(solution: Solution) -> str:
 
 def loop_gap(solution: Solution) -> str:
     """The largest loop gap with its unit."""
-    return f"{float(solution.residual):.1e} {solution.mechanism.length_unit}"
+    return f"{float(solution.residual):.1g} {solution.mechanism.length_unit}"
 
 
 def reasons(solution: Solution) -> list[str]:
-    """What holds a projected answer back, one phrase for each active limit."""
-    phrases = [as_phrase(limit, solution.mechanism) for limit in solution.active_limits]
-    return phrases or ["no limit is active: the links are too short or too long"]
+    """What holds a projected answer back, one phrase for the limits of a kind that have the same value."""
+    names: dict[tuple[str, str], list[str]] = {}
+    for limit in solution.active_limits:
+        names.setdefault(in_words(limit, solution.mechanism), []).append(limit.joint)
+    phrases = [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
+    return phrases or ["no limit is active: the links themselves do not reach"]
 
 
-def as_phrase(limit: ActiveLimit, mechanism: Mechanism) -> str:
-    """``strut B3 at its maximum 250 mm``, or ``joint C1's cone at 45 deg``."""
-    if limit.bound == "cone":
-        return f"joint {limit.joint}'s cone at {math.degrees(limit.limit):.6g} deg"
+def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
+    """What kind of joint it is, and which of its bounds: ``("strut", "maximum 250 mm")``."""
     joint = mechanism.joint(limit.joint)
     noun = "joint" if joint.type != "prismatic" else "strut" if joint.along else "slider"
+    if limit.bound == "cone":
+        return noun, f"cone at {math.degrees(limit.limit):.6g} deg"
     bound = "maximum" if limit.bound == "max" else "minimum"
-    return f"{noun} {limit.joint} at its {bound} {show_coordinate(limit.limit, joint, mechanism.length_unit)}"
+    return noun, f"{bound} {show_coordinate(limit.limit, joint, mechanism.length_unit)}"
+
+
+def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
+    """``strut B3 at its maximum 250 mm``, ``struts B1, B3 at their maximum 250 mm``, ``joint C1's cone at 45 deg``."""
+    subject = f"{noun}{'s' * (len(joints) > 1)} {', '.join(joints)}"
+    if bound.startswith("cone"):
+        return f"{subject}'s {bound}"
+    return f"{subject} at {'their' if len(joints) > 1 else 'its'} {bound}"
 
 
 def show_coordinate(value: float, joint: Joint, length_unit: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -119,7 +119,7 @@ def _path(table: Any, location: tuple[int | str, ...]) -> tuple[str, ...]:
         if not isinstance(table, dict) or not isinstance(key, str):
             break
         path.append(key)
-        table = table.get(key)
+        table = table.get(key) if key in _NESTED else None
     return tuple(path)
 
 

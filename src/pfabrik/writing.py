@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from .joint_types import KINDS
 from .mechanism import Joint, Mechanism
 from .units import converted, exact_degrees
 
@@ -42,17 +41,24 @@ def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:
             yield f"{field} = {_value(value)}"
     if joint.cone is not None:
         cone = joint.cone
-        yield f"cone = {_value(dict(axis=cone.axis, half_angle=convert(cone.half_angle), fixed_to=cone.fixed_to))}"
+        yield f"cone = {_value({'axis': cone.axis, 'half_angle': convert(cone.half_angle), 'fixed_to': cone.fixed_to})}"
 
 
 def _angles(mechanism: Mechanism) -> Iterator[float]:
+    """Every angle of the description [rad]."""
     found: list[float] = []
+
+    def note(angle: float) -> float:
+        found.append(angle)
+        return angle
+
     for joint in mechanism.joints:
-        for value in (joint.home, joint.range):
-            converted(value, joint.type, lambda angle: found.append(angle) or angle)
+        converted(joint.home, joint.type, note)
+        converted(joint.range, joint.type, note)
+        yield from found
+        found.clear()
         if joint.cone is not None:
-            found.append(joint.cone.half_angle)
-    return iter(found)
+            yield joint.cone.half_angle
 
 
 def _degrees(angle: float) -> float:

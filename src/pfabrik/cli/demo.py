@@ -64,10 +64,12 @@ def demo(out: Path, steps: int, quick: bool) -> int:
 
 def follow(key: str, steps: int) -> Run:
     """Track one circle, and time it without the compilation of the kernels."""
+    import numpy as np
+
     from .circles import CIRCLES
 
     mechanism = pf.load(key)
-    targets = pf.pose(CIRCLES[key].points(steps))
+    targets = np.stack([pf.pose(point) for point in CIRCLES[key].points(steps)])
     pf.track(mechanism, targets[:2])
     with progress(f"{mechanism.name}: {steps} steps") as on_progress:
         start = time.perf_counter()

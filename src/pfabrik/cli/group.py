@@ -8,6 +8,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, NoReturn
 
 import click
@@ -47,16 +48,17 @@ class CommandGroup(click.Group):
             ctx.fail(f"no command '{args[0]}'{hint}")
         return super().resolve_command(ctx, args)
 
-    def main(self, *args: Any, standalone_mode: bool = True, **kwargs: Any) -> Any:
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        **extra: Any,
+    ) -> Any:
         """Run a command line; in standalone mode, exit with the code that the subcommand returned."""
-
-        def run() -> Any:
-            return super(CommandGroup, self).main(*args, standalone_mode=False, **kwargs)
-
-        if not standalone_mode:
-            return run()
-        kwargs["prog_name"] = kwargs.get("prog_name") or "pfabrik"
-        leave(exit_code(run))
+        run = partial(super().main, args, prog_name or "pfabrik", complete_var, standalone_mode=False, **extra)
+        return leave(exit_code(run)) if standalone_mode else run()
 
 
 def exit_code(run: Callable[[], Any]) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -11,9 +11,15 @@ import pfabrik as pf
 if TYPE_CHECKING:
     from ..options import Options
 
+HOLDS: dict[str, Literal["orientation", "position"] | None] = {
+    "orientation": "orientation",
+    "position": "position",
+    "none": None,
+}
+
 hold_option = click.option(
     "--hold",
-    type=click.Choice(["orientation", "position", "none"]),
+    type=click.Choice(list(HOLDS)),
     default="orientation",
     show_default=True,
     help="What an answer to a target out of reach keeps exactly.",
@@ -22,4 +28,4 @@ hold_option = click.option(
 
 def options_holding(hold: str) -> Options:
     """Solver options for a value of ``--hold``."""
-    return pf.Options(hold=None if hold == "none" else hold)
+    return pf.Options(hold=HOLDS[hold])

@@ -63,7 +63,9 @@ def describe(solution: Solution) -> str:
     ]
     width = max(len(value) for _, value, _ in rows)
     lines = [f"{name:<16}{value:<{width}}   [{label}]" for name, value, label in rows]
-    return "\n".join([as_sentence(solution), "", *lines, f"{'loops closed to':<16}{loop_gap(solution)}", "", actuators(solution)])
+    return "\n".join(
+        [as_sentence(solution), "", *lines, f"{'loops closed to':<16}{loop_gap(solution)}", "", actuators(solution)]
+    )
 
 
 def actuators(solution: Solution) -> str:

@@ -69,8 +69,12 @@ def coordinate(joint: Joint) -> str:
         return f"distance {joint.along[0]} to {joint.along[1]}"
     if joint.axis is None:
         return ""
-    measured = " and ".join({"angle": "angle", "length": "displacement"}[kind] for kind in KINDS[joint.type].coordinates)
-    return f"{measured} about {vector(joint.axis)}" if joint.type == "revolute" else f"{measured} on {vector(joint.axis)}"
+    measured = " and ".join(
+        {"angle": "angle", "length": "displacement"}[kind] for kind in KINDS[joint.type].coordinates
+    )
+    return (
+        f"{measured} about {vector(joint.axis)}" if joint.type == "revolute" else f"{measured} on {vector(joint.axis)}"
+    )
 
 
 def limits(joint: Joint, unit: str) -> str:
@@ -104,6 +108,6 @@ def vector(components: Iterable[float]) -> str:
 
 def chain_table(chains: Sequence[SubChain]) -> str:
     """The distinct sub-chains in the field's notation, how often each occurs, and which engine solves it."""
-    counts = Counter((str(chain), chain.engine, chain.reason) for chain in chains)
+    counts = Counter((str(chain), chain.engine, chain.reason or "positions alone express it") for chain in chains)
     rows = [(str(count), notation, engine, reason) for (notation, engine, reason), count in counts.items()]
     return aligned(("count", "sub-chain", "engine", "why"), rows)

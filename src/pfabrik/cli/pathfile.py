@@ -51,7 +51,8 @@ def read_targets(path: Path) -> Floats:
         raise WrongPath(path, ["no targets below the header"])
     columns = dict(zip(header, np.array([[float(cell) for cell in cells] for _, cells in rows]).T, strict=True))
     rpy = np.radians(np.stack([columns.get(name, np.zeros(len(rows))) for name in ANGLES], axis=-1))
-    return pf.pose(np.stack([columns[name] for name in POSITION], axis=-1), rpy=rpy)
+    positions = np.stack([columns[name] for name in POSITION], axis=-1)
+    return np.stack([pf.pose(xyz, rpy=angles) for xyz, angles in zip(positions, rpy, strict=True)])
 
 
 def numbered(reader: Iterable[Sequence[str]]) -> Iterator[tuple[int, list[str]]]:

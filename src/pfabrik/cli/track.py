@@ -48,7 +48,9 @@ def summary(solution: Solution) -> str:
     told = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name == "reached")
     if not counts["projected"]:
         return told
-    return f"{told}; farthest from its target {float(solution.position_error.max()):.3g} {solution.mechanism.length_unit}"
+    return (
+        f"{told}; farthest from its target {float(solution.position_error.max()):.3g} {solution.mechanism.length_unit}"
+    )
 
 
 def count_statuses(solution: Solution) -> dict[str, int]:

@@ -19,12 +19,13 @@ def whole_file(path: Path) -> Iterator[TextIO]:
     """
     path = path.resolve()  # a link keeps pointing where it points
     if path.exists() and not path.is_file():
-        with path.open("w", newline="", encoding="utf-8") as handle:
-            yield handle
+        with path.open("w", newline="", encoding="utf-8") as direct:
+            yield direct
         return
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    handle = open_new(part, path)
     try:
-        with open_new(part, path) as handle:
+        with handle:
             yield handle
         part.replace(path)
     finally:

@@ -131,8 +131,9 @@ class Work(NamedTuple):
     trunks: Floats
     seed_nodes: Floats  # where the row began
     seed_trunks: Floats
-    start_nodes: Floats  # where a chain's search began
-    start_trunks: Floats
+    best_nodes: Floats  # the nearest a chain's search has come
+    best_trunks: Floats
+    sample_trunks: Floats
     modes: Floats  # (n_branches,)
     wanted: Floats  # (n_branches, 3): where each branch would have its first node
     normal: Floats  # (n + 1, n + 1): the normal equations, right-hand side in the last column

@@ -17,30 +17,59 @@ from .plan import (
     Settings,
     Work,
 )
-from .reach import end_gap, reach_by_passes, try_directly
-from .search import NEAR, place_ends, reach_pose
-from .settle import TRANSLATES, TURNS, settle
+from .reach import end_gap, reach_backward, reach_by_passes, try_directly
+from .search import NEAR, has_closed_form, place_ends, reach_pose
+from .settle import TRANSLATES, TURNS, note_violations, settle, trunk_span
 from .vectors import add, along, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec
 
 # Batches of rounds, each followed by a try of the exact step.
-TRIES = 3
+TRIES = 2
 # Steps tried on the way back from an infeasible pose to a feasible one, and the share of the way not worth a try.
 TRIALS = 60
 SHORTEST_STEP = 1e-9
 
 
 @routine
-def reach_out(plan: Plan, now: Configuration, work: Work, settings: Settings) -> tuple[float, int]:
+def reach_out(plan: Plan, now: Configuration, work: Work, enough: float, settings: Settings) -> tuple[float, int]:
     """Let every chain reach for the present pose as far as it can; the largest end gap left."""
     worst, iterations = 0.0, 0
-    enough = settings.tolerance if settings.exact == 0 else NEAR * plan.scalars[LENGTH]
     for c in range(plan.chains.shape[0]):
         if settings.exact == 1 and try_directly(plan, c, now, work.modes, settings):
             iterations = max(iterations, 1)
             continue
-        gap, chain_iterations = reach_by_passes(plan, c, now, work.wanted, work.system, enough, settings)
+        if settings.exact == 1 and not has_closed_form(plan, c):
+            gap, chain_iterations = reach_nearest(plan, c, now, work), 1
+        else:
+            gap, chain_iterations = reach_by_passes(plan, c, now, work.wanted, work.system, enough, settings)
         worst, iterations = max(worst, gap), max(iterations, chain_iterations)
     return worst, iterations
+
+
+@routine
+def reach_nearest(plan: Plan, c: int, now: Configuration, work: Work) -> float:
+    """Bring the ends of a chain that cannot reach as near to their targets as its limits allow; the gap left.
+
+    The least-squares compromise of the exact step, then one pass outward, which puts the whole miss at the ends.
+    """
+    place_ends(plan, c, now)
+    settle(plan, c, c + 1, 0, now, work)
+    for j in trunk_span(plan, c):
+        now.trunks[j] = min(max(now.trunks[j], plan.trunk_joints[j]["lo"]), plan.trunk_joints[j]["hi"])
+    move_carriers(plan, now)
+    gap = 0.0
+    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+        reach_backward(plan, b, now)
+        gap = max(gap, end_gap(plan, b, now))
+    return gap
+
+
+@routine
+def largest_violation(plan: Plan, now: Configuration, work: Work) -> float:
+    """How far the loops are from closed, and the limits from kept, when the platform is where it is wanted [length]."""
+    for c in range(plan.chains.shape[0]):
+        place_ends(plan, c, now)
+    note_violations(plan, 0, plan.chains.shape[0], now, work)
+    return float(work.totals[1])
 
 
 @routine
@@ -108,18 +137,19 @@ def project_target(
         free = TURNS
     enough = settings.tolerance if settings.exact == 0 else NEAR * plan.scalars[LENGTH]
     for _try in range(TRIES):
-        for _round in range(settings.max_rounds):
-            gap, more = reach_out(plan, now, work, settings)
-            iterations += more
-            if gap <= enough:
-                break
-            rounds += 1
-            if free & TRANSLATES:
-                move_to_centroid(plan, now)
-            if free & TURNS:
-                turn_to_fit(plan, now, work, hold == HOLD_POSITION)
-        for c in range(plan.chains.shape[0]):
-            place_ends(plan, c, now)
+        if settings.exact == 0 or largest_violation(plan, now, work) > enough:
+            for _round in range(settings.max_rounds):
+                gap, more = reach_out(plan, now, work, enough, settings)
+                iterations += more
+                if gap <= enough:
+                    break
+                rounds += 1
+                if free & TRANSLATES:
+                    move_to_centroid(plan, now)
+                if free & TURNS:
+                    turn_to_fit(plan, now, work, hold == HOLD_POSITION)
+            for c in range(plan.chains.shape[0]):
+                place_ends(plan, c, now)
         if settle(plan, 0, plan.chains.shape[0], free, now, work):
             gap, excess = measure_configuration(plan, now)
             if gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack:

@@ -90,8 +90,23 @@ def branch_is_reached(plan: Plan, b: int, now: Configuration, slack: float) -> b
     return gap <= slack and excess * plan.scalars[LENGTH] <= slack
 
 
+@inlined
+def trunk_is_within(plan: Plan, c: int, now: Configuration, slack: float) -> bool:
+    """Whether the trunk joints of a chain keep their ranges."""
+    trunk = plan.chains[c]["trunk"]
+    if trunk >= 0:
+        for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
+            joint = plan.trunk_joints[j]
+            unit = 1.0 if joint["kind"] == SLIDE else plan.scalars[LENGTH]
+            if max(joint["lo"] - now.trunks[j], now.trunks[j] - joint["hi"]) * unit > slack:
+                return False
+    return True
+
+
 @routine
 def chain_is_reached(plan: Plan, c: int, now: Configuration, slack: float) -> bool:
+    if not trunk_is_within(plan, c, now, slack):
+        return False
     for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
         if not branch_is_reached(plan, b, now, slack):
             return False
@@ -113,6 +128,8 @@ def reach_branch_exactly(plan: Plan, b: int, now: Configuration, mode: float, se
 @inlined
 def reach_chain_directly(plan: Plan, c: int, now: Configuration, modes: Floats, settings: Settings) -> bool:
     """One chain by closed forms alone, its trunk (if any) left where it is."""
+    if not trunk_is_within(plan, c, now, settings.slack):
+        return False
     for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
         if plan.branches[b]["kind"] == PASSES:
             return False

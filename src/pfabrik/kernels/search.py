@@ -16,6 +16,8 @@ NEAR = 1e-3
 # Other starts tried before a target is called out of reach; for trunks, each is the best of so many samples.
 RESTARTS = 8
 SAMPLES = 24
+# A start replaces the present one only where it comes notably nearer: share of the squared violation.
+NOTABLY = 0.25
 # Generators of an additive recurrence that fills a box evenly (powers of the inverse of the plastic number).
 _SPREAD = (0.7548776662466927, 0.5698402909980532, 0.4301597090019468, 0.3247179572447460)
 
@@ -97,21 +99,33 @@ def sample_trunk(plan: Plan, c: int, attempt: int, now: Configuration, work: Wor
         if work.totals[0] < best:
             best = work.totals[0]
             for j in range(span["first"], span["last"]):
-                work.start_trunks[j] = now.trunks[j]
+                work.sample_trunks[j] = now.trunks[j]
     for j in range(span["first"], span["last"]):
-        now.trunks[j] = work.start_trunks[j]
+        now.trunks[j] = work.sample_trunks[j]
     move_carriers(plan, now)
     place_ends(plan, c, now)
 
 
 @routine
-def reach_from_here(plan: Plan, c: int, now: Configuration, work: Work, settings: Settings) -> tuple[bool, int]:
+def violation(plan: Plan, c: int, now: Configuration, work: Work) -> float:
+    """Sum of the squared violations of one chain at the present pose."""
+    place_ends(plan, c, now)
+    note_violations(plan, c, c + 1, now, work)
+    return float(work.totals[0])
+
+
+@routine
+def reach_from_here(
+    plan: Plan, c: int, now: Configuration, work: Work, with_passes: bool, settings: Settings
+) -> tuple[bool, int]:
     """One chain by passes from the present nodes, finished by closed form or by the exact step."""
     if settings.exact == 0:
         gap, iterations = reach_by_passes(plan, c, now, work.wanted, work.system, settings.tolerance, settings)
         return gap <= settings.tolerance, iterations
-    near = NEAR * plan.scalars[LENGTH]
-    _gap, iterations = reach_by_passes(plan, c, now, work.wanted, work.system, near, settings)
+    iterations = 1
+    if with_passes:
+        near = NEAR * plan.scalars[LENGTH]
+        _gap, iterations = reach_by_passes(plan, c, now, work.wanted, work.system, near, settings)
     if try_directly(plan, c, now, work.modes, settings):
         return True, iterations
     place_ends(plan, c, now)
@@ -121,7 +135,7 @@ def reach_from_here(plan: Plan, c: int, now: Configuration, work: Work, settings
 
 @routine
 def reach_chain(plan: Plan, c: int, now: Configuration, work: Work, settings: Settings) -> tuple[bool, int]:
-    """One chain to the present pose; False leaves the chain as it was, or bent toward its target.
+    """One chain to the present pose; where it cannot, it is left as near as any of its starts came.
 
     A chain whose closed forms decide is not searched further; any other is tried from several starts.
     """
@@ -130,41 +144,45 @@ def reach_chain(plan: Plan, c: int, now: Configuration, work: Work, settings: Se
             return True, 1
         if has_closed_form(plan, c):
             return False, 1
-    keep_start(plan, c, now, work)
-    reached, iterations = reach_from_here(plan, c, now, work, settings)
-    if reached or settings.exact == 0:
+    reached, iterations = reach_from_here(plan, c, now, work, True, settings)
+    if reached or settings.exact == 0 or settings.any_mode == 0:
         return reached, iterations
-    if settings.any_mode == 1:
-        for attempt in range(RESTARTS):
-            start_anew(plan, c, attempt, now, work)
-            reached, more = reach_from_here(plan, c, now, work, settings)
-            iterations += more
-            if reached:
-                return True, iterations
-    return_to_start(plan, c, now, work)
+    least = violation(plan, c, now, work)
+    keep_best(now, work)
+    for attempt in range(RESTARTS):
+        start_anew(plan, c, attempt, now, work)
+        # a trunk's samples are near enough for the exact step at once
+        reached, more = reach_from_here(plan, c, now, work, plan.chains[c]["trunk"] < 0, settings)
+        iterations += more
+        if reached:
+            return True, iterations
+        size = violation(plan, c, now, work)
+        if size < NOTABLY * least:
+            least = size
+            keep_best(now, work)
+    return_to_best(plan, now, work)
     return False, iterations
 
 
 @routine
-def keep_start(plan: Plan, c: int, now: Configuration, work: Work) -> None:
-    copy_table(now.nodes, work.start_nodes)
-    copy_row(now.trunks, work.start_trunks)
+def keep_best(now: Configuration, work: Work) -> None:
+    copy_table(now.nodes, work.best_nodes)
+    copy_row(now.trunks, work.best_trunks)
 
 
 @routine
-def return_to_start(plan: Plan, c: int, now: Configuration, work: Work) -> None:
-    copy_table(work.start_nodes, now.nodes)
-    copy_row(work.start_trunks, now.trunks)
+def return_to_best(plan: Plan, now: Configuration, work: Work) -> None:
+    copy_table(work.best_nodes, now.nodes)
+    copy_row(work.best_trunks, now.trunks)
     move_carriers(plan, now)
 
 
 @routine
 def reach_pose(plan: Plan, now: Configuration, work: Work, settings: Settings) -> tuple[bool, int]:
-    """Every chain to the present pose; stops at the first that cannot."""
-    iterations = 0
+    """Every chain to the present pose, or as near as it comes."""
+    reached, iterations = True, 0
     for c in range(plan.chains.shape[0]):
-        reached, chain_iterations = reach_chain(plan, c, now, work, settings)
+        chain_reached, chain_iterations = reach_chain(plan, c, now, work, settings)
+        reached = reached and chain_reached
         iterations = max(iterations, chain_iterations)
-        if not reached:
-            return False, iterations
-    return True, iterations
+    return reached, iterations

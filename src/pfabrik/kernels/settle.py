@@ -37,6 +37,8 @@ NO_FRAME, CARRIER_FRAME, PLATFORM_FRAME = 0, 1, 2
 SETTLED = 1e-13
 MAX_STEPS = 60
 DAMPING_START, DAMPING_LEAST, DAMPING_MOST = 1e-4, 1e-16, 1e6
+# So many steps in a row that take off less than this share of what is left: a violation that no step removes.
+SLOW, PATIENCE = 0.05, 5
 # Inner nodes and trunks may move freely, the platform should not: weight of a unit step of each in the damping.
 INNER_WEIGHT = 1e-2
 
@@ -409,12 +411,12 @@ def settle(plan: Plan, c0: int, c1: int, free: int, now: Configuration, work: Wo
     """Close the loops of chains c0 ... c1 - 1 within their limits, moving the platform as `free` allows.
 
     The configuration to start from must have its first and last nodes in place. True when no violation is left; the
-    configuration is the best one found either way.
+    configuration is the best one found either way, a least-squares compromise where the loops cannot be closed.
     """
     n = assign_columns(plan, c0, c1, free, work)
     enough = SETTLED * plan.scalars[LENGTH]
     note_violations(plan, c0, c1, now, work)
-    damping, fresh = DAMPING_START, True
+    damping, fresh, slow = DAMPING_START, True, 0
     for _step in range(MAX_STEPS):
         cost = work.totals[0]
         if work.totals[1] <= enough:
@@ -434,6 +436,9 @@ def settle(plan: Plan, c0: int, c1: int, free: int, now: Configuration, work: Wo
         fresh = work.totals[0] < cost
         if fresh:
             damping = max(0.02 * damping, DAMPING_LEAST)
+            slow = slow + 1 if work.totals[0] > (1.0 - SLOW) * cost else 0
+            if slow >= PATIENCE:
+                return False
         else:
             restore(plan, now, work)
             work.totals[0] = cost

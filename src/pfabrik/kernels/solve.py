@@ -64,6 +64,7 @@ def new_work(plan: Plan) -> Work:
         np.zeros(n_trunks),
         np.zeros((n_nodes, 3)),
         np.zeros(n_trunks),
+        np.zeros(n_trunks),
         np.zeros(n_branches),
         np.zeros((n_branches, 3)),
         np.zeros((n + 1, n + 1)),
@@ -219,30 +220,21 @@ def solve_row(
 ) -> None:
     """One target by every means: reach it, or project it, or walk back to where it was feasible."""
     copy_table(wanted, now.pose)
-    copy_table(now.nodes, work.seed_nodes)
-    copy_row(now.trunks, work.seed_trunks)
     reached, iterations = reach_pose(plan, now, work, settings)
     rounds = 0
     if reached and settings.exact == 0:
         reached = close_loops(plan, now, work, settings)
     if not reached:
+        # the chains are bent toward the target by now; a projection that keeps what is held starts from there
+        copy_table(now.nodes, work.seed_nodes)
+        copy_row(now.trunks, work.seed_trunks)
+        staying = keep_mode(settings)
         hold = settings.hold
         for _hold in range(2):
             copy_table(wanted, now.pose)
             copy_table(work.seed_nodes, now.nodes)
             copy_row(work.seed_trunks, now.trunks)
             move_carriers(plan, now)
-            staying = Settings(
-                settings.tolerance,
-                settings.rotation_tolerance,
-                settings.slack,
-                settings.max_iterations,
-                settings.max_rounds,
-                settings.exact,
-                0,
-                settings.hold,
-                settings.chained,
-            )
             reached, more, more_rounds = project_target(plan, wanted, hold, now, work, staying)
             iterations += more
             rounds += more_rounds
@@ -255,6 +247,22 @@ def solve_row(
     rows.counters[i, 1] = rounds
     write_answer(plan, i, REACHED, now, wanted, targets[i], rows)
     rows.status[i] = judge_row(plan, i, settings, rows)
+
+
+@routine
+def keep_mode(settings: Settings) -> Settings:
+    """The same settings, staying in the working mode."""
+    return Settings(
+        settings.tolerance,
+        settings.rotation_tolerance,
+        settings.slack,
+        settings.max_iterations,
+        settings.max_rounds,
+        settings.exact,
+        0,
+        settings.hold,
+        settings.chained,
+    )
 
 
 @routine

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from ..report import Readout, readouts
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
     from ..mechanism import Mechanism
@@ -23,12 +23,13 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 REACHED = 0
-# Hues that differ in lightness, so that they stay apart in print; dashes tell neighbours apart without any colour.
+# Neighbours differ in dashes, and lines with the same dashes in lightness: they stay apart without any colour.
 COLOURS = ("#00204d", "#0072b2", "#009e73", "#d55e00", "#e69f00", "#999999")
-DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)))
+DASHES = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
 TARGET, ACHIEVED, OFF_TARGET, SHADE = "#8c8c8c", "#00204d", "#d55e00", "#ececec"
 NAMES_PER_COLUMN = 8
 MOST_PANELS = 3
+LIMIT_DASHES = (0, (8, 3, 1, 3))
 
 
 def draw_tracking(targets: Floats, solution: Solution, path: Path) -> None:
@@ -44,11 +45,11 @@ def draw_tracking(targets: Floats, solution: Solution, path: Path) -> None:
     groups = grouped(mechanism)
     figure = Figure(figsize=(12, 5.4), layout="constrained", dpi=130)
     figure.suptitle(mechanism.name)
-    left, right = figure.subfigures(1, 2, width_ratios=(1, 1.25))
+    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1, 1.25), squeeze=False))
     draw_path(left.subplots(), targets[:, :3, 3], solution, mechanism.length_unit)
     panels = right.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
     for axes, group in zip(panels, groups, strict=True):
-        draw_actuators(axes, group, solution)
+        draw_actuators(axes, group, solution, extra_keys=common_keys() if axes is panels[0] else [])
     panels[-1].set_xlabel("step")
     figure.savefig(path)
 
@@ -86,25 +87,31 @@ def widest_plane(points: Floats) -> tuple[int, int]:
     return first, second
 
 
-def draw_actuators(axes: Axes, group: list[tuple[int, Readout]], solution: Solution) -> None:
+def draw_actuators(axes: Axes, group: list[tuple[int, Readout]], solution: Solution, extra_keys: list[Artist]) -> None:
     """Values of actuators that share a unit, and their limits; steps off their target are shaded."""
-    styles = cycle((colour, dash) for dash in DASHES for colour in COLOURS)
     shade_steps(axes, np.asarray(solution.status) != REACHED)
-    for (index, readout), (colour, dash) in zip(group, styles, strict=False):
+    for place, (index, readout) in enumerate(group):
         values = readout.display(solution.actuators[:, index])
-        axes.plot(values, color=colour, linestyle=dash, linewidth=1.5, label=readout.name)
+        axes.plot(values, linewidth=1.5, label=readout.name, **line_style(place))
     draw_limits(axes, group)
     unit = group[0][1].unit
     axes.set(ylabel=f"{'angle' if group[0][1].is_angle else 'length'} [{unit}]", xlim=(0, len(solution) - 1))
     axes.grid(alpha=0.3)
-    columns = -(-len(group) // NAMES_PER_COLUMN)
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), ncols=columns, frameon=False, handles=keys(axes, group))
+    handles = [line for line in axes.get_lines() if not str(line.get_label()).startswith("_")] + extra_keys
+    columns = -(-len(handles) // NAMES_PER_COLUMN)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), ncols=columns, frameon=False, handles=handles)
+
+
+def line_style(place: int) -> dict[str, Any]:
+    """Colour and dashes of the line at a place: 18 that differ."""
+    colour = COLOURS[place % len(COLOURS)]
+    return {"color": colour, "linestyle": DASHES[(place + place // len(COLOURS)) % len(DASHES)]}
 
 
 def draw_limits(axes: Axes, group: list[tuple[int, Readout]]) -> None:
     """One line for every distinct finite limit."""
     for bound in sorted({bound for _, readout in group for bound in readout.limits if np.isfinite(bound)}):
-        axes.axhline(bound, color="black", linewidth=1, linestyle=(0, (8, 3, 1, 3)), zorder=1)
+        axes.axhline(bound, color="black", linewidth=1, linestyle=LIMIT_DASHES, zorder=1)
 
 
 def shade_steps(axes: Axes, marked: NDArray[np.bool_]) -> None:
@@ -114,11 +121,9 @@ def shade_steps(axes: Axes, marked: NDArray[np.bool_]) -> None:
         axes.axvspan(start - 0.5, stop - 0.5, color=SHADE, linewidth=0, zorder=0)
 
 
-def keys(axes: Axes, group: list[tuple[int, Readout]]) -> list[Line2D]:
-    """What the legend explains: the actuators, the limits if there are any, the shading if there is any."""
-    handles = [line for line in axes.get_lines() if not str(line.get_label()).startswith("_")]
-    if any(np.isfinite(bound) for _, readout in group for bound in readout.limits):
-        handles.append(Line2D([], [], color="black", linewidth=1, linestyle=(0, (8, 3, 1, 3)), label="limit"))
-    if axes.patches:
-        handles.append(Line2D([], [], color=SHADE, linewidth=7, label="projected"))
-    return handles
+def common_keys() -> list[Artist]:
+    """What the legend explains once for all panels."""
+    return [
+        Line2D([], [], color="black", linewidth=1, linestyle=LIMIT_DASHES, label="limit"),
+        Line2D([], [], color=SHADE, linewidth=7, label="projected"),
+    ]

@@ -1,0 +1,160 @@
+"""What imports what, and how quickly the command answers: the rules that keep the parts apart."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import pfabrik as pf
+
+PACKAGE = Path(pf.__file__).parent
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+KERNELS = sorted((PACKAGE / "kernels").glob("*.py"))
+COMMANDS = ("catalog", "info", "check", "ik", "track", "demo")
+HEAVY = ("numba", "pydantic", "matplotlib", "scipy")
+QUICK = 0.5  # seconds to start Python, import and answer
+# Runs a command line in this process, then reports what it loaded; the exit code is the command's.
+PROBE = """
+import sys
+try:
+    import pfabrik
+    if sys.argv[1:]:
+        from pfabrik.cli import main
+        main(sys.argv[1:])
+finally:
+    sys.stderr.write("\\nloaded: " + " ".join(sys.modules))
+"""
+
+
+def imports(source: Path) -> Iterator[str]:
+    """Modules that a source file imports, absolute names; imports for type checkers do not count."""
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    checked = {id(node) for branch in ast.walk(tree) if is_type_checking(branch) for node in ast.walk(branch)}
+    package = ["pfabrik", *source.relative_to(PACKAGE).parts[:-1]]
+    for node in ast.walk(tree):
+        if id(node) in checked:
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def is_type_checking(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+def texts(source: Path) -> Iterator[str]:
+    """String constants of a source file that are not docstrings."""
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    statements = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in statements:
+            yield node.value
+
+
+@pytest.mark.parametrize("source", KERNELS, ids=lambda path: path.name)
+def test_kernels_import_only_numpy_numba_and_each_other(source: Path) -> None:
+    allowed = {"numpy", "numba", *sys.stdlib_module_names}
+    foreign = [
+        name for name in imports(source) if name.split(".")[0] not in allowed and not name.startswith("pfabrik.kernels")
+    ]
+    assert foreign == []
+
+
+def test_closed_forms_never_import_the_kernels() -> None:
+    sources = [source for source in SOURCES if "geometric" in source.relative_to(PACKAGE).parts]
+    assert not [name for source in sources for name in imports(source) if "kernels" in name or "numba" in name]
+
+
+def test_pydantic_is_imported_for_files_only() -> None:
+    users = {source.stem for source in SOURCES if any(name.split(".")[0] == "pydantic" for name in imports(source))}
+    assert users <= {"files", "schema"}
+
+
+def test_the_library_never_imports_its_command_or_its_pictures() -> None:
+    library = [source for source in SOURCES if source.parent.name not in ("cli", "view") and source.stem != "__main__"]
+    names = {name for source in library for name in imports(source)}
+    assert not [
+        name for name in names if name.startswith(("pfabrik.cli", "pfabrik.view", "click", "rich", "matplotlib"))
+    ]
+
+
+def test_no_module_knows_a_machine_of_the_catalogue() -> None:
+    exempt = {"catalog", "geometric", "cli"}
+    knowing = [
+        (source.name, name)
+        for source in SOURCES
+        if not exempt & set(source.relative_to(PACKAGE).parts)
+        for text in texts(source)
+        for name in pf.catalog()
+        if name in text.lower()
+    ]
+    assert knowing == []
+
+
+def test_every_public_name_exists() -> None:
+    scope: dict[str, object] = {}
+    exec("from pfabrik import *", scope)
+    assert set(pf.__all__) <= set(scope)
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_every_all_names_what_exists(source: Path) -> None:
+    if source.stem == "__main__":
+        return
+    parts = [part for part in source.relative_to(PACKAGE.parent).with_suffix("").parts if part != "__init__"]
+    module = importlib.import_module(".".join(parts))
+    assert [name for name in getattr(module, "__all__", ()) if not hasattr(module, name)] == []
+
+
+LINES = [
+    [],
+    ["--help"],
+    *[[command, "--help"] for command in COMMANDS],
+    ["chek"],
+    ["ik"],
+    ["ik", "stewart"],
+    ["ik", "stewart", "--position", "1", "2"],
+    ["ik", "stewart", "--position", "1", "2", "three"],
+    ["track", "stewart"],
+    ["demo", "--steps", "0"],
+]
+
+
+@pytest.mark.parametrize("line", [pytest.param(line, id=" ".join(line) or "import") for line in LINES])
+def test_help_and_wrong_input_answer_at_once_and_load_nothing_heavy(line: list[str]) -> None:
+    seconds = []
+    for _ in range(3):
+        start = time.perf_counter()
+        done = subprocess.run([sys.executable, "-c", PROBE, *line], capture_output=True, text=True, check=False)
+        seconds.append(time.perf_counter() - start)
+        if seconds[-1] < QUICK:
+            break
+    complaint, loaded = done.stderr.rsplit("\nloaded: ", 1)
+    assert set(HEAVY) & set(loaded.split()) == set()
+    assert done.returncode == (0 if not line or "--help" in line else 2), complaint
+    assert "Traceback" not in complaint
+    assert min(seconds) < QUICK
+
+
+def test_wrong_names_are_told_without_the_kernels() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PROBE, "ik", "stewrt", "--position", "0", "0", "1"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    complaint, loaded = done.stderr.rsplit("\nloaded: ", 1)
+    assert done.returncode == 2
+    assert "did you mean 'stewart'" in complaint
+    assert "numba" not in loaded.split()
