@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import warnings
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -28,11 +29,11 @@ TRIPOD = (
     + """
 [[joint]]
 name = "A"
-type = "universal"
+type = "revolute"
 connects = ["base", "cylinder"]
 at = [2, 0, 0]
-cone = { axis = [0, 0, 1], half_angle = 60, fixed_to = "base" }
-copies = { count = 6, axis = [0, 0, 1] }
+axis = [0, 1, 0]
+copies = { count = 3, axis = [0, 0, 1] }
 
 [[joint]]
 name = "B"
@@ -41,14 +42,15 @@ actuated = true
 connects = ["cylinder", "rod"]
 along = ["A", "C"]
 range = [2, 4]
-copies = { count = 6, axis = [0, 0, 1] }
+copies = { count = 3, axis = [0, 0, 1] }
 
 [[joint]]
 name = "C"
 type = "spherical"
 connects = ["rod", "platform"]
-at = [1, 0.5, 3]
-copies = { count = 6, axis = [0, 0, 1] }
+at = [1, 0, 3]
+cone = { axis = [0, 0, -1], half_angle = 60, fixed_to = "platform" }
+copies = { count = 3, axis = [0, 0, 1] }
 """
 )
 CRANK = """
@@ -95,8 +97,8 @@ class TestReading:
         limits = CRANK + "home = 30\nrange = [-90, 180]\n"
         joint = loads(HEAD + limits).joints[0]
         assert joint.home == math.radians(30) and joint.range == (math.radians(-90), math.radians(180))
-        joint = loads(HEAD + 'units = { length = "in", angle = "rad" }\n' + limits.replace("180", "3").replace("90", "1")
-                      .replace("30", "1")).joints[0]  # fmt: skip
+        units = 'units = { length = "in", angle = "rad" }\n'
+        joint = loads(HEAD + units + CRANK + "home = 1\nrange = [-1, 3]").joints[0]
         assert joint.home == 1.0 and joint.range == (-1.0, 3.0)
 
     def test_only_the_first_coordinate_of_a_cylindrical_joint_is_an_angle(self):
@@ -108,7 +110,8 @@ class TestReading:
 
     def test_universal_ranges_are_angles(self):
         limits = "axes = [[0, 1, 0], [1, 0, 0]]\nrange = [[-90, 90], [-45, 45]]\n"
-        machine = loads(edited(("at = [2, 0, 0]\n", f"at = [2, 0, 0]\n{limits}")))
+        with pytest.warns(MobilityWarning):
+            machine = loads(edited(("revolute", "universal"), ("axis = [0, 1, 0]\n", limits)))
         assert machine.joint("A1").range == ((-math.pi / 2, math.pi / 2), (-math.pi / 4, math.pi / 4))
 
     def test_byte_order_mark_and_windows_line_ends_are_accepted(self, tmp_path):
@@ -117,7 +120,7 @@ class TestReading:
         assert load(path) == load(str(path)) == loads(TRIPOD)
 
     def test_missing_actuators_warn_with_the_numbers(self):
-        with pytest.warns(MobilityWarning, match="5 actuators leave the end effector 1 freedoms"):
+        with pytest.warns(MobilityWarning, match="2 actuators leave the end effector 1 freedoms"):
             text = dumps(loads(TRIPOD)).replace("actuated = true\n", "", 1)
             loads(text)
 
@@ -125,42 +128,31 @@ class TestReading:
 class TestCopies:
     def test_copies_are_numbered_and_the_base_and_end_effector_are_not(self):
         machine = loads(TRIPOD)
-        assert [joint.name for joint in machine.joints] == [f"{name}{n}" for name in "ABC" for n in range(1, 7)]
+        assert [joint.name for joint in machine.joints] == [f"{name}{n}" for name in "ABC" for n in range(1, 4)]
         assert machine.joint("A2").connects == ("base", "cylinder2")
         assert machine.joint("B3").along == ("A3", "C3")
-        assert machine.joint("C4").connects == ("rod4", "platform")
-        assert machine.joint("A5").cone.fixed_to == "base"
+        assert machine.joint("C2").connects == ("rod2", "platform")
+        assert machine.joint("C3").cone.fixed_to == "platform"
 
     def test_cone_of_a_copy_turns_and_follows_its_copied_body(self):
-        cone = 'cone = { axis = [1, 0, 3], half_angle = 60, fixed_to = "rod" }\n'
-        text = edited(("at = [1, 0.5, 3]\n", "at = [1, 0.5, 3]\n"), ('"platform"]\n', f'"rider"]\n{cone}'))
-        text += (
-            "axis = [0, 0, 1]\n".join(("", ""))
-            + """
-[[joint]]
-name = "D"
-type = "spherical"
-connects = ["rider", "platform"]
-at = [2, 0.5, 6]
-copies = { count = 6, axis = [0, 0, 1] }
-"""
+        text = edited(
+            ('["rod", "platform"]', '["rod", "rider"]'),
+            ("axis = [0, 0, -1]", "axis = [1, 0, 3]"),
+            ('fixed_to = "platform"', 'fixed_to = "rod"'),
         )
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MobilityWarning)
-            cone = loads(text).joint("C4").cone
-        assert cone.fixed_to == "rod4"
-        assert cone.axis == pytest.approx((-1 / math.sqrt(10), 0, 3 / math.sqrt(10)), abs=1e-15)
+        text += edited(("base", "rider"), ("[0, 0, 0]", "[1, 0, 6]"), ('"A"', '"D"'), text=CRANK)
+        cone = loads(text + "copies = { count = 3, axis = [0, 0, 1] }\n").joint("C2").cone
+        assert cone.fixed_to == "rod2"
+        assert cone.axis == pytest.approx(np.array([-0.5, math.sqrt(0.75), 3]) / math.sqrt(10), abs=1e-15)
 
     def test_first_copy_is_the_original_to_the_last_bit(self):
         text = edited(("[2, 0, 0]", "[0.1, 0.7, 0.3]"), ("[0, 0, 1] }\n", "[1, 2, 3] }\n"))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MobilityWarning)
-            assert loads(text).joint("A1").at == (0.1, 0.7, 0.3)
+        assert loads(text).joint("A1").at == (0.1, 0.7, 0.3)
 
     def test_copies_are_turned_right_handed_about_the_axis(self):
         machine = loads(TRIPOD)
-        assert machine.joint("A2").at == pytest.approx((1, math.sqrt(3), 0), abs=1e-15)
-        assert machine.joint("A4").at == (-2.0, 0.0, 0.0)
+        assert machine.joint("A2").at == pytest.approx((-1, math.sqrt(3), 0), abs=1e-15)
+        assert machine.joint("A2").axis == pytest.approx((-math.sqrt(0.75), -0.5, 0), abs=1e-15)
 
     def test_turns_are_exact_where_sines_are(self):
         assert [cos_sin(step, 4) for step in range(4)] == [(1, 0), (0, 1), (-1, 0), (0, -1)]
@@ -171,25 +163,25 @@ copies = { count = 6, axis = [0, 0, 1] }
     def test_turns_agree_with_the_rotation_matrix(self, step, steps, vector):
         angle = 2 * math.pi * step / steps
         axis = np.array([2, -1, 2]) / 3
-        K = np.cross(np.eye(3), axis) * -1
+        K = np.cross(axis, np.eye(3)).T
         R = np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K
         assert rotated(vector, tuple(axis), step, steps) == pytest.approx(R @ vector, abs=1e-13)
 
     def test_different_numbers_of_copies_of_one_body_are_a_fault(self):
-        faults = faults_of(edited(("count = 6", "count = 5")))
-        assert "6, but 'cylinder' has 5 copies at joint 'A' -> 5" in faults["joint[1].copies.count"]
+        faults = faults_of(edited(("count = 3", "count = 5")))
+        assert "3, but 'cylinder' has 5 copies at joint 'A' -> 5" in faults["joint[1].copies.count"]
 
     def test_joint_without_copies_must_say_which_copy_it_means(self):
-        loose = '[[joint]]\nname = "D"\ntype = "spherical"\nconnects = ["cylinder{}", "base"]\nat = [1, 1, 1]\n'
+        loose = '[[joint]]\nname = "D"\ntype = "fixed"\nconnects = ["cylinder{}", "base"]\nat = [1, 1, 1]\n'
         assert "did you mean 'cylinder1'?" in faults_of(TRIPOD + loose.format(""))["joint[3].connects"]
         assert loads(TRIPOD + loose.format("1")).joint("D").connects == ("cylinder1", "base")
 
     def test_most_copies_and_joints_are_accepted_and_no_more(self):
-        strut = TRIPOD.replace("count = 6", f"count = {MOST_COPIES}")
+        strut = TRIPOD.replace("count = 3", f"count = {MOST_COPIES}")
         assert len(loads(strut).joints) == 3 * MOST_COPIES
         assert (
             "from 1 to 100"
-            in faults_of(TRIPOD.replace("count = 6", f"count = {MOST_COPIES + 1}"))["joint[0].copies.count"]
+            in faults_of(TRIPOD.replace("count = 3", f"count = {MOST_COPIES + 1}"))["joint[0].copies.count"]
         )
         many = "".join(
             f'[[joint]]\nname = "{name}"\ntype = "spherical"\nconnects = ["base", "platform"]\nat = [1, 2, 3]\n'
@@ -209,7 +201,7 @@ HOSTILE = [
     ("schema = true", "schema", "True -> 1"),
     ("schema = ", "file", "no TOML: Invalid value (at end of document)"),
     ("a = 1\nb == 2", "file", "line 2, column 4"),
-    ("a = 1\na = 2", "file", "line 2"),
+    ("a = 1\na = 2\n", "file", "line 2"),
     ("x = " + "[" * 100_000, "file", "nested too deeply"),
     (".".join("a" * (MOST_DOTS + 2)) + " = 1", "file", "nested too deeply"),
     ("x = " + "9" * 10_000, "file", "no TOML"),
@@ -223,9 +215,9 @@ HOSTILE = [
     (HEAD + "task = ['x']", "task", "an unknown key"),
     (HEAD + "[units]\nangle = 'grad'", "units.angle", "'grad' -> 'deg' or 'rad'"),
     (HEAD + "[units]\nlenght = 'mm'", "units.lenght", "did you mean 'length'?"),
-    (HEAD + "'a\\nb' = 1", r"'a\\nb'", "an unknown key"),
+    (HEAD + "'a b' = 1", "'a b'", "an unknown key"),
     ("[[joint]]\n" * (MOST_JOINTS + 1), "joint", f"{MOST_JOINTS + 1} joints -> at most {MOST_JOINTS}"),
-    (HEAD + CRANK + "at = 5", "file", "line"),
+    (HEAD + CRANK + "at = 5\n", "file", "(at line "),
     (HEAD + CRANK.replace("[0, 0, 0]", '"0"'), "joint[0].at", "'0' -> three numbers"),
     (HEAD + CRANK.replace("[0, 0, 0]", '["0", 0, 0]'), "joint[0].at", "['0', 0, 0] -> three numbers"),
     (HEAD + CRANK.replace("[0, 0, 0]", "[true, 0, 0]"), "joint[0].at", "[True, 0, 0] -> three numbers"),
@@ -246,32 +238,34 @@ HOSTILE = [
     (HEAD + CRANK + "copies = { count = 2.5, axis = [0, 0, 1] }", "joint[0].copies.count", "2.5 -> a whole number"),
     (HEAD + CRANK + "copies = { count = 0, axis = [0, 0, 1] }", "joint[0].copies.count", "0 -> a whole number"),
     (HEAD + CRANK.replace('["base", "platform"]', '["base"]'), "joint[0].connects", "['base'] -> the names of two"),
-    (edited(("half_angle", "half_agle")), "joint[0].cone.half_agle", "did you mean 'half_angle'?"),
-    (edited(("half_angle = 60", 'half_angle = "60"')), "joint[0].cone.half_angle", "'60' -> a number"),
-    (edited(("half_angle = 60", "half_angle = 6")), "joint[0].cone.half_angle", "(6 deg) -> at least the angle at home"),
-    (edited(("half_angle = 60", "half_angle = 181")), "joint[0].cone.half_angle", "at most half a turn"),
+    (edited(("half_angle", "half_agle")), "joint[2].cone.half_agle", "did you mean 'half_angle'?"),
+    (edited(("half_angle = 60", 'half_angle = "60"')), "joint[2].cone.half_angle", "'60' -> a number"),
+    (edited(("half_angle = 60", "half_angle = 6")), "joint[2].cone.half_angle", "(6 deg) -> at least the angle"),
+    (edited(("half_angle = 60", "half_angle = 181")), "joint[2].cone.half_angle", "at most half a turn"),
     (edited(('end_effector = "platform"', 'end_effector = "platfrom"')), "end_effector", "did you mean 'platform'?"),
     (HEAD.replace('"m"', '"m"\nbase = "bse"') + CRANK, "base", "did you mean 'base'?"),
-    (edited(('["A", "C"]', '["A", "Cc"]')), "joint[1].along", "'Cc': no such joint; did you mean "),
-    (edited(('["rod", ', '["rood", ')), "joint[2].connects", "'rood', which no other joint connects; did you mean 'rod'?"),
+    (edited(('["A", "C"]', '["A", "Cc"]')), "joint[1].along", "'Cc': no such joint"),
+    (edited(('["rod", ', '["rood", ')), "joint[2].connects", "'rood', which no other joint connects; did you mean "),
 ]  # fmt: skip
 
 
 class TestFaults:
     @pytest.mark.parametrize(("text", "place", "fault"), HOSTILE, ids=range(len(HOSTILE)))
     def test_hostile_text_is_refused_with_a_fault_at_its_place(self, text, place, fault):
-        assert fault in faults_of(text)[place.replace("\\\\", "\\")]
+        assert fault in faults_of(text)[place]
 
-    def test_one_mistake_in_a_copied_joint_is_reported_once_and_in_the_words_of_the_file(self):
-        faults = faults_of(edited(("range = [2, 4]", "range = [3.5, 4]")))
-        assert list(faults) == ["joint[1].range"]
+    def test_one_mistake_in_a_copied_joint_is_reported_once(self):
+        assert list(faults_of(edited(("range = [2, 4]", "range = [3.5, 4]")))) == ["joint[1].range"]
+
+    def test_copied_joint_is_named_in_the_words_of_the_file(self):
+        assert "'rood', which no" in faults_of(edited(('["rod", ', '["rood", ')))["joint[2].connects"]
+
+    def test_misspelt_end_effector_is_not_taken_for_a_copied_body(self):
+        faults = faults_of(edited(('end_effector = "platform"', 'end_effector = "platfrom"')))
+        assert list(faults) == ["end_effector"]
         other = '[[joint]]\nname = "D"\ntype = "spherical"\nconnects = ["cylinder1", "platfrom"]\nat = [1, 1, 1]\n'
-        assert (
-            "'platfrom', which no other joint connects; did you mean 'platform'?"
-            in faults_of(TRIPOD + other)["joint[3].connects"]
-        )
-        faults = faults_of(edited(('["rod", "platform"]', '["rod", "platfrom"]')).replace("reference", "reference"))
-        assert list(faults) == ["end_effector"] or "'platfrom'" in faults["joint[2].connects"]
+        found = "'platfrom', which no other joint connects; did you mean 'platform'?"
+        assert found in faults_of(TRIPOD + other)["joint[3].connects"]
 
     def test_faults_of_schema_and_of_meaning_come_in_one_go_and_in_order(self):
         text = edited(
@@ -357,15 +351,14 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
     turn, shift, low, high = draw(angles), draw(numbers), draw(st.floats(0, 9)), draw(st.floats(0, 9))
     around, across = (turn - low, turn + high), (shift - low, shift + high)
     centres = draw(st.lists(vectors, min_size=5, max_size=5, unique=True))
-    half_angle = draw(st.one_of(st.just(math.pi), st.floats(3.1415, math.pi)))
-    cone = Cone(draw(directions), math.pi, bodies[3]) if half_angle < 0 else None
-    axis, links = draw(directions), list(zip(bodies, bodies[1:], strict=False))
+    half_angle = draw(st.one_of(st.just(math.pi), st.floats(3, math.pi)))
+    axis, links = draw(directions), list(pairwise(bodies))
     joints = [
         Joint(labels[0], "revolute", links[0], centres[0], axis=axis, actuated=True, home=turn, range=around),
         Joint(labels[1], "cylindrical", links[1], centres[1], axis=axis, home=(turn, shift), range=(around, across)),
         Joint(labels[2], "universal", links[2], centres[2], axes=((1, 0, 0), axis if axis[1] else (0, 0, 1)),
-              home=(turn, turn), range=(around, around), cone=cone),
-        Joint(labels[3], "spherical", links[3], centres[3], cone=Cone(axis, math.pi, bodies[3])),
+              home=(turn, turn), range=(around, around)),
+        Joint(labels[3], "spherical", links[3], centres[3], cone=Cone(axis, half_angle, bodies[3])),
         Joint(labels[4], "fixed", links[4], centres[4]),
         Joint(labels[5], "prismatic", (bodies[0], bodies[5]), axis=axis, home=shift, range=across, actuated=True),
     ]  # fmt: skip
@@ -385,7 +378,6 @@ class TestWriting:
                 return
             again = loads(dumps(machine))
         assert again == machine and hash(again) == hash(machine)
-        assert dumps(again).replace('"deg"', '"rad"') == dumps(again) or again.angle_unit == machine.angle_unit
 
     def test_end_effector_joint_survives_the_round_trip(self):
         machine = load("five_bar")

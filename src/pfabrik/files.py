@@ -229,10 +229,10 @@ def _as_written(faults: Sequence[Fault], layout: Layout, copies: Sequence[Copy])
     written: list[Fault] = []
     reporter: dict[str, int] = {}
     for fault in faults:
-        copy = copies[joint_index(fault.place)]
         if joint_index(fault.place) < 0:
             written.append(fault)
             continue
+        copy = copies[joint_index(fault.place)]
         place = f"joint[{copy.index}]{fault.place.partition(']')[2]}"
         if reporter.setdefault(place, copy.number) == copy.number:
             written.append(Fault(place, layout.as_written(fault.found, copy), layout.as_written(fault.expected, copy)))

@@ -1,0 +1,323 @@
+"""Inverse kinematics against the closed forms, and what an answer promises for any target."""
+
+from __future__ import annotations
+
+import os
+
+import checking
+import numpy as np
+import oracles
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from machines import MACHINES
+
+import pfabrik as pf
+from pfabrik.errors import InvalidArgument, UnsupportedMechanism
+
+CATALOGUE = ("five_bar", "stewart", "nrpm")
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+
+
+@pytest.fixture(scope="module", params=CATALOGUE)
+def machine(request: pytest.FixtureRequest) -> pf.Mechanism:
+    return pf.load(request.param)
+
+
+def assert_feasible(mechanism: pf.Mechanism, answer: pf.Solution) -> None:
+    for name in ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess"):
+        assert np.isfinite(getattr(answer, name)).all(), name
+    assert np.max(answer.status) <= pf.Status.PROJECTED
+    assert np.max(answer.residual) <= 1e-9 * mechanism.characteristic_length
+    assert np.max(answer.limit_excess) <= 1e-9
+    assert np.max(checking.worst_gap(mechanism, answer)) <= 1e-9
+    assert np.max(checking.worst_excess(mechanism, answer)) <= 1e-9
+
+
+def assert_same_as_closed_form(machine: pf.Mechanism, targets: np.ndarray, answer: pf.Solution) -> None:
+    margin = oracles.margin(machine, targets)
+    sure = np.abs(margin) > 1e-8
+    assert ((answer.status == pf.Status.REACHED) == (margin >= 0))[sure].all()
+    assert_feasible(machine, answer)
+
+
+def test_reached_exactly_where_the_closed_form_says(machine: pf.Mechanism) -> None:
+    targets = oracles.random_targets(machine, np.random.default_rng(1), 40 if INTERPRETED else 1000)
+    assert_same_as_closed_form(machine, targets, pf.solve_ik(machine, targets))
+
+
+@pytest.mark.slow
+def test_reached_exactly_where_the_closed_form_says_for_10000_targets_cold_and_warm(machine: pf.Mechanism) -> None:
+    rng = np.random.default_rng(2)
+    targets = oracles.random_targets(machine, rng, 10_000)
+    cold = pf.solve_ik(machine, targets)
+    assert_same_as_closed_form(machine, targets, cold)
+    seeds = cold[rng.permutation(len(targets))]
+    warm = pf.solve_ik(machine, targets, seed=seeds, options=pf.Options(working_mode="any"))
+    assert_same_as_closed_form(machine, targets, warm)
+
+
+def test_status_is_right_on_both_sides_of_the_boundary(machine: pf.Mechanism) -> None:
+    """Targets a millionth of L inside and outside the edge, found by bisection on the closed form."""
+    rng = np.random.default_rng(3)
+    outward = rng.normal(size=(30 if INTERPRETED else 200, 3)) * ([0, 1, 1] if machine.name.startswith("Planar") else 1)
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    home, length = np.array(machine.reference_point), machine.characteristic_length
+
+    def targets(distance: np.ndarray) -> np.ndarray:
+        return oracles.poses(home + distance[:, None] * outward)
+
+    low, high = np.zeros(len(outward)), np.full(len(outward), 10 * length)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        inside = oracles.margin(machine, targets(middle)) >= 0
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    within = pf.solve_ik(machine, targets(low - 1e-6 * length))
+    beyond = pf.solve_ik(machine, targets(low + 1e-6 * length))
+    assert (within.status == pf.Status.REACHED).all()
+    assert (beyond.status == pf.Status.PROJECTED).all()
+    assert np.median(beyond.position_error) <= 1.1e-6 * length
+    assert all(beyond.active_limits[i] or machine.end_effector_is_joint for i in range(len(outward)))
+
+
+def test_actuators_are_those_of_the_closed_form() -> None:
+    for name in ("five_bar", "stewart"):
+        machine = pf.load(name)
+        targets = oracles.inside_targets(machine, np.random.default_rng(4), 20 if INTERPRETED else 300)
+        answer = pf.solve_ik(machine, targets)
+        np.testing.assert_allclose(answer.actuators, oracles.actuators(machine, targets), rtol=0, atol=1e-9)
+
+
+_numbers = st.floats(-1.0, 1.0)
+_scales = st.sampled_from([0.0, 0.03, 0.3, 1.0, 10.0, 1e6, 1e150])
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
+@settings(max_examples=4 if INTERPRETED else 40, deadline=None)
+@given(direction=st.tuples(_numbers, _numbers, _numbers), scale=_scales, turn=st.tuples(*[st.floats(-3.2, 3.2)] * 3))
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_limits_are_kept_and_loops_closed_for_any_finite_target(
+    name: str, direction: tuple[float, ...], scale: float, turn: tuple[float, ...]
+) -> None:
+    mechanism = _machine(name)
+    position = mechanism.reference_point + scale * mechanism.characteristic_length * np.array(direction)
+    answer = pf.solve_ik(mechanism, pf.pose(position, rotvec=turn))
+    assert_feasible(mechanism, answer)
+    if answer.status == pf.Status.REACHED:
+        assert answer.position_error <= 1e-9 * mechanism.characteristic_length
+        assert answer.rotation_error <= 1e-9
+
+
+_MADE: dict[str, pf.Mechanism] = {}
+
+
+def _machine(name: str) -> pf.Mechanism:
+    if name not in _MADE:
+        _MADE[name] = MACHINES[name]() if name in MACHINES else pf.load(name)
+    return _MADE[name]
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_home_is_reached_with_the_coordinates_of_the_description(name: str) -> None:
+    mechanism = _machine(name)
+    answer = pf.solve_ik(mechanism, mechanism.home_pose)
+    assert answer.status is pf.Status.REACHED
+    home = [mechanism.home_coordinate(actuator) for actuator in mechanism.actuators]
+    np.testing.assert_allclose(answer.actuators, home, atol=1e-9 * mechanism.characteristic_length)
+    for joint, point in answer.points.items():
+        np.testing.assert_allclose(point, mechanism.joint(joint).at, atol=1e-9 * mechanism.characteristic_length)
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, "mixed", "hexapod_rus"])
+def test_a_row_alone_is_answered_as_in_a_batch(name: str) -> None:
+    mechanism = _machine(name)
+    rng = np.random.default_rng(6)
+    length = mechanism.characteristic_length
+    n = 8 if INTERPRETED else 150
+    targets = np.array(
+        [
+            pf.pose(mechanism.reference_point + rng.normal(size=3) * 0.3 * length, rotvec=0.2 * rng.normal(size=3))
+            for _ in range(n)
+        ]
+    )
+    batch = pf.solve_ik(mechanism, targets)
+    for i in range(n):
+        alone = pf.solve_ik(mechanism, targets[i])
+        assert alone.status == batch.status[i]
+        for field in ("pose", "actuators", "residual", "iterations", "rounds"):
+            np.testing.assert_array_equal(getattr(alone, field), getattr(batch, field)[i])
+        assert alone.active_limits == batch.active_limits[i]
+
+
+def test_batch_axes_come_first_on_every_field() -> None:
+    mechanism = pf.load("stewart")
+    targets = np.tile(mechanism.home_pose, (2, 3, 1, 1))
+    answer = pf.solve_ik(mechanism, targets)
+    assert answer.status.shape == answer.residual.shape == answer.iterations.shape == (2, 3)
+    assert answer.pose.shape == (2, 3, 4, 4)
+    assert answer.actuators.shape == (2, 3, 6)
+    assert answer.points["CL1"].shape == (2, 3, 3)
+    assert len(answer) == 2
+    assert answer[1].status.shape == (3,)
+    assert answer[1][2].status is pf.Status.REACHED
+    assert pf.solve_ik(mechanism, np.empty((0, 4, 4))).pose.shape == (0, 4, 4)
+
+
+def test_positions_alone_mean_home_orientation() -> None:
+    mechanism = pf.load("stewart")
+    position = np.add(mechanism.reference_point, (3.0, -2.0, 1.0))
+    by_position, by_pose = pf.solve_ik(mechanism, position), pf.solve_ik(mechanism, pf.pose(position))
+    np.testing.assert_array_equal(by_position.actuators, by_pose.actuators)
+
+
+def test_a_point_has_no_orientation_to_miss() -> None:
+    mechanism = pf.load("five_bar")
+    answer = pf.solve_ik(mechanism, pf.pose(mechanism.reference_point, rotvec=[0.3, 0.2, 0.1]))
+    assert answer
+    assert answer.rotation_error == 0.0
+
+
+def test_a_seed_keeps_its_working_mode_and_without_one_any_mode_reaches() -> None:
+    """Both elbows of an unlimited 5-bar reach; the answer stays on the elbow of the seed."""
+    mechanism = pf.load("five_bar").without_limits()
+    targets = oracles.inside_targets(pf.load("five_bar"), np.random.default_rng(7), 10)
+    home = pf.solve_ik(mechanism, mechanism.home_pose)
+    mirrored = mechanism.home_pose @ np.eye(4)
+    seeded = pf.solve_ik(mechanism, targets, seed=home)
+    np.testing.assert_allclose(seeded.actuators, pf.solve_ik(mechanism, targets).actuators)
+    assert pf.solve_ik(mechanism, mirrored, seed=home)
+
+
+def test_another_working_mode_is_used_where_only_it_keeps_the_limits() -> None:
+    """Limits that home keeps, but that forbid home's elbow at the target."""
+    free = pf.load("five_bar").without_limits()
+    target = np.add(free.reference_point, (0.0, 30.0, -40.0))
+    modes = oracles.working_mode_margins(free, oracles.poses(target[None]))
+    assert (modes > 0).all()
+    answer = pf.solve_ik(free, target)
+    crank = free.actuators[0]
+    used = float(answer.actuators[0])
+    bound = sorted((0.0, 0.9 * used))
+    narrow = (bound[0] - 0.01, bound[1]) if used > 0 else (bound[0], bound[1] + 0.01)
+    limited = free.with_limits({crank: (narrow[0] - 3.0, narrow[1]) if used > 0 else (narrow[0], narrow[1] + 3.0)})
+    assert pf.solve_ik(limited, target)
+    kept = pf.solve_ik(limited, target, options=pf.Options(working_mode="keep"))
+    assert kept.status is pf.Status.PROJECTED
+    assert kept.active_limits[0].joint == crank
+
+
+def test_projection_names_the_limits_that_hold_it_back() -> None:
+    mechanism = pf.load("stewart")
+    answer = pf.solve_ik(mechanism, np.add(mechanism.reference_point, (0, 0, 1000.0)))
+    assert answer.status is pf.Status.PROJECTED
+    assert {limit.joint for limit in answer.active_limits} == set(mechanism.actuators)
+    assert {limit.bound for limit in answer.active_limits} == {"max"}
+    assert answer.rotation_error <= 1e-9
+    sideways = pf.solve_ik(mechanism, np.add(mechanism.reference_point, (1000.0, 0, 0)))
+    assert 0 < len(sideways.active_limits) < 18
+
+
+def test_holding_the_position_turns_the_platform_instead() -> None:
+    mechanism = pf.load("stewart")
+    target = pf.pose(mechanism.reference_point, rotvec=[1.2, 0, 0])
+    answer = pf.solve_ik(mechanism, target, options=pf.Options(hold="position"))
+    assert answer.status is pf.Status.PROJECTED
+    assert answer.position_error <= 1e-9 * mechanism.characteristic_length
+    assert 0 < answer.rotation_error < 1.2
+    assert_feasible(mechanism, answer)
+
+
+def test_an_orientation_that_no_position_suits_gives_way() -> None:
+    mechanism = pf.load("stewart")
+    answer = pf.solve_ik(mechanism, pf.pose(mechanism.reference_point, rotvec=[0, 0, 3.0]))
+    assert answer.status is pf.Status.PROJECTED
+    assert answer.rotation_error > 0.1
+    assert_feasible(mechanism, answer)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_the_papers_settings_end_within_its_tolerance_with_the_loops_closed(name: str) -> None:
+    mechanism = pf.load(name)
+    targets = oracles.inside_targets(mechanism, np.random.default_rng(8), 10 if INTERPRETED else 200, least=0.05)
+    answer = pf.solve_ik(mechanism, targets, options=pf.Options.paper())
+    assert_feasible(mechanism, answer)
+    assert (answer.position_error <= 1e-2).mean() > 0.95
+    assert np.median(answer.iterations) <= 100
+
+
+def test_bad_rows_are_named_or_marked() -> None:
+    mechanism = pf.load("stewart")
+    targets = np.tile(mechanism.home_pose, (5, 1, 1))
+    targets[1, 0, 3] = np.nan
+    targets[3, :3, :3] *= 2
+    with pytest.raises(InvalidArgument, match="not finite") as caught:
+        pf.solve_ik(mechanism, targets)
+    assert caught.value.rows == (1, 3)
+    marked = pf.solve_ik(mechanism, targets, options=pf.Options(on_invalid="mark"))
+    assert marked.status.tolist() == [0, 3, 0, 3, 0]
+    assert np.isfinite(marked.actuators[[0, 2, 4]]).all()
+    assert marked.to_dict()["actuators"][1] == [None] * 6
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        np.zeros((3, 4)),
+        "here",
+        [[1, 2], [3]],
+        np.full((4, 4), np.inf),
+        np.eye(4) * 1j,
+        np.diag([1.0, 1, -1, 1]),
+        np.eye(4)[[0, 1, 3, 2]],
+        None,
+        5.0,
+        [True, False, True],
+    ],
+)
+def test_what_is_no_pose_is_refused_by_name(target: object) -> None:
+    with pytest.raises(InvalidArgument, match="target"):
+        pf.solve_ik(pf.load("stewart"), target)
+
+
+def test_rotations_are_accepted_up_to_the_stated_deviation() -> None:
+    mechanism = pf.load("stewart")
+    for deviation, accepted in ((0.4e-6, True), (0.6e-6, False)):
+        target = mechanism.home_pose.copy()
+        target[:3, :3] *= 1 + deviation
+        if accepted:
+            assert pf.solve_ik(mechanism, target)
+        else:
+            with pytest.raises(InvalidArgument):
+                pf.solve_ik(mechanism, target)
+
+
+def test_seeds_that_do_not_fit_are_refused() -> None:
+    mechanism = pf.load("stewart")
+    other = pf.solve_ik(pf.load("five_bar"), pf.load("five_bar").home_pose)
+    pair = pf.solve_ik(mechanism, np.tile(mechanism.home_pose, (2, 1, 1)))
+    for seed in (other, pair, mechanism.home_pose):
+        with pytest.raises(InvalidArgument, match="seed"):
+            pf.solve_ik(mechanism, mechanism.home_pose, seed=seed)
+
+
+def test_options_refuse_what_they_do_not_know() -> None:
+    for bad in ({"hold": "nothing"}, {"tolerance": -1}, {"max_iterations": 0}, {"projection": "best"}):
+        with pytest.raises(InvalidArgument, match="options"):
+            pf.Options(**bad)
+
+
+def test_a_mechanism_that_positions_cannot_express_is_refused_with_the_reason() -> None:
+    joints = []
+    for i, angle in enumerate((0.0, 2.1, 4.2), 1):
+        c, s = np.cos(angle), np.sin(angle)
+        joints += [
+            pf.Joint(f"A{i}", "universal", ("base", f"c{i}"), at=(80 * c, 80 * s, 0)),
+            pf.Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"C{i}"), actuated=True),
+            pf.Joint(f"C{i}", "universal", (f"r{i}", "platform"), at=(50 * c, 50 * s, 150)),
+        ]
+    with pytest.warns(pf.errors.MobilityWarning):
+        mechanism = pf.Mechanism("3-UPU", joints, "platform", (0, 0, 150))
+    assert all(chain.engine == "closure" for chain in pf.decompose(mechanism))
+    with pytest.raises(UnsupportedMechanism, match="carries orientation"):
+        pf.solve_ik(mechanism, mechanism.home_pose)
