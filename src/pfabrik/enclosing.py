@@ -43,8 +43,8 @@ def _radius_at_unit_size(cloud: NDArray[np.float64]) -> float:
         if distances[farthest] <= radius * (1.0 + ROUNDING):
             return radius
         grown = _smallest_among_subsets(np.vstack([carriers, cloud[farthest]]))
-        if grown[2] <= radius:
-            return radius
+        if not radius < grown[2] < np.inf:  # rounding is all that is left to gain
+            return float(distances[farthest])
         carriers, centre, radius = grown
 
 

@@ -63,7 +63,7 @@ def universal_axes(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
 
 
 def joint_screws(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
-    """Screws that span a joint's freedoms at home, shape (freedoms, 6): angular velocity, velocity at the origin [L]."""
+    """Screws that span a joint's freedoms at home, (freedoms, 6): angular velocity, velocity at the origin [L]."""
     if joint.type == "prismatic":
         return np.concatenate([np.zeros(3), mechanism.home_axis(joint.name)]).reshape(1, 6)
     if joint.type == "fixed":

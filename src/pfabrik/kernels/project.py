@@ -11,6 +11,7 @@ from .plan import (
     HOLD_POSITION,
     LENGTH,
     POINT_END,
+    STRUT,
     Configuration,
     Floats,
     Plan,
@@ -18,7 +19,7 @@ from .plan import (
     Work,
 )
 from .reach import end_gap, reach_backward, reach_by_passes, try_directly
-from .search import NEAR, has_closed_form, place_ends, reach_pose
+from .search import NEAR, place_ends, reach_pose
 from .settle import TRANSLATES, TURNS, note_violations, settle, trunk_span
 from .vectors import add, along, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec
 
@@ -37,12 +38,21 @@ def reach_out(plan: Plan, now: Configuration, work: Work, enough: float, setting
         if settings.exact == 1 and try_directly(plan, c, now, work.modes, settings):
             iterations = max(iterations, 1)
             continue
-        if settings.exact == 1 and not has_closed_form(plan, c):
+        if settings.exact == 1 and not is_struts(plan, c):
             gap, chain_iterations = reach_nearest(plan, c, now, work), 1
         else:
             gap, chain_iterations = reach_by_passes(plan, c, now, work.wanted, work.system, enough, settings)
         worst, iterations = max(worst, gap), max(iterations, chain_iterations)
     return worst, iterations
+
+
+@routine
+def is_struts(plan: Plan, c: int) -> bool:
+    """Whether one pass brings the ends of a chain as near as they come: single segments on the base."""
+    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+        if plan.branches[b]["kind"] != STRUT:
+            return False
+    return bool(plan.chains[c]["trunk"] < 0)
 
 
 @routine

@@ -164,11 +164,14 @@ def pass_over_chain(plan: Plan, c: int, now: Configuration, wanted: Floats, syst
 def reach_by_passes(
     plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats, enough: float, settings: Settings
 ) -> tuple[float, int]:
-    """Forward and backward passes until the ends are within `enough`, stall, or K iterations are spent."""
+    """Forward and backward passes until the ends are within `enough` or K iterations are spent.
+
+    Where an exact step follows, they also end when they stall.
+    """
     gap = pass_over_chain(plan, c, now, wanted, system)
     stalls = 0
     for iteration in range(1, settings.max_iterations):
-        if gap <= enough or stalls >= STALLS:
+        if gap <= enough or (settings.exact == 1 and stalls >= STALLS):
             return gap, iteration
         previous = gap
         gap = pass_over_chain(plan, c, now, wanted, system)
