@@ -64,7 +64,13 @@ def hexaglide() -> Mechanism:
         axis = _unit(np.array([-a[0] / 300, -a[1] / 300, 1.0]))
         joints += [
             Joint(f"P{i}", "prismatic", ("base", f"carriage{i}"), axis=axis, actuated=True, range=(-60, 80)),
-            Joint(f"U{i}", "universal", (f"carriage{i}", f"rod{i}"), at=a, cone=Cone(np.subtract(c, a), 0.8, f"carriage{i}")),
+            Joint(
+                f"U{i}",
+                "universal",
+                (f"carriage{i}", f"rod{i}"),
+                at=a,
+                cone=Cone(np.subtract(c, a), 0.8, f"carriage{i}"),
+            ),
             Joint(f"S{i}", "spherical", (f"rod{i}", "platform"), at=c),
         ]
     return Mechanism("6-PUS", joints, "platform", (0, 0, 190))
@@ -77,7 +83,14 @@ def tripod_rps() -> Mechanism:
         axis = np.cross([0, 0, 1], _unit(np.array(a)))
         joints += [
             Joint(f"R{i}", "revolute", ("base", f"cylinder{i}"), at=a, axis=axis, range=(-0.6, 0.6)),
-            Joint(f"P{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), along=(f"R{i}", f"S{i}"), actuated=True, range=(150, 250)),
+            Joint(
+                f"P{i}",
+                "prismatic",
+                (f"cylinder{i}", f"rod{i}"),
+                along=(f"R{i}", f"S{i}"),
+                actuated=True,
+                range=(150, 250),
+            ),
             Joint(f"S{i}", "spherical", (f"rod{i}", "platform"), at=c, cone=Cone((0, 0, -1), 0.6, "platform")),
         ]
     return Mechanism("3-RPS", joints, "platform", (0, 0, 200))
@@ -89,7 +102,9 @@ def tripod_prs() -> Mechanism:
     for i, (a, c) in enumerate(zip(ring(110, 0, [0, 120, 240]), ring(60, 150, [0, 120, 240]), strict=True), 1):
         axis = np.cross([0, 0, 1], _unit(np.array(a)))
         joints += [
-            Joint(f"P{i}", "prismatic", ("base", f"carriage{i}"), axis=(0, 0, 1), actuated=True, range=(-80, 80), home=0.0),
+            Joint(
+                f"P{i}", "prismatic", ("base", f"carriage{i}"), axis=(0, 0, 1), actuated=True, range=(-80, 80), home=0.0
+            ),
             Joint(f"R{i}", "revolute", (f"carriage{i}", f"rod{i}"), at=a, axis=axis, range=(-0.5, 0.5)),
             Joint(f"S{i}", "spherical", (f"rod{i}", "platform"), at=c),
         ]
@@ -115,7 +130,15 @@ def planar(chain: str) -> Mechanism:
             a[2] = c[2] = 0.0
             joints += [
                 Joint(f"A{i}", "revolute", ("base", f"cylinder{i}"), at=a, axis=z),
-                Joint(f"B{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), axis=c - a, actuated=True, home=150, range=(90, 230)),
+                Joint(
+                    f"B{i}",
+                    "prismatic",
+                    (f"cylinder{i}", f"rod{i}"),
+                    axis=c - a,
+                    actuated=True,
+                    home=150,
+                    range=(90, 230),
+                ),
                 Joint(f"C{i}", "revolute", (f"rod{i}", "platform"), at=c, axis=(0, 0, -1)),
             ]
         else:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 
-import checking
 import numpy as np
-import oracles
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from machines import MACHINES
 
+import checking
+import oracles
 import pfabrik as pf
+from machines import MACHINES
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 
 CATALOGUE = ("five_bar", "stewart", "nrpm")

@@ -28,7 +28,25 @@ _HOMES = {
     "track": "track",
 }
 
-__all__ = ["__version__", "errors", *_HOMES]
+__all__ = [
+    "ActiveLimit",
+    "Cone",
+    "Joint",
+    "Mechanism",
+    "Options",
+    "Solution",
+    "Status",
+    "SubChain",
+    "__version__",
+    "catalog",
+    "decompose",
+    "errors",
+    "load",
+    "pose",
+    "save",
+    "solve_ik",
+    "track",
+]
 
 if TYPE_CHECKING:
     from . import errors

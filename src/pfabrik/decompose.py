@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from itertools import chain
 from typing import Literal
 
 from .mechanism import Joint, Mechanism
@@ -94,8 +95,8 @@ def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
     weld = _welded(mechanism)
     base = weld[mechanism.base]
     end = TIP if mechanism.end_effector_is_joint else weld[mechanism.end_effector]
-    chains = [_sub_chain(mechanism, group, base, end) for group in _components(edges, base, end)]
-    return tuple(chain for chain in chains if chain is not None)
+    found = [_sub_chain(mechanism, group, base, end) for group in _components(edges, base, end)]
+    return tuple(sub_chain for sub_chain in found if sub_chain is not None)
 
 
 def _welded(mechanism: Mechanism) -> dict[str, str]:
@@ -137,7 +138,7 @@ def _components(edges: list[_Edge], base: str, end: str) -> list[list[_Edge]]:
         inner = [body for body in edge.bodies if body not in (base, end)]
         found = sorted({group_of[body] for body in inner if body in group_of})
         target = found[0] if found else number
-        merged = sum((groups.pop(old) for old in found), []) + [edge]
+        merged = [*chain.from_iterable(groups.pop(old) for old in found), edge]
         groups[target] = merged
         for member in merged:
             group_of.update({body: target for body in member.bodies if body not in (base, end)})
@@ -177,7 +178,9 @@ def _paths(edges: list[_Edge], base: str, end: str) -> list[tuple[Step, ...]]:
         came_by = path[-1].joint if path else None
         for edge in at[body]:
             if edge.joint is not came_by:
-                open_paths.append((edge.other(body), (*path, Step(edge.joint, edge.bodies[0] == body, TIP in edge.bodies))))
+                open_paths.append(
+                    (edge.other(body), (*path, Step(edge.joint, edge.bodies[0] == body, TIP in edge.bodies)))
+                )
     return paths
 
 

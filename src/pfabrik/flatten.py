@@ -101,9 +101,7 @@ class _Builder:
             if self.mechanism.joint(coordinate.joint).at is not None:
                 self.trunk_points.append((coordinate.joint, len(self.trunk_joints)))
             kind = P.SLIDE if slides else P.TURN
-            self.trunk_joints.append(
-                {"kind": kind, "point": point, "axis": axis, "lo": limits[0], "hi": limits[1]}
-            )
+            self.trunk_joints.append({"kind": kind, "point": point, "axis": axis, "lo": limits[0], "hi": limits[1]})
             self._add_coordinate(coordinate, first + coordinate.index, branch)
         self.trunks.append({"first": first, "last": len(self.trunk_joints)})
 
@@ -151,7 +149,9 @@ class _Builder:
                 }
             )
         self._add_points(form, first, carrier)
-        self.branches.append(self._branch_record(form, first, carrier) | {"cone_first": cone_first, "cone_last": len(self.cones)})
+        self.branches.append(
+            self._branch_record(form, first, carrier) | {"cone_first": cone_first, "cone_last": len(self.cones)}
+        )
 
     def _branch_record(self, form: BranchForm, first: int, carrier: int) -> dict[str, Any]:
         nodes, none = form.nodes, np.zeros(3)
@@ -204,7 +204,9 @@ class _Builder:
         )
         names = tuple(coordinate.joint for coordinate, _ in coordinates)
         home = P.Seeds(
-            self.mechanism.home_pose[None].copy(), plan.nodes["home"].copy()[None], np.zeros((1, len(self.trunk_joints)))
+            self.mechanism.home_pose[None].copy(),
+            plan.nodes["home"].copy()[None],
+            np.zeros((1, len(self.trunk_joints))),
         )
         return Flat(
             plan,

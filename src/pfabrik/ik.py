@@ -20,7 +20,7 @@ from .tolerances import TOLERANCES
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_DEFAULT = Options()
+DEFAULT = Options()
 _HOLDS = {None: P.HOLD_NOTHING, "orientation": P.HOLD_ORIENTATION, "position": P.HOLD_POSITION}
 
 
@@ -45,10 +45,11 @@ def solve_ik(
     UnsupportedMechanism : a sub-chain that the reaching engine cannot express.
     """
     targets, shape = as_targets(target)
-    options = options or _DEFAULT
+    options = options or DEFAULT
     flat = flatten(mechanism)
     rows = new_rows(flat, len(targets))
-    solve_rows(flat, targets, seeds_of(mechanism, flat, seed, shape), _settings(mechanism, options, seed is not None), rows)
+    settings = settings_of(mechanism, options, seeded=seed is not None)
+    solve_rows(flat, targets, seeds_of(mechanism, flat, seed, shape), settings, rows)
     handle_invalid(targets, rows, options)
     return Solution(mechanism, flat, rows, shape)
 
@@ -80,7 +81,8 @@ def new_rows(flat: Flat, n: int) -> P.Rows:
 
 
 @lru_cache(maxsize=256)
-def _settings(mechanism: Mechanism, options: Options, seeded: bool, chained: bool = False) -> P.Settings:
+def settings_of(mechanism: Mechanism, options: Options, seeded: bool, chained: bool = False) -> P.Settings:
+    """Options as the kernels take them."""
     length = mechanism.characteristic_length
     mode = options.working_mode or ("keep" if seeded or chained else "any")
     return P.Settings(

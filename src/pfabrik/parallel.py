@@ -38,8 +38,8 @@ def run_in_blocks(
 
     def run(start: int) -> int:
         block = slice(start, start + rows_a_block)
-        own = seeds if len(seeds.poses) == 1 else P.Seeds(*(array[block] for array in seeds))
-        return kernel(plan, targets[block], own, settings, P.Rows(*(array[block] for array in rows)))
+        own = seeds if len(seeds.poses) == 1 else P.Seeds._make(array[block] for array in seeds)
+        return kernel(plan, targets[block], own, settings, P.Rows._make(array[block] for array in rows))
 
     starts = range(0, len(targets), rows_a_block)
     if len(starts) <= 1 or n_cores() == 1:

@@ -146,7 +146,9 @@ def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -
     _classify(draft)
     nodes = _place_nodes(mechanism, draft)
     end_turn = _end_turn(mechanism, draft)
-    cones = tuple(_cone(draft, nodes, k, step) for k, spot in enumerate(draft.spots) for step in spot.steps if step.joint.cone)
+    cones = tuple(
+        _cone(draft, nodes, k, step) for k, spot in enumerate(draft.spots) for step in spot.steps if step.joint.cone
+    )
     rail, rail_range = _rail(mechanism, draft)
     return BranchForm(
         nodes=tuple(nodes),
@@ -268,7 +270,9 @@ def _classify(draft: _Draft) -> None:
         raise NotExpressible(f"joint {spots[0].steps[0].joint.name} ties the end effector to the base by orientation")
     for spot in rest:
         if spot.kind == "R":
-            raise NotExpressible(f"revolute joint {spot.steps[0].joint.name} turns about an axis that a moving link carries")
+            raise NotExpressible(
+                f"revolute joint {spot.steps[0].joint.name} turns about an axis that a moving link carries"
+            )
 
 
 def _is_parallel(axis: Array | None, normal: Array) -> bool:
@@ -307,8 +311,10 @@ def _stroke(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: int) 
         return length, length
     joint = slider.joint
     cosine = float(np.array(mechanism.home_axis(joint.name)) @ step) / length * slider.sign
-    if abs(cosine) < 1.0 - 0.5 * TOLERANCES.alignment**2 * 4.0:
-        raise NotExpressible(f"prismatic joint {joint.name} does not point from {nodes[k - 1].joint} to {nodes[k].joint}")
+    if abs(cosine) < math.cos(2.0 * TOLERANCES.alignment):
+        raise NotExpressible(
+            f"prismatic joint {joint.name} does not point from {nodes[k - 1].joint} to {nodes[k].joint}"
+        )
     sign = math.copysign(1.0, cosine)
     home, limits = _home(mechanism, joint), _limits(joint)
     if joint.along is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,11 +80,11 @@ class Solution:
 
     @property
     def pose(self) -> Floats:
-        return self._shaped(self._rows.poses)
+        return cast(Floats, self._shaped(self._rows.poses))
 
     @property
     def actuators(self) -> Floats:
-        return self._shaped(self._rows.actuators)
+        return cast(Floats, self._shaped(self._rows.actuators))
 
     @property
     def position_error(self) -> Any:
@@ -126,17 +126,17 @@ class Solution:
     @cached_property
     def active_limits(self) -> Any:
         rows = self._rows
-        held = [()] * len(rows.status)
+        held: list[tuple[ActiveLimit, ...]] = [()] * len(rows.status)
         projected = np.flatnonzero(rows.status == Status.PROJECTED)
         if len(projected):
             from .kernels.limits import read_limited
 
             plan = self._flat.plan
-            chosen = P.Rows(*(np.ascontiguousarray(array[projected]) for array in rows))
+            chosen = P.Rows._make(np.ascontiguousarray(array[projected]) for array in rows)
             values = np.empty((len(projected), len(plan.coordinates) + len(plan.cones)))
             read_limited(plan, chosen, values)
             for row, found in zip(projected, self._active(values), strict=True):
-                held[row] = found  # type: ignore[call-overload]
+                held[row] = found
         return held[0] if self.shape == () else held
 
     def _active(self, values: Floats) -> list[tuple[ActiveLimit, ...]]:
@@ -171,7 +171,7 @@ class Solution:
         if self.shape == ():
             raise TypeError("the answer to one target cannot be indexed")
         chosen = np.arange(len(self._rows.status)).reshape(self.shape)[index]
-        rows = P.Rows(*(np.ascontiguousarray(array[np.ravel(chosen)]) for array in self._rows))
+        rows = P.Rows._make(np.ascontiguousarray(array[np.ravel(chosen)]) for array in self._rows)
         return Solution(self.mechanism, self._flat, rows, np.shape(chosen))
 
     def __iter__(self) -> Iterator[Solution]:
@@ -179,7 +179,16 @@ class Solution:
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as plain numbers, lists and dicts, ready for JSON; NaN (an INVALID row) becomes None."""
-        names = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
+        names = (
+            "pose",
+            "actuators",
+            "position_error",
+            "rotation_error",
+            "residual",
+            "limit_excess",
+            "iterations",
+            "rounds",
+        )
         plain: dict[str, Any] = {"status": _plain_status(self.status)}
         plain |= {name: _plain(getattr(self, name)) for name in names}
         plain["points"] = {name: _plain(point) for name, point in self.points.items()}
@@ -195,13 +204,17 @@ class Solution:
 
 
 def _plain_status(status: Any) -> Any:
-    return status.name if isinstance(status, Status) else np.vectorize(lambda s: Status(s).name, otypes=[object])(status).tolist()
+    return (
+        status.name
+        if isinstance(status, Status)
+        else np.vectorize(lambda s: Status(s).name, otypes=[object])(status).tolist()
+    )
 
 
 def _plain(value: Any) -> Any:
     array = np.asarray(value)
     if array.dtype.kind == "f" and not np.isfinite(array).all():
-        return np.where(np.isfinite(array), array, None).tolist()
+        return np.where(np.isfinite(array), array.astype(object), np.array(None)).tolist()
     return array.tolist()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from .errors import InvalidArgument
 from .flatten import Flat, flatten
-from .ik import _DEFAULT, _settings, handle_invalid, new_rows, seeds_of
+from .ik import DEFAULT, handle_invalid, new_rows, seeds_of, settings_of
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
@@ -43,7 +43,7 @@ def track(
     As `solve_ik`; also InvalidArgument for targets that are no path, and for options that change the working mode.
     """
     poses, shape = as_targets(targets)
-    options = options or _DEFAULT
+    options = options or DEFAULT
     if len(shape) != 1:
         raise InvalidArgument("targets", f"batch shape {shape}", "a path: shape (n, 4, 4) or (n, 3)")
     if options.working_mode == "any":
@@ -51,7 +51,7 @@ def track(
     flat = flatten(mechanism)
     rows = new_rows(flat, len(poses))
     seeds = seeds_of(mechanism, flat, seed, ())
-    settings = _settings(mechanism, options, seeded=True, chained=True)
+    settings = settings_of(mechanism, options, seeded=True, chained=True)
     _follow(flat, poses, seeds, settings, rows, on_progress)
     handle_invalid(poses, rows, options)
     _count_turns(flat, rows)
@@ -72,7 +72,7 @@ def _follow(
     piece = _STEPS_A_REPORT if on_progress is not None else max(len(poses), 1)
     for start in range(0, len(poses), piece):
         block = slice(start, start + piece)
-        own = P.Rows(*(array[block] for array in rows))
+        own = P.Rows._make(array[block] for array in rows)
         solve_by_iteration(flat.plan, poses[block], seeds, settings, own)
         answered = np.flatnonzero(own.status != P.INVALID)
         if len(answered):

@@ -10,8 +10,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core import config
 from numba.core.caching import FunctionCache
+
+# Numba is typed in some versions and not in others, and never for the options below the public ones.
+_njit: Any = numba.njit
+_Cache: Any = FunctionCache
+_config: Any = numba.config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -27,7 +31,7 @@ def _sources_digest() -> str:
 _DIGEST = _sources_digest()
 
 
-class _KernelCache(FunctionCache):  # type: ignore[misc]  # numba ships no types
+class _KernelCache(_Cache):  # type: ignore[misc]  # a class only at run time
     """Numba's file cache, made stale by an edit to any kernel file; says so when it has to compile."""
 
     _announced = threading.Event()
@@ -40,7 +44,8 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]  # numba ships no types
         overload = super().load_overload(signature, target_context)
         if overload is None and not self._announced.is_set():
             self._announced.set()
-            print("pfabrik: compiling the kernels, once per version (under a minute) ...", file=sys.stderr, flush=True)
+            sys.stderr.write("pfabrik: compiling the kernels, once per version (under a minute) ...\n")
+            sys.stderr.flush()
         return overload
 
 
@@ -50,10 +55,10 @@ _PART = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_
 
 def kernel(function: F) -> F:
     """Compile `function` for any thread: no GIL, IEEE division, results cached on disk."""
-    dispatcher: Any = numba.njit(nogil=True, error_model="numpy")(function)
-    if not config.DISABLE_JIT:
+    dispatcher: Any = _njit(nogil=True, error_model="numpy")(function)
+    if not _config.DISABLE_JIT:
         dispatcher._cache = _KernelCache(function)
-    return dispatcher  # type: ignore[no-any-return]
+    return dispatcher
 
 
 def routine(function: F) -> F:
@@ -62,14 +67,14 @@ def routine(function: F) -> F:
     Without Numba's memory manager no reference is counted, which is most of the time of code as small as this, and
     most of its compilation.
     """
-    return numba.njit(**_PART, _nrt=False)(function)  # type: ignore[no-any-return]
+    return _njit(**_PART, _nrt=False)(function)
 
 
 def inlined(function: F) -> F:
     """A `routine` that every caller takes in whole: passing a mechanism by value costs more than such a call does."""
-    return numba.njit(**_PART, _nrt=False, forceinline=True)(function)  # type: ignore[no-any-return]
+    return _njit(**_PART, _nrt=False, forceinline=True)(function)
 
 
 def allocator(function: F) -> F:
     """Compile `function` as a part of kernels that may allocate."""
-    return numba.njit(**_PART)(function)  # type: ignore[no-any-return]
+    return _njit(**_PART)(function)

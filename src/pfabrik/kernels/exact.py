@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ._jit import inlined, routine
+from ._jit import inlined
 from .plan import DYAD, LENGTH, RAIL_ROD, STRUT, Configuration, Plan
 from .vectors import add, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec
 

@@ -18,7 +18,7 @@ from .plan import (
     Records,
 )
 from .restrict import cone_axis, end_hinge_angle, hinge_angle
-from .vectors import Vec, angle_between, dot, move, norm, scale, sub, turn, vec
+from .vectors import Vec, angle_between, dot, flatten, move, norm, scale, sub, turn, vec
 
 
 @inlined
@@ -39,8 +39,8 @@ def measure_branch(plan: Plan, b: int, now: Configuration) -> tuple[float, float
     normal = turn(carrier, vec(branch["normal"]))
     gap = norm(sub(vec(now.nodes[last]), move(now.pose, vec(branch["end"]))))
     excess = 0.0
-    if first == last:
-        gap = max(gap, norm(sub(vec(now.nodes[first]), move(carrier, vec(plan.nodes[first]["home"])))))
+    base = sub(vec(now.nodes[first]), move(carrier, vec(plan.nodes[first]["home"])))
+    gap = max(gap, norm(flatten(base, vec(branch["rail_axis"])) if branch["rail"] == 1 else base))
     for k in range(first + 1, last + 1):
         d = sub(vec(now.nodes[k]), vec(now.nodes[k - 1]))
         length = norm(d)
@@ -59,9 +59,7 @@ def measure_branch(plan: Plan, b: int, now: Configuration) -> tuple[float, float
 
 
 @inlined
-def measure_ends(
-    plan: Plan, branch: Records, now: Configuration, gap: float, excess: float
-) -> tuple[float, float]:
+def measure_ends(plan: Plan, branch: Records, now: Configuration, gap: float, excess: float) -> tuple[float, float]:
     """The rest of `measure_branch`: rail, platform hinge, cones."""
     carrier = now.carriers[branch["carrier"]]
     first, last = branch["first"], branch["last"]
@@ -79,7 +77,8 @@ def measure_ends(
                 gap = max(gap, abs(dot(end_normal, d)))
             if branch["end_ranged"] == 1:
                 angle = end_hinge_angle(branch, now.pose, d)
-                excess = max(excess, max(branch["end_angle_lo"] - angle, angle - branch["end_angle_hi"]))
+                over = max(branch["end_angle_lo"] - angle, angle - branch["end_angle_hi"])
+                excess = max(excess, float(over))
     for c in range(branch["cone_first"], branch["cone_last"]):
         cone = plan.cones[c]
         axis = cone_axis(cone, carrier, now.pose, normal, now.nodes)
@@ -101,9 +100,7 @@ def measure_trunks(plan: Plan, trunk_values: Floats) -> float:
 
 
 @inlined
-def measure_all(
-    plan: Plan, now: Configuration
-) -> tuple[float, float]:
+def measure_all(plan: Plan, now: Configuration) -> tuple[float, float]:
     """Largest gap [length] and largest limit excess [L or rad] of the whole mechanism."""
     gap, excess = 0.0, measure_trunks(plan, now.trunks)
     for b in range(plan.branches.shape[0]):
@@ -134,9 +131,7 @@ def pose_errors(plan: Plan, pose: Floats, wanted: Floats, target: Floats) -> tup
 
 
 @inlined
-def read_coordinate(
-    plan: Plan, i: int, now: Configuration
-) -> float:
+def read_coordinate(plan: Plan, i: int, now: Configuration) -> float:
     """The value of coordinate `i`, as the description counts it."""
     coordinate = plan.coordinates[i]
     kind, at = coordinate["kind"], coordinate["index"]
@@ -148,7 +143,9 @@ def read_coordinate(
         value = dot(sub(vec(now.nodes[at]), vec(plan.nodes[at]["home"])), vec(branch["rail_axis"]))
     elif kind == HINGE:
         normal = turn(carrier, vec(branch["normal"]))
-        value = hinge_angle(plan, branch, at, carrier, normal, now.nodes, sub(vec(now.nodes[at + 1]), vec(now.nodes[at])))
+        value = hinge_angle(
+            plan, branch, at, carrier, normal, now.nodes, sub(vec(now.nodes[at + 1]), vec(now.nodes[at]))
+        )
     elif kind == END_HINGE:
         value = end_hinge_angle(branch, now.pose, sub(vec(now.nodes[at - 1]), vec(now.nodes[at])))
     else:

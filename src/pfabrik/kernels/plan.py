@@ -1,7 +1,7 @@
 """What the kernels are given and what they fill: the mechanism as flat records, and the rows of a batch.
 
 Lengths are divided by nothing: every array is in the mechanism's own unit, angles in radians. Vectors named `home` are
-in base coordinates at home; a branch that hangs on a trunk moves rigidly with it (its carrier), and what is fixed to the
+in base coordinates at home; a branch that hangs on a trunk moves rigidly with it (its carrier); what is fixed to the
 platform is given relative to the reference point, at home orientation.
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Floats: TypeAlias = NDArray[np.float64]
 Records: TypeAlias = NDArray[np.void]
 
-# How a branch is reached: by passes, or by its closed form (a strut's direct check, a dyad's two circles, a rail's rod).
+# How a branch is reached: by passes, or by closed form (a strut's direct check, a dyad's two circles, a rail and rod).
 PASSES, STRUT, DYAD, RAIL_ROD = 0, 1, 2, 3
 # What the axis of a cone is fixed to: the branch's carrier, the previous link, the platform.
 CARRIER_CONE, LINK_CONE, PLATFORM_CONE = 0, 1, 2

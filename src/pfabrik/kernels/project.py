@@ -1,4 +1,4 @@
-"""Adaptive target projection: an unreachable target moves to where the chains' ends agree, then the loops are closed."""
+"""Adaptive target projection: an unreachable target moves to where the chains' ends agree; then the loops close."""
 
 from __future__ import annotations
 

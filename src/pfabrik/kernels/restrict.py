@@ -6,7 +6,21 @@ import math
 
 from ._jit import inlined, routine
 from .plan import CARRIER_CONE, PLATFORM_CONE, Floats, Plan, Records
-from .vectors import Vec, add, angle_about, angle_between, cross, dot, flatten, norm, rotate, scale, sub, turn, vec, wrap
+from .vectors import (
+    Vec,
+    add,
+    angle_about,
+    angle_between,
+    cross,
+    flatten,
+    norm,
+    rotate,
+    scale,
+    sub,
+    turn,
+    vec,
+    wrap,
+)
 
 # Below this a vector has no direction; far under any length of a machine, far over the smallest normal number.
 NO_LENGTH = 1e-150

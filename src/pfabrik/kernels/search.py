@@ -9,7 +9,7 @@ from .frames import move_carriers
 from .plan import LENGTH, PASSES, TURN, Configuration, Plan, Settings, Work
 from .reach import chain_is_reached, reach_by_passes, try_directly
 from .settle import note_violations, settle
-from .vectors import add, along, copy_row, copy_table, dot, move, put, scale, sub, turn, vec
+from .vectors import add, along, copy_row, copy_table, dot, move, put, scale, sub, vec
 
 # Passes bring a chain within this share of L before the exact step takes over.
 NEAR = 1e-3

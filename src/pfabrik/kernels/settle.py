@@ -113,9 +113,7 @@ def add_node(plan: Plan, branch: Records, b: int, now: Configuration, work: Work
 
 
 @routine
-def add_moment(
-    plan: Plan, branch: Records, now: Configuration, work: Work, free: int, frame: int, moment: Vec
-) -> None:
+def add_moment(plan: Plan, branch: Records, now: Configuration, work: Work, free: int, frame: int, moment: Vec) -> None:
     """Add to the row what a violation owes to the rotation of the carrier or of the platform."""
     if frame == PLATFORM_FRAME and free & TURNS:
         start = 3 * (free & TRANSLATES)
@@ -325,7 +323,7 @@ def trunk_span(plan: Plan, c: int) -> range:
     """Indices of the trunk joints of a chain."""
     trunk = plan.chains[c]["trunk"]
     if trunk < 0:
-        return range(0, 0)
+        return range(0)
     return range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"])
 
 

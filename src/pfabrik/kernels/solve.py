@@ -216,7 +216,15 @@ def write_answer(
 
 @routine
 def solve_row(
-    plan: Plan, i: int, targets: Floats, wanted: Floats, safe: Configuration, now: Configuration, work: Work, settings: Settings, rows: Rows
+    plan: Plan,
+    i: int,
+    targets: Floats,
+    wanted: Floats,
+    safe: Configuration,
+    now: Configuration,
+    work: Work,
+    settings: Settings,
+    rows: Rows,
 ) -> None:
     """One target by every means: reach it, or project it, or walk back to where it was feasible."""
     copy_table(wanted, now.pose)
@@ -279,7 +287,10 @@ def close_loops(plan: Plan, now: Configuration, work: Work, settings: Settings) 
 @routine
 def judge_row(plan: Plan, i: int, settings: Settings, rows: Rows) -> int:
     """The status a row has earned by its measures."""
-    if rows.measures[i, 2] > 10.0 * settings.slack or rows.measures[i, 3] * plan.scalars[LENGTH] > 10.0 * settings.slack:
+    if (
+        rows.measures[i, 2] > 10.0 * settings.slack
+        or rows.measures[i, 3] * plan.scalars[LENGTH] > 10.0 * settings.slack
+    ):
         return FAILED
     if rows.measures[i, 0] <= settings.tolerance and rows.measures[i, 1] <= settings.rotation_tolerance:
         return REACHED
