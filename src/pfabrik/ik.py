@@ -14,7 +14,7 @@ from .mechanism import Mechanism
 from .options import Options
 from .parallel import run_in_blocks
 from .poses import as_targets, what_is_wrong
-from .solution import Solution, Status
+from .solution import Solution
 from .tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def seeds_of(mechanism: Mechanism, flat: Flat, seed: Solution | None, shape: tup
     if seed.mechanism != mechanism:
         raise InvalidArgument("seed", f"an answer of '{seed.mechanism.name}'", f"an answer of '{mechanism.name}'")
     rows = seed._rows
-    if (rows.status >= Status.FAILED).any():
+    if (rows.status >= P.FAILED).any():
         raise InvalidArgument("seed", "an answer that is FAILED or INVALID", "a feasible configuration")
     if seed.shape not in ((), shape):
         raise InvalidArgument("seed", f"batch shape {seed.shape}", f"a single answer or batch shape {shape}")
@@ -116,9 +116,9 @@ def seeds_of(mechanism: Mechanism, flat: Flat, seed: Solution | None, shape: tup
 
 def handle_invalid(targets: NDArray[np.float64], rows: P.Rows, options: Options) -> None:
     """Raise for rows that are no poses, naming the first; or leave them marked, their numbers NaN."""
-    if len(targets) == 1 and rows.status[0] != Status.INVALID:
+    if len(targets) == 1 and rows.status[0] != P.INVALID:
         return
-    bad = np.flatnonzero(rows.status == Status.INVALID)
+    bad = np.flatnonzero(rows.status == P.INVALID)
     if not len(bad):
         return
     if options.on_invalid == "raise":

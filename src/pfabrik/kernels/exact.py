@@ -58,11 +58,10 @@ def reach_exact(plan: Plan, b: int, now: Configuration, mode: float, slack: floa
         outer = math.sqrt(outer * outer - off_plane * off_plane)
         d = flatten(sub(target, base), normal)
         distance = norm(d)
-        if distance <= slack:  # the target is on the base joint: any direction serves, the present one is kept
+        if distance <= slack:  # the target is on the base joint: any direction serves: home's
             if abs(inner - outer) > slack:
                 return False
-            side = flatten(sub(vec(now.nodes[first + 1]), base), normal)
-            put(now.nodes[first + 1], along(base, inner / norm(side), side))
+            put(now.nodes[first + 1], along(base, inner, turn(carrier, vec(branch["reference"]))))
             return True
         if distance > inner + outer + slack or distance < abs(inner - outer) - slack:
             return False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ._jit import inlined, routine
 from .exact import reach_exact
 from .frames import move_carriers
@@ -85,63 +87,69 @@ def end_gap(plan: Plan, b: int, now: Configuration) -> float:
 
 
 @inlined
-def branch_is_reached(plan: Plan, b: int, now: Configuration, slack: float) -> bool:
-    gap, excess = measure_branch(plan, b, now)
-    return gap <= slack and excess * plan.scalars[LENGTH] <= slack
-
-
-@inlined
-def trunk_is_within(plan: Plan, c: int, now: Configuration, slack: float) -> bool:
-    """Whether the trunk joints of a chain keep their ranges."""
+def measure_chain_trunk(plan: Plan, c: int, now: Configuration) -> float:
+    """Largest excess of the trunk joints of a chain over their ranges [L or rad]."""
+    excess = 0.0
     trunk = plan.chains[c]["trunk"]
     if trunk >= 0:
         for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
             joint = plan.trunk_joints[j]
-            unit = 1.0 if joint["kind"] == SLIDE else plan.scalars[LENGTH]
-            if max(joint["lo"] - now.trunks[j], now.trunks[j] - joint["hi"]) * unit > slack:
-                return False
-    return True
+            over = max(joint["lo"] - now.trunks[j], now.trunks[j] - joint["hi"])
+            excess = max(excess, over / plan.scalars[LENGTH] if joint["kind"] == SLIDE else over)
+    return excess
 
 
 @routine
 def chain_is_reached(plan: Plan, c: int, now: Configuration, slack: float) -> bool:
-    if not trunk_is_within(plan, c, now, slack):
+    if measure_chain_trunk(plan, c, now) * plan.scalars[LENGTH] > slack:
         return False
     for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-        if not branch_is_reached(plan, b, now, slack):
+        gap, excess = measure_branch(plan, b, now)
+        if gap > slack or excess * plan.scalars[LENGTH] > slack:
             return False
     return True
 
 
 @inlined
-def reach_branch_exactly(plan: Plan, b: int, now: Configuration, mode: float, settings: Settings) -> bool:
-    """The closed form of one branch, in the seed's mode and, where allowed, in the other; limits checked."""
+def reach_branch_exactly(
+    plan: Plan, b: int, now: Configuration, mode: float, settings: Settings
+) -> tuple[bool, float, float]:
+    """The closed form of one branch, in the seed's mode and, where allowed, in the other.
+
+    Whether it reaches with all limits kept, and the gap [length] and excess [L or rad] measured.
+    """
+    gap, excess = math.inf, math.inf
     for _mode in range(1 + settings.any_mode):
         if not reach_exact(plan, b, now, mode, settings.slack):
-            return False
-        if branch_is_reached(plan, b, now, settings.slack):
-            return True
+            break
+        gap, excess = measure_branch(plan, b, now)
+        if gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack:
+            return True, gap, excess
         mode = -mode
-    return False
+    return False, gap, excess
 
 
 @inlined
-def reach_chain_directly(plan: Plan, c: int, now: Configuration, modes: Floats, settings: Settings) -> bool:
-    """One chain by closed forms alone, its trunk (if any) left where it is."""
-    if not trunk_is_within(plan, c, now, settings.slack):
-        return False
+def reach_chain_directly(
+    plan: Plan, c: int, now: Configuration, modes: Floats, settings: Settings
+) -> tuple[bool, float, float]:
+    """One chain by closed forms alone, its trunk (if any) left where it is; returns as `reach_branch_exactly`."""
+    gap, excess = 0.0, measure_chain_trunk(plan, c, now)
+    reached = excess * plan.scalars[LENGTH] <= settings.slack
     for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-        if plan.branches[b]["kind"] == PASSES:
-            return False
-        if not reach_branch_exactly(plan, b, now, modes[b], settings):
-            return False
-    return True
+        if reached:
+            reached = plan.branches[b]["kind"] != PASSES
+        if reached:
+            reached, branch_gap, branch_excess = reach_branch_exactly(plan, b, now, modes[b], settings)
+            gap, excess = max(gap, branch_gap), max(excess, branch_excess)
+    return reached, gap, excess
 
 
 @routine
 def try_directly(plan: Plan, c: int, now: Configuration, modes: Floats, settings: Settings) -> bool:
     """`reach_chain_directly`, compiled once for the iterations to call."""
-    return reach_chain_directly(plan, c, now, modes, settings)
+    reached, _gap, _excess = reach_chain_directly(plan, c, now, modes, settings)
+    return reached
 
 
 @routine

@@ -9,7 +9,7 @@ import numpy as np
 from ._jit import allocator, inlined, kernel, routine
 from .exact import branch_mode
 from .frames import identity_pose, move_carriers, orthonormalise
-from .measure import measure_all, measure_configuration, pose_errors, read_coordinate
+from .measure import measure_configuration, pose_errors, read_coordinate
 from .plan import (
     FAILED,
     HOLD_NOTHING,
@@ -150,9 +150,8 @@ def home_modes(plan: Plan, now: Configuration, modes: Floats) -> None:
 
 
 @inlined
-def write_row(plan: Plan, i: int, status: int, now: Configuration, wanted: Floats, target: Floats, rows: Rows) -> None:
-    """The answer of row `i`: the configuration, measured."""
-    rows.status[i] = status
+def write_row(plan: Plan, i: int, now: Configuration, rows: Rows) -> None:
+    """The configuration that answers row `i`, and its actuators."""
     for k in range(4):
         for j in range(4):
             rows.poses[i, k, j] = now.pose[k, j]
@@ -163,12 +162,6 @@ def write_row(plan: Plan, i: int, status: int, now: Configuration, wanted: Float
         rows.trunks[i, j] = now.trunks[j]
     for j in range(rows.actuators.shape[1]):
         rows.actuators[i, j] = read_coordinate(plan, j, now)
-    gap, excess = measure_all(plan, now)
-    distance, angle = pose_errors(plan, now.pose, wanted, target)
-    rows.measures[i, 0] = distance
-    rows.measures[i, 1] = angle
-    rows.measures[i, 2] = gap
-    rows.measures[i, 3] = excess
 
 
 @kernel
@@ -182,24 +175,33 @@ def solve_directly(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings
     first_modes = np.ones(plan.branches.shape[0])
     home_modes(plan, now, first_modes)
     wanted = np.zeros((4, 4))
+    shared = seeds.poses.shape[0] == 1
+    copy_row(first_modes, modes)
+    if targets.shape[0] > 0:
+        load_seed(plan, seeds, 0, now, modes)
     pending = 0
     for i in range(targets.shape[0]):
         if not load_target(plan, targets[i], wanted):
             rows.status[i] = INVALID
             continue
-        for b in range(modes.shape[0]):
-            modes[b] = first_modes[b]
-        load_seed(plan, seeds, i, now, modes)
-        for k in range(4):
-            for j in range(4):
-                now.pose[k, j] = wanted[k, j]
-        reached = settings.exact == 1
+        if not shared:
+            copy_row(first_modes, modes)
+            load_seed(plan, seeds, i, now, modes)
+        copy_table(wanted, now.pose)
+        reached, gap, excess = settings.exact == 1, 0.0, 0.0
         for c in range(plan.chains.shape[0]):
-            reached = reached and reach_chain_directly(plan, c, now, modes, settings)
+            if reached:
+                reached, chain_gap, chain_excess = reach_chain_directly(plan, c, now, modes, settings)
+                gap, excess = max(gap, chain_gap), max(excess, chain_excess)
         if reached:
+            rows.status[i] = REACHED
             rows.counters[i, 0] = 1
             rows.counters[i, 1] = 0
-            write_row(plan, i, REACHED, now, wanted, targets[i], rows)
+            write_row(plan, i, now, rows)
+            rows.measures[i, 0] = 0.0
+            rows.measures[i, 1] = 0.0
+            rows.measures[i, 2] = gap
+            rows.measures[i, 3] = excess
         else:
             rows.status[i] = PENDING
             pending += 1
@@ -207,11 +209,11 @@ def solve_directly(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings
 
 
 @routine
-def write_answer(
-    plan: Plan, i: int, status: int, now: Configuration, wanted: Floats, target: Floats, rows: Rows
-) -> None:
-    """`write_row`, compiled once for the iterations to call."""
-    write_row(plan, i, status, now, wanted, target, rows)
+def write_answer(plan: Plan, i: int, now: Configuration, wanted: Floats, target: Floats, rows: Rows) -> None:
+    """The answer of row `i`: the configuration, measured."""
+    write_row(plan, i, now, rows)
+    rows.measures[i, 0], rows.measures[i, 1] = pose_errors(plan, now.pose, wanted, target)
+    rows.measures[i, 2], rows.measures[i, 3] = measure_configuration(plan, now)
 
 
 @routine
@@ -253,7 +255,7 @@ def solve_row(
             step_back(plan, safe, wanted, now, work, settings)
     rows.counters[i, 0] = iterations
     rows.counters[i, 1] = rounds
-    write_answer(plan, i, REACHED, now, wanted, targets[i], rows)
+    write_answer(plan, i, now, wanted, targets[i], rows)
     rows.status[i] = judge_row(plan, i, settings, rows)
 
 

@@ -1,0 +1,221 @@
+"""How fast it is: every time next to a baseline measured in the same run, by turns, so that noise hits both.
+
+python benchmarks/run.py [--quick] [--markdown]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from closed_forms import Array, FiveBar, Struts
+
+import pfabrik as pf
+
+Solve = Callable[[], object]
+HOLD_NOTHING = pf.Options(hold=None)
+
+USE_EVERYTHING = """
+import time, numpy as np
+start = time.perf_counter()
+import pfabrik as pf
+for name in pf.catalog():
+    m = pf.load(name)
+    pf.solve_ik(m, m.home_pose)
+    pf.solve_ik(m, np.array(m.reference_point) * 3.0).active_limits
+    pf.track(m, np.array([m.reference_point] * 2))
+print(time.perf_counter() - start)
+"""
+IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.perf_counter() - start)"
+
+
+class Row(NamedTuple):
+    """One line of the table; times in seconds a pose (or in all)."""
+
+    what: str
+    poses: int
+    seconds: float
+    baseline: str = ""
+    baseline_seconds: float = float("nan")
+
+
+def best_times(runs: int, *solves: Solve) -> list[float]:
+    """Shortest time of each [s], run by turns after one run to warm up."""
+    best = [float("inf")] * len(solves)
+    for solve in solves:
+        solve()
+    for _ in range(runs):
+        for i, solve in enumerate(solves):
+            start = time.perf_counter()
+            solve()
+            best[i] = min(best[i], time.perf_counter() - start)
+    return best
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep this thread, and with it a batch, on one core."""
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
+def draw(mechanism: pf.Mechanism, rng: np.random.Generator, n: int, size: float, tilt: float) -> Array:
+    """Poses (n, 4, 4) about home's: in a box of half width `size` L, turned by up to `tilt` [rad] about each axis."""
+    targets = np.tile(mechanism.home_pose, (n, 1, 1))
+    targets[:, :3, 3] += rng.uniform(-size, size, (n, 3)) * mechanism.characteristic_length
+    if mechanism.end_effector_is_joint:
+        axis = np.array(mechanism.joint(mechanism.end_effector).axis)
+        targets[:, :3, 3] -= ((targets[:, :3, 3] - mechanism.reference_point) @ axis)[:, None] * axis
+        return targets
+    for target in targets:
+        target[:3, :3] = pf.pose((0, 0, 0), rotvec=rng.uniform(-tilt, tilt, 3))[:3, :3]
+    return targets
+
+
+def agree(solution: pf.Solution, values: Array) -> None:
+    """Stop when the closed form answers differently: then the comparison would mean nothing."""
+    if not solution or np.abs(solution.actuators - values).max() > 1e-6 * solution.mechanism.characteristic_length:
+        sys.exit(f"the closed form disagrees with {solution!r}")
+
+
+def single_calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
+    """One call at a time from Python, kernels loaded."""
+    mechanism = pf.load("stewart")
+    struts, calls = Struts(mechanism), 200
+    drawn = draw(mechanism, rng, 4 * calls, 0.2, 0.2)
+    targets = list(drawn[struts.solve(drawn)[1]][:calls])
+    ours, theirs = best_times(
+        runs,
+        lambda: [pf.solve_ik(mechanism, target) for target in targets],
+        lambda: [struts.one(target) for target in targets],
+    )
+    baseline = "NumPy, lengths and strokes of one pose"
+    yield Row("6-UPS, one call, reachable", calls, ours / len(targets), baseline, theirs / len(targets))
+
+
+def batches(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
+    """Reachable batches: on one core and on all, next to vectorised closed forms (which use one)."""
+    for name, closed, what in (("stewart", Struts, "6-UPS"), ("five_bar", FiveBar, "5-bar")):
+        mechanism = pf.load(name)
+        form = closed(mechanism)
+        drawn = draw(mechanism, rng, 4 * n, 0.2, 0.2)
+        targets = drawn[form.solve(drawn)[1]][:n]
+        agree(pf.solve_ik(mechanism, targets), form.solve(targets)[0])
+        baselines = {"vectorised NumPy, all limits": lambda form=form, t=targets: form.solve(t)}
+        if name == "stewart":
+            baselines["vectorised NumPy, lengths only"] = lambda form=form, t=targets: form.lengths(t)
+        yield from batch_rows(mechanism, f"{what}, batch, reachable", targets, baselines, runs)
+    mechanism = pf.load("nrpm")
+    drawn = draw(mechanism, rng, n // 5, 0.1, 0.1)
+    targets = drawn[pf.solve_ik(mechanism, drawn).status == pf.Status.REACHED][: n // 20]
+    struts = Struts(mechanism)
+    baselines = {"vectorised NumPy, six lengths, arms unmoved": lambda: struts.lengths(targets)}
+    yield from batch_rows(mechanism, "NRPM, batch, reachable", targets, baselines, runs)
+
+
+def batch_rows(
+    mechanism: pf.Mechanism, what: str, targets: Array, baselines: dict[str, Solve], runs: int
+) -> Iterator[Row]:
+    def solve() -> object:
+        return pf.solve_ik(mechanism, targets)
+
+    n = len(targets)
+    with one_core():
+        ours, *theirs = best_times(runs, solve, *baselines.values())
+    for baseline, seconds in zip(baselines, theirs, strict=True):
+        yield Row(f"{what}, one core", n, ours / n, baseline, seconds / n)
+    ours, *theirs = best_times(runs, solve, *baselines.values())
+    yield Row(f"{what}, all cores", n, ours / n, next(iter(baselines)), theirs[0] / n)
+
+
+def projections(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
+    """Targets out of reach, on one core, next to as many reachable ones."""
+    mechanism = pf.load("stewart")
+    drawn = draw(mechanism, rng, 8 * n, 1.0, 0.5)
+    far = drawn[~Struts(mechanism).solve(drawn)[1]][:n]
+    near = draw(mechanism, rng, n, 0.05, 0.05)
+    agree(pf.solve_ik(mechanism, near), Struts(mechanism).lengths(near))
+    with one_core():
+        reached, holding, free = best_times(
+            runs,
+            lambda: pf.solve_ik(mechanism, near),
+            lambda: pf.solve_ik(mechanism, far),
+            lambda: pf.solve_ik(mechanism, far, options=HOLD_NOTHING),
+        )
+    for what, seconds in (("orientation", holding), ("nothing", free)):
+        yield Row(f"6-UPS, out of reach, hold {what}, one core", n, seconds / n, "reachable batch", reached / n)
+
+
+def start_up(runs: int) -> Iterator[Row]:
+    """New processes: with an empty kernel cache, then with a full one."""
+    with tempfile.TemporaryDirectory() as cache:
+        environment = os.environ | {"NUMBA_CACHE_DIR": cache, "PYTHONPATH": os.pathsep.join(sys.path)}
+
+        def measured(code: str) -> float:
+            command = [sys.executable, "-c", code]
+            return float(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
+
+        def command_line() -> None:
+            command = [sys.executable, "-m", "pfabrik", "ik", "stewart", "--position", "10", "0", "190"]
+            subprocess.run(command, env=environment, check=True, capture_output=True)
+
+        def plain_python() -> None:
+            subprocess.run([sys.executable, "-c", "import numba"], env=environment, check=True)
+
+        yield Row("compile every kernel, in an empty cache", 1, measured(USE_EVERYTHING))
+        yield Row("import, load and use every kernel, warm cache", 1, min(measured(USE_EVERYTHING) for _ in range(runs)))
+        ours, theirs = best_times(runs, command_line, plain_python)
+        yield Row("pfabrik ik stewart --position 10 0 190, warm", 1, ours, 'python -c "import numba"', theirs)
+        yield Row("import pfabrik", 1, min(measured(IMPORT) for _ in range(runs)))
+
+
+def shown(seconds: float) -> str:
+    """A time in the unit that suits it."""
+    units = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
+    size, unit = next((each for each in units if seconds >= each[0]), units[-1])
+    return f"{seconds / size:.3g} {unit}"
+
+
+def cells(row: Row) -> list[str]:
+    rate = f"{1.0 / row.seconds:,.0f}" if row.poses > 1 else ""
+    ratio = f"{row.seconds / row.baseline_seconds:.2f}" if row.baseline else ""
+    baseline = f"{row.baseline}: {shown(row.baseline_seconds)}" if row.baseline else ""
+    return [row.what, f"{row.poses:,}", shown(row.seconds), rate, baseline, ratio]
+
+
+HEADER = ["what", "poses", "time a pose", "poses/s", "baseline", "ratio"]
+
+
+def table(rows: list[list[str]], markdown: bool) -> Iterator[str]:
+    """The rows under their header, as a Markdown table or aligned."""
+    if markdown:
+        rows = [HEADER, ["---"] * len(HEADER), *rows]
+        yield from ("| " + " | ".join(row) + " |" for row in rows)
+        return
+    rows = [HEADER, *rows]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    yield from ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
+
+
+def machine() -> str:
+    """What this ran on."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    versions = f"Python {platform.python_version()}, NumPy {np.__version__}, Numba {numba.__version__}"
+    return f"{names[0] if names else platform.processor()}, {len(os.sched_getaffinity(0))} cores; {versions}"
