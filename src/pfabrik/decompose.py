@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Literal
 
+from .forms import BranchForm, NotExpressible, TrunkForm
 from .mechanism import Joint, Mechanism
-from .positions import BranchForm, NotExpressible, TrunkForm, express_branch, express_trunk
+from .positions import express_branch, express_trunk
 
 TIP = "(tip)"
 LETTERS = {"revolute": "R", "prismatic": "P", "universal": "U", "spherical": "S", "cylindrical": "C", "fixed": "F"}

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from .decompose import SubChain, decompose
 from .errors import UnsupportedMechanism
+from .forms import BranchForm, Coordinate, TrunkForm
 from .kernels import plan as P
 from .mechanism import Mechanism
-from .positions import BranchForm, Coordinate, TrunkForm
 
 _BRANCH_KINDS = {"passes": P.PASSES, "strut": P.STRUT, "dyad": P.DYAD, "rail_rod": P.RAIL_ROD}
 _CONE_KINDS = {"carrier": P.CARRIER_CONE, "link": P.LINK_CONE, "platform": P.PLATFORM_CONE}

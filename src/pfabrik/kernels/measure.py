@@ -11,6 +11,7 @@ from .plan import (
     PLATFORM_CONE,
     POINT_END,
     RAIL,
+    SLIDE,
     STROKE,
     Configuration,
     Floats,
@@ -89,30 +90,36 @@ def measure_ends(plan: Plan, branch: Records, now: Configuration, gap: float, ex
 
 
 @inlined
-def measure_trunks(plan: Plan, trunk_values: Floats) -> float:
-    """Largest limit excess of the trunk joints [L or rad]."""
+def measure_trunk(plan: Plan, trunk: int, now: Configuration) -> float:
+    """Largest excess of the joints of a trunk over their ranges [L or rad]; 0 for no trunk (-1)."""
     excess = 0.0
-    for j in range(plan.trunk_joints.shape[0]):
-        joint = plan.trunk_joints[j]
-        over = max(joint["lo"] - trunk_values[j], trunk_values[j] - joint["hi"])
-        excess = max(excess, over / plan.scalars[LENGTH] if joint["kind"] == 1 else over)
+    if trunk >= 0:
+        for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
+            joint = plan.trunk_joints[j]
+            over = max(joint["lo"] - now.trunks[j], now.trunks[j] - joint["hi"])
+            excess = max(excess, over / plan.scalars[LENGTH] if joint["kind"] == SLIDE else over)
     return excess
 
 
-@inlined
-def measure_all(plan: Plan, now: Configuration) -> tuple[float, float]:
-    """Largest gap [length] and largest limit excess [L or rad] of the whole mechanism."""
-    gap, excess = 0.0, measure_trunks(plan, now.trunks)
-    for b in range(plan.branches.shape[0]):
+@routine
+def measure_chain(plan: Plan, c: int, now: Configuration) -> tuple[float, float]:
+    """Largest gap [length] and largest limit excess [L or rad] of one chain."""
+    chain = plan.chains[c]
+    gap, excess = 0.0, measure_trunk(plan, chain["trunk"], now)
+    for b in range(chain["first"], chain["last"]):
         branch_gap, branch_excess = measure_branch(plan, b, now)
         gap, excess = max(gap, branch_gap), max(excess, branch_excess)
     return gap, excess
 
 
 @routine
-def measure_configuration(plan: Plan, now: Configuration) -> tuple[float, float]:
-    """`measure_all`, compiled once for the iterations to call."""
-    return measure_all(plan, now)
+def measure_all(plan: Plan, now: Configuration) -> tuple[float, float]:
+    """Largest gap [length] and largest limit excess [L or rad] of the whole mechanism."""
+    gap, excess = 0.0, 0.0
+    for c in range(plan.chains.shape[0]):
+        chain_gap, chain_excess = measure_chain(plan, c, now)
+        gap, excess = max(gap, chain_gap), max(excess, chain_excess)
+    return gap, excess
 
 
 @inlined

@@ -31,7 +31,6 @@ _vector = ("f8", (3,))
 NODE = np.dtype(
     [
         ("home", *_vector),
-        ("shift", "f8"),  # the joint's centre is the node + shift * the branch's normal
         ("lo", "f8"),  # length of the segment from the previous node
         ("hi", "f8"),
         ("hinge", "i8"),  # 1: the next segment stays in the branch's plane

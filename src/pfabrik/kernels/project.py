@@ -5,7 +5,7 @@ from __future__ import annotations
 from ._jit import routine
 from .frames import move_carriers, orthonormalise, rotation_between, turn_pose, turn_pose_by_vector
 from .linear import solve_spd
-from .measure import measure_configuration
+from .measure import measure_all
 from .plan import (
     HOLD_ORIENTATION,
     HOLD_POSITION,
@@ -20,8 +20,9 @@ from .plan import (
 )
 from .reach import end_gap, reach_backward, reach_by_passes, try_directly
 from .search import NEAR, place_ends, reach_pose
-from .settle import TRANSLATES, TURNS, note_violations, settle, trunk_span
+from .settle import TRANSLATES, TURNS, settle
 from .vectors import add, along, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec
+from .violations import note_violations, trunk_span
 
 # Batches of rounds, each followed by a try of the exact step.
 TRIES = 2
@@ -161,7 +162,7 @@ def project_target(
             for c in range(plan.chains.shape[0]):
                 place_ends(plan, c, now)
         if settle(plan, 0, plan.chains.shape[0], free, now, work):
-            gap, excess = measure_configuration(plan, now)
+            gap, excess = measure_all(plan, now)
             if gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack:
                 return True, iterations, rounds
     return False, iterations, rounds

@@ -8,7 +8,7 @@ from ._jit import inlined, routine
 from .exact import reach_exact
 from .frames import move_carriers
 from .linear import solve_spd
-from .measure import measure_branch
+from .measure import measure_branch, measure_chain, measure_trunk
 from .plan import LENGTH, PASSES, PLATFORM_CONE, SLIDE, Configuration, Floats, Plan, Records, Settings
 from .restrict import NO_LENGTH, clamp_cone, clamp_stroke, cone_axis, restrict_step
 from .vectors import Vec, along, cross, dot, flatten, move, norm, put, sub, turn, vec
@@ -86,28 +86,10 @@ def end_gap(plan: Plan, b: int, now: Configuration) -> float:
     return norm(sub(vec(now.nodes[branch["last"]]), move(now.pose, vec(branch["end"]))))
 
 
-@inlined
-def measure_chain_trunk(plan: Plan, c: int, now: Configuration) -> float:
-    """Largest excess of the trunk joints of a chain over their ranges [L or rad]."""
-    excess = 0.0
-    trunk = plan.chains[c]["trunk"]
-    if trunk >= 0:
-        for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
-            joint = plan.trunk_joints[j]
-            over = max(joint["lo"] - now.trunks[j], now.trunks[j] - joint["hi"])
-            excess = max(excess, over / plan.scalars[LENGTH] if joint["kind"] == SLIDE else over)
-    return excess
-
-
 @routine
 def chain_is_reached(plan: Plan, c: int, now: Configuration, slack: float) -> bool:
-    if measure_chain_trunk(plan, c, now) * plan.scalars[LENGTH] > slack:
-        return False
-    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-        gap, excess = measure_branch(plan, b, now)
-        if gap > slack or excess * plan.scalars[LENGTH] > slack:
-            return False
-    return True
+    gap, excess = measure_chain(plan, c, now)
+    return gap <= slack and excess * plan.scalars[LENGTH] <= slack
 
 
 @inlined
@@ -134,7 +116,7 @@ def reach_chain_directly(
     plan: Plan, c: int, now: Configuration, modes: Floats, settings: Settings
 ) -> tuple[bool, float, float]:
     """One chain by closed forms alone, its trunk (if any) left where it is; returns as `reach_branch_exactly`."""
-    gap, excess = 0.0, measure_chain_trunk(plan, c, now)
+    gap, excess = 0.0, measure_trunk(plan, plan.chains[c]["trunk"], now)
     reached = excess * plan.scalars[LENGTH] <= settings.slack
     for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
         if reached:

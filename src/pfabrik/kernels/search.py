@@ -8,8 +8,9 @@ from ._jit import routine
 from .frames import move_carriers
 from .plan import LENGTH, PASSES, TURN, Configuration, Plan, Settings, Work
 from .reach import chain_is_reached, reach_by_passes, try_directly
-from .settle import note_violations, settle
+from .settle import settle
 from .vectors import add, along, copy_row, copy_table, dot, move, put, scale, sub, vec
+from .violations import note_violations
 
 # Passes bring a chain within this share of L before the exact step takes over.
 NEAR = 1e-3

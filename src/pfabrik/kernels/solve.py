@@ -9,7 +9,7 @@ import numpy as np
 from ._jit import allocator, inlined, kernel, routine
 from .exact import branch_mode
 from .frames import identity_pose, move_carriers, orthonormalise
-from .measure import measure_configuration, pose_errors, read_coordinate
+from .measure import measure_all, pose_errors, read_coordinate
 from .plan import (
     FAILED,
     HOLD_NOTHING,
@@ -213,7 +213,7 @@ def write_answer(plan: Plan, i: int, now: Configuration, wanted: Floats, target:
     """The answer of row `i`: the configuration, measured."""
     write_row(plan, i, now, rows)
     rows.measures[i, 0], rows.measures[i, 1] = pose_errors(plan, now.pose, wanted, target)
-    rows.measures[i, 2], rows.measures[i, 3] = measure_configuration(plan, now)
+    rows.measures[i, 2], rows.measures[i, 3] = measure_all(plan, now)
 
 
 @routine
@@ -326,7 +326,7 @@ def solve_by_iteration(plan: Plan, targets: Floats, seeds: Seeds, settings: Sett
             copy_table(seeds.poses[i if seeds.poses.shape[0] > 1 else 0], now.pose)
         else:
             read_modes(plan, now, work.modes)
-        gap, excess = measure_configuration(plan, now)
+        gap, excess = measure_all(plan, now)
         feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack
         copy_configuration(plan, now if feasible else home, safe)
         solve_row(plan, i, targets, wanted, safe, now, work, settings, rows)

@@ -1,0 +1,83 @@
+"""What is known of a sub-chain once it is expressed in positions: nodes, strokes, hinges, cones, coordinates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+Interval: TypeAlias = tuple[float, float]
+FREE: Interval = (-math.inf, math.inf)
+
+
+class NotExpressible(Exception):
+    """Positions alone cannot express this chain; the text says why."""
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """Where the coordinate of a joint is read: value = offset + sign * reading."""
+
+    joint: str
+    kind: Literal["stroke", "rail", "hinge", "end_hinge", "trunk"]
+    index: int  # node of the branch, or joint of the trunk
+    sign: float
+    offset: float
+    limits: Interval
+    actuated: bool
+
+
+@dataclass(frozen=True)
+class NodeForm:
+    """A node at home; `stroke` is the length allowed to the segment before it, `turn` the range of the hinge in it."""
+
+    joint: str
+    at: Array
+    shift: float = 0.0
+    stroke: Interval = (0.0, 0.0)
+    hinge: bool = False
+    turn: Interval = FREE
+    angle_home: float = 0.0
+
+
+@dataclass(frozen=True)
+class ConeForm:
+    """A cone at a node: about an axis of the carrier, of the link before it, or of the platform."""
+
+    joint: str
+    kind: Literal["carrier", "link", "platform"]
+    node: int
+    axis: Array
+    half_angle: float
+
+
+@dataclass(frozen=True)
+class TrunkForm:
+    """The joints between the base and the body that carries several branches."""
+
+    points: tuple[Array, ...]
+    axes: tuple[Array, ...]
+    slides: tuple[bool, ...]
+    ranges: tuple[Interval, ...]
+    coordinates: tuple[Coordinate, ...]
+
+
+@dataclass(frozen=True)
+class BranchForm:
+    """One branch as nodes and restrictions, at home, in base coordinates."""
+
+    nodes: tuple[NodeForm, ...]
+    planar: int
+    normal: Array
+    end_normal: Array | None
+    align: bool
+    end_turn: Interval
+    rail: Array | None
+    rail_range: Interval
+    cones: tuple[ConeForm, ...]
+    coordinates: tuple[Coordinate, ...]
+    kind: Literal["passes", "strut", "dyad", "rail_rod"]
