@@ -8,11 +8,11 @@ from itertools import chain
 from typing import Literal
 
 from .forms import BranchForm, NotExpressible, TrunkForm
+from .joint_types import KINDS
 from .mechanism import Joint, Mechanism
 from .positions import express_branch, express_trunk
 
 TIP = "(tip)"
-LETTERS = {"revolute": "R", "prismatic": "P", "universal": "U", "spherical": "S", "cylindrical": "C", "fixed": "F"}
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Step:
         return self.joint.connects[0 if self.forward else 1]
 
     def __str__(self) -> str:
-        return LETTERS[self.joint.type] + ("*" if self.joint.actuated else "")
+        return KINDS[self.joint.type].letter + ("*" if self.joint.actuated else "")
 
 
 @dataclass(frozen=True)

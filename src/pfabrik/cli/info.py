@@ -11,6 +11,7 @@ import click
 
 import pfabrik as pf
 
+from ..freedom import end_effector_freedom
 from ..joint_types import KINDS
 from .table import aligned
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 def info(mech: str) -> int:
     """Show what a mechanism is made of.
 
-    Its sub-chains in the field's notation and the engine that solves them, joints, limits, actuators and task.
+    Its sub-chains in the field's notation and the engine that solves them, joints, limits, actuators, freedom and task.
     """
     mechanism = pf.load(mech)
     click.echo(summary(mechanism) + "\n")
@@ -43,9 +44,18 @@ def summary(mechanism: Mechanism) -> str:
             f"end effector           {kind} {mechanism.end_effector}, reference point ({point})",
             f"task                   {' '.join(mechanism.task)}",
             f"actuators              {' '.join(mechanism.actuators)}",
+            f"freedom                {freedom(mechanism)}",
             f"characteristic length  {mechanism.characteristic_length:.6g} {mechanism.length_unit}",
         ]
     )
+
+
+def freedom(mechanism: Mechanism) -> str:
+    """What the end effector can do at home, against what drives it; counted to first order."""
+    own, left = (end_effector_freedom(mechanism, frozenset(locked)) for locked in ((), mechanism.actuators))
+    n = len(mechanism.actuators)
+    text = f"{own} at home, {n} actuated" + (f", redundancy {n - own}" if n > own else "")
+    return text + (f"; {left} left free with all actuators locked" if left else "")
 
 
 def joint_table(mechanism: Mechanism) -> str:
