@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pfabrik as pf
+from pfabrik.decompose import Step
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -121,7 +122,7 @@ class FiveBar:
         return np.stack(angles, axis=1), reached[0] & reached[1]
 
 
-def _crank(steps: tuple[pf.decompose.Step, ...]) -> _Crank:  # type: ignore[name-defined]
+def _crank(steps: tuple[Step, ...]) -> _Crank:
     shoulder, elbow, tip = (step.joint for step in steps)
     normal = np.array(shoulder.axis)
     plane = np.linalg.svd(normal[None])[2][1:]

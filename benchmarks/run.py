@@ -198,6 +198,10 @@ def cells(row: Row) -> list[str]:
     return [row.what, f"{row.poses:,}", shown(row.seconds), rate, baseline, ratio]
 
 
+NOTE = """Times are the shortest of several runs, subject and baseline by turns. A ratio is time by time of the baseline:
+below 1 is faster. The closed forms in benchmarks/closed_forms.py know their machine, use one core, and return numbers
+and a flag; pfabrik returns poses, points, errors and measures as well. The answers are compared before the clock runs.
+Times of new processes are for all of it, not a pose."""
 HEADER = ["what", "poses", "time a pose", "poses/s", "baseline", "ratio"]
 
 
@@ -219,3 +223,26 @@ def machine() -> str:
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     versions = f"Python {platform.python_version()}, NumPy {np.__version__}, Numba {numba.__version__}"
     return f"{names[0] if names else platform.processor()}, {len(os.sched_getaffinity(0))} cores; {versions}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer poses and runs, kernels not compiled anew")
+    parser.add_argument("--markdown", action="store_true", help="the table as the page docs/benchmarks.md")
+    given = parser.parse_args()
+    runs, rng = (3 if given.quick else 15), np.random.default_rng(1)
+    rows = [
+        *single_calls(rng, runs),
+        *batches(rng, runs, 10_000 if given.quick else 100_000),
+        *projections(rng, runs, 100 if given.quick else 1000),
+        *([] if given.quick else start_up(5)),
+    ]
+    if given.markdown:
+        print("# Benchmarks\n\nWritten by `python benchmarks/run.py --markdown`.\n")
+    print(machine(), end="\n\n")
+    print("\n".join(table([cells(row) for row in rows], given.markdown)))
+    print(f"\n{NOTE}")
+
+
+if __name__ == "__main__":
+    main()

@@ -56,7 +56,7 @@ class Flat:
 def flatten(mechanism: Mechanism) -> Flat:
     """Compile a mechanism; `UnsupportedMechanism` names every sub-chain that positions cannot express."""
     chains = decompose(mechanism)
-    reasons = [f"sub-chain {chain} {chain.reason}" for chain in chains if chain.reason is not None]
+    reasons = [f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None]
     builder = _Builder(mechanism)
     if not reasons:
         for chain in chains:

@@ -22,5 +22,5 @@ def check(mech: str) -> int:
     )
     for chain in chains:
         if chain.reason is not None:
-            click.echo(f"sub-chain {chain} cannot be solved yet: it {chain.reason}", err=True)
+            click.echo(f"sub-chain {chain} cannot be solved yet: {chain.reason}", err=True)
     return 0
