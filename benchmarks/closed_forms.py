@@ -24,7 +24,8 @@ class Struts:
     def __init__(self, mechanism: pf.Mechanism) -> None:
         struts = [joint for joint in mechanism.joints if joint.along is not None]
         ends = [[mechanism.joint(name) for name in strut.along or ()] for strut in struts]
-        feet, heads = zip(*(sorted(pair, key=lambda joint: mechanism.end_effector in joint.connects) for pair in ends))
+        ends = [sorted(pair, key=lambda joint: mechanism.end_effector in joint.connects) for pair in ends]
+        feet, heads = zip(*ends, strict=True)
         self.feet = np.array([joint.at for joint in feet])
         self.tops = np.array([joint.at for joint in heads]) - mechanism.reference_point
         self.low, self.high = np.array([strut.range for strut in struts]).T

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import sys
 import threading
@@ -57,7 +58,9 @@ def kernel(function: F) -> F:
     """Compile `function` for any thread: no GIL, IEEE division, results cached on disk."""
     dispatcher: Any = _njit(nogil=True, error_model="numpy")(function)
     if not _config.DISABLE_JIT:
-        dispatcher._cache = _KernelCache(function)
+        # where neither the package's folder nor the user's cache can be written, every process compiles anew
+        with contextlib.suppress(RuntimeError):
+            dispatcher._cache = _KernelCache(function)
     return dispatcher
 
 
