@@ -24,11 +24,12 @@ from .settle import TRANSLATES, TURNS, settle
 from .vectors import add, along, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec
 from .violations import note_violations, trunk_span
 
-# Batches of rounds, each followed by a try of the exact step.
-TRIES = 2
 # Steps tried on the way back from an infeasible pose to a feasible one, and the share of the way not worth a try.
 TRIALS = 60
 SHORTEST_STEP = 1e-9
+# A best fit turns by one linear step a round: at most so far [rad], and damped for points on a line, whose turn about
+# it is free.
+LARGEST_TURN, FIT_DAMPING = 0.5, 1e-9
 
 
 @routine
@@ -123,11 +124,11 @@ def turn_to_fit(plan: Plan, now: Configuration, work: Work, about_reference: boo
             system[i, 3] += moment[i]
             for j in range(3):
                 system[i, j] += (square if i == j else 0.0) - arm[i] * arm[j]
-    solve_spd(system, 3, 1e-9)
+    solve_spd(system, 3, FIT_DAMPING)
     w = (system[0, 3], system[1, 3], system[2, 3])
     size = norm(w)
-    if size > 0.5:
-        w = scale(0.5 / size, w)
+    if size > LARGEST_TURN:
+        w = scale(LARGEST_TURN / size, w)
     fixed = add(p, turn(now.pose, centre))
     turn_pose_by_vector(now.pose, w)
     moved = sub(fixed, turn(now.pose, centre))
@@ -136,9 +137,7 @@ def turn_to_fit(plan: Plan, now: Configuration, work: Work, about_reference: boo
 
 
 @routine
-def project_target(
-    plan: Plan, target: Floats, hold: int, now: Configuration, work: Work, settings: Settings
-) -> tuple[bool, int, int]:
+def project_target(plan: Plan, hold: int, now: Configuration, work: Work, settings: Settings) -> tuple[bool, int, int]:
     """Revise the target round by round, then settle; True with a feasible configuration in `now`."""
     iterations, rounds = 0, 0
     free = TRANSLATES | TURNS
@@ -147,25 +146,23 @@ def project_target(
     elif hold == HOLD_POSITION:
         free = TURNS
     enough = settings.tolerance if settings.exact == 0 else NEAR * plan.scalars[LENGTH]
-    for _try in range(TRIES):
-        if settings.exact == 0 or largest_violation(plan, now, work) > enough:
-            for _round in range(settings.max_rounds):
-                gap, more = reach_out(plan, now, work, enough, settings)
-                iterations += more
-                if gap <= enough:
-                    break
-                rounds += 1
-                if free & TRANSLATES:
-                    move_to_centroid(plan, now)
-                if free & TURNS:
-                    turn_to_fit(plan, now, work, hold == HOLD_POSITION)
-            for c in range(plan.chains.shape[0]):
-                place_ends(plan, c, now)
-        if settle(plan, 0, plan.chains.shape[0], free, now, work):
-            gap, excess = measure_all(plan, now)
-            if gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack:
-                return True, iterations, rounds
-    return False, iterations, rounds
+    if settings.exact == 0 or largest_violation(plan, now, work) > enough:
+        for _round in range(settings.max_rounds):
+            gap, more = reach_out(plan, now, work, enough, settings)
+            iterations += more
+            if gap <= enough:
+                break
+            rounds += 1
+            if free & TRANSLATES:
+                move_to_centroid(plan, now)
+            if free & TURNS:
+                turn_to_fit(plan, now, work, hold == HOLD_POSITION)
+        for c in range(plan.chains.shape[0]):
+            place_ends(plan, c, now)
+    settle(plan, 0, plan.chains.shape[0], free, now, work)
+    gap, excess = measure_all(plan, now)
+    feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack
+    return feasible, iterations, rounds
 
 
 @routine

@@ -17,6 +17,8 @@ from .vectors import Vec, along, cross, dot, flatten, move, norm, put, sub, turn
 STALL = 1e-3
 # ... unless it moves on after a while: so many stalls in a row are believed.
 STALLS = 4
+# Two Gauss-Newton steps fit a trunk well enough for one pass; damped where a joint moves no branch joint.
+FIT_STEPS, FIT_DAMPING = 2, 1e-12
 
 
 @routine
@@ -178,7 +180,7 @@ def fit_trunk(plan: Plan, c: int, now: Configuration, wanted: Floats, system: Fl
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
     n = last - first
-    for _step in range(2):
+    for _step in range(FIT_STEPS):
         for i in range(n):
             for j in range(n + 1):
                 system[i, j] = 0.0
@@ -190,7 +192,7 @@ def fit_trunk(plan: Plan, c: int, now: Configuration, wanted: Floats, system: Fl
                 system[i, n] += dot(rate, miss)
                 for j in range(n):
                     system[i, j] += dot(rate, point_rate(plan, now, first + j, present))
-        solve_spd(system, n, 1e-12)
+        solve_spd(system, n, FIT_DAMPING)
         for i in range(n):
             joint = plan.trunk_joints[first + i]
             value = now.trunks[first + i] + system[i, n]

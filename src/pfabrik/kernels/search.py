@@ -18,6 +18,8 @@ NEAR = 1e-3
 CLOSE = 0.1
 # Other starts tried before a target is called out of reach; for trunks, each is the best of so many samples.
 RESTARTS = 8
+# Starts of a trunk in a row that come no nearer end the search: each is the best of an even spread already.
+VAIN = 3
 SAMPLES = 24
 # A start replaces the present one only where it comes notably nearer: share of the squared violation.
 NOTABLY = 0.25
@@ -159,6 +161,7 @@ def reach_chain(plan: Plan, c: int, now: Configuration, work: Work, settings: Se
         return reached, iterations
     least = violation(plan, c, now, work)
     keep_best(now, work)
+    vain = 0
     for attempt in range(RESTARTS):
         start_anew(plan, c, attempt, now, work)
         # a trunk's samples are near enough for the exact step at once
@@ -168,8 +171,12 @@ def reach_chain(plan: Plan, c: int, now: Configuration, work: Work, settings: Se
             return True, iterations
         size = violation(plan, c, now, work)
         if size < NOTABLY * least:
-            least = size
+            least, vain = size, 0
             keep_best(now, work)
+        else:
+            vain += 1
+            if vain >= VAIN and plan.chains[c]["trunk"] >= 0:
+                break
     return_to_best(plan, now, work)
     return False, iterations
 

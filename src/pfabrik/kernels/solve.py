@@ -245,7 +245,7 @@ def solve_row(
             copy_table(work.seed_nodes, now.nodes)
             copy_row(work.seed_trunks, now.trunks)
             move_carriers(plan, now)
-            reached, more, more_rounds = project_target(plan, wanted, hold, now, work, staying)
+            reached, more, more_rounds = project_target(plan, hold, now, work, staying)
             iterations += more
             rounds += more_rounds
             if reached or hold == HOLD_NOTHING or plan.scalars[POINT_END] == 1.0:
