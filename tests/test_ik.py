@@ -14,6 +14,8 @@ import oracles
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
+from pfabrik.kernels import solve as kernels
+from pfabrik.tolerances import TOLERANCES
 
 CATALOGUE = ("five_bar", "stewart", "nrpm")
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -282,6 +284,10 @@ def test_rotations_are_accepted_up_to_the_stated_deviation() -> None:
         else:
             with pytest.raises(InvalidArgument):
                 pf.solve_ik(mechanism, target)
+
+
+def test_the_kernels_and_the_library_agree_on_what_a_rotation_is() -> None:
+    assert kernels.NOT_A_ROTATION == TOLERANCES.rotation_matrix
 
 
 def test_seeds_that_do_not_fit_are_refused() -> None:

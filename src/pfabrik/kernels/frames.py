@@ -8,6 +8,9 @@ from ._jit import routine
 from .plan import TURN, Configuration, Floats, Plan
 from .vectors import Vec, add, along, cross, dot, norm, put, rotate, scale, sub, turn, vec
 
+# Above this sine of its angle a rotation shows its axis to twelve digits; below it, the limits at 0 and pi serve.
+SURE_SINE = 1e-4
+
 
 @routine
 def identity_pose(T: Floats) -> None:
@@ -94,7 +97,7 @@ def rotation_between(A: Floats, B: Floats) -> Vec:
     sine = 0.5 * norm(twice_sine)
     cosine = 0.5 * (xx + yy + zz - 1.0)
     angle = math.atan2(sine, cosine)
-    if sine > 1e-4:
+    if sine > SURE_SINE:
         return scale(0.5 * angle / sine, twice_sine)
     if cosine > 0.0:  # a small rotation: angle / sine is 1 to machine precision
         return scale(0.5, twice_sine)

@@ -21,6 +21,9 @@ from .plan import (
 from .restrict import cone_axis, end_hinge_angle, hinge_angle
 from .vectors import Vec, angle_between, dot, flatten, move, norm, scale, sub, turn, vec
 
+# Components beyond this have squares that come near the largest number.
+OVERFLOWING = 1e100
+
 
 @inlined
 def cone_step(cone: Records, nodes: Floats) -> Vec:
@@ -130,7 +133,7 @@ def pose_errors(plan: Plan, pose: Floats, wanted: Floats, target: Floats) -> tup
     """
     d = (pose[0, 3] - target[0, 3], pose[1, 3] - target[1, 3], pose[2, 3] - target[2, 3])
     largest = max(abs(d[0]), abs(d[1]), abs(d[2]))
-    distance = largest * norm(scale(1.0 / largest, d)) if largest > 1e100 else norm(d)
+    distance = largest * norm(scale(1.0 / largest, d)) if largest > OVERFLOWING else norm(d)
     angle = 0.0
     if plan.scalars[POINT_END] == 0.0:
         angle = norm(rotation_between(pose, wanted))

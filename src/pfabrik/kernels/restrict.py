@@ -26,6 +26,8 @@ from .vectors import (
 NO_LENGTH = 1e-150
 # A clamp to a cone keeps at least this share of the length, so that the direction survives.
 LEAST_SHARE = 1e-3
+# A sweep over the restrictions that turns a step by no more than rounding was the last.
+UNMOVED = 1e-15
 
 
 @routine
@@ -118,6 +120,6 @@ def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Fl
                     d = clamp_cone(axis, cone["half_angle"], d)
             elif cone["node"] == k - 1:
                 d = clamp_cone(cone_axis(cone, carrier, pose, normal, nodes), cone["half_angle"], d)
-        if norm(sub(d, start)) <= 1e-15 * norm(start):
+        if norm(sub(d, start)) <= UNMOVED * norm(start):
             break
     return d

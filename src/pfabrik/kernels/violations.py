@@ -18,6 +18,9 @@ from .vectors import Vec, add, angle_between, cross, dot, move, norm, scale, sub
 # What a violation turns with: nothing, the branch's carrier, the platform.
 NO_FRAME, CARRIER_FRAME, PLATFORM_FRAME = 0, 1, 2
 
+# A line opposite to its cone's axis has no direction to turn; its gradient is kept finite.
+LEAST_SINE = 1e-9
+
 _ZERO = (0.0, 0.0, 0.0)
 
 
@@ -115,7 +118,7 @@ def enter_cones(plan: Plan, b: int, now: Configuration, work: Work) -> None:
             continue
         size = max(norm(d), NO_LENGTH)
         u = scale(1.0 / size, d)
-        sine = max(math.sin(angle), 1e-9)
+        sine = max(math.sin(angle), LEAST_SINE)
         g = scale(-length / (size * sine), sub(axis, scale(math.cos(angle), u)))
         g_axis = scale(-length / sine, sub(u, scale(math.cos(angle), axis)))
         value = length * (angle - cone["half_angle"])
