@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 
@@ -37,10 +38,10 @@ print(time.perf_counter() - start)
 IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.perf_counter() - start)"
 
 
-NOTE = """Times are the shortest of several runs, subject and baseline by turns; ratio: time by time of the baseline, below 1
-is faster. The closed forms (benchmarks/closed_forms.py) know their machine, use one core and return numbers and a flag;
-pfabrik returns poses, points, errors and measures as well. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM:
-0.4), those out of reach within 1 L and 0.5 rad. Times of new processes are for all of it, not for a pose."""
+NOTE = """Times are the shortest of several runs, subject and baseline by turns; a ratio below 1 is faster than the
+baseline. The closed forms (benchmarks/closed_forms.py) know their machine, use one core, and return numbers and a flag;
+pfabrik returns poses, points, errors and measures as well. Reachable targets lie within 0.2 L and 0.2 rad of home (of
+the NRPM 0.4), those out of reach within 1 L and 0.5 rad. Times of new processes are for all of it, not for a pose."""
 
 
 def best_times(runs: int, *solves: Solve) -> list[float]:
@@ -124,10 +125,7 @@ def batches(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
 def batch_rows(
     mechanism: pf.Mechanism, what: str, targets: Array, baselines: dict[str, Solve], runs: int
 ) -> Iterator[Row]:
-    def solve() -> object:
-        return pf.solve_ik(mechanism, targets)
-
-    n = len(targets)
+    n, solve = len(targets), partial(pf.solve_ik, mechanism, targets)
     with one_core():
         ours, *theirs = best_times(runs, solve, *baselines.values())
     for baseline, seconds in zip(baselines, theirs, strict=True):

@@ -287,7 +287,7 @@ def test_rotations_are_accepted_up_to_the_stated_deviation() -> None:
 
 
 def test_the_kernels_and_the_library_agree_on_what_a_rotation_is() -> None:
-    assert kernels.NOT_A_ROTATION == TOLERANCES.rotation_matrix
+    assert TOLERANCES.rotation_matrix == kernels.NOT_A_ROTATION
 
 
 def test_seeds_that_do_not_fit_are_refused() -> None:
