@@ -73,6 +73,7 @@ class _Builder:
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
         self.nodes: list[dict[str, Any]] = []
+        self.n_stored = 0
         self.branches: list[dict[str, Any]] = []
         self.chains: list[dict[str, Any]] = []
         self.cones: list[dict[str, Any]] = []
@@ -121,10 +122,11 @@ class _Builder:
 
     def _add_branch(self, form: BranchForm, carrier: int) -> None:
         first, number = len(self.nodes), len(self.branches)
-        for node in form.nodes:
+        for k, node in enumerate(form.nodes):
             self.nodes.append(
                 {
                     "home": node.at,
+                    "stored": self._store(form, k),
                     "lo": node.stroke[0],
                     "hi": node.stroke[1],
                     "hinge": int(node.hinge),
@@ -152,6 +154,13 @@ class _Builder:
         self.branches.append(
             self._branch_record(form, first, carrier) | {"cone_first": cone_first, "cone_last": len(self.cones)}
         )
+
+    def _store(self, form: BranchForm, k: int) -> int:
+        """The place of node k of a branch among the stored ones, or -1 if pose and trunks tell where it is."""
+        if k == len(form.nodes) - 1 or (k == 0 and form.rail is None):
+            return -1
+        self.n_stored += 1
+        return self.n_stored - 1
 
     def _branch_record(self, form: BranchForm, first: int, carrier: int) -> dict[str, Any]:
         nodes, none = form.nodes, np.zeros(3)
@@ -205,7 +214,7 @@ class _Builder:
         names = tuple(coordinate.joint for coordinate, _ in coordinates)
         home = P.Seeds(
             self.mechanism.home_pose[None].copy(),
-            plan.nodes["home"].copy()[None],
+            plan.nodes["home"][plan.nodes["stored"] >= 0][None],
             np.zeros((1, len(self.trunk_joints))),
         )
         return Flat(

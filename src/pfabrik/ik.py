@@ -73,7 +73,7 @@ def new_rows(flat: Flat, n: int) -> P.Rows:
         status=np.empty(n, np.int64),
         counters=np.empty((n, 2), np.int64),
         poses=np.empty((n, 4, 4)),
-        nodes=np.empty((n, len(plan.nodes), 3)),
+        nodes=np.empty((n, flat.home_seed.nodes.shape[1], 3)),
         trunks=np.empty((n, len(plan.trunk_joints))),
         actuators=np.empty((n, flat.n_actuators)),
         measures=np.empty((n, 4)),

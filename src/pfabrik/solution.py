@@ -119,9 +119,23 @@ class Solution:
             found[name] = screw_points[joint]
         for point in self._flat.points:
             turning = rows.poses[:, :3, :3] if point.carrier < 0 else carriers[point.carrier][:, :3, :3]
-            found[point.joint] = rows.nodes[:, point.node] + turning @ (point.shift * point.axis)
+            found[point.joint] = self._node(point.node, carriers) + turning @ (point.shift * point.axis)
         order = [joint.name for joint in self.mechanism.joints if joint.name in found]
-        return MappingProxyType({name: self._shaped(found[name]) for name in order})
+        unknown = (rows.status == Status.INVALID)[:, None]
+        return MappingProxyType({name: self._shaped(np.where(unknown, np.nan, found[name])) for name in order})
+
+    def _node(self, k: int, carriers: list[Floats]) -> Floats:
+        """Positions (n, 3) of node k: stored, on the platform, or on its carrier."""
+        rows, plan = self._rows, self._flat.plan
+        node = plan.nodes[k]
+        if node["stored"] >= 0:
+            return rows.nodes[:, node["stored"]]
+        branch = plan.branches[np.searchsorted(plan.branches["last"], k)]
+        if k == branch["last"]:
+            T, point = rows.poses, branch["end"]
+        else:
+            T, point = carriers[branch["carrier"]], node["home"]
+        return cast(Floats, T[:, :3, :3] @ point + T[:, :3, 3])
 
     @cached_property
     def active_limits(self) -> Any:

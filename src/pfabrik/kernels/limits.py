@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from ._jit import kernel, routine
-from .frames import move_carriers
 from .measure import cone_step, read_coordinate
 from .plan import Configuration, Floats, Plan, Rows
 from .restrict import cone_axis
-from .solve import new_configuration
-from .vectors import angle_between, copy_row, copy_table, turn, vec
+from .solve import load_configuration, new_configuration
+from .vectors import angle_between, turn, vec
 
 
 @kernel
@@ -17,10 +16,7 @@ def read_limited(plan: Plan, rows: Rows, values: Floats) -> None:
     now = new_configuration(plan)
     n_coordinates = plan.coordinates.shape[0]
     for i in range(values.shape[0]):
-        copy_table(rows.poses[i], now.pose)
-        copy_table(rows.nodes[i], now.nodes)
-        copy_row(rows.trunks[i], now.trunks)
-        move_carriers(plan, now)
+        load_configuration(plan, rows.poses[i], rows.nodes[i], rows.trunks[i], now)
         for j in range(n_coordinates):
             values[i, j] = read_coordinate(plan, j, now)
         for b in range(plan.branches.shape[0]):

@@ -31,6 +31,7 @@ _vector = ("f8", (3,))
 NODE = np.dtype(
     [
         ("home", *_vector),
+        ("stored", "i8"),  # its place in Rows.nodes; -1 if it follows from the pose and the trunks
         ("lo", "f8"),  # length of the segment from the previous node
         ("hi", "f8"),
         ("hinge", "i8"),  # 1: the next segment stays in the branch's plane
@@ -106,7 +107,7 @@ class Rows(NamedTuple):
     status: NDArray[np.int64]  # (n,)
     counters: NDArray[np.int64]  # (n, 2): iterations, rounds
     poses: Floats  # (n, 4, 4)
-    nodes: Floats  # (n, n_nodes, 3)
+    nodes: Floats  # (n, n_stored, 3): the nodes that do not follow from the pose and the trunks
     trunks: Floats  # (n, n_trunk_joints): deviation from home
     actuators: Floats  # (n, n_actuators)
     measures: Floats  # (n, 4): position error, rotation error, residual, limit excess

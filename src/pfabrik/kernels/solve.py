@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ._jit import allocator, inlined, kernel, routine
+from .blocks import BLOCK, LENGTHS, WORST, is_all_struts, lay_out_pose, measure_struts, read_actuator
 from .exact import branch_mode
 from .frames import identity_pose, move_carriers, orthonormalise
 from .measure import measure_all, pose_errors, read_coordinate
@@ -33,7 +35,7 @@ from .project import copy_configuration, project_target, step_back
 from .reach import reach_chain_directly
 from .search import place_ends, reach_pose
 from .settle import TRANSLATES, TURNS, settle
-from .vectors import copy_row, copy_table
+from .vectors import copy_row, copy_table, put, vec
 
 # Largest deviation of R^T R from I in a target, and below which it is machine noise.
 NOT_A_ROTATION, ROUNDED = 1e-6, 1e-15
@@ -113,16 +115,24 @@ def load_target(plan: Plan, target: Floats, pose: Floats) -> bool:
     return True
 
 
-@inlined
+@routine
+def load_configuration(plan: Plan, pose: Floats, nodes: Floats, trunks: Floats, now: Configuration) -> None:
+    """Take up a stored configuration; the nodes that are not stored follow from the pose and the trunks."""
+    copy_table(pose, now.pose)
+    copy_row(trunks, now.trunks)
+    move_carriers(plan, now)
+    for k in range(plan.nodes.shape[0]):
+        if plan.nodes[k]["stored"] >= 0:
+            put(now.nodes[k], vec(nodes[plan.nodes[k]["stored"]]))
+    for c in range(plan.chains.shape[0]):
+        place_ends(plan, c, now)
+
+
+@routine
 def load_seed(plan: Plan, seeds: Seeds, i: int, now: Configuration, modes: Floats) -> None:
     """Take up seed `i` (or the only one), and the working mode of each branch; home's where the seed has none."""
     row = i if seeds.poses.shape[0] > 1 else 0
-    for k in range(plan.nodes.shape[0]):
-        for j in range(3):
-            now.nodes[k, j] = seeds.nodes[row, k, j]
-    for j in range(plan.trunk_joints.shape[0]):
-        now.trunks[j] = seeds.trunks[row, j]
-    move_carriers(plan, now)
+    load_configuration(plan, seeds.poses[row], seeds.nodes[row], seeds.trunks[row], now)
     read_modes(plan, now, modes)
 
 
@@ -156,8 +166,8 @@ def write_row(plan: Plan, i: int, now: Configuration, rows: Rows) -> None:
         for j in range(4):
             rows.poses[i, k, j] = now.pose[k, j]
     for k in range(plan.nodes.shape[0]):
-        for j in range(3):
-            rows.nodes[i, k, j] = now.nodes[k, j]
+        if plan.nodes[k]["stored"] >= 0:
+            put(rows.nodes[i, plan.nodes[k]["stored"]], vec(now.nodes[k]))
     for j in range(plan.trunk_joints.shape[0]):
         rows.trunks[i, j] = now.trunks[j]
     for j in range(rows.actuators.shape[1]):
@@ -175,37 +185,99 @@ def solve_directly(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings
     first_modes = np.ones(plan.branches.shape[0])
     home_modes(plan, now, first_modes)
     wanted = np.zeros((4, 4))
+    table = np.zeros((LENGTHS + plan.branches.shape[0], BLOCK))
+    columns = np.full(BLOCK, -1)
     shared = seeds.poses.shape[0] == 1
     copy_row(first_modes, modes)
     if targets.shape[0] > 0:
         load_seed(plan, seeds, 0, now, modes)
+    in_blocks = shared and settings.exact == 1 and targets.shape[0] > 1 and is_all_struts(plan)
     pending = 0
-    for i in range(targets.shape[0]):
-        if not load_target(plan, targets[i], wanted):
-            rows.status[i] = INVALID
-            continue
-        if not shared:
-            copy_row(first_modes, modes)
-            load_seed(plan, seeds, i, now, modes)
-        copy_table(wanted, now.pose)
-        reached, gap, excess = settings.exact == 1, 0.0, 0.0
-        for c in range(plan.chains.shape[0]):
-            if reached:
-                reached, chain_gap, chain_excess = reach_chain_directly(plan, c, now, modes, settings)
-                gap, excess = max(gap, chain_gap), max(excess, chain_excess)
-        if reached:
-            rows.status[i] = REACHED
-            rows.counters[i, 0] = 1
-            rows.counters[i, 1] = 0
-            write_row(plan, i, now, rows)
-            rows.measures[i, 0] = 0.0
-            rows.measures[i, 1] = 0.0
-            rows.measures[i, 2] = gap
-            rows.measures[i, 3] = excess
-        else:
-            rows.status[i] = PENDING
-            pending += 1
+    for start in range(0, targets.shape[0], BLOCK):
+        end = min(start + BLOCK, targets.shape[0])
+        if in_blocks:
+            lay_out_block(plan, targets, start, end, wanted, columns, now, table)
+        for i in range(start, end):
+            column = columns[i - start]
+            if column >= 0 and table[WORST, column] <= 0.0:
+                write_column(plan, i, column, now, table, rows)
+                continue
+            if not load_target(plan, targets[i], wanted):
+                rows.status[i] = INVALID
+                continue
+            if not shared:
+                copy_row(first_modes, modes)
+                load_seed(plan, seeds, i, now, modes)
+            pending += solve_one_directly(plan, i, wanted, now, modes, settings, rows)
     return pending
+
+
+@routine
+def lay_out_block(
+    plan: Plan,
+    targets: Floats,
+    start: int,
+    end: int,
+    wanted: Floats,
+    columns: NDArray[np.int64],
+    now: Configuration,
+    table: Floats,
+) -> None:
+    """Measure all struts for a block of targets; `columns` says where each target is in the table, -1 for no pose."""
+    n = 0
+    for i in range(start, end):
+        columns[i - start] = -1
+        if load_target(plan, targets[i], wanted):
+            lay_out_pose(wanted, table, n)
+            columns[i - start] = n
+            n += 1
+    for b in range(plan.branches.shape[0]):
+        measure_struts(plan, b, now, table, n)
+
+
+@inlined
+def solve_one_directly(
+    plan: Plan, i: int, wanted: Floats, now: Configuration, modes: Floats, settings: Settings, rows: Rows
+) -> int:
+    """Answer one row by closed forms; 1 where that leaves it pending, else 0."""
+    copy_table(wanted, now.pose)
+    reached, gap, excess = settings.exact == 1, 0.0, 0.0
+    for c in range(plan.chains.shape[0]):
+        if reached:
+            reached, chain_gap, chain_excess = reach_chain_directly(plan, c, now, modes, settings)
+            gap, excess = max(gap, chain_gap), max(excess, chain_excess)
+    if not reached:
+        rows.status[i] = PENDING
+        return 1
+    write_row(plan, i, now, rows)
+    write_reached(i, gap, excess, rows)
+    return 0
+
+
+@routine
+def write_reached(i: int, gap: float, excess: float, rows: Rows) -> None:
+    """Status, counters and measures of a row that took one iteration and has its target's own pose."""
+    rows.status[i] = REACHED
+    rows.counters[i, 0] = 1
+    rows.counters[i, 1] = 0
+    rows.measures[i, 0] = 0.0
+    rows.measures[i, 1] = 0.0
+    rows.measures[i, 2] = gap
+    rows.measures[i, 3] = excess
+
+
+@routine
+def write_column(plan: Plan, i: int, column: int, now: Configuration, table: Floats, rows: Rows) -> None:
+    """Row `i` from a column of the block: struts end on their targets, and no limit is exceeded."""
+    for k in range(3):
+        for j in range(4):
+            rows.poses[i, k, j] = table[4 * k + j, column]
+            rows.poses[i, 3, j] = 1.0 if j == 3 else 0.0
+    for j in range(plan.trunk_joints.shape[0]):
+        rows.trunks[i, j] = now.trunks[j]
+    for j in range(rows.actuators.shape[1]):
+        rows.actuators[i, j] = read_actuator(plan, j, now, table, column)
+    write_reached(i, 0.0, 0.0, rows)
 
 
 @routine
@@ -323,7 +395,6 @@ def solve_by_iteration(plan: Plan, targets: Floats, seeds: Seeds, settings: Sett
         if settings.chained == 0 or answered == 0:
             copy_row(first_modes, work.modes)
             load_seed(plan, seeds, i, now, work.modes)
-            copy_table(seeds.poses[i if seeds.poses.shape[0] > 1 else 0], now.pose)
         else:
             read_modes(plan, now, work.modes)
         gap, excess = measure_all(plan, now)
