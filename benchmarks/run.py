@@ -181,7 +181,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer poses and runs, kernels not compiled anew")
     parser.add_argument("--markdown", action="store_true", help="the table as the page docs/benchmarks.md")
     given = parser.parse_args()
-    runs, rng = (3 if given.quick else 15), np.random.default_rng(1)
+    where, runs, rng = machine(), (3 if given.quick else 15), np.random.default_rng(1)
     rows = [
         *single_calls(rng, runs),
         *batches(rng, runs, 10_000 if given.quick else 100_000),
@@ -190,7 +190,7 @@ def main() -> None:
     ]
     if given.markdown:
         print("# Benchmarks\n\nWritten by `python benchmarks/run.py --markdown`.\n")
-    print(machine(), end="\n\n")
+    print(where, end="\n\n")
     print("\n".join(table([cells(row) for row in rows], given.markdown)))
     print(f"\n{NOTE}")
 

@@ -192,7 +192,8 @@ class _Builder:
         for k, node in enumerate(form.nodes):
             at_end = k == len(form.nodes) - 1 and form.end_normal is not None
             axis = form.end_normal if at_end and form.end_normal is not None else form.normal
-            self.points.append(JointPoint(node.joint, first + k, node.shift, axis, -1 if at_end else carrier))
+            turning = -1 if at_end else carrier
+            self.points += [JointPoint(name, first + k, node.shift, axis, turning) for name in node.joints]
 
     def missing_actuators(self) -> list[str]:
         known = {coordinate.joint for coordinate, _ in self.coordinates}

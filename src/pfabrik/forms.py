@@ -33,15 +33,23 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class NodeForm:
-    """A node at home; `stroke` is the length allowed to the segment before it, `turn` the range of the hinge in it."""
+    """A node at home; `stroke` is the length allowed to the segment before it, `turn` the range of the hinge in it.
 
-    joint: str
+    `joints` are those with their centre here; several where they act as one.
+    """
+
+    joints: tuple[str, ...]
     at: Array
     shift: float = 0.0
     stroke: Interval = (0.0, 0.0)
     hinge: bool = False
     turn: Interval = FREE
     angle_home: float = 0.0
+
+    @property
+    def joint(self) -> str:
+        """The first of the node's joints, for messages."""
+        return self.joints[0]
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,8 @@ def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> TrunkForm:
 
 def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -> BranchForm:
     """One branch, from the base (or from the body it hangs on) to the end effector."""
-    draft = _Draft(_merge(_spots(steps, mechanism.end_effector_is_joint)))
+    near = TOLERANCES.alignment * mechanism.characteristic_length
+    draft = _Draft(_merge(_spots(steps, mechanism.end_effector_is_joint), near))
     if steps[0].joint.type == "prismatic" and len(draft.spots) > 0:
         if not on_base:
             raise NotExpressible(f"joint {steps[0].joint.name} slides on a moving body")
@@ -137,12 +138,12 @@ def _spots(steps: Sequence[Step], ends_in_point: bool) -> list[_Spot]:
     return spots
 
 
-def _merge(spots: list[_Spot]) -> list[_Spot]:
-    """Joints that share a centre act as one: R+R = U, R+R+R = U+R = R+U = S."""
+def _merge(spots: list[_Spot], near: float) -> list[_Spot]:
+    """Joints whose centres are no farther apart than `near` act as one: R+R = U, R+R+R = U+R = R+U = S."""
     merged: list[_Spot] = []
     for spot in spots:
         last = merged[-1] if merged else None
-        centre = _common_centre(last, spot) if last is not None and spot.slider is None else None
+        centre = _common_centre(last, spot, near) if last is not None and spot.slider is None else None
         if last is None or centre is None:
             merged.append(spot)
             continue
@@ -156,9 +157,8 @@ def _merge(spots: list[_Spot]) -> list[_Spot]:
     return merged
 
 
-def _common_centre(a: _Spot, b: _Spot) -> Array | None:
+def _common_centre(a: _Spot, b: _Spot, near: float) -> Array | None:
     """Where two neighbouring joints act as one, or None."""
-    scale = max(float(np.linalg.norm(a.at)), float(np.linalg.norm(b.at)), 1.0) * TOLERANCES.alignment
     if "point" in (a.kind, b.kind) or (a.kind == "S" and b.kind == "S"):
         return None
     if a.kind == b.kind == "R":
@@ -167,18 +167,20 @@ def _common_centre(a: _Spot, b: _Spot) -> Array | None:
         across = np.cross(a.axis, b.axis)
         sine = float(np.linalg.norm(across))
         apart = b.at - a.at
-        if sine < TOLERANCES.alignment or abs(float(apart @ across)) / sine > scale:
+        if sine < TOLERANCES.alignment or abs(float(apart @ across)) / sine > near:
             return None
         along_a = float(np.cross(apart, b.axis) @ across) / sine**2
         return np.asarray(a.at + along_a * a.axis)
     if {a.kind, b.kind} == {"R", "U"}:
-        return a.at if float(np.linalg.norm(a.at - b.at)) <= scale else None
+        return a.at if float(np.linalg.norm(a.at - b.at)) <= near else None
     return None
 
 
 def _classify(draft: _Draft) -> None:
     """Count the leading hinges, and see that nothing else carries orientation through the chain."""
     spots = draft.spots
+    if len(spots) == 1 and spots[0].kind in ("R", "U"):
+        raise NotExpressible(f"joint {spots[0].steps[0].joint.name} ties the end effector to the base by orientation")
     if spots[0].axis is not None:
         draft.normal = spots[0].axis
         while draft.planar < len(spots) and _is_parallel(spots[draft.planar].axis, draft.normal):
@@ -195,8 +197,6 @@ def _classify(draft: _Draft) -> None:
     elif rest[-1].kind == "R" and len(rest) > 1:
         draft.ends_in_plane = True
         rest = rest[:-1]
-    if len(spots) == 1 and spots[0].kind != "S":
-        raise NotExpressible(f"joint {spots[0].steps[0].joint.name} ties the end effector to the base by orientation")
     for spot in rest:
         if spot.kind == "R":
             raise NotExpressible(
@@ -211,7 +211,8 @@ def _is_parallel(axis: Array | None, normal: Array) -> bool:
 def _place_nodes(mechanism: Mechanism, draft: _Draft) -> list[NodeForm]:
     """The nodes: centres of hinges moved along their axes into one plane, segments with their strokes."""
     spots, planar = draft.spots, draft.planar
-    nodes = [NodeForm(spot.steps[0].joint.name if spot.steps else mechanism.end_effector, spot.at) for spot in spots]
+    names = [tuple(step.joint.name for step in spot.steps) or (mechanism.end_effector,) for spot in spots]
+    nodes = [NodeForm(joints, spot.at) for joints, spot in zip(names, spots, strict=True)]
     in_plane = spots[min(planar, len(spots) - 1)].at if not draft.align else spots[0].at
     for k in range(planar):
         shift = float(draft.normal @ (spots[k].at - in_plane))

@@ -56,7 +56,8 @@ class Solution:
     status : a `Status`; for a batch an integer array of them, (...,).
     pose : T_base_platform achieved, (..., 4, 4) [length].
     actuators : actuated coordinates in the order of `mechanism.actuators`, (..., n_a) [length or rad].
-    points : joint name -> position of its centre in the base frame, (..., 3) [length].
+    points : joint name -> position of its centre in the base frame, (..., 3) [length]; joints that act as one are at
+        their common centre.
     position_error, rotation_error : distance of the pose from the target, (...,) [length], [rad].
     residual : largest gap of any loop: open ends, stretched rigid links, links out of their plane, (...,) [length].
     limit_excess : largest excess over any limit, (...,); lengths relative to L, angles in rad; 0 if all are kept.

@@ -101,12 +101,13 @@ def rotation_between(A: Floats, B: Floats) -> Vec:
         return scale(0.5 * angle / sine, twice_sine)
     if cosine > 0.0:  # a small rotation: angle / sine is 1 to machine precision
         return scale(0.5, twice_sine)
-    # near half a turn the axis is the largest column of M + I
-    axis = (xx + 1.0, yx, zx)
+    # near half a turn the axis is the largest column of the symmetric part, M + M^T = 2 cos I + 2 (1 - cos) a a^T
+    xy, xz, yz = 0.5 * (xy + yx), 0.5 * (xz + zx), 0.5 * (yz + zy)
+    axis = (xx - cosine, xy, xz)
     if yy > xx and yy >= zz:
-        axis = (xy, yy + 1.0, zy)
+        axis = (xy, yy - cosine, yz)
     elif zz > xx and zz > yy:
-        axis = (xz, yz, zz + 1.0)
+        axis = (xz, yz, zz - cosine)
     if dot(axis, twice_sine) < 0.0:
         axis = scale(-1.0, axis)
     return scale(angle / norm(axis), axis)

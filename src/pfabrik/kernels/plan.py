@@ -141,7 +141,7 @@ class Work(NamedTuple):
     row: Floats  # (n,)
     weights: Floats  # (n,)
     totals: Floats  # (3,): sum of squares, largest and number of the violations noted
-    violations: Floats  # (many, 14): see `settle.enter`
+    violations: Floats  # (many, 16): see `violations.enter`
     columns: NDArray[np.int64]  # (n_nodes + n_branches + n_trunk_joints,): first unknown of each, or -1
 
 

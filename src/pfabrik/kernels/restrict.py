@@ -24,6 +24,8 @@ from .vectors import (
 
 # Below this a vector has no direction; far under any length of a machine, far over the smallest normal number.
 NO_LENGTH = 1e-150
+# A vector within this angle of a cone's axis, or of its opposite, points to no side of it: the rest is rounding.
+NO_SIDE = 1e-12
 # A clamp to a cone keeps at least this share of the length, so that the direction survives.
 LEAST_SHARE = 1e-3
 # A sweep over the restrictions that turns a step by no more than rounding was the last.
@@ -52,7 +54,7 @@ def clamp_cone(axis: Vec, half_angle: float, d: Vec) -> Vec:
         return d
     radial = flatten(d, axis)
     size = norm(radial)
-    radial = scale(1.0 / size, radial) if size > NO_LENGTH else any_normal(axis)
+    radial = scale(1.0 / size, radial) if size > NO_SIDE * norm(d) else any_normal(axis)
     kept = norm(d) * max(math.cos(angle - half_angle), LEAST_SHARE)
     return add(scale(kept * math.cos(half_angle), axis), scale(kept * math.sin(half_angle), radial))
 

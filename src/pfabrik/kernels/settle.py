@@ -12,7 +12,7 @@ from .linear import solve_spd
 from .plan import LENGTH, SPAN, TURN, Configuration, Floats, Plan, Records, Work
 from .reach import point_rate
 from .vectors import Vec, copy_row, copy_table, cross, dot, move, scale, sub, vec
-from .violations import CARRIER_FRAME, PLATFORM_FRAME, note_violations, trunk_excess, trunk_span, trunk_unit
+from .violations import CARRIER, note_violations, trunk_excess, trunk_span, trunk_unit
 
 # What the platform may do: bits of `free`.
 TRANSLATES, TURNS = 1, 2
@@ -68,19 +68,13 @@ def add_node(plan: Plan, branch: Records, b: int, now: Configuration, work: Work
         if free & TRANSLATES:
             for i in range(3):
                 row[i] += g[i]
-        if free & TURNS:
-            p = (now.pose[0, 3], now.pose[1, 3], now.pose[2, 3])
-            moment = cross(sub(vec(now.nodes[k]), p), g)
-            add_moment(plan, branch, now, work, free, PLATFORM_FRAME, moment)
+        p = (now.pose[0, 3], now.pose[1, 3], now.pose[2, 3])
+        add_platform_moment(plan, work, free, cross(sub(vec(now.nodes[k]), p), g))
     elif k == branch["first"]:
         if branch["rail"] == 1:
             column = work.columns[plan.nodes.shape[0] + b]
             row[column] += dot(g, vec(branch["rail_axis"]))
-        if branch["carrier"] > 0:
-            span = plan.trunks[branch["carrier"] - 1]
-            for j in range(span["first"], span["last"]):
-                rate = point_rate(plan, now, j, vec(now.nodes[k]))
-                row[trunk_column(plan, work, j)] += dot(g, rate) * trunk_unit(plan, j)
+        add_carried(plan, branch, now, work, vec(now.nodes[k]), g)
     else:
         column = work.columns[k]
         for i in range(3):
@@ -88,18 +82,32 @@ def add_node(plan: Plan, branch: Records, b: int, now: Configuration, work: Work
 
 
 @routine
-def add_moment(plan: Plan, branch: Records, now: Configuration, work: Work, free: int, frame: int, moment: Vec) -> None:
-    """Add to the row what a violation owes to the rotation of the carrier or of the platform."""
-    if frame == PLATFORM_FRAME and free & TURNS:
-        start = 3 * (free & TRANSLATES)
-        for i in range(3):
-            work.row[start + i] += moment[i] / plan.scalars[SPAN]
-    elif frame == CARRIER_FRAME and branch["carrier"] > 0:
+def add_carried(plan: Plan, branch: Records, now: Configuration, work: Work, p: Vec, g: Vec) -> None:
+    """Add to the row what a gradient `g` at the point `p` of a carrier owes to its trunk."""
+    if branch["carrier"] > 0:
+        span = plan.trunks[branch["carrier"] - 1]
+        for j in range(span["first"], span["last"]):
+            work.row[trunk_column(plan, work, j)] += dot(g, point_rate(plan, now, j, p)) * trunk_unit(plan, j)
+
+
+@routine
+def add_carrier_moment(plan: Plan, branch: Records, now: Configuration, work: Work, moment: Vec) -> None:
+    """Add to the row what a violation owes to the rotation of the carrier."""
+    if branch["carrier"] > 0:
         span = plan.trunks[branch["carrier"] - 1]
         for j in range(span["first"], span["last"]):
             if plan.trunk_joints[j]["kind"] == TURN:
                 turned = dot(moment, vec(now.screws[j, 1]))
                 work.row[trunk_column(plan, work, j)] += turned * trunk_unit(plan, j)
+
+
+@routine
+def add_platform_moment(plan: Plan, work: Work, free: int, moment: Vec) -> None:
+    """Add to the row what a violation owes to the rotation of the platform."""
+    if free & TURNS:
+        start = 3 * (free & TRANSLATES)
+        for i in range(3):
+            work.row[start + i] += moment[i] / plan.scalars[SPAN]
 
 
 @routine
@@ -120,14 +128,18 @@ def add_violation(plan: Plan, now: Configuration, work: Work, free: int, n: int,
     """Turn one noted violation into a row of the normal equations."""
     b, k, k_from = int(entry[1]), int(entry[2]), int(entry[3])
     branch = plan.branches[b]
-    d_gradient, before_gradient, moment = vec(entry[5:]), vec(entry[8:]), vec(entry[11:])
+    d_gradient, before_gradient = vec(entry[4:]), vec(entry[7:])
     if k >= 0:
         add_node(plan, branch, b, now, work, free, k, d_gradient)
     if k_from >= 0:
         add_node(plan, branch, b, now, work, free, k_from, sub(before_gradient, d_gradient))
         if dot(before_gradient, before_gradient) > 0.0:
             add_node(plan, branch, b, now, work, free, k_from - 1, scale(-1.0, before_gradient))
-    add_moment(plan, branch, now, work, free, int(entry[4]), moment)
+    elif k_from == CARRIER:
+        foot = move(now.carriers[branch["carrier"]], vec(plan.nodes[branch["first"]]["home"]))
+        add_carried(plan, branch, now, work, foot, scale(-1.0, d_gradient))
+    add_carrier_moment(plan, branch, now, work, vec(entry[10:]))
+    add_platform_moment(plan, work, free, vec(entry[13:]))
     commit_row(work, n, entry[0])
 
 

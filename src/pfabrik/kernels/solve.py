@@ -74,7 +74,7 @@ def new_work(plan: Plan) -> Work:
         np.zeros(n),
         np.zeros(n),
         np.zeros(3),
-        np.zeros((4 * n_nodes + plan.cones.shape[0] + 12 * n_branches, 14)),
+        np.zeros((4 * n_nodes + plan.cones.shape[0] + 12 * n_branches, 16)),
         np.zeros(n_nodes + n_branches + n_trunks, np.int64),
     )
 

@@ -15,8 +15,8 @@ from .plan import CARRIER_CONE, LENGTH, PLATFORM_CONE, TURN, Configuration, Plan
 from .restrict import NO_LENGTH, cone_axis, end_hinge_angle, hinge_angle
 from .vectors import Vec, add, angle_between, cross, dot, move, norm, scale, sub, turn, vec
 
-# What a violation turns with: nothing, the branch's carrier, the platform.
-NO_FRAME, CARRIER_FRAME, PLATFORM_FRAME = 0, 1, 2
+# What a step may depend on beside nodes.
+NO_NODE, CARRIER = -1, -2
 
 # A line opposite to its cone's axis has no direction to turn; its gradient is kept finite.
 LEAST_SINE = 1e-9
@@ -33,13 +33,14 @@ def enter(
     d_gradient: Vec,
     k_from: int,
     before_gradient: Vec,
-    frame: int,
-    moment: Vec,
+    carrier_moment: Vec,
+    platform_moment: Vec,
 ) -> None:
     """Note one violation of branch `b` that depends on the step from node `k_from` to node `k`.
 
-    `before_gradient` is its gradient in the step that ends at `k_from` (zero for most), `moment` its derivative in a
-    rotation of `frame`. A node of -1 stands for no step.
+    `before_gradient` is its gradient in the step that ends at `k_from` (zero for most); moments are its derivatives
+    in rotations of carrier and platform that leave the nodes where they are. Instead of a node, NO_NODE stands for no
+    step, and CARRIER for the place of the branch's first node on its carrier.
     """
     entry = work.violations[int(work.totals[2])]
     work.totals[0] += value * value
@@ -49,11 +50,11 @@ def enter(
     entry[1] = b
     entry[2] = k
     entry[3] = k_from
-    entry[4] = frame
     for i in range(3):
-        entry[5 + i] = d_gradient[i]
-        entry[8 + i] = before_gradient[i]
-        entry[11 + i] = moment[i]
+        entry[4 + i] = d_gradient[i]
+        entry[7 + i] = before_gradient[i]
+        entry[10 + i] = carrier_moment[i]
+        entry[13 + i] = platform_moment[i]
 
 
 @routine
@@ -84,10 +85,10 @@ def enter_segments(plan: Plan, b: int, now: Configuration, work: Work) -> None:
         size = max(norm(d), NO_LENGTH)
         value = beyond(size, plan.nodes[k]["lo"], plan.nodes[k]["hi"])
         if value != 0.0:
-            enter(work, b, value, k, scale(1.0 / size, d), k - 1, _ZERO, NO_FRAME, _ZERO)
+            enter(work, b, value, k, scale(1.0 / size, d), k - 1, _ZERO, _ZERO, _ZERO)
         if plan.nodes[k - 1]["hinge"] == 1:
             moment = cross(normal, d)
-            enter(work, b, dot(normal, d), k, normal, k - 1, _ZERO, CARRIER_FRAME, moment)
+            enter(work, b, dot(normal, d), k, normal, k - 1, _ZERO, moment, _ZERO)
             if plan.nodes[k - 1]["ranged"] == 1:
                 angle = hinge_angle(plan, branch, k - 1, carrier, normal, now.nodes, d)
                 value = beyond(angle, plan.nodes[k - 1]["angle_lo"], plan.nodes[k - 1]["angle_hi"])
@@ -95,11 +96,11 @@ def enter_segments(plan: Plan, b: int, now: Configuration, work: Work) -> None:
                     g = scale(length / (size * size), cross(normal, d))
                     if k - 1 == branch["first"]:
                         moment = scale(-length, normal)
-                        enter(work, b, length * value, k, g, k - 1, _ZERO, CARRIER_FRAME, moment)
+                        enter(work, b, length * value, k, g, k - 1, _ZERO, moment, _ZERO)
                     else:
                         e = sub(vec(now.nodes[k - 1]), vec(now.nodes[k - 2]))
                         g_before = scale(-length / dot(e, e), cross(normal, e))
-                        enter(work, b, length * value, k, g, k - 1, g_before, NO_FRAME, _ZERO)
+                        enter(work, b, length * value, k, g, k - 1, g_before, _ZERO, _ZERO)
 
 
 @routine
@@ -125,16 +126,17 @@ def enter_cones(plan: Plan, b: int, now: Configuration, work: Work) -> None:
         k = cone["node"]
         moment = cross(axis, g_axis)
         if cone["kind"] == PLATFORM_CONE:
-            enter(work, b, value, k - 1, g, k, _ZERO, PLATFORM_FRAME, moment)
+            enter(work, b, value, k - 1, g, k, _ZERO, _ZERO, moment)
         elif cone["kind"] == CARRIER_CONE:
-            enter(work, b, value, k + 1, g, k, _ZERO, CARRIER_FRAME, moment)
+            enter(work, b, value, k + 1, g, k, _ZERO, moment, _ZERO)
         else:
             link = sub(vec(now.nodes[k]), vec(now.nodes[k - 1]))
             link_size = max(norm(link), NO_LENGTH)
             e = scale(1.0 / link_size, link)
             g_link = add(scale(cone["axis"][0], g_axis), scale(cone["axis"][1], cross(g_axis, normal)))
             g_link = scale(1.0 / link_size, sub(g_link, scale(dot(g_link, e), e)))
-            enter(work, b, value, k + 1, g, k, g_link, NO_FRAME, _ZERO)
+            g_normal = add(scale(cone["axis"][1], cross(e, g_axis)), scale(cone["axis"][2], g_axis))
+            enter(work, b, value, k + 1, g, k, g_link, cross(normal, g_normal), _ZERO)
 
 
 @routine
@@ -148,32 +150,34 @@ def enter_ends(plan: Plan, b: int, now: Configuration, work: Work) -> None:
         miss = sub(vec(now.nodes[last]), move(carrier, vec(plan.nodes[first]["home"])))
         for i in range(3):
             unit = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
-            enter(work, b, miss[i], last, unit, -1, _ZERO, NO_FRAME, _ZERO)
+            enter(work, b, miss[i], last, unit, CARRIER, _ZERO, _ZERO, _ZERO)
     if branch["rail"] == 1:
         axis = vec(branch["rail_axis"])
         slide = dot(sub(vec(now.nodes[first]), vec(plan.nodes[first]["home"])), axis)
         value = beyond(slide, branch["rail_lo"], branch["rail_hi"])
         if value != 0.0:
-            enter(work, b, value, first, axis, -1, _ZERO, NO_FRAME, _ZERO)
+            enter(work, b, value, first, axis, NO_NODE, _ZERO, _ZERO, _ZERO)
     end_normal = turn(now.pose, vec(branch["end_normal"]))
     if branch["align"] == 1:
-        miss = sub(end_normal, turn(carrier, vec(branch["normal"])))
+        normal = turn(carrier, vec(branch["normal"]))
+        miss = sub(end_normal, normal)
         for i in range(3):
             unit = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
+            turned_back = scale(-length, cross(normal, unit))
             moment = scale(length, cross(end_normal, unit))
-            enter(work, b, length * miss[i], -1, _ZERO, -1, _ZERO, PLATFORM_FRAME, moment)
+            enter(work, b, length * miss[i], NO_NODE, _ZERO, NO_NODE, _ZERO, turned_back, moment)
     if last > first:
         d = sub(vec(now.nodes[last - 1]), vec(now.nodes[last]))
         if branch["end_plane"] == 1:
             moment = cross(end_normal, d)
             value = dot(end_normal, d)
-            enter(work, b, value, last - 1, end_normal, last, _ZERO, PLATFORM_FRAME, moment)
+            enter(work, b, value, last - 1, end_normal, last, _ZERO, _ZERO, moment)
         if branch["end_ranged"] == 1:
             value = beyond(end_hinge_angle(branch, now.pose, d), branch["end_angle_lo"], branch["end_angle_hi"])
             if value != 0.0:
                 g = scale(length / max(dot(d, d), NO_LENGTH), cross(end_normal, d))
                 moment = scale(-length, end_normal)
-                enter(work, b, length * value, last - 1, g, last, _ZERO, PLATFORM_FRAME, moment)
+                enter(work, b, length * value, last - 1, g, last, _ZERO, _ZERO, moment)
 
 
 @routine

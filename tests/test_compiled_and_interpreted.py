@@ -1,0 +1,243 @@
+"""The compiled kernels: they answer as their source does, take every array alike, and leave their inputs alone."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from machines import MACHINES
+from pfabrik.flatten import flatten
+from pfabrik.kernels import _jit, limits, solve
+
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+TESTS = Path(__file__).parent
+pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+ANSWERED = ("five_bar", "stewart", "nrpm", "hexapod_rus", "tripod_prs", "mixed", "serial_spherical")
+
+SCRIPT = """
+import sys, warnings
+import numpy as np
+warnings.simplefilter("ignore")
+from test_compiled_and_interpreted import ANSWERED, answers
+np.savez(sys.argv[1], **{f"{name} {field}": values for name in ANSWERED for field, values in answers(name).items()})
+"""
+
+
+def machine(name: str) -> pf.Mechanism:
+    return MACHINES[name]() if name in MACHINES else pf.load(name)
+
+
+def some_targets(mechanism: pf.Mechanism, n: int, seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    steps = 0.2 * mechanism.characteristic_length * rng.uniform(-1, 1, (n, 3))
+    return np.array([pf.pose(mechanism.reference_point + d, rotvec=0.1 * rng.uniform(-1, 1, 3)) for d in steps])
+
+
+def answers(name: str) -> dict[str, np.ndarray]:
+    """What is compared; the home pose, three targets nearby, and one far out for machines that are quick to say so."""
+    mechanism = machine(name)
+    targets = some_targets(mechanism, 4)
+    targets[0] = mechanism.home_pose
+    if name in ("five_bar", "stewart", "nrpm"):
+        targets[3, :3, 3] += 5 * mechanism.characteristic_length
+    answer = pf.solve_ik(mechanism, targets)
+    values = {"status": answer.status, "pose": answer.pose, "actuators": answer.actuators}
+    return values | {f"point {joint}": points for joint, points in answer.points.items()}
+
+
+@pytest.mark.slow
+def test_compiled_and_interpreted_answers_are_the_same(tmp_path: Path) -> None:
+    """This process against one that runs the kernels the other way; what is projected agrees to what it settles to."""
+    paths = os.pathsep.join([str(TESTS), *(path for path in sys.path if path)])
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "0" if INTERPRETED else "1", "PYTHONPATH": paths}
+    subprocess.run([sys.executable, "-c", SCRIPT, str(tmp_path / "other.npz")], env=environment, check=True)
+    other = np.load(tmp_path / "other.npz")
+    for name in ANSWERED:
+        length = machine(name).characteristic_length
+        here = answers(name)
+        np.testing.assert_array_equal(other[f"{name} status"], here["status"])
+        reached = here["status"] == pf.Status.REACHED
+        assert reached[0]
+        for field, values in here.items():
+            found = other[f"{name} {field}"]
+            np.testing.assert_allclose(found[reached], values[reached], rtol=0, atol=1e-9 * length)
+            np.testing.assert_allclose(found[~reached], values[~reached], rtol=0, atol=1e-5 * length)
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    copy = array.copy()
+    copy.setflags(write=False)
+    return copy
+
+
+def integers(poses: np.ndarray) -> np.ndarray:
+    """Home's orientation, and positions a few units apart."""
+    whole = np.tile(np.eye(4, dtype=np.int64), (len(poses), 1, 1))
+    whole[:, :3, 3] = np.round(poses[:, :3, 3]).astype(np.int64)
+    return whole
+
+
+FORMS = {
+    "as they are": lambda poses: poses,
+    "Fortran-ordered": np.asfortranarray,
+    "strided": lambda poses: np.repeat(poses, 2, axis=0)[::2],
+    "reversed": lambda poses: poses[::-1].copy()[::-1],
+    "transposed": lambda poses: poses.transpose(0, 2, 1).copy().transpose(0, 2, 1),
+    "read-only": read_only,
+    "a list": lambda poses: poses.tolist(),
+    "big-endian": lambda poses: poses.astype(">f8"),
+    "single rows": lambda poses: poses[0],
+    "an empty batch": lambda poses: poses[:0],
+    "positions": lambda poses: poses[:, :3, 3],
+    "a grid": lambda poses: poses.reshape(2, -1, 4, 4),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_targets_in_any_memory_layout_give_the_same_answer(form: str) -> None:
+    mechanism = pf.load("stewart")
+    targets = some_targets(mechanism, 6)
+    if form == "positions":
+        targets[:, :3, :3] = np.eye(3)
+    expected = pf.solve_ik(mechanism, targets).actuators
+    found = pf.solve_ik(mechanism, FORMS[form](targets)).actuators.reshape(-1, 6)
+    np.testing.assert_array_equal(found, expected[: len(found)])
+
+
+@pytest.mark.parametrize(
+    "change", [integers, lambda poses: poses.astype(np.float32), lambda poses: integers(poses) > 0]
+)
+def test_numbers_of_another_type_are_converted(change: object) -> None:
+    mechanism = pf.load("stewart")
+    targets = change(some_targets(mechanism, 4))
+    if targets.dtype == bool:
+        with pytest.raises(pf.errors.InvalidArgument):
+            pf.solve_ik(mechanism, targets)
+        return
+    expected = pf.solve_ik(mechanism, targets.astype(float))
+    np.testing.assert_array_equal(pf.solve_ik(mechanism, targets).actuators, expected.actuators)
+
+
+@pytest.mark.skipif(INTERPRETED, reason="nothing is compiled")
+@pytest.mark.parametrize("name", ["stewart", "nrpm", "serial_spherical"])
+def test_every_kernel_is_compiled_for_one_signature(name: str) -> None:
+    """Whatever the layout of targets and seeds, single or batch, seeded, tracked or projected."""
+    mechanism = machine(name)
+    targets = some_targets(mechanism, 6)
+    far = targets + np.eye(4)[3] * [[1e4], [0], [0], [0]]
+    for form in FORMS.values():
+        pf.solve_ik(mechanism, form(targets))
+    for other in (targets.astype(np.float32), integers(targets)):
+        pf.solve_ik(mechanism, other)
+    seed = pf.solve_ik(mechanism, targets)
+    for answer in (
+        pf.solve_ik(mechanism, targets, seed=seed),
+        pf.solve_ik(mechanism, targets[::-1], seed=seed[::-1]),
+        pf.solve_ik(mechanism, targets, seed=seed[0]),
+        pf.solve_ik(mechanism, far, options=pf.Options(hold=None, max_rounds=3, tolerance=1)),
+        pf.solve_ik(mechanism, far, options=pf.Options.paper()),
+        pf.track(mechanism, targets, seed=seed[1], on_progress=lambda done, total: None),
+    ):
+        assert answer.active_limits is not None
+    for dispatcher in (solve.solve_directly, solve.solve_by_iteration, limits.read_limited):
+        assert len(dispatcher.signatures) == 1
+
+
+@pytest.mark.parametrize("name", ["stewart", "nrpm"])
+def test_inputs_are_never_written_to(name: str) -> None:
+    mechanism = machine(name)
+    targets = some_targets(mechanism, 4)
+    targets[2:, 0, 3] += 1e4
+    seed = pf.solve_ik(mechanism, targets)
+    flat = flatten(mechanism)
+    watched = [targets, *seed._rows, *flat.plan, *flat.home_seed]
+    before = [array.copy() for array in watched]
+    answer = pf.solve_ik(mechanism, targets, seed=seed)
+    followed = pf.track(mechanism, targets, seed=seed[0])
+    assert answer.active_limits is not None
+    answer.pose[:] = answer.actuators[:] = np.nan
+    followed.pose[:] = np.nan
+    for array, copy in zip(watched, before, strict=True):
+        np.testing.assert_array_equal(array, copy)
+
+
+def test_a_plan_is_not_shared_with_its_answers() -> None:
+    """Overwriting an answer, home's included, changes no later one."""
+    mechanism = pf.load("stewart")
+    first = pf.solve_ik(mechanism, mechanism.home_pose)
+    expected = first.actuators.copy()
+    first.pose[:] = first.actuators[:] = 7.0
+    np.testing.assert_array_equal(pf.solve_ik(mechanism, mechanism.home_pose).actuators, expected)
+
+
+def test_calls_from_several_threads_answer_as_one_after_the_other() -> None:
+    mechanisms = [machine(name) for name in ("five_bar", "stewart", "nrpm")] * (1 if INTERPRETED else 8)
+    tasks = [(m, some_targets(m, 3 if INTERPRETED else 200, seed)) for seed, m in enumerate(mechanisms)]
+    expected = [pf.solve_ik(*task) for task in tasks]
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda task: pf.solve_ik(*task), tasks))
+    for one, other in zip(expected, found, strict=True):
+        np.testing.assert_array_equal(other.status, one.status)
+        np.testing.assert_array_equal(other.pose, one.pose)
+        np.testing.assert_array_equal(other.actuators, one.actuators)
+
+
+def load_decorator(folder: Path) -> ModuleType:
+    """The decorator's module, run from a folder with copies of the kernels."""
+    spec = importlib.util.spec_from_file_location("copied_jit", folder / "_jit.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def copies(tmp_path: Path) -> Path:
+    for source in Path(_jit.__file__).parent.glob("*.py"):
+        (tmp_path / source.name).write_bytes(source.read_bytes())
+    return tmp_path
+
+
+def test_the_cache_is_keyed_by_the_text_of_every_kernel(copies: Path) -> None:
+    seen = {load_decorator(copies)._DIGEST}
+    for source in sorted(copies.glob("*.py")):
+        source.write_text(source.read_text() + "# edited\n")
+        digest = load_decorator(copies)._DIGEST
+        assert digest not in seen
+        seen.add(digest)
+
+
+def test_the_cache_is_keyed_by_text_not_by_time(copies: Path) -> None:
+    before = load_decorator(copies)._DIGEST
+    for source in copies.glob("*.py"):
+        os.utime(source, (1, 1))
+    assert before == load_decorator(copies)._DIGEST
+
+
+@pytest.mark.skipif(INTERPRETED, reason="nothing is cached")
+def test_a_kernel_compiled_from_other_sources_is_not_taken_from_the_cache(
+    copies: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An edit in `vectors.py` makes what was compiled from `caller.py`, which has not changed, stale."""
+    caller = copies / "caller.py"
+    caller.write_text("def double(x):\n    return 2.0 * x\n")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
+    hits = []
+    for _ in range(2):
+        for _again in range(2):
+            spec = importlib.util.spec_from_file_location("caller", caller)
+            module = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(module)
+            double = load_decorator(copies).kernel(module.double)
+            assert double(2.0) == 4.0
+            hits.append(sum(double.stats.cache_hits.values()))
+        (copies / "vectors.py").write_text("# edited\n")
+    assert hits == [0, 1, 0, 1]

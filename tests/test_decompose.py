@@ -1,0 +1,394 @@
+"""Decomposition: how machines fall apart into sub-chains, how those are written, and which engine serves them."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from machines import MACHINES, planar, ring
+from pfabrik import Cone, Joint, Mechanism
+from pfabrik.errors import UnsupportedMechanism
+from pfabrik.flatten import flatten
+
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+
+NOTATION = {
+    "five_bar": ["R*-R-R"] * 2,
+    "stewart": ["U-P*-S"] * 6,
+    "nrpm": ["R*-P*-[U-P*-S, U-P*-S]"] * 3,
+    "hexapod_ups": ["U-P*-S"] * 6,
+    "hexapod_rus": ["R*-S-S"] * 6,
+    "hexaglide": ["P*-U-S"] * 6,
+    "tripod_rps": ["R-P*-S"] * 3,
+    "tripod_prs": ["P*-R-S"] * 3,
+    "planar_rrr": ["R*-R-R"] * 3,
+    "planar_rpr": ["R-P*-R"] * 3,
+    "planar_prr": ["P*-R-R"] * 3,
+    "serial_planar": ["R*-R*-R*-R*-R"],
+    "serial_spherical": ["P*-S-S-S-S"],
+    "mixed": ["U-P*-S", "U-P*-S", "S-P*-R", "R*-U-S", "U-P*-S"],
+}
+
+
+def machine(name: str) -> Mechanism:
+    return MACHINES[name]() if name in MACHINES else pf.load(name)
+
+
+def strut(number: int | str, foot: object, head: object) -> list[Joint]:
+    """A U-P*-S leg from base to platform."""
+    return [
+        Joint(f"A{number}", "universal", ("base", f"c{number}"), at=foot),
+        Joint(
+            f"B{number}", "prismatic", (f"c{number}", f"r{number}"), along=(f"A{number}", f"C{number}"), actuated=True
+        ),
+        Joint(f"C{number}", "spherical", (f"r{number}", "platform"), at=head),
+    ]
+
+
+def struts(count: int) -> list[Joint]:
+    feet, heads = (
+        ring(100, 0, [60 * i + 5 * (i % 2) for i in range(count)]),
+        ring(60, 150, [60 * i for i in range(count)]),
+    )
+    return [joint for i in range(count) for joint in strut(i + 1, feet[i], heads[i])]
+
+
+def with_leg(*leg: Joint) -> Mechanism:
+    """Five struts, and the leg in question as the sixth."""
+    return Mechanism("five struts and another leg", [*struts(5), *leg], "platform", (0, 0, 150))
+
+
+def last_chain(*leg: Joint) -> pf.SubChain:
+    return pf.decompose(with_leg(*leg))[-1]
+
+
+@pytest.mark.parametrize("name", NOTATION)
+def test_machines_fall_apart_into_the_legs_the_field_writes(name: str) -> None:
+    chains = pf.decompose(machine(name))
+    assert [str(chain) for chain in chains] == NOTATION[name]
+    assert {chain.engine for chain in chains} == {"reaching"}
+    assert {chain.reason for chain in chains} == {None}
+
+
+def test_every_machine_has_its_notation_checked() -> None:
+    assert set(NOTATION) == {*MACHINES, *pf.catalog()}
+
+
+def test_a_serial_chain_has_one_branch_and_no_trunk() -> None:
+    chain = pf.decompose(pf.load("stewart"))[0]
+    assert chain.trunk == ()
+    assert chain.joints == ("AL1", "BL1", "CL1")
+
+
+def test_a_branched_chain_shares_its_trunk() -> None:
+    chain = pf.decompose(pf.load("nrpm"))[1]
+    assert [step.joint.name for step in chain.trunk] == ["A2", "B2"]
+    assert [[s.joint.name for s in b] for b in chain.branches] == [["CL2", "DL2", "EL2"], ["CR2", "DR2", "ER2"]]
+    assert chain.joints == ("A2", "B2", "CL2", "DL2", "EL2", "CR2", "DR2", "ER2")
+
+
+def test_a_joint_end_effector_is_cut_and_belongs_to_every_chain_that_ends_there() -> None:
+    left, right = pf.decompose(pf.load("five_bar"))
+    assert left.joints == ("p1", "p2", "p3")
+    assert right.joints == ("p5", "p4", "p3")
+    assert [step.ends for step in left.steps] == [False, False, True]
+
+
+def test_a_ball_joint_straight_from_base_to_platform_is_a_chain_without_links() -> None:
+    pivot = with_leg(Joint("pivot", "spherical", ("base", "platform"), at=(0, 0, 150)))
+    chain = pf.decompose(pivot)[-1]
+    assert (str(chain), chain.engine) == ("S", "reaching")
+    assert [node.joint for node in chain.branch_forms[0].nodes] == ["pivot"]
+    turned = pf.solve_ik(pivot, pf.pose([0, 0, 150], rotvec=[0.1, -0.2, 0.1]))
+    assert turned
+    lifted = pf.solve_ik(pivot, pf.pose([0, 0, 160]))
+    assert lifted.status is pf.Status.PROJECTED
+    np.testing.assert_allclose(lifted.pose[:3, 3], (0, 0, 150), atol=1e-7)
+
+
+def test_another_joint_straight_from_base_to_platform_carries_orientation() -> None:
+    chain = last_chain(Joint("pivot", "universal", ("base", "platform"), at=(0, 0, 150)))
+    assert (str(chain), chain.engine) == ("U", "closure")
+    assert "pivot" in chain.reason
+
+
+def test_fixed_joints_weld_bodies_into_one() -> None:
+    """A foot on the base, a rod in two pieces and a head on the platform change nothing but the list of bodies."""
+    welds = [
+        Joint("weld1", "fixed", ("foot", "base"), at=(100, 0, 0)),
+        Joint("weld2", "fixed", ("rod", "r1"), at=(80, 0, 75)),
+        Joint("weld3", "fixed", ("platform", "head"), at=(60, 0, 150)),
+    ]
+    plain = struts(6)
+    plain[1] = dataclasses.replace(plain[1], along=None, axis=(-40, 0, 150))
+    renamed = {"A1": ("foot", "c1"), "C1": ("rod", "head")}
+    joints = [dataclasses.replace(j, connects=renamed.get(j.name, j.connects)) for j in plain]
+    welded = Mechanism("welded", [*joints[:2], *welds, *joints[2:]], "platform", (0, 0, 150))
+    assert [chain.joints for chain in pf.decompose(welded)] == [(f"A{i}", f"B{i}", f"C{i}") for i in range(1, 7)]
+    target = pf.pose([5, -3, 155], rotvec=[0.1, 0.05, -0.2])
+    expected = pf.solve_ik(Mechanism("plain", plain, "platform", (0, 0, 150)), target)
+    np.testing.assert_array_equal(pf.solve_ik(welded, target).actuators, expected.actuators)
+
+
+def crossing(**changes: object) -> list[Joint]:
+    """An R-R-P*-R-R-R leg that is a U-P*-S leg: two axes cross at (-50, -80, 0), three at (-30, -50, 150)."""
+    foot, head = (-50, -80, 0), (-30, -50, 150)
+    leg = [
+        Joint("Ra", "revolute", ("base", "gimbal"), at=foot, axis=(1, 0, 0)),
+        Joint("Rb", "revolute", ("gimbal", "c"), at=foot, axis=(0, 1, 0)),
+        Joint("P", "prismatic", ("c", "r"), axis=np.subtract(head, foot), actuated=True, home=100),
+        Joint("Rc", "revolute", ("r", "yoke"), at=head, axis=(1, 0, 0)),
+        Joint("Rd", "revolute", ("yoke", "ring"), at=head, axis=(0, 1, 0)),
+        Joint("Re", "revolute", ("ring", "platform"), at=head, axis=(0, 0, 1)),
+    ]
+    return [dataclasses.replace(j, **changes.get(j.name, {})) for j in leg]
+
+
+def test_revolutes_whose_axes_cross_are_a_universal_or_a_ball_joint() -> None:
+    separate = with_leg(*crossing())
+    chain = pf.decompose(separate)[-1]
+    assert (str(chain), chain.engine) == ("R-R-P*-R-R-R", "reaching")
+    assert [node.at.tolist() for node in chain.branch_forms[0].nodes] == [[-50, -80, 0], [-30, -50, 150]]
+    target = pf.pose([5, -3, 155], rotvec=[0.1, 0.05, -0.2])
+    answer = pf.solve_ik(separate, target)
+    turned = target[:3, :3] @ [-30, -50, 0] + target[:3, 3]
+    home = np.linalg.norm((20, 30, 150))
+    assert answer.actuators[-1] == pytest.approx(100 + np.linalg.norm(turned - (-50, -80, 0)) - home, abs=1e-10)
+
+
+def test_joints_that_share_a_centre_each_have_their_point() -> None:
+    separate = with_leg(*crossing())
+    points = pf.solve_ik(separate, separate.home_pose).points
+    for joint in separate.joints:
+        if joint.at is not None:
+            np.testing.assert_allclose(points[joint.name], joint.at, atol=1e-9)
+
+
+def test_joints_described_off_the_crossing_of_their_axes_are_reported_at_it() -> None:
+    aside = with_leg(*crossing(Ra={"at": (-70, -80, 0)}, Rb={"at": (-50, -60, 0)}))
+    assert pf.decompose(aside)[-1].branch_forms[0].nodes[0].at == pytest.approx([-50, -80, 0], abs=1e-12)
+    answer = pf.solve_ik(aside, aside.home_pose)
+    assert answer
+    for name in ("Ra", "Rb"):
+        np.testing.assert_allclose(answer.points[name], (-50, -80, 0), atol=1e-9)
+
+
+@pytest.mark.parametrize("gap, engine", [(0.5e-6, "reaching"), (2e-4, "closure")])
+def test_axes_that_pass_each_other_do_not_cross(gap: float, engine: str) -> None:
+    """The gap is a share of L, about 100 here."""
+    chain = last_chain(*crossing(Rb={"at": (-50, -80, 100 * gap)}))
+    assert chain.engine == engine
+
+
+@pytest.mark.parametrize(
+    "name, change", [("Rb", {"range": (-1.0, 1.0)}), ("Ra", {"actuated": True}), ("Rd", {"range": (-1.0, 1.0)})]
+)
+def test_coincident_joints_with_a_motor_or_a_limit_are_left_to_the_closure_engine(name: str, change: dict) -> None:
+    chain = last_chain(*crossing(**{name: change}))
+    assert chain.engine == "closure"
+    assert f"joint {name} shares its centre" in chain.reason
+
+
+@pytest.mark.parametrize("size, shift", [(1.0, 0.0), (1e-8, 0.0), (1e8, 0.0), (1.0, 1e8), (1e-5, 1e8)])
+def test_what_coincides_depends_neither_on_the_unit_nor_on_the_origin(size: float, shift: float) -> None:
+    """The crank of the R*-U-S leg is 36 of L = 130 long, wherever the machine stands and whatever its unit."""
+    mixed = MACHINES["mixed"]()
+
+    def place(joint: Joint) -> Joint:
+        at = None if joint.at is None else size * (np.array(joint.at) + shift)
+        stroke = tuple(size * np.array(joint.range)) if joint.type == "prismatic" else joint.range
+        return dataclasses.replace(joint, at=at, range=stroke)
+
+    placed = Mechanism("placed", [place(j) for j in mixed.joints], "platform", size * (np.array((0, 0, 180)) + shift))
+    forms = [chain.branch_forms[0] for chain in pf.decompose(placed)]
+    assert [len(form.nodes) for form in forms] == [2, 2, 2, 3, 2]
+
+
+def test_hinges_with_parallel_axes_lie_in_one_plane_whatever_their_heights() -> None:
+    machine = planar("RRR")
+    for chain in pf.decompose(machine):
+        (form,) = chain.branch_forms
+        heights = [node.at[2] for node in form.nodes]
+        assert np.ptp(heights) <= 1e-12
+        for node in form.nodes:
+            np.testing.assert_allclose(node.at + node.shift * form.normal, machine.joint(node.joint).at, atol=1e-12)
+    shifts = [node.shift for chain in pf.decompose(machine) for node in chain.branch_forms[0].nodes]
+    assert np.ptp(shifts) > 10
+
+
+def with_spindle(driven: bool) -> Mechanism:
+    """A hexapod with a tool that turns in two bearings on the platform."""
+    bearings = [
+        Joint(
+            name, "revolute", ("platform", "tool"), at=(0, 0, height), axis=(0, 0, 1), actuated=driven and height > 150
+        )
+        for name, height in (("bearing", 140), ("spindle", 160))
+    ]
+    return Mechanism("with spindle", [*struts(6), *bearings], "platform", (0, 0, 150))
+
+
+def test_a_tool_on_the_platform_and_a_gripper_on_the_tip_belong_to_no_chain() -> None:
+    joints = [chain.joints for chain in pf.decompose(with_spindle(driven=False))]
+    assert joints == [(f"A{i}", f"B{i}", f"C{i}") for i in range(1, 7)]
+    assert pf.decompose(MACHINES["serial_planar"]())[0].joints == ("j1", "j2", "j3", "j4", "tip")
+
+
+def test_a_motor_that_no_chain_contains_is_named() -> None:
+    with pytest.raises(UnsupportedMechanism, match="spindle is in no sub-chain"):
+        flatten(with_spindle(driven=True))
+
+
+FOOT, KNEE, HEAD = (-50, -80, 0), (-80, -70, 70), (-30, -50, 150)
+UP = np.subtract(HEAD, FOOT)
+
+BEYOND_POSITIONS = {
+    "revolute on a moving link": (
+        "B",
+        Joint("A", "revolute", ("base", "k"), at=FOOT, axis=(1, 0, 0)),
+        Joint("B", "revolute", ("k", "r"), at=KNEE, axis=(0, 0, 1)),
+        Joint("C", "spherical", ("r", "platform"), at=HEAD),
+    ),
+    "cylindrical joint": (
+        "B",
+        Joint("A", "universal", ("base", "k"), at=FOOT),
+        Joint("B", "cylindrical", ("k", "r"), at=KNEE, axis=UP),
+        Joint("C", "spherical", ("r", "platform"), at=HEAD),
+    ),
+    "two prismatic joints in a row": (
+        "D",
+        Joint("A", "universal", ("base", "k"), at=FOOT),
+        Joint("B", "prismatic", ("k", "m"), axis=UP),
+        Joint("D", "prismatic", ("m", "r"), axis=UP, actuated=True),
+        Joint("C", "spherical", ("r", "platform"), at=HEAD),
+    ),
+    "prismatic joint aside of its neighbours": (
+        "B",
+        Joint("A", "universal", ("base", "k"), at=FOOT),
+        Joint("B", "prismatic", ("k", "r"), axis=(0, 0, 1), actuated=True),
+        Joint("C", "spherical", ("r", "platform"), at=HEAD),
+    ),
+    "prismatic joint that carries the platform": (
+        "B",
+        Joint("A", "spherical", ("base", "k"), at=FOOT),
+        Joint("B", "prismatic", ("k", "platform"), axis=UP, actuated=True),
+    ),
+    "universal joint with ranges": (
+        "A",
+        Joint("A", "universal", ("base", "k"), at=FOOT, axes=((1, 0, 0), (0, 1, 0)), range=((-1, 1), (-1, 1))),
+        Joint("B", "prismatic", ("k", "r"), axis=UP, actuated=True),
+        Joint("C", "spherical", ("r", "platform"), at=HEAD),
+    ),
+    "universal joint below a branching body": (
+        "A",
+        Joint("A", "universal", ("base", "k"), at=FOOT),
+        Joint("B", "spherical", ("k", "platform"), at=HEAD),
+        Joint("C", "spherical", ("k", "platform"), at=KNEE),
+    ),
+    "cone that turns with a link of unknown twist": (
+        "C",
+        Joint("A", "universal", ("base", "k"), at=FOOT),
+        Joint("C", "spherical", ("k", "r"), at=KNEE, cone=Cone((1, 0, 0), 2.0, "k")),
+        Joint("D", "spherical", ("r", "platform"), at=HEAD),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BEYOND_POSITIONS)
+def test_a_chain_that_needs_more_than_positions_names_the_joint_and_the_reason(name: str) -> None:
+    culprit, *leg = BEYOND_POSITIONS[name]
+    mechanism = with_leg(*leg)
+    *others, chain = pf.decompose(mechanism)
+    assert [each.engine for each in others] == ["reaching"] * 5
+    assert chain.engine == "closure"
+    assert culprit in chain.reason.replace(",", " ").split()
+    with pytest.raises(UnsupportedMechanism) as caught:
+        pf.solve_ik(mechanism, mechanism.home_pose)
+    assert chain.reason in str(caught.value)
+    assert str(chain) in str(caught.value)
+
+
+def test_two_universal_joints_carry_orientation() -> None:
+    leg = [
+        Joint("A", "universal", ("base", "k"), at=FOOT),
+        Joint("B", "prismatic", ("k", "r"), axis=UP, actuated=True),
+        Joint("C", "universal", ("r", "platform"), at=HEAD),
+    ]
+    chain = last_chain(*leg)
+    assert (str(chain), chain.engine) == ("U-P*-U", "closure")
+    assert "carries orientation" in chain.reason
+
+
+def test_a_loop_within_a_leg_is_found() -> None:
+    """A parallelogram forearm: two rods side by side between crank and platform carrier."""
+    loop = [
+        Joint("A", "revolute", ("base", "crank"), at=FOOT, axis=(1, 0, 0), actuated=True),
+        Joint("KB1", "spherical", ("crank", "rod1"), at=KNEE),
+        Joint("KB2", "spherical", ("crank", "rod2"), at=np.add(KNEE, (10, 0, 0))),
+        Joint("KC1", "spherical", ("rod1", "carrier"), at=HEAD),
+        Joint("KC2", "spherical", ("rod2", "carrier"), at=np.add(HEAD, (10, 0, 0))),
+        Joint("D", "revolute", ("carrier", "platform"), at=HEAD, axis=(1, 0, 0)),
+    ]
+    chain = last_chain(*loop)
+    assert chain.engine == "closure"
+    assert "loop of its own" in chain.reason
+    assert set(chain.joints) == {"A", "KB1", "KB2", "KC1", "KC2", "D"}
+
+
+@pytest.mark.parametrize("sine, engine", [(0.5e-6, "reaching"), (1e-5, "closure")])
+def test_axes_count_as_parallel_up_to_the_stated_angle(sine: float, engine: str) -> None:
+    leg = [
+        Joint("A", "revolute", ("base", "k"), at=FOOT, axis=(1, 0, 0), actuated=True),
+        Joint("B", "revolute", ("k", "r"), at=KNEE, axis=(1, sine, 0)),
+        Joint("C", "spherical", ("r", "platform"), at=HEAD),
+    ]
+    assert last_chain(*leg).engine == engine
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", ["nrpm", "mixed", "five_bar"])
+def test_sub_chains_come_in_the_order_of_their_first_joints(name: str, seed: int) -> None:
+    original = machine(name)
+    order = np.random.default_rng(seed).permutation(len(original.joints))
+    shuffled = dataclasses.replace(original, joints=[original.joints[i] for i in order])
+    chains = pf.decompose(shuffled)
+    place = {joint.name: i for i, joint in enumerate(shuffled.joints)}
+    shared = {original.end_effector}
+    firsts = [min(place[joint] for joint in chain.joints if joint not in shared) for chain in chains]
+    assert {frozenset(c.joints) for c in chains} == {frozenset(c.joints) for c in pf.decompose(original)}
+    assert firsts == sorted(firsts) or original.end_effector_is_joint
+
+
+def swapped(joint: Joint) -> Joint:
+    """The same joint seen from its other body: an axis coordinate changes sign, a distance does not."""
+    changes: dict[str, object] = {"connects": joint.connects[::-1]}
+    if joint.type in ("revolute", "prismatic") and joint.along is None:
+        changes["home"] = -joint.home
+        changes["range"] = joint.range and (-joint.range[1], -joint.range[0])
+    return dataclasses.replace(joint, **changes)
+
+
+@pytest.mark.parametrize("name", NOTATION)
+def test_a_joint_described_the_other_way_around_flips_its_coordinate_and_nothing_else(name: str) -> None:
+    original = machine(name)
+    rng = np.random.default_rng(5)
+    length = original.characteristic_length
+    targets = [
+        pf.pose(original.reference_point + 0.1 * length * rng.normal(size=3), rotvec=0.1 * rng.normal(size=3))
+        for _ in range(2 if INTERPRETED else 10)
+    ]
+    expected = pf.solve_ik(original, targets)
+    for every in (1, 2, 3):
+        chosen = {joint.name for joint in original.joints[::every]}
+        other = dataclasses.replace(original, joints=[swapped(j) if j.name in chosen else j for j in original.joints])
+        answer = pf.solve_ik(other, targets)
+        signs = [-1 if a in chosen and original.joint(a).along is None else 1 for a in original.actuators]
+        np.testing.assert_array_equal(answer.status, expected.status)
+        np.testing.assert_allclose(answer.pose, expected.pose, rtol=0, atol=1e-9 * length)
+        np.testing.assert_allclose(answer.actuators, expected.actuators * signs, rtol=0, atol=1e-9 * length)
+        for joint, points in expected.points.items():
+            np.testing.assert_allclose(answer.points[joint], points, rtol=0, atol=1e-9 * length)

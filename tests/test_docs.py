@@ -1,0 +1,131 @@
+"""What the documentation shows is true: its programs run, its commands print what it prints, its links lead on."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import pfabrik as pf
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *ROOT.glob("docs/**/*.md")])
+EXAMPLES = sorted(ROOT.glob("examples/*.py"))
+FORMAT = ROOT / "docs" / "describing-a-mechanism.md"
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+NOISE = "loops closed to"  # of rounding errors, which differ between processors
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """The fenced blocks of a page in one language."""
+    fenced = re.findall(r"^```(\w*)\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    return [text for label, text in fenced if label == language]
+
+
+def anchors(page: Path) -> set[str]:
+    """What a link may have behind its #: the headings of a page."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Python in a folder of its own, with this package, warnings being errors."""
+    environment = os.environ | {"PYTHONPATH": str(Path(pf.__file__).parents[1])}
+    command = [sys.executable, "-W", "error", *arguments]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_there_is_something_to_check() -> None:
+    assert len(PAGES) > 10
+    assert EXAMPLES
+    assert sum(len(blocks(page, "python")) for page in PAGES) >= 4
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_within_the_project_lead_somewhere(page: Path) -> None:
+    for link in LINK.findall(page.read_text(encoding="utf-8")):
+        if "://" in link:
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+@pytest.mark.parametrize("page", sorted(ROOT.glob("docs/**/*.md")), ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_page_is_on_the_map(page: Path) -> None:
+    index = ROOT / "docs" / "index.md"
+    linked = {(index.parent / link).resolve() for link in LINK.findall(index.read_text(encoding="utf-8"))}
+    assert page == index or page.resolve() in linked
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "code",
+    [
+        pytest.param(code, id=f"{page.relative_to(ROOT)}-{number}")
+        for page in PAGES
+        for number, code in enumerate(blocks(page, "python"), 1)
+    ],
+)
+def test_python_blocks_run_as_they_are_written(code: str, tmp_path: Path) -> None:
+    done = python(tmp_path, "-c", code)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
+def test_examples_run(example: Path, tmp_path: Path) -> None:
+    done = python(tmp_path, str(example))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+def test_the_worked_example_is_a_mechanism_that_can_be_solved(tmp_path: Path) -> None:
+    (text,) = blocks(FORMAT, "toml")
+    (tmp_path / "hexapod.toml").write_text(text, encoding="utf-8")
+    chains = pf.decompose(pf.load(tmp_path / "hexapod.toml"))
+    assert [str(chain) for chain in chains] == ["R*-S-S"] * 6
+
+
+@pytest.mark.slow
+def test_the_worked_example_prints_what_the_page_shows(tmp_path: Path) -> None:
+    (text,) = blocks(FORMAT, "toml")
+    shown = [block.partition("\n") for block in blocks(FORMAT, "") if block.startswith("$ pfabrik ")]
+    assert len(shown) == 4
+    for line, _, expected in shown:
+        faulty = " found " in expected
+        written = misspelt(text) if faulty else text
+        (tmp_path / "hexapod.toml").write_text(written, encoding="utf-8")
+        done = python(tmp_path, "-m", "pfabrik", *shlex.split(line)[2:])
+        found = done.stderr if faulty else done.stdout
+        assert without_noise(found) == without_noise(expected), line
+
+
+def misspelt(text: str) -> str:
+    """The example with the two faults that the page describes."""
+    return text.replace('name = "TopR"', 'name = "TopL"').replace('["rodR", "platform"]', '["rodR", "platfrom"]')
+
+
+def without_noise(text: str) -> list[str]:
+    return [line.rstrip() for line in text.splitlines() if not line.startswith(NOISE)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "line",
+    [line for block in blocks(ROOT / "README.md", "") for line in block.splitlines() if line.startswith("pfabrik ")],
+)
+def test_commands_of_the_readme_answer(line: str, tmp_path: Path) -> None:
+    pf.save(pf.load("five_bar"), tmp_path / "my_machine.toml")
+    (tmp_path / "path.csv").write_text("x,y,z\n0,0,190\n0,0,300\n", encoding="utf-8")
+    if "demo" in line:
+        pytest.importorskip("matplotlib")
+    done = python(tmp_path, "-m", "pfabrik", *shlex.split(line, comments=True)[1:])
+    assert done.returncode in (0, 1), done.stderr
+    assert done.stdout

@@ -1,0 +1,225 @@
+"""What an answer lets one read: batches, points, active limits, plain data."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from machines import ring
+from pfabrik import Joint, Mechanism, Options, Solution, Status
+from pfabrik.flatten import flatten
+from pfabrik.kernels import plan as P
+
+FIELDS = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
+
+
+@pytest.fixture(scope="module")
+def stewart() -> Mechanism:
+    return pf.load("stewart")
+
+
+@pytest.fixture(scope="module")
+def batch(stewart: Mechanism) -> Solution:
+    """Rows 0 and 3 reached, row 1 no pose, rows 2, 4 and 5 out of reach; shape (2, 3)."""
+    targets = np.tile(stewart.home_pose, (2, 3, 1, 1))
+    targets[0, 1, 0, 0] = np.nan
+    targets[0, 2, 2, 3] += 1000
+    targets[1, 0, 0, 3] += 5
+    targets[1, 1, 1, 3] += 1000
+    targets[1, 2, 2, 3] -= 500
+    return pf.solve_ik(stewart, targets, options=Options(on_invalid="mark"))
+
+
+def assert_same_rows(part: Solution, whole: Solution, index: object) -> None:
+    np.testing.assert_array_equal(part.status, whole.status[index])
+    for field in FIELDS:
+        np.testing.assert_array_equal(getattr(part, field), getattr(whole, field)[index])
+    for joint, points in whole.points.items():
+        np.testing.assert_array_equal(part.points[joint], points[index])
+
+
+@pytest.mark.parametrize(
+    "index",
+    [0, -1, slice(None), slice(1, None), (1, 2), (slice(None), 0), [1, 0, 1], np.array([[True, False, True]] * 2), ...],
+)
+def test_indexing_follows_numpys_rules_on_every_field(batch: Solution, index: object) -> None:
+    assert_same_rows(batch[index], batch, index)
+
+
+def test_a_single_answer_is_scalar(batch: Solution) -> None:
+    row = batch[1][0]
+    assert row.status is Status.REACHED
+    assert isinstance(row.position_error, float)
+    assert isinstance(row.iterations, int)
+    assert row.pose.shape == (4, 4)
+
+
+def test_iteration_gives_the_rows_in_order(batch: Solution) -> None:
+    rows = list(batch)
+    assert len(rows) == len(batch) == 2
+    for i, row in enumerate(rows):
+        assert_same_rows(row, batch, i)
+
+
+def test_active_limits_follow_their_rows(batch: Solution) -> None:
+    """One tuple a row, in row order; none for a row that is reached or no pose."""
+    limits = batch.active_limits
+    assert [bool(row) for row in limits] == [False, False, True, False, True, True]
+    assert batch[0, 2].active_limits == limits[2]
+    assert batch[1].active_limits == limits[3:]
+
+
+def test_a_single_answer_has_neither_length_nor_rows(batch: Solution) -> None:
+    for use in (len, lambda answer: answer[0], list):
+        with pytest.raises(TypeError):
+            use(batch[0, 0])
+
+
+def test_an_index_out_of_range_is_refused(batch: Solution) -> None:
+    with pytest.raises(IndexError):
+        batch[2]
+
+
+def test_a_batch_is_true_when_every_row_is_reached(batch: Solution) -> None:
+    assert not batch
+    assert batch[[0, 1], [0, 0]]
+    assert not batch[1]
+    assert bool(batch[0, 0])
+    assert not batch[0, 1]
+    assert not batch[0, 2]
+
+
+def test_the_worst_status_is_the_largest(batch: Solution) -> None:
+    assert Status.REACHED < Status.PROJECTED < Status.FAILED < Status.INVALID
+    assert batch.status.max() == Status.INVALID
+
+
+def test_rows_that_were_no_poses_are_nan(batch: Solution) -> None:
+    marked = batch[0, 1]
+    assert marked.status is Status.INVALID
+    for field in ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess"):
+        assert np.isnan(getattr(marked, field)).all()
+    assert all(np.isnan(point).all() for point in marked.points.values())
+    assert marked.iterations == marked.rounds == 0
+
+
+KEYS = {"status", *FIELDS, "points", "active_limits"}
+
+
+def test_plain_data_has_the_fields_and_is_json(batch: Solution) -> None:
+    for part in (batch, batch[0], batch[0, 0], batch[0, 1], batch[0, 2], batch[:0]):
+        plain = part.to_dict()
+        assert set(plain) == KEYS
+        assert json.loads(json.dumps(plain, allow_nan=False)) == plain
+
+
+def test_plain_data_says_what_the_fields_say(batch: Solution) -> None:
+    plain = batch.to_dict()
+    assert plain["status"] == [["REACHED", "INVALID", "PROJECTED"], ["REACHED", "PROJECTED", "PROJECTED"]]
+    assert plain["position_error"][0][1] is None
+    assert plain["points"]["AL1"][0][1] == [None] * 3
+    assert plain["points"]["AL1"][1][0] == [100, 20, 0]
+    single = batch[0, 2].to_dict()
+    assert single["status"] == "PROJECTED"
+    first, limit = batch[0, 2].active_limits[0], single["active_limits"][0]
+    assert limit == {"joint": first.joint, "bound": first.bound, "value": first.value, "limit": first.limit}
+
+
+def test_the_representation_counts_what_became_of_the_rows(batch: Solution) -> None:
+    assert repr(batch) == "<Solution of '6-UPS Stewart platform': 2 REACHED, 3 PROJECTED, 1 INVALID>"
+    assert repr(batch[0, 0]) == "<Solution of '6-UPS Stewart platform': 1 REACHED>"
+    assert repr(batch[:0]) == "<Solution of '6-UPS Stewart platform': empty>"
+
+
+def test_points_are_in_the_order_of_the_joints(stewart: Mechanism, batch: Solution) -> None:
+    assert list(batch.points) == [joint.name for joint in stewart.joints if joint.at is not None]
+
+
+def test_points_cannot_be_replaced(batch: Solution) -> None:
+    with pytest.raises(TypeError):
+        batch.points["AL1"] = 0
+
+
+def test_branches_start_where_their_trunk_carries_them() -> None:
+    """Arm angle and extension of the redundant machine, and the ends of its crossbars by hand."""
+    machine = pf.load("nrpm")
+    answer = pf.solve_ik(machine, pf.pose([30, 50, 210], rotvec=[0.1, -0.2, 0.3]))
+    assert answer
+    values = dict(zip(machine.actuators, answer.actuators, strict=True))
+    assert max(abs(values[f"A{arm}"] - np.pi / 2) for arm in (1, 2, 3)) > 1e-2
+    for arm in (1, 2, 3):
+        hinge, slide = machine.joint(f"A{arm}"), machine.joint(f"B{arm}")
+        swing = Rotation.from_rotvec((values[hinge.name] - hinge.home) * np.array(hinge.axis))
+        np.testing.assert_allclose(answer.points[hinge.name], hinge.at, atol=1e-12)
+        for side in "LR":
+            home = np.array(machine.joint(f"C{side}{arm}").at)
+            extended = home + (values[slide.name] - slide.home) * np.array(slide.axis)
+            expected = hinge.at + swing.apply(extended - hinge.at)
+            np.testing.assert_allclose(answer.points[f"C{side}{arm}"], expected, atol=1e-9)
+
+
+def test_centres_along_a_trunk_move_with_the_joints_before_them() -> None:
+    """A shoulder, a slide and an elbow below a crossbar with two struts; four struts more hold the platform."""
+    joints = [
+        Joint("shoulder", "revolute", ("base", "arm"), at=(100, 0, 0), axis=(0, 1, 0), actuated=True),
+        Joint("slide", "prismatic", ("slider", "arm"), axis=(-1, 0, 3), actuated=True, range=(-20, 20)),
+        Joint("elbow", "revolute", ("bar", "slider"), at=(90, 0, 40), axis=(1, 1, 0), actuated=True),
+        Joint("C1", "universal", ("bar", "c1"), at=(80, 20, 60)),
+        Joint("D1", "prismatic", ("c1", "r1"), along=("C1", "E1"), actuated=True),
+        Joint("E1", "spherical", ("r1", "platform"), at=(50, 30, 150)),
+        Joint("C2", "universal", ("bar", "c2"), at=(80, -20, 60)),
+        Joint("D2", "prismatic", ("c2", "r2"), along=("C2", "E2"), actuated=True),
+        Joint("E2", "spherical", ("r2", "platform"), at=(50, -30, 150)),
+    ]
+    feet, heads = ring(100, 0, (80, 120, 200, 260)), ring(50, 150, (90, 140, 180, 270))
+    for i, (foot, head) in enumerate(zip(feet, heads, strict=True), 3):
+        joints += [
+            Joint(f"C{i}", "universal", ("base", f"c{i}"), at=foot),
+            Joint(f"D{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"C{i}", f"E{i}"), actuated=True),
+            Joint(f"E{i}", "spherical", (f"r{i}", "platform"), at=head),
+        ]
+    machine = Mechanism("arm with elbow", joints, "platform", (0, 0, 150))
+    flat = flatten(machine)
+    values = np.array([[0.3, 12.0, -0.5]])
+    rows = P.Rows(
+        np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.eye(4)[None], flat.home_seed.nodes,
+        values, np.zeros((1, flat.n_actuators)), np.zeros((1, 4)),
+    )  # fmt: skip
+    points = Solution(machine, flat, rows, ()).points
+    shoulder = Rotation.from_rotvec([0, 0.3, 0])
+    at = np.array((100.0, 0, 0)) + shoulder.apply((90.0 - 100, 0, 40) - 12.0 * np.array((-1, 0, 3)) / np.sqrt(10))
+    np.testing.assert_allclose(points["shoulder"], (100, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(points["elbow"], at, atol=1e-12)
+
+
+@pytest.mark.parametrize("distance, named", [(0.9e-7, True), (1.1e-7, False)])
+@pytest.mark.parametrize("bound", ["min", "max", "cone"])
+def test_limits_are_active_up_to_the_stated_distance(
+    stewart: Mechanism, bound: str, distance: float, named: bool
+) -> None:
+    """A limit is put at a distance (of L, or in rad) from where a projected answer happens to be."""
+    answer = pf.solve_ik(stewart, np.add(stewart.reference_point, (500.0, 0, -500.0 if bound == "min" else 0)))
+    assert answer.status is Status.PROJECTED
+    held = {limit.joint for limit in answer.active_limits}
+    if bound == "cone":
+        joint = next(j for j in stewart.joints if j.cone and j.cone.fixed_to == "base" and j.name not in held)
+        line = answer.points[joint.name.replace("A", "C")] - joint.at
+        angle = np.arctan2(np.hypot(line[0], line[1]), line[2])
+        limit = pf.Cone((0, 0, 1), angle + distance, "base")
+        expected = angle + distance
+    else:
+        gap = distance * stewart.characteristic_length
+        lengths = dict(zip(stewart.actuators, answer.actuators, strict=True))
+        homeward = 1 if bound == "min" else -1
+        free = (n for n, v in lengths.items() if n not in held and homeward * (stewart.home_coordinate(n) - v) > 0)
+        joint = stewart.joint(next(free))
+        expected = lengths[joint.name] - homeward * gap
+        limit = (expected, 400.0) if bound == "min" else (1.0, expected)
+    moved = stewart.with_limits({joint.name: limit})
+    found = Solution(moved, flatten(moved), answer._rows, ()).active_limits
+    hits = [(hit.bound, hit.limit) for hit in found if hit.joint == joint.name]
+    assert hits == ([(bound, pytest.approx(expected))] if named else [])

@@ -1,0 +1,220 @@
+"""Tracking: continuous, in one working mode, the same as answering step by step."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+import checking
+import pfabrik as pf
+from machines import MACHINES
+from pfabrik import Joint, Mechanism, Options, Status
+from pfabrik.errors import InvalidArgument
+
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+STEPS = 60 if INTERPRETED else 360
+CIRCLES = {"five_bar": (200.0, 60.0), "stewart": (220.0, 60.0), "nrpm": (200.0, 100.0)}
+"""Height and radius of the circle in the plane x = 0 that each catalogue file names as its test path."""
+
+
+def circle(height: float, radius: float, steps: int = STEPS, turns: float = 1.0) -> np.ndarray:
+    angle = np.linspace(0, 2 * np.pi * turns, steps, endpoint=False)
+    return np.stack([0 * angle, radius * np.cos(angle), height + radius * np.sin(angle)], axis=1)
+
+
+def largest_jump(values: np.ndarray) -> np.ndarray:
+    """Largest step of each column over the larger of its neighbours and a hundredth of its range."""
+    steps = np.abs(np.diff(values, axis=0))
+    near = np.maximum(steps[:-2], steps[2:])
+    return (steps[1:-1] / np.maximum(near, 1e-2 * np.ptp(values, axis=0) + 1e-12)).max(axis=0)
+
+
+@pytest.mark.parametrize("name", ["five_bar", "stewart"])
+def test_actuators_move_continuously_along_a_circle_within_reach(name: str) -> None:
+    machine = pf.load(name)
+    height, radius = CIRCLES[name]
+    followed = pf.track(machine, circle(height, 0.6 * radius))
+    assert followed
+    assert (largest_jump(followed.actuators) <= 3).all()
+
+
+def test_redundant_actuators_move_continuously_along_a_circle_within_reach() -> None:
+    """The machine is free to move its arms along the way: they may, but not in jumps."""
+    machine = pf.load("nrpm")
+    followed = pf.track(machine, circle(200.0, 60.0))
+    assert followed
+    pace = 60.0 * 2 * np.pi / STEPS
+    steps = np.abs(np.diff(followed.actuators, axis=0))
+    turns = np.array([machine.joint(actuator).type == "revolute" for actuator in machine.actuators])
+    assert steps[:, ~turns].max() <= 3 * pace
+    assert steps[:, turns].max() <= 3 * pace / 90.0
+
+
+@pytest.mark.parametrize("name", CIRCLES)
+def test_a_path_partly_out_of_reach_is_followed_as_far_as_it_goes(name: str) -> None:
+    machine = pf.load(name)
+    followed = pf.track(machine, circle(*CIRCLES[name]))
+    assert set(followed.status) == {Status.REACHED, Status.PROJECTED}
+    length = machine.characteristic_length
+    assert followed.residual.max() <= 1e-9 * length
+    assert followed.limit_excess.max() <= 1e-9
+    assert checking.worst_gap(machine, followed).max() <= 1e-9
+    assert checking.worst_excess(machine, followed).max() <= 1e-9
+
+
+@pytest.mark.parametrize("name", [*CIRCLES, "hexapod_rus", "tripod_prs", "mixed"])
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_tracking_is_answering_step_by_step_from_the_answer_before(name: str) -> None:
+    machine = MACHINES[name]() if name in MACHINES else pf.load(name)
+    length = machine.characteristic_length
+    height, radius = CIRCLES.get(name, (machine.reference_point[2], 0.25 * length))
+    path = circle(height, radius, steps=12 if INTERPRETED else 40)
+    followed = pf.track(machine, path)
+    seed = None
+    for i, target in enumerate(path):
+        seed = pf.solve_ik(machine, target, seed=seed, options=Options(working_mode="keep"))
+        assert followed.status[i] == seed.status
+        np.testing.assert_allclose(followed.pose[i], seed.pose, rtol=0, atol=1e-8 * length)
+        np.testing.assert_allclose(followed.actuators[i], seed.actuators, rtol=0, atol=1e-8 * length)
+
+
+def elbow_sides(machine: Mechanism, answer: pf.Solution) -> np.ndarray:
+    """On which side of the line from its base joint to the tip each elbow is, in the plane x = 0."""
+    sides = []
+    for base, elbow in (("p1", "p2"), ("p5", "p4")):
+        line, arm = answer.points["p3"] - answer.points[base], answer.points[elbow] - answer.points[base]
+        sides.append(np.sign(np.cross(line, arm)[..., 0]))
+    return np.array(sides)
+
+
+def two_modes() -> tuple[Mechanism, np.ndarray]:
+    """A 5-bar whose left elbow may bend either way, and a path to where only the bend that is not home's is allowed."""
+    machine = pf.load("five_bar").without_limits().with_limits(p2=np.radians((-100.0, 140.0)))
+    home = np.array(machine.reference_point)
+    return machine, home + np.linspace(0, 1, 20)[:, None] * np.array((0.0, -5.0, -75.0))
+
+
+def test_the_working_mode_stays_where_another_would_reach() -> None:
+    machine, path = two_modes()
+    assert pf.solve_ik(machine, path[-1])
+    followed = pf.track(machine, path)
+    assert followed.status[0] == Status.REACHED
+    assert followed.status[-1] == Status.PROJECTED
+    sides = elbow_sides(machine, followed)
+    np.testing.assert_array_equal(sides, np.tile(sides[:, :1], len(path)))
+
+
+def test_the_seed_decides_the_working_mode() -> None:
+    """Started with the left elbow flipped, the way back to home ends with it flipped."""
+    machine, path = two_modes()
+    flipped = pf.solve_ik(machine, path[-1])
+    followed = pf.track(machine, path[::-1], seed=flipped)
+    assert followed
+    home = elbow_sides(machine, pf.solve_ik(machine, path[:1]))
+    np.testing.assert_array_equal(elbow_sides(machine, followed), np.tile(home * [[-1], [1]], len(path)))
+
+
+def test_a_path_starts_from_its_seed() -> None:
+    machine = pf.load("nrpm")
+    seed = pf.solve_ik(machine, np.add(machine.reference_point, (20.0, 30.0, -20.0)))
+    from_seed = pf.track(machine, seed.pose[None], seed=seed)
+    np.testing.assert_allclose(from_seed.actuators[0], seed.actuators, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("steps", [0, 1, 16, 17, 50])
+def test_progress_is_reported_up_to_the_end_and_changes_nothing(steps: int) -> None:
+    machine = pf.load("stewart")
+    path = circle(*CIRCLES["stewart"])[:steps]
+    calls: list[tuple[int, int]] = []
+    watched = pf.track(machine, path, on_progress=lambda done, total: calls.append((done, total)))
+    np.testing.assert_array_equal(watched.actuators, pf.track(machine, path).actuators)
+    assert [total for _, total in calls] == [steps] * len(calls)
+    done = [count for count, _ in calls]
+    assert done == sorted(set(done))
+    assert (done[-1] if done else 0) == steps
+
+
+def test_rows_that_are_no_poses_are_marked_and_passed_over() -> None:
+    machine = pf.load("stewart")
+    path = np.tile(machine.home_pose, (40, 1, 1))
+    path[:, :3, 3] = circle(200.0, 20.0, steps=40)
+    clean = pf.track(machine, path)
+    bad = [0, 16, 17, 31]
+    path[bad, 0, 0] = np.nan
+    for report in (None, lambda done, total: None):
+        marked = pf.track(machine, path, options=Options(on_invalid="mark"), on_progress=report)
+        assert np.flatnonzero(marked.status == Status.INVALID).tolist() == bad
+        good = np.setdiff1d(np.arange(40), bad)
+        np.testing.assert_allclose(marked.actuators[good], clean.actuators[good], rtol=0, atol=1e-9)
+        assert np.isnan(marked.actuators[bad]).all()
+    with pytest.raises(InvalidArgument, match="first bad rows: 0, 16, 17, 31"):
+        pf.track(machine, path)
+
+
+def arm(limit: tuple[float, float] | None) -> Mechanism:
+    """Two links of 3 and 2 in the plane z = 0, driven at both joints."""
+    joints = [
+        Joint("j1", "revolute", ("base", "upper"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True, range=limit),
+        Joint("j2", "revolute", ("upper", "lower"), at=(3, 0, 0), axis=(0, 0, -1), actuated=True, range=(-2.5, 2.5)),
+        Joint("tip", "revolute", ("lower", "tool"), at=(3, 2, 0), axis=(0, 0, 1)),
+    ]
+    return Mechanism("two-link arm", joints, "tip")
+
+
+@pytest.mark.parametrize("turns", [3.0, -2.5])
+@pytest.mark.parametrize("invalid", [False, True])
+def test_an_unlimited_crank_counts_on_through_full_turns(turns: float, invalid: bool) -> None:
+    """The tip goes round the base at home's distance: the shoulder turns as far, and the elbow stays."""
+    steps = 200
+    angle = np.linspace(0.0, 2 * np.pi * turns, steps)
+    c, s = np.cos(angle), np.sin(angle)
+    path = np.stack([3 * c - 2 * s, 3 * s + 2 * c, 0 * c], axis=1)
+    if invalid:
+        path[::7] = np.nan
+    followed = pf.track(arm(None), path, options=Options(on_invalid="mark"))
+    known = followed.status == Status.REACHED
+    assert known.sum() == (np.isfinite(path[:, 0])).sum()
+    shoulder = followed.actuators[known, 0]
+    np.testing.assert_allclose(shoulder - shoulder[0], (angle - angle[known][0])[known], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(followed.actuators[known, 1], 0, atol=1e-8)
+
+
+def test_a_limited_crank_stays_within_its_range() -> None:
+    angle = np.linspace(0.0, 4.0, 100)
+    c, s = np.cos(angle), np.sin(angle)
+    path = np.stack([3 * c - 2 * s, 3 * s + 2 * c, 0 * c], axis=1)
+    followed = pf.track(arm((-2.0, 2.0)), path)
+    np.testing.assert_array_equal(followed.status == Status.REACHED, angle <= 2.0)
+    assert np.abs(followed.actuators[:, 0]).max() <= 2.0 + 1e-9
+
+
+def test_what_is_no_path_is_refused() -> None:
+    machine = pf.load("stewart")
+    for targets in (machine.home_pose, machine.reference_point, np.tile(machine.home_pose, (2, 3, 1, 1))):
+        with pytest.raises(InvalidArgument, match="path"):
+            pf.track(machine, targets)
+
+
+def test_a_path_cannot_change_its_working_mode() -> None:
+    machine = pf.load("stewart")
+    with pytest.raises(InvalidArgument, match="working_mode"):
+        pf.track(machine, [machine.reference_point], options=Options(working_mode="any"))
+
+
+def test_a_path_starts_from_a_single_feasible_answer_of_its_machine() -> None:
+    machine = pf.load("stewart")
+    pair = pf.solve_ik(machine, [machine.reference_point] * 2)
+    other = pf.solve_ik(pf.load("five_bar"), pf.load("five_bar").reference_point)
+    unknown = pf.solve_ik(machine, [[np.nan] * 3], options=Options(on_invalid="mark"))[0]
+    for seed in (pair, other, unknown, machine.home_pose):
+        with pytest.raises(InvalidArgument, match="seed"):
+            pf.track(machine, [machine.reference_point], seed=seed)
+
+
+def test_a_path_may_be_empty() -> None:
+    machine = pf.load("stewart")
+    empty = pf.track(machine, np.empty((0, 3)))
+    assert len(empty) == 0
+    assert empty.actuators.shape == (0, 6)
