@@ -73,7 +73,7 @@ def as_floats(name: str, value: Any, expected: str) -> Floats:
         raise InvalidArgument(name, "a ragged nest of sequences", expected) from error
     if array.dtype.kind not in "iuf":
         raise InvalidArgument(name, f"{type(value).__name__} of dtype {array.dtype}", expected)
-    return np.ascontiguousarray(array, np.float64)
+    return np.require(array, np.float64, ["C", "W"])  # the one memory layout that kernels are compiled for
 
 
 def _from_rpy(name: str, value: Any) -> Floats:

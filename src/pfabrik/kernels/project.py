@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ._jit import routine
+from .blocks import is_all_struts
 from .frames import move_carriers, orthonormalise, rotation_between, turn_pose, turn_pose_by_vector
 from .linear import solve_spd
 from .measure import measure_all
@@ -24,6 +25,8 @@ from .settle import TRANSLATES, TURNS, settle
 from .vectors import add, along, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec
 from .violations import note_violations, trunk_span
 
+# Rounds and exact step are tried so often; struts, whose violations have no valleys to be caught in, once.
+TRIES = 3
 # Steps tried on the way back from an infeasible pose to a feasible one, and the share of the way not worth a try.
 TRIALS = 60
 SHORTEST_STEP = 1e-9
@@ -146,22 +149,26 @@ def project_target(plan: Plan, hold: int, now: Configuration, work: Work, settin
     elif hold == HOLD_POSITION:
         free = TURNS
     enough = settings.tolerance if settings.exact == 0 else NEAR * plan.scalars[LENGTH]
-    if settings.exact == 0 or largest_violation(plan, now, work) > enough:
-        for _round in range(settings.max_rounds):
-            gap, more = reach_out(plan, now, work, enough, settings)
-            iterations += more
-            if gap <= enough:
-                break
-            rounds += 1
-            if free & TRANSLATES:
-                move_to_centroid(plan, now)
-            if free & TURNS:
-                turn_to_fit(plan, now, work, hold == HOLD_POSITION)
-        for c in range(plan.chains.shape[0]):
-            place_ends(plan, c, now)
-    settle(plan, 0, plan.chains.shape[0], free, now, work)
-    gap, excess = measure_all(plan, now)
-    feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack
+    feasible = False
+    for _try in range(TRIES):
+        if settings.exact == 0 or largest_violation(plan, now, work) > enough:
+            for _round in range(settings.max_rounds):
+                gap, more = reach_out(plan, now, work, enough, settings)
+                iterations += more
+                if gap <= enough:
+                    break
+                rounds += 1
+                if free & TRANSLATES:
+                    move_to_centroid(plan, now)
+                if free & TURNS:
+                    turn_to_fit(plan, now, work, hold == HOLD_POSITION)
+            for c in range(plan.chains.shape[0]):
+                place_ends(plan, c, now)
+        settle(plan, 0, plan.chains.shape[0], free, now, work)
+        gap, excess = measure_all(plan, now)
+        feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack
+        if feasible or is_all_struts(plan):
+            break
     return feasible, iterations, rounds
 
 

@@ -9,9 +9,9 @@ from .exact import reach_exact
 from .frames import move_carriers
 from .linear import solve_spd
 from .measure import measure_branch, measure_chain, measure_trunk
-from .plan import LENGTH, PASSES, PLATFORM_CONE, SLIDE, Configuration, Floats, Plan, Records, Settings
+from .plan import LENGTH, PASSES, PLATFORM_CONE, SLIDE, TURN, Configuration, Floats, Plan, Records, Settings
 from .restrict import NO_LENGTH, clamp_cone, clamp_stroke, cone_axis, restrict_step
-from .vectors import Vec, along, cross, dot, flatten, move, norm, put, sub, turn, vec
+from .vectors import Vec, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec
 
 # A pass that improves the error by less than this share has stalled: the target is out of reach ...
 STALL = 1e-3
@@ -188,16 +188,23 @@ def fit_trunk(plan: Plan, c: int, now: Configuration, wanted: Floats, system: Fl
             present = move(now.carriers[trunk + 1], vec(plan.nodes[plan.branches[b]["first"]]["home"]))
             miss = sub(vec(wanted[b]), present)
             for i in range(n):
-                rate = point_rate(plan, now, first + i, present)
+                rate = scale(trunk_unit(plan, first + i), point_rate(plan, now, first + i, present))
                 system[i, n] += dot(rate, miss)
                 for j in range(n):
-                    system[i, j] += dot(rate, point_rate(plan, now, first + j, present))
+                    other = scale(trunk_unit(plan, first + j), point_rate(plan, now, first + j, present))
+                    system[i, j] += dot(rate, other)
         solve_spd(system, n, FIT_DAMPING)
         for i in range(n):
             joint = plan.trunk_joints[first + i]
-            value = now.trunks[first + i] + system[i, n]
+            value = now.trunks[first + i] + system[i, n] * trunk_unit(plan, first + i)
             now.trunks[first + i] = min(max(value, joint["lo"]), joint["hi"])
         move_carriers(plan, now)
+
+
+@routine
+def trunk_unit(plan: Plan, j: int) -> float:
+    """Size of one unit step of a trunk joint's unknown: unknowns are lengths."""
+    return 1.0 / plan.scalars[LENGTH] if plan.trunk_joints[j]["kind"] == TURN else 1.0
 
 
 @routine

@@ -10,9 +10,9 @@ from ._jit import routine
 from .frames import move_carriers, turn_pose_by_vector
 from .linear import solve_spd
 from .plan import LENGTH, SPAN, TURN, Configuration, Floats, Plan, Records, Work
-from .reach import point_rate
+from .reach import point_rate, trunk_unit
 from .vectors import Vec, copy_row, copy_table, cross, dot, move, scale, sub, vec
-from .violations import CARRIER, note_violations, trunk_excess, trunk_span, trunk_unit
+from .violations import CARRIER, note_violations, trunk_excess, trunk_span
 
 # What the platform may do: bits of `free`.
 TRANSLATES, TURNS = 1, 2

@@ -11,7 +11,8 @@ import math
 
 from ._jit import routine
 from .measure import cone_step
-from .plan import CARRIER_CONE, LENGTH, PLATFORM_CONE, TURN, Configuration, Plan, Work
+from .plan import CARRIER_CONE, LENGTH, PLATFORM_CONE, Configuration, Plan, Work
+from .reach import trunk_unit
 from .restrict import NO_LENGTH, cone_axis, end_hinge_angle, hinge_angle
 from .vectors import Vec, add, angle_between, cross, dot, move, norm, scale, sub, turn, vec
 
@@ -55,12 +56,6 @@ def enter(
         entry[7 + i] = before_gradient[i]
         entry[10 + i] = carrier_moment[i]
         entry[13 + i] = platform_moment[i]
-
-
-@routine
-def trunk_unit(plan: Plan, j: int) -> float:
-    """Size of one unit step of a trunk joint's unknown: unknowns are lengths."""
-    return 1.0 / plan.scalars[LENGTH] if plan.trunk_joints[j]["kind"] == TURN else 1.0
 
 
 @routine
