@@ -1,7 +1,4 @@
-"""How fast it is: every time next to a baseline measured in the same run, by turns, so that noise hits both.
-
-python benchmarks/run.py [--quick] [--markdown]
-"""
+"""How fast it is: every time next to a baseline measured in the same run, by turns, so that noise hits both."""
 
 from __future__ import annotations
 
@@ -39,9 +36,10 @@ IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.p
 
 
 NOTE = """Times are the shortest of several runs, subject and baseline by turns; a ratio below 1 is faster than the
-baseline. The closed forms (benchmarks/closed_forms.py) know their machine, use one core, and return numbers and a flag;
-pfabrik returns poses, points, errors and measures as well. Reachable targets lie within 0.2 L and 0.2 rad of home (of
-the NRPM 0.4), those out of reach within 1 L and 0.5 rad. Times of new processes are for all of it, not for a pose."""
+baseline. The closed forms (benchmarks/closed_forms.py) know their machine, use one core and blocks of 4096 poses, and
+return numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres only
+when `points` is read. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM: 0.4), those out of reach within 1 L
+and 0.5 rad. Times of new processes are for all of it, not for a pose."""
 
 
 def best_times(runs: int, *solves: Solve) -> list[float]:
@@ -81,6 +79,11 @@ def draw(mechanism: pf.Mechanism, rng: np.random.Generator, n: int, size: float,
     return targets
 
 
+def in_blocks(solve: Callable[[Array], object], targets: Array, size: int = 4096) -> list[object]:
+    """A vectorised closed form at its best: in blocks whose intermediate arrays stay in the cache."""
+    return [solve(targets[start : start + size]) for start in range(0, len(targets), size)]
+
+
 def agree(solution: pf.Solution, values: Array) -> None:
     """Stop where the closed form answers differently: the comparison would mean nothing."""
     if not solution or np.abs(solution.actuators - values).max() > 1e-6 * solution.mechanism.characteristic_length:
@@ -99,26 +102,26 @@ def single_calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
         lambda: [struts.one(target) for target in targets],
     )
     baseline = "NumPy, lengths and strokes of one pose"
-    yield Row("6-UPS, one call, reachable", calls, ours / len(targets), baseline, theirs / len(targets))
+    yield Row("6-UPS, one call, reachable", calls, ours / calls, baseline, theirs / calls)
 
 
 def batches(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
-    """Reachable batches: on one core and on all, next to vectorised closed forms (which use one)."""
+    """Reachable batches: on one core and on all, next to vectorised closed forms on one."""
     for name, closed, what in (("stewart", Struts, "6-UPS"), ("five_bar", FiveBar, "5-bar")):
         mechanism = pf.load(name)
         form = closed(mechanism)
         drawn = draw(mechanism, rng, 4 * n, 0.2, 0.2)
         targets = drawn[form.solve(drawn)[1]][:n]
         agree(pf.solve_ik(mechanism, targets), form.solve(targets)[0])
-        baselines = {"vectorised NumPy, all limits": lambda form=form, t=targets: form.solve(t)}
-        if name == "stewart":
-            baselines["vectorised NumPy, lengths only"] = lambda form=form, t=targets: form.lengths(t)
+        baselines = {"NumPy, all limits": partial(in_blocks, form.solve, targets)}
+        if isinstance(form, Struts):
+            baselines["NumPy, lengths only"] = partial(in_blocks, form.lengths, targets)
         yield from batch_rows(mechanism, f"{what}, batch, reachable", targets, baselines, runs)
     mechanism = pf.load("nrpm")
     drawn = draw(mechanism, rng, n // 5, 0.4, 0.4)  # nearer to home, few targets need the arms to move
     targets = drawn[pf.solve_ik(mechanism, drawn).status == pf.Status.REACHED][: n // 10]
     struts = Struts(mechanism)
-    baselines = {"vectorised NumPy, six lengths, arms unmoved": lambda: struts.lengths(targets)}
+    baselines = {"NumPy, six lengths, arms unmoved": partial(in_blocks, struts.lengths, targets)}
     yield from batch_rows(mechanism, "NRPM, batch, reachable within 0.4 L", targets, baselines, runs)
 
 
@@ -127,10 +130,11 @@ def batch_rows(
 ) -> Iterator[Row]:
     n, solve = len(targets), partial(pf.solve_ik, mechanism, targets)
     with one_core():
-        ours, *theirs = best_times(runs, solve, *baselines.values())
+        ours, with_points, *theirs = best_times(runs, solve, lambda: solve().points, *baselines.values())
     for baseline, seconds in zip(baselines, theirs, strict=True):
         yield Row(f"{what}, one core", n, ours / n, baseline, seconds / n)
     ours, *theirs = best_times(runs, solve, *baselines.values())
+    yield Row(f"{what}, with points, one core", n, with_points / n, next(iter(baselines)), theirs[0] / n)
     yield Row(f"{what}, all cores", n, ours / n, next(iter(baselines)), theirs[0] / n)
 
 
@@ -161,17 +165,13 @@ def start_up(runs: int) -> Iterator[Row]:
             command = [sys.executable, "-c", code]
             return float(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
 
-        def command_line() -> None:
-            command = [sys.executable, "-m", "pfabrik", "ik", "stewart", "--position", "10", "0", "190"]
-            subprocess.run(command, env=environment, check=True, capture_output=True)
+        def run(*arguments: str) -> None:
+            subprocess.run([sys.executable, *arguments], env=environment, check=True, capture_output=True)
 
-        def plain_python() -> None:
-            subprocess.run([sys.executable, "-c", "import numba"], env=environment, check=True)
-
+        command_line = partial(run, "-m", "pfabrik", "ik", "stewart", "--position", "10", "0", "190")
         yield Row("compile and use every kernel, in an empty cache", 1, measured(USE_EVERYTHING))
-        again = min(measured(USE_EVERYTHING) for _ in range(runs))
-        yield Row("the same program with the cache filled", 1, again)
-        ours, theirs = best_times(runs, command_line, plain_python)
+        yield Row("the same with the cache filled", 1, min(measured(USE_EVERYTHING) for _ in range(runs)))
+        ours, theirs = best_times(runs, command_line, partial(run, "-c", "import numba"))
         yield Row("pfabrik ik stewart --position 10 0 190, warm", 1, ours, 'python -c "import numba"', theirs)
         yield Row("import pfabrik", 1, min(measured(IMPORT) for _ in range(runs)))
 

@@ -292,7 +292,8 @@ def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     assert "Traceback" not in process.communicate(timeout=120)[1]
-    assert process.returncode == 130
+    # a shell calls both 130; Python sends itself the signal again if it arrived in code that it was just generating
+    assert process.returncode in (130, -signal.SIGINT)
     assert os.listdir(tmp_path) == []
 
 

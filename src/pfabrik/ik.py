@@ -45,13 +45,22 @@ def solve_ik(
     UnsupportedMechanism : a sub-chain that the reaching engine cannot express.
     """
     targets, shape = as_targets(target)
-    options = options or DEFAULT
+    options = checked(mechanism, options)
     flat = flatten(mechanism)
     rows = new_rows(flat, len(targets))
     settings = settings_of(mechanism, options, seeded=seed is not None)
     solve_rows(flat, targets, seeds_of(mechanism, flat, seed, shape), settings, rows)
     handle_invalid(targets, rows, options)
     return Solution(mechanism, flat, rows, shape)
+
+
+def checked(mechanism: Mechanism, options: Options | None) -> Options:
+    """The options to use; InvalidArgument where a mechanism or options are something else."""
+    if not isinstance(mechanism, Mechanism):
+        raise InvalidArgument("mechanism", type(mechanism).__name__, "a Mechanism, as `load` returns")
+    if not isinstance(options, Options | None):
+        raise InvalidArgument("options", type(options).__name__, "Options, or None")
+    return options or DEFAULT
 
 
 def solve_rows(flat: Flat, targets: NDArray[np.float64], seeds: P.Seeds, settings: P.Settings, rows: P.Rows) -> None:
@@ -89,8 +98,8 @@ def settings_of(mechanism: Mechanism, options: Options, seeded: bool, chained: b
         tolerance=float(options.tolerance or TOLERANCES.position * length),
         rotation_tolerance=float(options.rotation_tolerance),
         slack=0.1 * TOLERANCES.limit * length,
-        max_iterations=options.max_iterations,
-        max_rounds=options.max_rounds,
+        max_iterations=int(options.max_iterations),
+        max_rounds=int(options.max_rounds),
         exact=int(options.exact),
         any_mode=int(mode == "any"),
         hold=_HOLDS[options.hold],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Literal
 
 from .errors import InvalidArgument
@@ -52,16 +53,24 @@ class Options:
         for name, choices in _CHOICES.items():
             if getattr(self, name) not in choices:
                 raise InvalidArgument(f"options.{name}", repr(getattr(self, name)), f"one of {choices}")
+        if not isinstance(self.exact, bool):
+            raise InvalidArgument("options.exact", repr(self.exact), "True or False")
         for name in ("tolerance", "rotation_tolerance"):
             value = getattr(self, name)
-            if value is not None and not (isinstance(value, int | float) and 0.0 < value < float("inf")):
+            optional = name == "tolerance" and value is None
+            if not optional and not (_is_a(Real, value) and 0.0 < value < float("inf")):
                 raise InvalidArgument(f"options.{name}", repr(value), "a positive number")
         for name in ("max_iterations", "max_rounds"):
             value = getattr(self, name)
-            if not (isinstance(value, int) and 1 <= value <= 1_000_000):
+            if not (_is_a(Integral, value) and 1 <= value <= 1_000_000):
                 raise InvalidArgument(f"options.{name}", repr(value), "an integer from 1 to 1000000")
 
     @classmethod
     def paper(cls) -> Options:
         """The paper's K = 100 and E = 1e-2 [length], by passes alone."""
         return cls(tolerance=1e-2, max_iterations=100, max_rounds=1000, exact=False)
+
+
+def _is_a(kind: type, value: object) -> bool:
+    """Whether a value is such a number; a truth value is none."""
+    return isinstance(value, kind) and not isinstance(value, bool)

@@ -25,6 +25,10 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(n_cores(), thread_name_prefix="pfabrik")
 
 
+if hasattr(os, "register_at_fork"):  # threads do not survive a fork: the child starts its own
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
 def run_in_blocks(
     kernel: Kernel,
     plan: P.Plan,

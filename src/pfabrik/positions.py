@@ -57,7 +57,8 @@ def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> TrunkForm:
         axes.append(np.array(mechanism.home_axis(joint.name)) * step.sign)
         points.append(np.array(joint.at if joint.at is not None else (0.0, 0.0, 0.0)))
         slides.append(joint.type == "prismatic")
-        home, limits = _home(mechanism, joint), _limits(joint)
+        home = _home(mechanism, joint)
+        limits = _limits(joint, home)
         ranges.append((limits[0] - home, limits[1] - home))
         coordinates.append(Coordinate(joint.name, "trunk", index, 1.0, home, limits, joint.actuated))
     return TrunkForm(tuple(points), tuple(axes), tuple(slides), tuple(ranges), tuple(coordinates))
@@ -75,7 +76,10 @@ def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -
     nodes = _place_nodes(mechanism, draft)
     end_turn = _end_turn(mechanism, draft)
     cones = tuple(
-        _cone(draft, nodes, k, step) for k, spot in enumerate(draft.spots) for step in spot.steps if step.joint.cone
+        _cone(draft, nodes, k, step, near)
+        for k, spot in enumerate(draft.spots)
+        for step in spot.steps
+        if step.joint.cone
     )
     rail, rail_range = _rail(mechanism, draft)
     return BranchForm(
@@ -100,13 +104,14 @@ def _home(mechanism: Mechanism, joint: Joint) -> float:
     return home
 
 
-def _limits(joint: Joint) -> Interval:
+def _limits(joint: Joint, home: float) -> Interval:
+    """The range of a joint, which contains home: a description may be off by the rounding of its numbers."""
     if joint.range is None:
         return FREE
     lo, hi = joint.range
     if isinstance(lo, tuple) or isinstance(hi, tuple):
         raise NotExpressible(f"joint {joint.name} has ranges about two axes")
-    return lo, hi
+    return min(lo, home), max(hi, home)
 
 
 def _spots(steps: Sequence[Step], ends_in_point: bool) -> list[_Spot]:
@@ -171,9 +176,21 @@ def _common_centre(a: _Spot, b: _Spot, near: float) -> Array | None:
             return None
         along_a = float(np.cross(apart, b.axis) @ across) / sine**2
         return np.asarray(a.at + along_a * a.axis)
-    if {a.kind, b.kind} == {"R", "U"}:
-        return a.at if float(np.linalg.norm(a.at - b.at)) <= near else None
+    if {a.kind, b.kind} == {"R", "U"} and float(np.linalg.norm(a.at - b.at)) <= near:
+        own, other = (a, b) if a.kind == "R" else (b, a)
+        inner = own is a  # the axis of U that is next to R: its first if R comes before it on the way out
+        axes = [axis for step in other.steps for axis in (step.joint.axes or ())][
+            :: 1 if _first_is_inward(other) else -1
+        ]
+        if axes and _is_parallel(np.array(axes[0 if inner else -1]), own.axis if own.axis is not None else np.zeros(3)):
+            raise NotExpressible(f"joint {own.steps[0].joint.name} turns about an axis of its neighbour")
+        return a.at
     return None
+
+
+def _first_is_inward(spot: _Spot) -> bool:
+    """Whether the first axis of a universal joint is the one fixed to the inward body."""
+    return spot.steps[0].forward
 
 
 def _classify(draft: _Draft) -> None:
@@ -246,7 +263,8 @@ def _stroke(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: int) 
             f"prismatic joint {joint.name} does not point from {nodes[k - 1].joint} to {nodes[k].joint}"
         )
     sign = math.copysign(1.0, cosine)
-    home, limits = _home(mechanism, joint), _limits(joint)
+    home = _home(mechanism, joint)
+    limits = _limits(joint, home)
     if joint.along is not None:
         own = {each.joint.name for spot in draft.spots[k - 1 : k + 1] for each in spot.steps} | {nodes[k].joint}
         if not set(joint.along) <= own:
@@ -262,7 +280,8 @@ def _range_hinge(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: 
     """Node k with the range of its hinge, as deviation from home about the branch's normal."""
     step = draft.spots[k].steps[0]
     sense = _sense(step, draft.normal)
-    home, limits = _home(mechanism, step.joint), _limits(step.joint)
+    home = _home(mechanism, step.joint)
+    limits = _limits(step.joint, home)
     draft.coordinates.append(Coordinate(step.joint.name, "hinge", k, sense, home, limits, step.joint.actuated))
     lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
     before = nodes[k].at - nodes[k - 1].at if k > 0 else None
@@ -288,7 +307,8 @@ def _end_turn(mechanism: Mechanism, draft: _Draft) -> Interval:
     assert normal is not None
     sense = -_sense(spot.steps[0], normal)
     joint = spot.steps[0].joint
-    home, limits = _home(mechanism, joint), _limits(joint)
+    home = _home(mechanism, joint)
+    limits = _limits(joint, home)
     last = len(draft.spots) - 1
     draft.coordinates.append(Coordinate(joint.name, "end_hinge", last, sense, home, limits, joint.actuated))
     lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
@@ -300,16 +320,20 @@ def _rail(mechanism: Mechanism, draft: _Draft) -> tuple[Array | None, Interval]:
         return None, FREE
     joint = draft.rail.joint
     axis = np.array(mechanism.home_axis(joint.name)) * draft.rail.sign
-    home, limits = _home(mechanism, joint), _limits(joint)
+    home = _home(mechanism, joint)
+    limits = _limits(joint, home)
     draft.coordinates.append(Coordinate(joint.name, "rail", 0, 1.0, home, limits, joint.actuated))
     return axis, (limits[0] - home, limits[1] - home)
 
 
-def _cone(draft: _Draft, nodes: list[NodeForm], k: int, step: Step) -> ConeForm:
+def _cone(draft: _Draft, nodes: list[NodeForm], k: int, step: Step, near: float) -> ConeForm:
     """The cone of the joint at node k."""
     cone, name = step.joint.cone, step.joint.name
     assert cone is not None
     axis, last = np.array(cone.axis), len(nodes) - 1
+    seen = k - 1 if cone.fixed_to != step.inward else k + 1
+    if 0 <= seen <= last and abs(nodes[seen].shift) > near:
+        raise NotExpressible(f"the cone of joint {name} is about a line to {nodes[seen].joint}, off the chain's plane")
     outward = nodes[k + 1].at - nodes[k].at if k < last else None
     if cone.fixed_to != step.inward:
         if k == last and k > 0:

@@ -12,7 +12,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .flatten import Flat
+from .flatten import Flat, flatten
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .tolerances import TOLERANCES
@@ -70,6 +70,14 @@ class Solution:
         self.shape = shape
         self._flat = flat
         self._rows = rows
+
+    def __getstate__(self) -> tuple[Mechanism, P.Rows, tuple[int, ...]]:
+        """What an answer is made of; all else follows again where it is unpickled."""
+        return self.mechanism, self._rows, self.shape
+
+    def __setstate__(self, state: tuple[Mechanism, P.Rows, tuple[int, ...]]) -> None:
+        mechanism, rows, shape = state
+        self.__init__(mechanism, flatten(mechanism), rows, shape)  # type: ignore[misc]
 
     def _shaped(self, array: NDArray[Any]) -> Any:
         shaped = array.reshape(self.shape + array.shape[1:])

@@ -9,12 +9,13 @@ import numpy as np
 
 from .errors import InvalidArgument
 from .flatten import Flat, flatten
-from .ik import DEFAULT, handle_invalid, new_rows, seeds_of, settings_of
+from .ik import checked, handle_invalid, new_rows, seeds_of, settings_of
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
 from .poses import as_targets
 from .solution import Solution
+from .tolerances import TOLERANCES
 
 _STEPS_A_REPORT = 16
 
@@ -36,14 +37,15 @@ def track(
 
     Returns
     -------
-    Solution : batch shape (n,). Revolute actuators without limits are counted on through full turns.
+    Solution : batch shape (n,). Revolute actuators that may turn more than once are counted on through
+        full turns, as far as their range goes.
 
     Raises
     ------
     As `solve_ik`; also InvalidArgument for targets that are no path, and for options that change the working mode.
     """
     poses, shape = as_targets(targets)
-    options = options or DEFAULT
+    options = checked(mechanism, options)
     if len(shape) != 1:
         raise InvalidArgument("targets", f"batch shape {shape}", "a path: shape (n, 4, 4) or (n, 3)")
     if options.working_mode == "any":
@@ -83,9 +85,12 @@ def _follow(
 
 
 def _count_turns(flat: Flat, rows: P.Rows) -> None:
-    """Make the angles of unlimited revolute actuators continuous along the path."""
+    """Make the angles of revolute actuators that may turn more than once continuous along the path."""
     known = rows.status != P.INVALID
     for j in range(flat.n_actuators):
         coordinate = flat.plan.coordinates[j]
-        if coordinate["kind"] in (P.HINGE, P.END_HINGE) and np.isinf(coordinate["hi"]):
-            rows.actuators[known, j] = np.unwrap(rows.actuators[known, j])
+        lo, hi = coordinate["lo"], coordinate["hi"]
+        if coordinate["kind"] in (P.HINGE, P.END_HINGE) and hi - lo > 2 * np.pi:
+            counted = np.unwrap(rows.actuators[known, j])
+            if (counted >= lo - TOLERANCES.limit).all() and (counted <= hi + TOLERANCES.limit).all():
+                rows.actuators[known, j] = counted

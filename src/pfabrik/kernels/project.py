@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ._jit import routine
 from .blocks import is_all_struts
+from .exact import branch_mode, reach_exact
 from .frames import move_carriers, orthonormalise, rotation_between, turn_pose, turn_pose_by_vector
 from .linear import solve_spd
 from .measure import measure_all
@@ -140,6 +141,14 @@ def turn_to_fit(plan: Plan, now: Configuration, work: Work, about_reference: boo
 
 
 @routine
+def return_to_modes(plan: Plan, now: Configuration, work: Work, settings: Settings) -> None:
+    """Put branches that have crossed into their other mode back into their own, at the pose they have settled to."""
+    for b in range(plan.branches.shape[0]):
+        if branch_mode(plan, b, now) == -work.modes[b]:
+            reach_exact(plan, b, now, work.modes[b], settings.slack)
+
+
+@routine
 def project_target(plan: Plan, hold: int, now: Configuration, work: Work, settings: Settings) -> tuple[bool, int, int]:
     """Revise the target round by round, then settle; True with a feasible configuration in `now`."""
     iterations, rounds = 0, 0
@@ -165,6 +174,7 @@ def project_target(plan: Plan, hold: int, now: Configuration, work: Work, settin
             for c in range(plan.chains.shape[0]):
                 place_ends(plan, c, now)
         settle(plan, 0, plan.chains.shape[0], free, now, work)
+        return_to_modes(plan, now, work, settings)
         gap, excess = measure_all(plan, now)
         feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack
         if feasible or is_all_struts(plan):
@@ -190,8 +200,9 @@ def step_back(
             orthonormalise(now.pose)
         for i in range(3):
             now.pose[i, 3] += step * (wanted[i, 3] - safe.pose[i, 3])
-        reached, _iterations = reach_pose(plan, now, work, settings)
-        if reached:
+        reach_pose(plan, now, work, settings)
+        gap, excess = measure_all(plan, now)
+        if gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack:
             copy_configuration(plan, now, safe)
         else:
             step *= 0.5

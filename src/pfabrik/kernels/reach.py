@@ -17,6 +17,8 @@ from .vectors import Vec, along, cross, dot, flatten, move, norm, put, scale, su
 STALL = 1e-3
 # ... unless it moves on after a while: so many stalls in a row are believed.
 STALLS = 4
+# A rail that leaves the plane of its branch by more than this sine moves the plane along.
+OBLIQUE = 1e-6
 # Two Gauss-Newton steps fit a trunk well enough for one pass; damped where a joint moves no branch joint.
 FIT_STEPS, FIT_DAMPING = 2, 1e-12
 
@@ -30,6 +32,7 @@ def reach_forward(plan: Plan, b: int, now: Configuration) -> None:
     put(nodes[last], move(now.pose, vec(branch["end"])))
     normal = turn(carrier, vec(branch["normal"]))
     base = move(carrier, vec(plan.nodes[first]["home"]))
+    oblique = branch["rail"] == 1 and abs(dot(normal, vec(branch["rail_axis"]))) > OBLIQUE
     for k in range(last - 1, first - 1, -1):
         d = sub(vec(nodes[k]), vec(nodes[k + 1]))
         if k + 1 == last:
@@ -40,7 +43,7 @@ def reach_forward(plan: Plan, b: int, now: Configuration) -> None:
             length = norm(d)
         reach = clamp_stroke(length, plan.nodes[k + 1]["lo"], plan.nodes[k + 1]["hi"])
         p = along(vec(nodes[k + 1]), reach / length, d)
-        if branch["planar"] > 0 and k - first <= branch["planar"]:
+        if branch["planar"] > 0 and k - first <= branch["planar"] and not oblique:
             p = along(p, -dot(normal, sub(p, base)), normal)
         put(nodes[k], p)
 

@@ -20,6 +20,7 @@ from .vectors import (
     turn,
     vec,
     wrap,
+    wrap_into,
 )
 
 # Below this a vector has no direction; far under any length of a machine, far over the smallest normal number.
@@ -67,7 +68,7 @@ def hinge_angle(plan: Plan, branch: Records, k: int, carrier: Floats, normal: Ve
         angle = angle_about(normal, turn(carrier, vec(branch["reference"])), d)
     else:
         angle = angle_about(normal, sub(vec(nodes[k]), vec(nodes[k - 1])), d) - node["angle_home"]
-    return wrap(angle, 0.5 * (node["angle_lo"] + node["angle_hi"]) if node["ranged"] == 1 else 0.0)
+    return wrap_into(angle, node["angle_lo"], node["angle_hi"]) if node["ranged"] == 1 else wrap(angle, 0.0)
 
 
 @inlined
@@ -75,8 +76,9 @@ def end_hinge_angle(branch: Records, pose: Floats, d: Vec) -> float:
     """Angle from home of the hinge on the platform when the last segment, seen from there, is `d`."""
     normal = turn(pose, vec(branch["end_normal"]))
     angle = angle_about(normal, turn(pose, vec(branch["end_reference"])), d)
-    middle = 0.5 * (branch["end_angle_lo"] + branch["end_angle_hi"]) if branch["end_ranged"] == 1 else 0.0
-    return wrap(angle, middle)
+    if branch["end_ranged"] == 1:
+        return wrap_into(angle, float(branch["end_angle_lo"]), float(branch["end_angle_hi"]))
+    return wrap(angle, 0.0)
 
 
 @inlined

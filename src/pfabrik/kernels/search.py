@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ._jit import routine
+from .exact import reach_exact
 from .frames import move_carriers
 from .plan import LENGTH, PASSES, TURN, Configuration, Plan, Settings, Work
 from .reach import chain_is_reached, reach_by_passes, try_directly
@@ -17,7 +18,7 @@ NEAR = 1e-3
 # A chain that misses by less than this share of L tries the exact step before any passes.
 CLOSE = 0.1
 # Other starts tried before a target is called out of reach; for trunks, each is the best of so many samples.
-RESTARTS = 8
+RESTARTS = 12
 # Starts of a trunk in a row that come no nearer end the search: each is the best of an even spread already.
 VAIN = 3
 SAMPLES = 24
@@ -50,7 +51,7 @@ def has_closed_form(plan: Plan, c: int) -> bool:
 
 
 @routine
-def start_anew(plan: Plan, c: int, attempt: int, now: Configuration, work: Work) -> None:
+def start_anew(plan: Plan, c: int, attempt: int, now: Configuration, work: Work, settings: Settings) -> None:
     """A new start for one chain: home, then the present one mirrored, then bends and trunk values spread evenly."""
     chain = plan.chains[c]
     for b in range(chain["first"], chain["last"]):
@@ -61,6 +62,8 @@ def start_anew(plan: Plan, c: int, attempt: int, now: Configuration, work: Work)
         else:
             for k in range(first, last + 1):
                 put(now.nodes[k], move(now.carriers[branch["carrier"]], vec(plan.nodes[k]["home"])))
+        if attempt >= 2 and branch["rail"] == 1:
+            slide_branch(plan, b, attempt, now)
         if attempt >= 2:
             for k in range(first + 1, last):
                 size = 0.0
@@ -70,7 +73,24 @@ def start_anew(plan: Plan, c: int, attempt: int, now: Configuration, work: Work)
                     spread = (attempt + 0.37 * k) * _SPREAD[i]
                     now.nodes[k, i] += size * (spread - math.floor(spread) - 0.5)
     if chain["trunk"] >= 0:
-        sample_trunk(plan, c, attempt, now, work)
+        sample_trunk(plan, c, attempt, now, work, settings)
+
+
+@routine
+def slide_branch(plan: Plan, b: int, attempt: int, now: Configuration) -> None:
+    """Take a branch along its rail, to somewhere within reach of the target where the rail is that long."""
+    branch = plan.branches[b]
+    home, axis = vec(plan.nodes[branch["first"]]["home"]), vec(branch["rail_axis"])
+    foot = dot(axis, sub(move(now.pose, vec(branch["end"])), home))
+    reach = 0.0
+    for k in range(branch["first"] + 1, branch["last"] + 1):
+        reach += min(plan.nodes[k]["hi"], 2.0 * plan.scalars[LENGTH])
+    lo = min(max(branch["rail_lo"], foot - reach), branch["rail_hi"])
+    hi = max(min(branch["rail_hi"], foot + reach), branch["rail_lo"])
+    spread = attempt * _SPREAD[0]
+    slide = lo + (hi - lo) * (spread - math.floor(spread))
+    for k in range(branch["first"], branch["last"]):
+        put(now.nodes[k], along(vec(now.nodes[k]), slide, axis))
 
 
 @routine
@@ -87,7 +107,7 @@ def mirror_branch(plan: Plan, b: int, now: Configuration) -> None:
 
 
 @routine
-def sample_trunk(plan: Plan, c: int, attempt: int, now: Configuration, work: Work) -> None:
+def sample_trunk(plan: Plan, c: int, attempt: int, now: Configuration, work: Work, settings: Settings) -> None:
     """Set a trunk to the best of some values spread over its ranges."""
     span = plan.trunks[plan.chains[c]["trunk"]]
     best = math.inf
@@ -96,10 +116,14 @@ def sample_trunk(plan: Plan, c: int, attempt: int, now: Configuration, work: Wor
             joint = plan.trunk_joints[j]
             reach = math.pi if joint["kind"] == TURN else 2.0 * plan.scalars[LENGTH]
             spread = (1.0 + sample + attempt * SAMPLES) * _SPREAD[(j - span["first"]) % 4]
-            lo, hi = max(joint["lo"], -reach), min(joint["hi"], reach)
+            middle = 0.5 * (joint["lo"] + joint["hi"]) if math.isfinite(joint["hi"] - joint["lo"]) else 0.0
+            lo, hi = max(joint["lo"], middle - reach), min(joint["hi"], middle + reach)
             now.trunks[j] = lo + (hi - lo) * (spread - math.floor(spread))
         move_carriers(plan, now)
         place_ends(plan, c, now)
+        for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+            if plan.branches[b]["kind"] != PASSES:
+                reach_exact(plan, b, now, work.modes[b], settings.slack)
         note_violations(plan, c, c + 1, now, work)
         if work.totals[0] < best:
             best = work.totals[0]
@@ -163,7 +187,7 @@ def reach_chain(plan: Plan, c: int, now: Configuration, work: Work, settings: Se
     keep_best(now, work)
     vain = 0
     for attempt in range(RESTARTS):
-        start_anew(plan, c, attempt, now, work)
+        start_anew(plan, c, attempt, now, work, settings)
         # a trunk's samples are near enough for the exact step at once
         reached, more = reach_from_here(plan, c, now, work, plan.chains[c]["trunk"] < 0, settings)
         iterations += more

@@ -22,6 +22,8 @@ MAX_STEPS = 60
 DAMPING_START, DAMPING_LEAST, DAMPING_MOST = 1e-4, 1e-16, 1e6
 # So many steps in a row that take off less than this share of what is left: a violation that no step removes.
 SLOW, PATIENCE = 0.05, 5
+# Below this share of L a violation may well vanish, slowly: chains at full stretch lose rank, and gain two bits a step.
+NEARLY = 1e-3
 # Inner nodes and trunks may move freely, the platform should not: weight of a unit step of each in the damping.
 INNER_WEIGHT = 1e-2
 
@@ -224,6 +226,7 @@ def settle(plan: Plan, c0: int, c1: int, free: int, now: Configuration, work: Wo
     enough = SETTLED * plan.scalars[LENGTH]
     note_violations(plan, c0, c1, now, work)
     damping, fresh, slow = DAMPING_START, True, 0
+    small = (NEARLY * plan.scalars[LENGTH]) ** 2
     for _step in range(MAX_STEPS):
         cost = work.totals[0]
         if work.totals[1] <= enough:
@@ -243,7 +246,7 @@ def settle(plan: Plan, c0: int, c1: int, free: int, now: Configuration, work: Wo
         fresh = work.totals[0] < cost
         if fresh:
             damping = max(0.02 * damping, DAMPING_LEAST)
-            slow = slow + 1 if work.totals[0] > (1.0 - SLOW) * cost else 0
+            slow = slow + 1 if work.totals[0] > max((1.0 - SLOW) * cost, small) else 0
             if slow >= PATIENCE:
                 return False
         else:

@@ -208,8 +208,18 @@ def solve_directly(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings
             if not shared:
                 copy_row(first_modes, modes)
                 load_seed(plan, seeds, i, now, modes)
+            if is_beyond_horizon(targets[i], wanted):
+                rows.status[i] = PENDING
+                pending += 1
+                continue
             pending += solve_one_directly(plan, i, wanted, now, modes, settings, rows)
     return pending
+
+
+@routine
+def is_beyond_horizon(target: Floats, wanted: Floats) -> bool:
+    """Whether a target is solved for as if it lay nearer."""
+    return bool(target[0, 3] != wanted[0, 3] or target[1, 3] != wanted[1, 3] or target[2, 3] != wanted[2, 3])
 
 
 @routine
@@ -227,7 +237,7 @@ def lay_out_block(
     n = 0
     for i in range(start, end):
         columns[i - start] = -1
-        if load_target(plan, targets[i], wanted):
+        if load_target(plan, targets[i], wanted) and not is_beyond_horizon(targets[i], wanted):
             lay_out_pose(wanted, table, n)
             columns[i - start] = n
             n += 1
@@ -395,7 +405,7 @@ def solve_by_iteration(plan: Plan, targets: Floats, seeds: Seeds, settings: Sett
         if settings.chained == 0 or answered == 0:
             copy_row(first_modes, work.modes)
             load_seed(plan, seeds, i, now, work.modes)
-        else:
+        elif rows.status[i - 1] == REACHED:
             read_modes(plan, now, work.modes)
         gap, excess = measure_all(plan, now)
         feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack

@@ -9,6 +9,8 @@ from ._jit import routine
 from .plan import Floats
 
 Vec: TypeAlias = tuple[float, float, float]
+# An angle beyond the end of its range by no more than this [rad] is on it, not a turn away.
+ON_BOUND = 1e-9
 
 
 @routine
@@ -119,3 +121,14 @@ def angle_about(axis: Vec, a: Vec, b: Vec) -> float:
 def wrap(angle: float, centre: float) -> float:
     """The same angle within half a turn of `centre`."""
     return angle - 2.0 * math.pi * math.floor((angle - centre) / (2.0 * math.pi) + 0.5)
+
+
+@routine
+def wrap_into(angle: float, lo: float, hi: float) -> float:
+    """The same angle where a range has it: near its middle, or near 0 (home) where it spans more than a turn."""
+    if hi - lo <= 2.0 * math.pi:
+        return wrap(angle, 0.5 * (lo + hi))
+    angle = wrap(angle, 0.0)
+    if angle > hi + ON_BOUND:
+        return angle - 2.0 * math.pi
+    return angle + 2.0 * math.pi if angle < lo - ON_BOUND else angle

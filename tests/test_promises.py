@@ -1,0 +1,179 @@
+"""Cases in which an easier solver breaks its word: each a machine that once showed how."""
+
+from __future__ import annotations
+
+import copy
+import multiprocessing
+import pickle
+import sys
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from pfabrik import Cone, Joint, Mechanism, Options, Status
+from pfabrik.errors import InvalidArgument, UnsupportedMechanism
+
+Z = (0.0, 0.0, 1.0)
+pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+
+
+def five_bar() -> Mechanism:
+    joints = [
+        Joint("A1", "revolute", ("base", "a1"), at=(-50, 0, 0), axis=Z, actuated=True),
+        Joint("B1", "revolute", ("a1", "c1"), at=(-120, 60, 0), axis=Z),
+        Joint("A2", "revolute", ("base", "a2"), at=(50, 0, 0), axis=Z, actuated=True),
+        Joint("B2", "revolute", ("a2", "c2"), at=(120, 60, 0), axis=Z),
+        Joint("tip", "revolute", ("c1", "c2"), at=(0, 130, 0), axis=Z),
+    ]
+    return Mechanism("unlimited 5-bar", joints, "tip")
+
+
+def arm_on_a_rail() -> Mechanism:
+    joints = [
+        Joint("P", "prismatic", ("base", "c"), axis=(0, 1, 0), actuated=True),
+        Joint("R1", "revolute", ("c", "a"), at=(0, 0, 0), axis=Z, actuated=True, range=(-0.4, 0.4)),
+        Joint("R2", "revolute", ("a", "b"), at=(100, 0, 0), axis=Z, actuated=True, range=(-0.9, 0.5)),
+        Joint("tip", "revolute", ("b", "g"), at=(150, 50, 0), axis=Z),
+    ]
+    return Mechanism("arm on a rail", joints, "tip")
+
+
+@pytest.mark.parametrize("angle", np.linspace(0, 2 * np.pi, 7))
+def test_a_path_that_leaves_the_workspace_and_returns_ends_as_it_began(angle: float) -> None:
+    """The arms stretch out at the boundary, where their two bends meet; they come back in their own."""
+    machine = five_bar()
+    away = np.r_[np.linspace(0, 500, 60), np.linspace(500, 0, 60)]
+    path = machine.reference_point + away[:, None] * [np.cos(angle), np.sin(angle), 0]
+    answer = pf.track(machine, path)
+    assert (answer.status == Status.PROJECTED).any()
+    np.testing.assert_allclose(answer.actuators[-1], answer.actuators[0], atol=1e-9)
+
+
+def test_a_projection_keeps_the_working_mode_of_its_seed() -> None:
+    machine = five_bar()
+    home = pf.solve_ik(machine, machine.home_pose)
+    projected = pf.solve_ik(machine, [500, 130, 0], seed=home)
+    back = pf.solve_ik(machine, machine.home_pose, seed=projected)
+    np.testing.assert_allclose(back.actuators, home.actuators, atol=1e-9)
+
+
+def test_an_arm_on_an_endless_rail_reaches_what_its_joints_reach() -> None:
+    rng = np.random.default_rng(0)
+    slide, first, second = rng.uniform((-600, -0.4, -0.9), (600, 0.4, 0.5), (100, 3)).T
+    tip = slide * 1j + np.exp(1j * first) * (100 + np.exp(1j * second) * (50 + 50j))
+    targets = np.stack([tip.real, tip.imag, 0 * slide], axis=-1)
+    assert pf.solve_ik(arm_on_a_rail(), targets)
+
+
+def test_a_rail_oblique_to_its_hinge_is_driven_to_where_the_plane_holds_the_target() -> None:
+    joints = [
+        Joint("P", "prismatic", ("base", "c"), axis=(0.6, 0.8, 0), actuated=True, range=(-100, 100)),
+        Joint("R", "revolute", ("c", "r"), at=(100, 0, 0), axis=(0, 1, 0)),
+        Joint("S", "spherical", ("r", "platform"), at=(60, 0, 150)),
+    ]
+    machine = Mechanism("oblique PRS", joints, "platform", (60, 0, 150))
+    slide, turn = np.random.default_rng(1).uniform((-100, -1), (100, 1), (100, 2)).T
+    rod = (-40 + 150j) * np.exp(-1j * turn)
+    targets = np.stack([100 + 0.6 * slide + rod.real, 0.8 * slide, rod.imag], axis=-1)
+    answer = pf.solve_ik(machine, targets)
+    assert answer
+    np.testing.assert_allclose(answer.actuators[:, 0], slide, atol=1e-6)
+
+
+def test_a_cone_about_a_line_to_a_hinge_off_the_plane_is_refused_with_the_reason() -> None:
+    joints = [
+        Joint("P", "prismatic", ("base", "c"), axis=Z, actuated=True),
+        Joint("R", "revolute", ("c", "r"), at=(100, 30, 0), axis=(0, 1, 0)),
+        Joint("S", "spherical", ("r", "platform"), at=(60, 0, 150), cone=Cone((0, 0, -1), 0.5, "platform")),
+    ]
+    with pytest.raises(UnsupportedMechanism, match="cone of joint S"):
+        pf.solve_ik(Mechanism("PRS", joints, "platform", (0, 0, 150)), (0, 0, 150))
+
+
+def test_a_revolute_along_an_axis_of_its_universal_neighbour_makes_no_ball_joint() -> None:
+    axes = ((1, 0, 0), (0, 1, 0))
+    for axis, notation in (((0, 1, 0), "closure"), ((0, 0, 1), "reaching")):
+        joints = [
+            Joint("A", "universal", ("base", "c"), at=(0, 0, 0), axes=axes),
+            Joint("P", "prismatic", ("c", "r"), axis=Z, actuated=True),
+            Joint("B", "universal", ("r", "x"), at=(0, 0, 100), axes=axes),
+            Joint("C", "revolute", ("x", "platform"), at=(0, 0, 100), axis=axis),
+        ]
+        assert pf.decompose(Mechanism("leg", joints, "platform", (0, 0, 100)))[0].engine == notation
+
+
+@pytest.mark.parametrize("distance", [1e8, 1e12, 1e150, 1.7e308])
+def test_targets_at_any_distance_are_told_from_where_the_machine_goes(distance: float) -> None:
+    """Struts without limits follow far, but not to where numbers end; the error is measured against the target."""
+    machine = pf.load("stewart").without_limits()
+    for target in ([distance, distance, 180], [[distance, distance, 180]] * 2):
+        answer = pf.solve_ik(machine, target)
+        assert np.isfinite(answer.position_error).all()
+        gone = np.abs(np.subtract(answer.pose[..., 0, 3], distance)) / distance
+        assert (np.equal(answer.status, Status.REACHED) == (gone < 1e-12)).all()
+
+
+def test_a_range_of_more_than_a_turn_counts_from_home() -> None:
+    joints = [
+        Joint("j1", "revolute", ("base", "l1"), at=(0, 0, 0), axis=Z, actuated=True, range=(0, 10)),
+        Joint("j2", "revolute", ("l1", "l2"), at=(100, 0, 0), axis=Z, actuated=True, range=(-2.5, 2.5)),
+        Joint("tip", "revolute", ("l2", "g"), at=(150, 80, 0), axis=Z),
+    ]
+    machine = Mechanism("arm", joints, "tip")
+    assert pf.solve_ik(machine, machine.home_pose).actuators[0] == pytest.approx(0, abs=1e-9)
+    turn = np.linspace(0, 9, 200)
+    tip = np.exp(1j * turn) * (150 + 80j)
+    answer = pf.track(machine, np.stack([tip.real, tip.imag, 0 * turn], axis=-1))
+    np.testing.assert_allclose(answer.actuators[:, 0], turn, atol=1e-9)
+
+
+def test_home_just_off_its_bound_is_reached() -> None:
+    machine = five_bar().with_limits(A1=(9e-10, 1.0), A2=(-1.0, -9e-10))
+    assert pf.solve_ik(machine, machine.home_pose)
+
+
+def test_a_coarse_tolerance_opens_no_loop() -> None:
+    machine = arm_on_a_rail()
+    targets = np.random.default_rng(2).uniform(-900, 900, (40, 3))
+    answer = pf.solve_ik(machine, targets, options=Options(exact=False, tolerance=1e3))
+    assert np.max(answer.residual) <= 1e-9 * machine.characteristic_length
+    assert (answer.status <= Status.PROJECTED).all()
+
+
+def test_answers_survive_pickling_and_copying_after_they_were_read() -> None:
+    answer = pf.solve_ik(pf.load("stewart"), [[0, 0, 200], [0, 0, 900]])
+    points, limits = dict(answer.points), answer.active_limits
+    for twin in (pickle.loads(pickle.dumps(answer)), copy.deepcopy(answer)):
+        assert twin.active_limits == limits
+        np.testing.assert_equal(dict(twin.points), points)
+
+
+def _solve_in_child() -> None:
+    machine = five_bar()
+    pf.solve_ik(machine, np.tile(machine.reference_point, (9000, 1)))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="fork is Linux's way to start processes")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_forked_child_solves_batches_too() -> None:
+    _solve_in_child()
+    child = multiprocessing.get_context("fork").Process(target=_solve_in_child)
+    child.start()
+    child.join(60)
+    assert child.exitcode == 0
+
+
+def test_what_is_no_mechanism_and_what_are_no_options_are_named() -> None:
+    machine = pf.load("stewart")
+    for call in (
+        lambda: pf.solve_ik("stewart", machine.home_pose),
+        lambda: pf.solve_ik(machine, machine.home_pose, options={"hold": None}),
+        lambda: Options(exact="no"),
+        lambda: Options(tolerance=True),
+        lambda: Options(max_iterations=True),
+        lambda: Options(rotation_tolerance=None),
+    ):
+        with pytest.raises(InvalidArgument):
+            call()
+    assert Options(max_iterations=np.int64(5), tolerance=np.float32(0.5)) != Options()
