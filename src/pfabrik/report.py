@@ -129,7 +129,9 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
     """``strut B3 at its maximum 250 mm``, ``struts B1, B3 at their maximum 250 mm``, ``joint C1's cone at 45 deg``."""
     subject = f"{noun}{'s' * (len(joints) > 1)} {', '.join(joints)}"
     if bound.startswith("cone"):
-        return f"{subject}'s {bound}"
+        return (
+            f"{subject}'s {bound}" if len(joints) == 1 else f"the cones of {subject} at{bound.removeprefix('cone at')}"
+        )
     return f"{subject} at {'their' if len(joints) > 1 else 'its'} {bound}"
 
 
