@@ -14,7 +14,7 @@ import oracles
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
-from pfabrik.kernels import solve as kernels
+from pfabrik.kernels import rows as kernels
 from pfabrik.tolerances import TOLERANCES
 
 CATALOGUE = ("five_bar", "stewart", "nrpm")

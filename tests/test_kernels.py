@@ -21,7 +21,7 @@ import pfabrik as pf
 from machines import MACHINES, ring
 from pfabrik import Cone, Joint, Mechanism
 from pfabrik.flatten import Flat, flatten
-from pfabrik.kernels import exact, frames, linear, reach, restrict, search, settle, solve, vectors
+from pfabrik.kernels import exact, frames, linear, reach, restrict, rows, search, settle, vectors
 from pfabrik.kernels import plan as P
 from pfabrik.kernels._jit import kernel
 
@@ -68,7 +68,7 @@ def solve_spd(A, n, damping):
 
 @kernel
 def room(plan):
-    return solve.new_configuration(plan), solve.new_work(plan)
+    return rows.new_configuration(plan), rows.new_work(plan)
 
 
 @kernel

@@ -6,7 +6,7 @@ from ._jit import kernel, routine
 from .measure import cone_step, read_coordinate
 from .plan import Configuration, Floats, Plan, Rows
 from .restrict import cone_axis
-from .solve import load_configuration, new_configuration
+from .rows import load_configuration, new_configuration
 from .vectors import angle_between, turn, vec
 
 

@@ -134,10 +134,7 @@ def pose_errors(plan: Plan, pose: Floats, wanted: Floats, target: Floats) -> tup
     """
     d = (pose[0, 3] - target[0, 3], pose[1, 3] - target[1, 3], pose[2, 3] - target[2, 3])
     largest = max(abs(d[0]), abs(d[1]), abs(d[2]))
-    if largest > OVERFLOWING:
-        distance = largest * min(norm(scale(1.0 / largest, d)), LARGEST / largest)
-    else:
-        distance = norm(d)
+    distance = largest * min(norm(scale(1.0 / largest, d)), LARGEST / largest) if largest > OVERFLOWING else norm(d)
     angle = 0.0
     if plan.scalars[POINT_END] == 0.0:
         angle = norm(rotation_between(pose, wanted))
