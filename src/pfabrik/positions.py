@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from .decompose import Step
 
 
+_SPOT_KINDS: dict[str, Literal["R", "U", "S"]] = {"revolute": "R", "universal": "U", "spherical": "S"}
+
+
 @dataclass
 class _Spot:
     """A joint centre on the way: what turns there, and the prismatic joint (if any) between it and the spot before."""
@@ -134,7 +137,7 @@ def _spots(steps: Sequence[Step], ends_in_point: bool) -> list[_Spot]:
         else:
             if joint.type == "universal" and joint.range is not None:
                 raise NotExpressible(f"joint {joint.name} has ranges about two axes")
-            kind: Literal["R", "U", "S"] = {"revolute": "R", "universal": "U"}.get(joint.type, "S")  # type: ignore[assignment]
+            kind = _SPOT_KINDS[joint.type]
             axis = np.array(joint.axis) if joint.type == "revolute" else None
             spots.append(_Spot(kind, [step], np.array(joint.at), axis, slider))
             slider = None
