@@ -8,15 +8,19 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import numba
+from numba.core import codegen, compiler
 from numba.core.caching import FunctionCache
 
 # Numba is typed in some versions and not in others, and never for the options below the public ones.
 _njit: Any = numba.njit
 _Cache: Any = FunctionCache
 _config: Any = numba.config
+_Library: Any = getattr(codegen, "JITCodeLibrary", object)
+_Compiler: Any = getattr(compiler, "Compiler", object)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -50,13 +54,64 @@ class _KernelCache(_Cache):  # type: ignore[misc]  # a class only at run time
         return overload
 
 
+class _PartLibrary(_Library):  # type: ignore[misc]  # a class only at run time
+    """The code of a part, not optimised and no machine code: each kernel that it goes into does both, for the whole."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    @property
+    def codegen(self) -> Any:
+        """What Numba asks, with the code in place, to note its Python environment there; here it is in no place."""
+        return SimpleNamespace(set_env=lambda name, environment: None)
+
+
+class _KernelLibrary(_Library):  # type: ignore[misc]  # a class only at run time
+    """The code of a kernel with all its parts; nobody else can call them, so arguments that go unused are dropped.
+
+    A mechanism by value is more than fifty arguments, of which most parts use a few.
+    """
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage.name == "linkonce_odr":
+                function.linkage = "internal"
+        super()._optimize_final_module()
+
+
+class _KernelCompiler(_Compiler):  # type: ignore[misc]  # a class only at run time
+    """Numba's compiler, which otherwise optimises a part by itself and again in every function above it."""
+
+    library: Any = _KernelLibrary
+
+    def define_pipelines(self) -> Any:
+        if self.state.library is None:
+            self.state.library = self.library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+            self.state.library.enable_object_caching()
+        return super().define_pipelines()
+
+
+class _PartCompiler(_KernelCompiler):
+    library = _PartLibrary
+
+
+# Numba promises these to nobody: with a version that has others, all is compiled in its own way, which takes longer.
+_HOOKS = ((_Library, "_optimize_final_module _finalize_final_module codegen"), (_Compiler, "define_pipelines"))
+_IS_HOOKED = all(hasattr(owner, name) for owner, names in _HOOKS for name in names.split())
+
+_KERNEL: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 # Parts of kernels are called by compiled code alone: without entry points for Python they compile faster.
-_PART = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_PART = _KERNEL | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+if _IS_HOOKED:
+    _KERNEL["pipeline_class"], _PART["pipeline_class"] = _KernelCompiler, _PartCompiler
 
 
 def kernel(function: F) -> F:
     """Compile `function` for any thread: no GIL, IEEE division, results cached on disk."""
-    dispatcher: Any = _njit(nogil=True, error_model="numpy")(function)
+    dispatcher: Any = _njit(**_KERNEL)(function)
     if not _config.DISABLE_JIT:
         # where neither the package's folder nor the user's cache can be written, every process compiles anew
         with contextlib.suppress(RuntimeError):
@@ -74,7 +129,7 @@ def routine(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """A `routine` that every caller takes in whole: passing a mechanism by value costs more than such a call does."""
+    """A `routine` that every caller takes in whole: it is called so often that a call would show in the time."""
     return _njit(**_PART, _nrt=False, forceinline=True)(function)
 
 
