@@ -7,22 +7,94 @@ the twists of its two bodies differ by its own screws only. The null space of th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .cones import next_joints
+from .joint_types import KINDS
 from .tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from .mechanism import Joint, Mechanism
 
 
+@dataclass(frozen=True)
+class Tree:
+    """The joints that lead from the base to every body, and the loops that the other joints close.
+
+    Attributes
+    ----------
+    steps : index of each of the tree's joints, in the order in which it grows, and whether it leads from the joint's
+        first body to the second.
+    closing : indices of the joints that close a loop each.
+    paths : body -> (joints,): +1 for a joint that the way from the base passes from its first body to its second, -1
+        for one that it passes backward, 0 for the others.
+    loops : the same for every loop, (loops, joints); the closing joint has -1.
+    """
+
+    steps: tuple[tuple[int, bool], ...]
+    closing: tuple[int, ...]
+    paths: Mapping[str, NDArray[np.float64]]
+    loops: NDArray[np.float64]
+
+
+def spanning_tree(mechanism: Mechanism) -> Tree:
+    """The tree that grows from the base, always by the first joint that reaches a body already on it."""
+    one = np.eye(len(mechanism.joints))
+    paths = {mechanism.base: np.zeros(len(mechanism.joints))}
+    steps: list[tuple[int, bool]] = []
+    loops: dict[int, NDArray[np.float64]] = {}
+    waiting = list(range(len(mechanism.joints)))
+    while waiting:
+        index = waiting.pop(_next_reached(mechanism, waiting, paths))
+        first, second = mechanism.joints[index].connects
+        if first in paths and second in paths:
+            loops[index] = paths[second] - paths[first] - one[index]
+            continue
+        steps.append((index, first in paths))
+        if first in paths:
+            paths[second] = paths[first] + one[index]
+        else:
+            paths[first] = paths[second] - one[index]
+    return Tree(tuple(steps), tuple(loops), paths, np.array(list(loops.values())).reshape(-1, len(one)))
+
+
+def _next_reached(mechanism: Mechanism, waiting: list[int], reached: Container[str]) -> int:
+    """Place in `waiting` of the first joint of a body that is reached already."""
+    connects = (mechanism.joints[index].connects for index in waiting)
+    return next(place for place, bodies in enumerate(connects) if any(body in reached for body in bodies))
+
+
+def body_twist(path: NDArray[np.float64], screws: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Twist of a body per rate, shape (..., 6, c).
+
+    Parameters
+    ----------
+    path : for every column, how the way to the body passes its joint (+1, -1 or 0), shape (c,).
+    screws : one a column, shape (..., c, 6).
+    """
+    return np.swapaxes(screws, -1, -2) * path
+
+
+def loop_conditions(loops: NDArray[np.float64], screws: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What the loops ask to vanish, per rate, shape (..., 6 loops, c).
+
+    Parameters
+    ----------
+    loops : for every column, how each loop (or a combination of loops) passes its joint, shape (loops, c).
+    screws : one a column, shape (..., c, 6).
+    """
+    conditions = loops[:, None, :] * np.swapaxes(screws, -1, -2)[..., None, :, :]
+    return conditions.reshape(*screws.shape[:-2], 6 * len(loops), screws.shape[-2])
+
+
 def instantaneous_mobility(mechanism: Mechanism) -> int:
     """Number of independent motions of the whole mechanism at home, passive ones included (a strut's own spin)."""
-    _, closure = _twists_and_closure(mechanism, frozenset())
+    _, closure = _home_motion(mechanism, frozenset())
     return int(_null_space(closure).shape[1])
 
 
@@ -37,13 +109,19 @@ def end_effector_freedom(mechanism: Mechanism, locked: frozenset[str]) -> int:
     -------
     0 to 6 for a body, 0 to 3 for a joint (of whose centre only the velocity counts).
     """
-    twists, closure = _twists_and_closure(mechanism, locked)
+    twist, closure = _home_motion(mechanism, locked)
     motions = _null_space(closure)
     if not mechanism.end_effector_is_joint:
-        return _rank(twists[mechanism.end_effector] @ motions)
-    twist = twists[mechanism.joint(mechanism.end_effector).connects[0]] @ motions
+        return _rank(twist @ motions)
     centre = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
-    return _rank(twist[3:] + np.cross(twist[:3], centre, axisa=0, axisc=0))
+    return _rank((twist[3:] + np.cross(twist[:3], centre, axisa=0, axisc=0)) @ motions)
+
+
+def end_effector_body(mechanism: Mechanism) -> str:
+    """The body that carries the end effector; of a joint end effector, the first of its two."""
+    if not mechanism.end_effector_is_joint:
+        return mechanism.end_effector
+    return mechanism.joint(mechanism.end_effector).connects[0]
 
 
 def universal_axes(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
@@ -63,7 +141,10 @@ def universal_axes(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
 
 
 def joint_screws(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
-    """Screws that span a joint's freedoms at home, (freedoms, 6): angular velocity, velocity at the origin [L]."""
+    """Unit screws of a joint's coordinates at home, (freedoms, 6): angular velocity, velocity at the origin [L].
+
+    The three of a spherical joint are the rotations about x, y and z.
+    """
     if joint.type == "prismatic":
         return np.concatenate([np.zeros(3), mechanism.home_axis(joint.name)]).reshape(1, 6)
     if joint.type == "fixed":
@@ -72,12 +153,33 @@ def joint_screws(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
     if joint.type == "spherical":
         return _rotations(np.eye(3), centre)
     if joint.type == "universal":
-        plane = np.linalg.qr(universal_axes(mechanism, joint).T)[0].T  # also for axes that are far from normal
-        return _rotations(plane, centre)
+        return _rotations(universal_axes(mechanism, joint), centre)
     turn = _rotations([mechanism.home_axis(joint.name)], centre)
     if joint.type == "revolute":
         return turn
     return np.vstack([turn, np.concatenate([np.zeros(3), turn[0, :3]])])
+
+
+def column_joints(mechanism: Mechanism) -> NDArray[np.intp]:
+    """Index of the joint that every coordinate of the mechanism belongs to, shape (c,)."""
+    counts = [len(KINDS[joint.type].coordinates) for joint in mechanism.joints]
+    return np.repeat(np.arange(len(counts)), counts)
+
+
+def orthonormal_rates(mechanism: Mechanism) -> NDArray[np.float64]:
+    """Combinations of coordinates that turn a joint about orthonormal axes, shape (c, c), one a row.
+
+    They count what a universal joint can do, however close its axes are; for all other joints they change nothing.
+    As the two axes keep their angle, the same combinations serve in every configuration.
+    """
+    first_columns = np.searchsorted(column_joints(mechanism), np.arange(len(mechanism.joints)))
+    combinations = np.eye(len(column_joints(mechanism)))
+    for joint, column in zip(mechanism.joints, first_columns, strict=True):
+        if joint.type == "universal":
+            first, second = universal_axes(mechanism, joint)
+            cosine, sine = first @ second, np.linalg.norm(np.cross(first, second))
+            combinations[column + 1, column : column + 2] = np.array([-cosine, 1.0]) / sine
+    return combinations
 
 
 def _rotations(axes: ArrayLike, centre: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -85,40 +187,15 @@ def _rotations(axes: ArrayLike, centre: NDArray[np.float64]) -> NDArray[np.float
     return np.hstack([directions, np.cross(centre, directions)])
 
 
-def _twists_and_closure(
-    mechanism: Mechanism, locked: frozenset[str]
-) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
-    """The twist of every body, shape (6, rates), and the loop conditions, shape (6 loops, rates), per joint rate."""
-    differences = _differences(mechanism, locked)
-    twists = {mechanism.base: np.zeros((6, differences[0].shape[1]))}
-    waiting = list(zip(mechanism.joints, differences, strict=True))
-    conditions = [twists[mechanism.base]]  # no loop asks for nothing
-    while waiting:
-        joint, difference = waiting.pop(_next_reached(waiting, twists))
-        first, second = joint.connects
-        if first in twists and second in twists:
-            conditions.append(twists[second] - twists[first] - difference)
-        elif first in twists:
-            twists[second] = twists[first] + difference
-        else:
-            twists[first] = twists[second] - difference
-    return twists, np.vstack(conditions)
-
-
-def _next_reached(waiting: list[tuple[Joint, NDArray[np.float64]]], twists: Mapping[str, NDArray[np.float64]]) -> int:
-    """Index of the first joint of a body whose twist is known."""
-    return next(index for index, (joint, _) in enumerate(waiting) if any(body in twists for body in joint.connects))
-
-
-def _differences(mechanism: Mechanism, locked: frozenset[str]) -> list[NDArray[np.float64]]:
-    """Twist of the second body of every joint relative to its first, shape (6, rates), per joint rate."""
-    none = np.empty((0, 6))
-    screws = [none if joint.name in locked else joint_screws(mechanism, joint) for joint in mechanism.joints]
-    ends = np.cumsum([len(each) for each in screws])
-    differences = [np.zeros((6, ends[-1])) for _ in screws]
-    for difference, own, end in zip(differences, screws, ends, strict=True):
-        difference[:, end - len(own) : end] = own.T
-    return differences
+def _home_motion(mechanism: Mechanism, locked: frozenset[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Twist of the end effector, (6, rates), and loop conditions, (6 loops, rates), per rate of what is not locked."""
+    screws = np.vstack([joint_screws(mechanism, joint) for joint in mechanism.joints])
+    owners = column_joints(mechanism)
+    moving = np.array([joint.name not in locked for joint in mechanism.joints])[owners]
+    screws, owners = (orthonormal_rates(mechanism) @ screws)[moving], owners[moving]
+    tree = spanning_tree(mechanism)
+    path = tree.paths[end_effector_body(mechanism)]
+    return body_twist(path[owners], screws), loop_conditions(tree.loops[:, owners], screws)
 
 
 def _null_space(matrix: NDArray[np.float64]) -> NDArray[np.float64]:

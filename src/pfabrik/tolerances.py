@@ -21,7 +21,14 @@ class Tolerances:
     rotation_matrix : largest deviation of R^T R from I accepted in a target: matrices typed with 7 digits pass,
         scaled or sheared ones do not.
     alignment : sine of the angle up to which two axes of a description count as parallel, and offset [L] up to which
-        points count as aligned: descriptions are often typed with four to six digits.
+        points count as aligned: descriptions are often typed with four to six digits. For the same reason the
+        singular value [L and rad] up to which a condition of the loops counts as following from the others.
+    rank : sine or singular value [L and rad] up to which a direction of motion counts as lost at a configuration: its
+        loops are closed to 1e-9, so that below there is nothing but their error.
+    singular : measure of singularity [L and rad] below which a configuration counts as singular: at the border of a
+        workspace it grows with the square root of a length, so that 1e-9 of L leaves 3e-5.
+    same_mode : largest difference of positions [L] and rotation matrices of two solutions that count as one: where two
+        solutions meet, closing the loops to 1e-13 places each to 3e-7 only.
     """
 
     position: float = 1e-9
@@ -31,6 +38,9 @@ class Tolerances:
     active: float = 1e-7
     rotation_matrix: float = 1e-6
     alignment: float = 1e-6
+    same_mode: float = 1e-5
+    rank: float = 1e-9
+    singular: float = 1e-4
 
 
 TOLERANCES = Tolerances()
