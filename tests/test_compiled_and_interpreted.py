@@ -12,11 +12,12 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from numba.core.caching import NullCache
 
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.flatten import flatten
-from pfabrik.kernels import _jit, limits, solve
+from pfabrik.kernels import _jit, close, solve
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 TESTS = Path(__file__).parent
@@ -148,7 +149,8 @@ def test_every_kernel_is_compiled_for_one_signature(name: str) -> None:
         pf.track(mechanism, targets, seed=seed[1], on_progress=lambda done, total: None),
     ):
         assert answer.active_limits is not None
-    for dispatcher in (solve.solve_directly, solve.solve_by_iteration, limits.read_limited):
+        assert pf.solve_fk(mechanism, answer.actuators, seed=answer).joints
+    for dispatcher in (solve.solve_directly, solve.solve_by_iteration, close.close):
         assert len(dispatcher.signatures) == 1
 
 
@@ -241,3 +243,22 @@ def test_a_kernel_compiled_from_other_sources_is_not_taken_from_the_cache(
             hits.append(sum(double.stats.cache_hits.values()))
         (copies / "vectors.py").write_text("# edited\n")
     assert hits == [0, 1, 0, 1]
+
+
+@pytest.mark.skipif(INTERPRETED, reason="nothing is compiled")
+@pytest.mark.parametrize("hooked", [True, False])
+def test_parts_become_machine_code_only_within_kernels(
+    hooked: bool, copies: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That is most of what keeps compilation short; a Numba without the hooks for it compiles all the same."""
+    if not hooked:
+        monkeypatch.delattr("numba.core.codegen.JITCodeLibrary")
+    jit = load_decorator(copies)
+    monkeypatch.setattr(jit, "_KernelCache", lambda function: NullCache())
+    double = jit.routine(lambda x: 2.0 * x)
+    pair = jit.allocator(lambda x: np.full(2, double(x)))
+    quadruple = jit.kernel(lambda x: double(pair(x)[1]))
+    assert quadruple(1.5) == 6.0
+    for dispatcher, has_code in ((quadruple, True), (double, not hooked), (pair, not hooked)):
+        (compiled,) = dispatcher.overloads.values()
+        assert bool(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)) == has_code

@@ -13,7 +13,7 @@ import checking
 import oracles
 import pfabrik as pf
 from machines import MACHINES
-from pfabrik.errors import InvalidArgument, UnsupportedMechanism
+from pfabrik.errors import InvalidArgument
 from pfabrik.kernels import rows as kernels
 from pfabrik.tolerances import TOLERANCES
 
@@ -305,16 +305,20 @@ def test_options_refuse_what_they_do_not_know() -> None:
             pf.Options(**bad)
 
 
-def test_a_mechanism_that_positions_cannot_express_is_refused_with_the_reason() -> None:
+def test_a_mechanism_that_positions_cannot_express_is_solved_by_the_closure_engine() -> None:
     joints = []
-    for i, angle in enumerate((0.0, 2.1, 4.2), 1):
-        c, s = np.cos(angle), np.sin(angle)
+    directions = [(np.cos(angle), np.sin(angle)) for angle in (0.0, 2.1, 4.2)]
+    for i, (c, s) in enumerate(directions, 1):
+        tangent, across = (-s, c, 0), (150 * c, 150 * s, 30)
         joints += [
-            pf.Joint(f"A{i}", "universal", ("base", f"c{i}"), at=(80 * c, 80 * s, 0)),
+            pf.Joint(f"A{i}", "universal", ("base", f"c{i}"), at=(80 * c, 80 * s, 0), axes=(tangent, across)),
             pf.Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"C{i}"), actuated=True),
-            pf.Joint(f"C{i}", "universal", (f"r{i}", "platform"), at=(50 * c, 50 * s, 150)),
+            pf.Joint(f"C{i}", "universal", (f"r{i}", "platform"), at=(50 * c, 50 * s, 150), axes=(across, tangent)),
         ]
     mechanism = pf.Mechanism("3-UPU", joints, "platform", (0, 0, 150))
     assert all(chain.engine == "closure" for chain in pf.decompose(mechanism))
-    with pytest.raises(UnsupportedMechanism, match="carries orientation"):
-        pf.solve_ik(mechanism, mechanism.home_pose)
+    raised = mechanism.home_pose + np.array([[0], [0], [12.0], [0]]) * [0, 0, 0, 1]
+    answer = pf.solve_ik(mechanism, raised)
+    assert answer.status is pf.Status.REACHED
+    expected = [np.linalg.norm(np.subtract((50 * c, 50 * s, 162), (80 * c, 80 * s, 0))) for c, s in directions]
+    np.testing.assert_allclose(answer.actuators, expected, rtol=0, atol=1e-9)

@@ -107,7 +107,7 @@ def test_rows_that_were_no_poses_are_nan(batch: Solution) -> None:
     assert marked.iterations == marked.rounds == 0
 
 
-KEYS = {"status", *FIELDS, "points", "active_limits"}
+KEYS = {"status", *FIELDS, "actuator_error", "joints", "points", "active_limits"}
 
 
 def test_plain_data_has_the_fields_and_is_json(batch: Solution) -> None:
@@ -187,9 +187,9 @@ def test_centres_along_a_trunk_move_with_the_joints_before_them() -> None:
     values = np.array([[0.3, 12.0, -0.5]])
     rows = P.Rows(
         np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.eye(4)[None], flat.home_seed.nodes,
-        values, np.zeros((1, flat.n_actuators)), np.zeros((1, 4)),
+        values, np.zeros((1, flat.n_actuators)), np.zeros((1, 5)),
     )  # fmt: skip
-    points = Solution(machine, flat, rows, ()).points
+    points = Solution(machine, rows, ()).points
     shoulder = Rotation.from_rotvec([0, 0.3, 0])
     at = np.array((100.0, 0, 0)) + shoulder.apply((90.0 - 100, 0, 40) - 12.0 * np.array((-1, 0, 3)) / np.sqrt(10))
     np.testing.assert_allclose(points["shoulder"], (100, 0, 0), atol=1e-12)
@@ -220,6 +220,6 @@ def test_limits_are_active_up_to_the_stated_distance(
         expected = lengths[joint.name] - homeward * gap
         limit = (expected, 400.0) if bound == "min" else (1.0, expected)
     moved = stewart.with_limits({joint.name: limit})
-    found = Solution(moved, flatten(moved), answer._rows, ()).active_limits
+    found = Solution(moved, answer._rows, ()).active_limits
     hits = [(hit.bound, hit.limit) for hit in found if hit.joint == joint.name]
     assert hits == ([(bound, pytest.approx(expected))] if named else [])

@@ -21,43 +21,68 @@ _HOMES = {
     "Options": "options",
     "Solution": "solution",
     "Status": "solution",
-    "ActiveLimit": "solution",
+    "ActiveLimit": "limits",
     "SubChain": "decompose",
     "decompose": "decompose",
     "solve_ik": "ik",
     "track": "track",
+    "AssemblyModes": "assembly",
+    "assembly_modes": "assembly",
+    "closure_residual": "residual",
+    "Mobility": "differential",
+    "Singularity": "differential",
+    "mobility": "differential",
+    "inverse_jacobian": "differential",
+    "forward_jacobian": "differential",
+    "singularity": "differential",
+    "solve_fk": "fk",
 }
 
 __all__ = [
     "ActiveLimit",
+    "AssemblyModes",
     "Cone",
     "Joint",
     "Mechanism",
+    "Mobility",
     "Options",
+    "Singularity",
     "Solution",
     "Status",
     "SubChain",
     "__version__",
+    "assembly_modes",
     "catalog",
+    "closure_residual",
     "decompose",
     "errors",
+    "forward_jacobian",
+    "inverse_jacobian",
     "load",
+    "mobility",
     "pose",
     "save",
+    "singularity",
+    "solve_fk",
     "solve_ik",
     "track",
 ]
 
 if TYPE_CHECKING:
     from . import errors
+    from .assembly import AssemblyModes, assembly_modes
     from .catalog import catalog
     from .decompose import SubChain, decompose
+    from .differential import Mobility, Singularity, forward_jacobian, inverse_jacobian, mobility, singularity
     from .files import load, save
+    from .fk import solve_fk
     from .ik import solve_ik
+    from .limits import ActiveLimit
     from .mechanism import Cone, Joint, Mechanism
     from .options import Options
     from .poses import pose
-    from .solution import ActiveLimit, Solution, Status
+    from .residual import closure_residual
+    from .solution import Solution, Status
     from .track import track
 
 

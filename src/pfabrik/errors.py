@@ -58,6 +58,27 @@ class UnsupportedMechanism(PfabrikError, ValueError):
         super().__init__(f"'{mechanism}' cannot be solved: " + "; ".join(self.reasons))
 
 
+class ContinuumOfSolutions(PfabrikError, ValueError):
+    """With its actuators locked the end effector still moves: there are no single solutions to list.
+
+    Attributes
+    ----------
+    mechanism : its name.
+    freedoms : how many independent motions are left.
+    """
+
+    def __init__(self, mechanism: str, freedoms: int) -> None:
+        self.mechanism = mechanism
+        self.freedoms = freedoms
+        super().__init__(
+            f"'{mechanism}' still moves with its actuators locked at these values ({freedoms} freedom"
+            f"{'s' if freedoms > 1 else ''} of the end effector): a continuum of solutions, none of which stands alone"
+        )
+
+    def __reduce__(self) -> tuple[type, tuple[str, int]]:
+        return type(self), (self.mechanism, self.freedoms)
+
+
 class InvalidArgument(PfabrikError, ValueError):
     """A call with an argument of the wrong shape, type or value.
 

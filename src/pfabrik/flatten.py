@@ -67,6 +67,15 @@ def flatten(mechanism: Mechanism) -> Flat:
     return builder.build()
 
 
+@lru_cache(maxsize=64)
+def flat_of(mechanism: Mechanism) -> Flat | None:
+    """The mechanism, compiled; None if it is one for the closure engine."""
+    try:
+        return flatten(mechanism)
+    except UnsupportedMechanism:
+        return None
+
+
 class _Builder:
     """Collects records, numbering nodes, branches and trunk joints as it goes."""
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .closure import closure_of
+from .closure_ik import answer_by_closure
+from .completion import coordinates_of
 from .errors import InvalidArgument
-from .flatten import Flat, flatten
+from .flatten import Flat, flat_of
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
 from .parallel import run_in_blocks
 from .poses import as_targets, what_is_wrong
+from .rows import new_rows
 from .solution import Solution
 from .tolerances import TOLERANCES
 
@@ -42,16 +47,46 @@ def solve_ik(
     Raises
     ------
     InvalidArgument : a target or seed of the wrong shape, or (unless marked) rows that are no poses.
-    UnsupportedMechanism : a sub-chain that the reaching engine cannot express.
     """
     targets, shape = as_targets(target)
     options = checked(mechanism, options)
-    flat = flatten(mechanism)
-    rows = new_rows(flat, len(targets))
-    settings = settings_of(mechanism, options, seeded=seed is not None)
-    solve_rows(flat, targets, seeds_of(mechanism, flat, seed, shape), settings, rows)
+    flat = flat_of(mechanism)
+    rows = new_rows(mechanism, flat, len(targets))
+    joints: Callable[[], NDArray[np.float64]] | None = None
+    if flat is None:
+        joints = closed_rows(mechanism, targets, seed, shape, options, chained=False, rows=rows)
+    else:
+        seeds = seeds_of(mechanism, flat, seed, shape)
+        solve_rows(flat, targets, seeds, settings_of(mechanism, options, seeded=seed is not None), rows)
+        if seed is not None:
+            joints = partial(joints_near, mechanism, rows, seed._rows)
     handle_invalid(targets, rows, options)
-    return Solution(mechanism, flat, rows, shape)
+    return Solution(mechanism, rows, shape, joints)
+
+
+def closed_rows(
+    mechanism: Mechanism,
+    targets: NDArray[np.float64],
+    seed: Solution | None,
+    shape: tuple[int, ...],
+    options: Options,
+    chained: bool,
+    rows: P.Rows,
+) -> Callable[[], NDArray[np.float64]]:
+    """Answer rows by the closure engine; where their joint coordinates are found."""
+    start = np.zeros((1, len(closure_of(mechanism).scale)))
+    if seed is not None:
+        seed_rows(mechanism, seed, shape)
+        start = seed._coordinates
+    mode = options.working_mode or ("keep" if chained or seed is not None else "any")
+    found = answer_by_closure(mechanism, targets, start, options, mode == "keep", chained, rows)
+    return lambda: found
+
+
+def joints_near(mechanism: Mechanism, rows: P.Rows, seed: P.Rows | None, chained: bool = False) -> NDArray[np.float64]:
+    """Joint coordinates of answers, nearest to those of their seeds, and those nearest to home."""
+    start = None if seed is None else coordinates_of(mechanism, seed)
+    return coordinates_of(mechanism, rows, start, chained)
 
 
 def checked(mechanism: Mechanism, options: Options | None) -> Options:
@@ -73,20 +108,6 @@ def solve_rows(flat: Flat, targets: NDArray[np.float64], seeds: P.Seeds, setting
         return
     if run_in_blocks(solve_directly, flat.plan, targets, seeds, settings, rows, rows_a_block=4096):
         run_in_blocks(solve_by_iteration, flat.plan, targets, seeds, settings, rows, rows_a_block=64)
-
-
-def new_rows(flat: Flat, n: int) -> P.Rows:
-    """Room for n answers."""
-    plan = flat.plan
-    return P.Rows(
-        status=np.empty(n, np.int64),
-        counters=np.empty((n, 2), np.int64),
-        poses=np.empty((n, 4, 4)),
-        nodes=np.empty((n, flat.home_seed.nodes.shape[1], 3)),
-        trunks=np.empty((n, len(plan.trunk_joints))),
-        actuators=np.empty((n, flat.n_actuators)),
-        measures=np.empty((n, 4)),
-    )
 
 
 @lru_cache(maxsize=256)
@@ -111,16 +132,21 @@ def seeds_of(mechanism: Mechanism, flat: Flat, seed: Solution | None, shape: tup
     """Where the rows of a batch start."""
     if seed is None:
         return flat.home_seed
+    rows = seed_rows(mechanism, seed, shape)
+    return P.Seeds(rows.poses, rows.nodes, rows.trunks)
+
+
+def seed_rows(mechanism: Mechanism, seed: Solution, shape: tuple[int, ...]) -> P.Rows:
+    """The rows of a seed; InvalidArgument for one that is no feasible answer of this mechanism and batch shape."""
     if not isinstance(seed, Solution):
         raise InvalidArgument("seed", type(seed).__name__, "a Solution, or None")
     if seed.mechanism != mechanism:
         raise InvalidArgument("seed", f"an answer of '{seed.mechanism.name}'", f"an answer of '{mechanism.name}'")
-    rows = seed._rows
-    if (rows.status >= P.FAILED).any():
+    if (seed._rows.status >= P.FAILED).any():
         raise InvalidArgument("seed", "an answer that is FAILED or INVALID", "a feasible configuration")
     if seed.shape not in ((), shape):
         raise InvalidArgument("seed", f"batch shape {seed.shape}", f"a single answer or batch shape {shape}")
-    return P.Seeds(rows.poses, rows.nodes, rows.trunks)
+    return seed._rows
 
 
 def handle_invalid(targets: NDArray[np.float64], rows: P.Rows, options: Options) -> None:

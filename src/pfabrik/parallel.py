@@ -6,12 +6,14 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .kernels import plan as P
 
+T = TypeVar("T")
 Kernel = Callable[[P.Plan, NDArray[np.float64], P.Seeds, P.Settings, P.Rows], int]
 
 
@@ -40,12 +42,16 @@ def run_in_blocks(
 ) -> int:
     """The kernel over all rows, in blocks spread over the cores; the sum of what it returns."""
 
-    def run(start: int) -> int:
-        block = slice(start, start + rows_a_block)
+    def run(block: slice) -> int:
         own = seeds if len(seeds.poses) == 1 else P.Seeds._make(array[block] for array in seeds)
         return kernel(plan, targets[block], own, settings, P.Rows._make(array[block] for array in rows))
 
-    starts = range(0, len(targets), rows_a_block)
-    if len(starts) <= 1 or n_cores() == 1:
-        return sum(map(run, starts))
-    return sum(_pool().map(run, starts))
+    return sum(in_blocks(run, len(targets), rows_a_block))
+
+
+def in_blocks(run: Callable[[slice], T], n: int, rows_a_block: int) -> list[T]:
+    """What `run` returns for the blocks of n rows, in order; it must release the GIL for other cores to help."""
+    blocks = [slice(start, start + rows_a_block) for start in range(0, n, rows_a_block)]
+    if len(blocks) <= 1 or n_cores() == 1:
+        return [run(block) for block in blocks]
+    return list(_pool().map(run, blocks))

@@ -156,6 +156,16 @@ def as_targets(target: Any) -> tuple[Floats, tuple[int, ...]]:
     raise InvalidArgument("target", f"shape {array.shape}", _EXPECTED)
 
 
+def are_poses(targets: Floats) -> NDArray[np.bool_]:
+    """Which of (n, 4, 4) arrays are poses, (n,)."""
+    finite = np.asarray(np.isfinite(targets).all(axis=(1, 2)))
+    R = np.where(finite[:, None, None], targets, np.eye(4))[:, :3, :3]
+    error = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    last = np.abs(targets[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=1, initial=0.0)
+    near = TOLERANCES.rotation_matrix
+    return np.asarray(finite & (error <= near) & (last <= near) & (np.linalg.det(R) > 0.0))
+
+
 def what_is_wrong(target: Floats) -> str:
     """Why a (4, 4) array is not a pose, in words."""
     if not np.isfinite(target).all():

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from .tolerances import TOLERANCES
 
 if TYPE_CHECKING:
+    from .limits import ActiveLimit
     from .mechanism import Joint, Mechanism
-    from .solution import ActiveLimit, Solution
+    from .solution import Solution
 
 
 @dataclass(frozen=True)

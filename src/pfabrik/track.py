@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from .errors import InvalidArgument
-from .flatten import Flat, flatten
-from .ik import checked, handle_invalid, new_rows, seeds_of, settings_of
+from .flatten import Flat, flat_of
+from .ik import checked, closed_rows, handle_invalid, joints_near, seeds_of, settings_of
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
 from .poses import as_targets
+from .rows import new_rows
 from .solution import Solution
 from .tolerances import TOLERANCES
 
@@ -50,14 +52,19 @@ def track(
         raise InvalidArgument("targets", f"batch shape {shape}", "a path: shape (n, 4, 4) or (n, 3)")
     if options.working_mode == "any":
         raise InvalidArgument("options.working_mode", "'any'", "'keep' or None: a machine cannot change it on its way")
-    flat = flatten(mechanism)
-    rows = new_rows(flat, len(poses))
+    flat = flat_of(mechanism)
+    rows = new_rows(mechanism, flat, len(poses))
+    if flat is None:
+        joints = closed_rows(mechanism, poses, seed, (), options, chained=True, rows=rows)
+        handle_invalid(poses, rows, options)
+        return Solution(mechanism, rows, shape, joints)
     seeds = seeds_of(mechanism, flat, seed, ())
     settings = settings_of(mechanism, options, seeded=True, chained=True)
     _follow(flat, poses, seeds, settings, rows, on_progress)
     handle_invalid(poses, rows, options)
     _count_turns(flat, rows)
-    return Solution(mechanism, flat, rows, shape)
+    begin = None if seed is None else seed._rows
+    return Solution(mechanism, rows, shape, partial(joints_near, mechanism, rows, begin, chained=True))
 
 
 def _follow(

@@ -110,7 +110,7 @@ class Rows(NamedTuple):
     nodes: Floats  # (n, n_stored, 3): the nodes that do not follow from the pose and the trunks
     trunks: Floats  # (n, n_trunk_joints): deviation from home
     actuators: Floats  # (n, n_actuators)
-    measures: Floats  # (n, 4): position error, rotation error, residual, limit excess
+    measures: Floats  # (n, 5): position error, rotation error, residual, limit excess, actuator error
 
 
 class Configuration(NamedTuple):

@@ -1,0 +1,240 @@
+"""Inverse kinematics by the closure engine alone, for mechanisms with sub-chains that positions cannot express."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closure import HELD, Closing, Closure, close, closure_of
+from .completion import actuators_of
+from .displacements import displacements
+from .kernels import plan as P
+from .kernels.loops import LOCKED
+from .limits import within_turns
+from .mechanism import Mechanism
+from .nearest import MARGIN, is_feasible, nearest
+from .options import Options
+from .paths import end_body
+from .poses import are_poses
+from .starts import random_coordinates
+from .tolerances import TOLERANCES
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+STRIDES = 8
+"""Steps in which the platform is taken from the seed's pose to the target where one step strays."""
+
+STARTS = 40
+"""Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
+
+FREE = (0.0, 0.0, 0.0)
+WISHED = (1.0, 1.0, 1.0)
+LOCK = (LOCKED, LOCKED, LOCKED)
+
+
+def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
+    """Poses (n, 4, 4) of the end effector, or of the body that carries it where it is a joint."""
+    return np.asarray(displacements(mechanism, coordinates)[end_body(mechanism)] @ mechanism.home_pose)
+
+
+def answer_by_closure(
+    mechanism: Mechanism, targets: Floats, start: Floats, options: Options, keep_mode: bool, chained: bool, rows: P.Rows
+) -> Floats:
+    """Answer targets (n, 4, 4) from joint coordinates (n, columns) or (1, columns); fills `rows`.
+
+    Parameters
+    ----------
+    keep_mode : stay in the working mode of the start.
+    chained : every row starts from the answer of the one before.
+
+    Returns
+    -------
+    Joint coordinates of the answers, deviations from home, (n, columns); NaN for rows that are no poses.
+    """
+    closure = closure_of(mechanism)
+    known = are_poses(targets)
+    coordinates = np.full((len(targets), start.shape[1]), np.nan)
+    for array in (rows.poses, rows.actuators, rows.measures):
+        array[~known] = np.nan
+    rows.status[~known], rows.counters[~known] = P.INVALID, 0
+    if not chained:
+        begin = start[known] if len(start) > 1 else np.repeat(start, known.sum(), axis=0)
+        coordinates[known] = _answer(closure, targets, known, begin, options, keep_mode, rows)
+        return coordinates
+    for i in np.flatnonzero(known):
+        only = np.arange(len(targets)) == i
+        start = coordinates[only] = _answer(closure, targets, only, start, options, keep_mode, rows)
+    return coordinates
+
+
+def _answer(
+    closure: Closure, targets: Floats, which: Mask, start: Floats, options: Options, keep_mode: bool, rows: P.Rows
+) -> Floats:
+    """Answer the rows `which` of the targets from (m, columns)."""
+    wanted, mechanism = targets[which], closure.mechanism
+    begin = platform_poses(mechanism, start)
+    found = _reach(closure, wanted, start, begin, keep_mode)
+    away = np.flatnonzero(~is_feasible(found))
+    if len(away):
+        projected = _project(closure, wanted[away], found, away, start[away], begin[away], options)
+        for array, own in zip(found, projected, strict=True):
+            array[away] = own
+    _fill(closure, found, wanted, which, options, rows)
+    return found.coordinates
+
+
+def _target_platform(mechanism: Mechanism, targets: Floats, begin: Floats) -> Floats:
+    """Where the platform is to be: the targets, with the present rotation where only the position is asked for."""
+    wanted = targets.copy()
+    if mechanism.end_effector_is_joint:
+        wanted[:, :3, :3] = begin[:, :3, :3]
+    return wanted
+
+
+def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_mode: bool) -> Closing:
+    """Close the legs below platforms on their targets, within limits; the rows that are feasible are reached."""
+    mechanism = closure.mechanism
+    wanted = _target_platform(mechanism, targets, begin)
+    held = LOCK + FREE if mechanism.end_effector_is_joint else HELD
+    found = close(closure, start, wanted, platform=held, limits=True, margin=MARGIN)
+    rest = np.flatnonzero(~is_feasible(found))
+    if len(rest):
+        _take_better(found, rest, _led(closure, wanted[rest], start[rest], begin[rest], held))
+    rng = np.random.default_rng(0)
+    for _ in range(0 if keep_mode else STARTS):
+        rest = np.flatnonzero(~is_feasible(found))
+        if not len(rest):
+            break
+        scattered = np.repeat(random_coordinates(closure, 1, rng), len(rest), axis=0)
+        if held == HELD:  # with the platform at rest, legs are found one by one
+            reached = _legs_reached(closure, found, rest)
+            scattered = np.where(reached, found.coordinates[rest], scattered)
+        tried = close(closure, scattered, wanted[rest], platform=held, limits=True, margin=MARGIN)
+        if held == HELD:
+            _take_legs(closure, found, rest, tried)
+        else:
+            _take_better(found, rest, tried)
+    return found
+
+
+def _led(closure: Closure, targets: Floats, start: Floats, begin: Floats, held: tuple[float, ...]) -> Closing:
+    """The platform led from where it is to its target."""
+    for stride in range(1, STRIDES + 1):
+        between = _between(begin, targets, stride / STRIDES)
+        found = close(closure, start, between, platform=held, limits=True, margin=MARGIN)
+        start = found.coordinates
+    return found
+
+
+def _between(begin: Floats, end: Floats, share: float) -> Floats:
+    """Poses a share of the way from one to another: straight positions, the shortest turn."""
+    between = begin + (end - begin) * share
+    U, _, Vt = np.linalg.svd(between[:, :3, :3])  # the rotation nearest to the blend of the two
+    proper = np.linalg.det(U @ Vt) > 0.0
+    between[:, :3, :3] = np.where(proper[:, None, None], U @ Vt, begin[:, :3, :3])
+    return between
+
+
+def _off(found: Closing) -> Floats:
+    """What keeps each group of each row from being feasible, (n, groups) [L or rad]."""
+    return np.maximum(found.gaps, found.excesses)
+
+
+def _legs_reached(closure: Closure, found: Closing, rows: NDArray[np.intp]) -> Mask:
+    """Which coordinates belong to groups that are feasible, (m, columns)."""
+    reached = _off(found)[rows] <= TOLERANCES.limit
+    group_of = closure.loops.group_of
+    return np.asarray(np.where(group_of >= 0, reached[:, group_of], True))
+
+
+def _take_legs(closure: Closure, found: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
+    """Take over the groups that came nearer."""
+    better = _off(tried) < _off(found)[rest]
+    group_of = closure.loops.group_of
+    columns = np.where(group_of >= 0, better[:, group_of], False)
+    found.coordinates[rest] = np.where(columns, tried.coordinates, found.coordinates[rest])
+    for array, own in ((found.gaps, tried.gaps), (found.excesses, tried.excesses)):
+        array[rest] = np.where(better, own, array[rest])
+
+
+def _take_better(found: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
+    better = np.flatnonzero(_off(tried).max(axis=1) < _off(found)[rest].max(axis=1))
+    for array, own in zip(found, tried, strict=True):
+        array[rest[better]] = own[better]
+
+
+def _project(
+    closure: Closure,
+    targets: Floats,
+    found: Closing,
+    away: NDArray[np.intp],
+    start: Floats,
+    begin: Floats,
+    options: Options,
+) -> Closing:
+    """Feasible configurations near targets that are not reached; the start itself where nothing better is found."""
+    mechanism = closure.mechanism
+    best = close(closure, start, begin, max_iterations=0)
+    nearest_yet = np.full(len(away), np.inf)
+    wanted = _target_platform(mechanism, targets, begin)
+    for platform in _ways(mechanism, options):
+        waiting = np.flatnonzero(np.isinf(nearest_yet))
+        if not len(waiting):
+            break
+        held = np.array(platform) == LOCKED
+        for legs, poses in ((start, begin), (found.coordinates[away], wanted)):
+            placed = poses[waiting].copy()
+            if held[0]:
+                placed[:, :3, 3] = wanted[waiting, :3, 3]
+            if held[3]:
+                placed[:, :3, :3] = wanted[waiting, :3, :3]
+            tried = nearest(closure, legs[waiting], placed, platform=platform, targets=wanted[waiting])
+            distance = np.where(is_feasible(tried), _distances(closure, tried.poses, wanted[waiting], platform), np.inf)
+            better = np.flatnonzero(distance < nearest_yet[waiting])
+            nearest_yet[waiting[better]] = distance[better]
+            for array, own in zip(best, tried, strict=True):
+                array[waiting[better]] = own[better]
+    return best
+
+
+def _ways(mechanism: Mechanism, options: Options) -> list[tuple[float, ...]]:
+    """Weights of the platform's position and rotation, the ways to project in the order in which they are tried."""
+    if mechanism.end_effector_is_joint:
+        return [WISHED + FREE]
+    held = {"orientation": [WISHED + LOCK], "position": [LOCK + WISHED], None: []}[options.hold]
+    return [*held, WISHED + WISHED]
+
+
+def _distances(closure: Closure, poses: Floats, others: Floats, platform: tuple[float, ...]) -> Floats:
+    """How far poses are apart in what counts, (n,): lengths relative to L, rotations as the chord of their angle."""
+    position = np.linalg.norm((poses - others)[:, :3, 3], axis=1) / closure.mechanism.characteristic_length
+    rotation = np.linalg.norm((poses - others)[:, :3, :3], axis=(1, 2))
+    return np.asarray(np.hypot(position, rotation if platform[3] != 0.0 else 0.0))
+
+
+def _fill(closure: Closure, found: Closing, wanted: Floats, which: Mask, options: Options, rows: P.Rows) -> None:
+    """Write answers with what was measured of them."""
+    mechanism = closure.mechanism
+    length = mechanism.characteristic_length
+    within_turns(mechanism, found.coordinates)
+    poses = found.poses.copy()
+    if mechanism.end_effector_is_joint:
+        poses[:, :3, :3] = wanted[:, :3, :3]
+    position, rotation = pose_errors(poses, wanted)
+    near = (position <= (options.tolerance or TOLERANCES.position * length)) & (rotation <= options.rotation_tolerance)
+    rows.status[which] = np.where(is_feasible(found), np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
+    rows.counters[which] = np.stack([found.iterations, np.zeros_like(found.iterations)], axis=1)
+    rows.poses[which] = poses
+    rows.actuators[which] = actuators_of(mechanism, found.coordinates)
+    zero = np.zeros(len(poses))
+    rows.measures[which] = np.stack(
+        [position, rotation, found.gap * length, np.maximum(found.excess, 0.0), zero], axis=1
+    )
+
+
+def pose_errors(poses: Floats, targets: Floats) -> tuple[Floats, Floats]:
+    """Distances [length] and angles [rad] between poses, (n,) each."""
+    turned = poses[:, :3, :3] @ np.swapaxes(targets[:, :3, :3], 1, 2)
+    chord = np.linalg.norm(turned - np.eye(3), axis=(1, 2)) / np.sqrt(8.0)  # sine of half the angle
+    return np.linalg.norm((poses - targets)[:, :3, 3], axis=1), 2.0 * np.arcsin(np.minimum(chord, 1.0))

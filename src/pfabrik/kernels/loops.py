@@ -1,0 +1,83 @@
+"""What the closure kernel is given: the loops of a mechanism as paths of unit motions, and what is asked of them.
+
+Lengths are in units of L, the characteristic length; coordinates are deviations from home. Every path leads from the
+base to the end effector. Paths that share joints form a group: with the platform at rest, groups move independently.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Unit motions: about an axis, along an axis, about a point.
+TURN, SLIDE, BALL = 0, 1, 2
+
+
+class Loops(NamedTuple):
+    """A mechanism's paths, at home, in base coordinates."""
+
+    kinds: Ints  # (units,)
+    axes: Floats  # (units, 3)
+    points: Floats  # (units, 3)
+    columns: Ints  # (units,): first coordinate of each
+    visits: Ints  # (visits, 2): unit, and +1 or -1 as the path passes it in its own direction or against it
+    visit_rows: Ints  # (visits + 1,): first of the columns of the Jacobian that belong to a visit
+    row_columns: Ints  # (rows,): the coordinate of each of them
+    paths: Ints  # (paths + 1,): first visit of each path
+    groups: Ints  # (groups + 1,): first path of each group
+    group_of: Ints  # (columns,): group of each coordinate, or -1 where it is on no path
+    end: Floats  # (3,): the reference point
+    lo: Floats  # (columns,): ranges
+    hi: Floats
+    cone_units: Ints  # (cones, 2): first and last unit of the joint
+    cone_axes: Floats  # (cones, 3)
+    cone_lines: Floats  # (cones, 3): to the next joint
+    cone_angles: Floats  # (cones,): half angles
+    cone_outward: Ints  # (cones,): 1 if the axis is fixed to the joint's first body
+    cone_slides: Ints  # (cones, 2): first and last of the slides that move the line
+    slides: Ints  # coordinate of each such slide
+    slide_axes: Floats  # (slides, 3): how it moves the line
+    marks: Ints  # (marks, 2): visit before which a joint's centre is posed, and the joint's place in Wishes.centres
+    path_marks: Ints  # (paths + 1,): first mark of each path
+
+
+class Layout(NamedTuple):
+    """Which coordinates are free: their places in the equations of their groups."""
+
+    slots: Ints  # (columns,): place among the free coordinates of its group, or -1 if it is locked
+    sizes: Ints  # (groups,): free coordinates of each group
+
+
+class Wishes(NamedTuple):
+    """What is asked beyond closed loops. Weights multiply squares; lengths in L, angles in radians."""
+
+    weights: Floats  # (columns,): of the distance of each free coordinate from its anchor
+    anchors: Floats  # (n, columns)
+    platform: Floats  # (6,): weights of the pose's distance from its target, position then rotation; LOCKED holds it
+    targets: Floats  # (n, 4, 4)
+    centres: Floats  # (n, joints, 3): where joint centres are wished to be; NaN where they are not
+    limits: int  # 1: limits are to be kept
+    margin: float  # by how much inside
+    chained: int  # 1: every row starts from the free coordinates of the one before
+    plunging: int  # 1: undamped steps, up and down: finds more of many solutions, but not the nearest
+    closeness: float  # largest gap that ends the search
+    max_iterations: int
+
+
+LOCKED = 1e12
+
+
+class Closed(NamedTuple):
+    """What is worked on, row by row."""
+
+    coordinates: Floats  # (n, columns): where to start; where it ended
+    poses: Floats  # (n, 4, 4): of the platform, likewise
+    gaps: Floats  # (n, groups): largest gap of a group's loops
+    excesses: Floats  # (n, groups): largest excess over a limit
+    misses: Floats  # (n, groups): largest distance of a joint's centre from where it was wished
+    iterations: Ints  # (n,)

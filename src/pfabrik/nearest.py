@@ -1,0 +1,72 @@
+"""The exact constrained step of the closure engine: closed loops and kept limits first, then nearest to a wish."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closure import EVERYTHING_FREE, Closing, Closure, close
+from .kernels.loops import LOCKED
+from .tolerances import TOLERANCES
+
+Floats = NDArray[np.float64]
+
+WISHES = (1e-2, 1e-4, 1e-6, 1e-8)
+"""Weights of what is wished against what must hold: each starts from the answer to the one before, and the last leaves
+the loops open by less than the step that then closes them can notice."""
+
+STEPS = 60
+"""Steps for each weight."""
+
+MARGIN = 0.1 * TOLERANCES.limit
+"""How far inside their limits answers are put: limits that are met to the last digit count as kept."""
+
+
+def nearest(
+    closure: Closure,
+    coordinates: Floats,
+    poses: Floats,
+    *,
+    platform: Sequence[float] = EVERYTHING_FREE,
+    targets: Floats | None = None,
+    weights: Floats | None = None,
+    anchors: Floats | None = None,
+) -> Closing:
+    """Feasible configurations nearest to wishes for the platform or for coordinates: a local search.
+
+    Parameters
+    ----------
+    coordinates, poses : where to start; need not be closed, nor within limits.
+    platform : what counts of the platform's distance from `targets`: six weights relative to each other; LOCKED keeps
+        a part where it starts.
+    weights, anchors : what counts of the coordinates' distances from anchors, (columns,), (n, columns).
+
+    Returns
+    -------
+    Closing : judge by `is_feasible`.
+    """
+    wished, own = np.array(platform, dtype=float), np.zeros(len(closure.scale)) if weights is None else weights
+    held = wished == LOCKED
+    for weight in WISHES:
+        found = close(
+            closure,
+            coordinates,
+            poses,
+            platform=np.where(held, LOCKED, weight * wished).tolist(),
+            targets=targets,
+            weights=weight * own,
+            anchors=anchors,
+            limits=True,
+            margin=MARGIN,
+            closeness=-1.0,
+            max_iterations=STEPS,
+        )
+        coordinates, poses = found.coordinates, found.poses
+    return close(closure, coordinates, poses, platform=np.where(held, LOCKED, 0.0).tolist(), limits=True, margin=MARGIN)
+
+
+def is_feasible(closing: Closing) -> NDArray[np.bool_]:
+    """Which rows are closed within every limit, (n,)."""
+    return np.asarray((closing.gap <= TOLERANCES.position) & (closing.excess <= TOLERANCES.limit))

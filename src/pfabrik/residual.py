@@ -1,0 +1,42 @@
+"""The independent check: whether an answer closes its mechanism's loops, worked out from its joint coordinates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .closure_ik import pose_errors
+from .completion import joint_values
+from .displacements import end_effector_pose, gaps
+from .errors import InvalidArgument
+from .mechanism import Mechanism
+from .solution import Solution
+
+
+def closure_residual(mechanism: Mechanism, solution: Solution) -> Any:
+    """Largest gap of any loop of an answer, by the closure engine, (...,) [length].
+
+    Bodies are posed from `solution.joints` alone, along one tree of joints. Compared are the two bodies of every other
+    joint, the end effector with the pose of the answer, and the actuated joints with its actuator values; angles count
+    times L. NaN for INVALID rows.
+
+    Raises
+    ------
+    InvalidArgument : an answer of another mechanism.
+    """
+    if not isinstance(solution, Solution) or solution.mechanism != mechanism:
+        raise InvalidArgument("solution", type(solution).__name__, f"an answer of '{mechanism.name}'")
+    length, rows, q = mechanism.characteristic_length, solution._rows, solution._coordinates
+    known = np.isfinite(q).all(axis=1)
+    found = np.full(len(q), np.nan)
+    position, rotation = pose_errors(end_effector_pose(mechanism, q[known]), rows.poses[known])
+    if mechanism.end_effector_is_joint:
+        rotation = np.zeros_like(rotation)
+    found[known] = np.max([gaps(mechanism, q[known]), position, rotation * length], axis=0)
+    values = joint_values(mechanism, q[known])
+    for column, name in enumerate(mechanism.actuators):
+        unit = 1.0 if mechanism.joint(name).type == "prismatic" else length
+        off = np.abs(values[name] - rows.actuators[known, column]) * unit
+        found[known] = np.maximum(found[known], off)
+    return found.item() if solution.shape == () else found.reshape(solution.shape)

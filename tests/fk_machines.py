@@ -1,0 +1,192 @@
+"""Machines for forward kinematics: built from published dimensions, or with a known number of assembly modes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import fk_oracles
+from pfabrik import Joint, Mechanism
+
+Array = NDArray[np.float64]
+
+PUBLISHED: dict[str, Any] = json.loads(
+    (Path(__file__).parent / "data" / "published_cases.json").read_text(encoding="utf-8")
+)
+"""Published geometries and answers, each with its source."""
+
+
+def moved_from_home(pose: Array, home_pose: Array) -> Array:
+    """A pose given in the platform's own coordinates, as the library counts it: the rotation from home."""
+    result = np.array(pose, dtype=float)
+    result[..., :3, :3] = pose[..., :3, :3] @ home_pose[:3, :3].T
+    return result
+
+
+# --- planar ----------------------------------------------------------------------------------------------------------
+
+
+def planar_3rpr(geometry: fk_oracles.Planar3RPR, p: Sequence[float]) -> tuple[Mechanism, Array]:
+    """A planar 3-RPR at home in the first of its configurations with strut lengths p, and home's (theta, x, y)."""
+    home = np.array(geometry.solutions(p)[0])
+    joints = []
+    for i, (a, c) in enumerate(zip(geometry.anchors, geometry.corners(*home), strict=True), 1):
+        joints += [
+            Joint(f"A{i}", "revolute", ("base", f"cylinder{i}"), at=(*a, 0.0), axis=(0, 0, 1)),
+            Joint(f"B{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), along=(f"A{i}", f"C{i}"), actuated=True),
+            Joint(f"C{i}", "revolute", (f"rod{i}", "platform"), at=(*c, 0.0), axis=(0, 0, 1)),
+        ]
+    return Mechanism("planar 3-RPR", joints, "platform", (*home[1:], 0.0)), home
+
+
+def planar_pose(theta_x_y: Sequence[float], home: Array) -> Array:
+    """The library's pose of a planar 3-RPR in Sauer's coordinates."""
+    theta, x, y = theta_x_y
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_rotvec([0, 0, theta - home[0]]).as_matrix()
+    pose[:2, 3] = x, y
+    return pose
+
+
+ARM_LINKS = np.array([300.0, 200.0, 100.0])
+ARM_HOME = np.array([0.3, 0.4, 0.5])
+
+
+def planar_arm() -> Mechanism:
+    """A serial arm of three driven revolutes in the plane z = 0, whose coordinates count from the link before."""
+    joints, at = [], np.zeros(3)
+    for k, heading in enumerate(np.cumsum(ARM_HOME)):
+        bodies = ("base" if k == 0 else f"link{k}", "hand" if k == 2 else f"link{k + 1}")
+        joints.append(
+            Joint(f"J{k + 1}", "revolute", bodies, at=at, axis=(0, 0, 1), home=float(ARM_HOME[k]), actuated=True)
+        )
+        at = at + ARM_LINKS[k] * np.array([np.cos(heading), np.sin(heading), 0.0])
+    return Mechanism("planar arm", joints, "hand", tuple(at))
+
+
+# --- three legs ------------------------------------------------------------------------------------------------------
+
+
+def rps(base_radius: float, platform_radius: float, height: float) -> Mechanism:
+    """A 3-RPS without limits, feet 120 degrees apart and hinges tangential, level at home."""
+    joints = []
+    for i, azimuth in enumerate(np.radians([0.0, 120.0, 240.0]), 1):
+        out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        joints += [
+            Joint(
+                f"R{i}",
+                "revolute",
+                ("base", f"cylinder{i}"),
+                at=base_radius * out,
+                axis=(-np.sin(azimuth), np.cos(azimuth), 0.0),
+            ),
+            Joint(f"P{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), along=(f"R{i}", f"S{i}"), actuated=True),
+            Joint(f"S{i}", "spherical", (f"rod{i}", "platform"), at=platform_radius * out + [0, 0, height]),
+        ]
+    return Mechanism("3-RPS", joints, "platform", (0, 0, height))
+
+
+TRIPOD_FEET = np.array([[0.0, 0, 0], [200, 30, 10], [70, 180, -20]])
+TRIPOD_TIP = np.array([80.0, 60.0, 250.0])
+
+
+def tripod() -> Mechanism:
+    """Three struts that meet at a point: one carries the tool (U-P), the others end on it in ball joints (U-P-S).
+
+    The point is where three spheres meet. The tool's own joint turns about x, then about y, and so holds a point in
+    two postures of the tool.
+    """
+    a, b, c = TRIPOD_FEET
+    joints = [
+        Joint("A1", "universal", ("base", "cylinder1"), at=a, axes=((1, 0, 0), (0, 1, 0))),
+        Joint(
+            "B1", "prismatic", ("cylinder1", "tool"), axis=TRIPOD_TIP - a, home=_distance(a, TRIPOD_TIP), actuated=True
+        ),
+    ]
+    for i, foot in ((2, b), (3, c)):
+        joints += [
+            Joint(f"A{i}", "universal", ("base", f"cylinder{i}"), at=foot),
+            Joint(f"B{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), along=(f"A{i}", f"C{i}"), actuated=True),
+            Joint(f"C{i}", "spherical", (f"rod{i}", "tool"), at=TRIPOD_TIP),
+        ]
+    return Mechanism("tripod", joints, "tool", tuple(TRIPOD_TIP))
+
+
+def _distance(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(np.subtract(a, b)))
+
+
+# --- six struts ------------------------------------------------------------------------------------------------------
+
+
+def gough(base: Any, platform: Any, home_pose: Array, name: str = "6-UPS") -> Mechanism:
+    """Six unlimited U-P-S struts; `platform` in the platform's own coordinates, placed by `home_pose` at home.
+
+    The library counts rotations from home: see `moved_from_home`.
+    """
+    joints = []
+    for i, (a, b) in enumerate(zip(np.array(base, float), np.array(platform, float), strict=True), 1):
+        joints += [
+            Joint(f"A{i}", "universal", ("base", f"cylinder{i}"), at=a),
+            Joint(f"B{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), along=(f"A{i}", f"C{i}"), actuated=True),
+            Joint(f"C{i}", "spherical", (f"rod{i}", "platform"), at=home_pose[:3, :3] @ b + home_pose[:3, 3]),
+        ]
+    return Mechanism(name, joints, "platform", tuple(home_pose[:3, 3]))
+
+
+def published_gough(case: str, p: Sequence[float]) -> Mechanism:
+    """A published 6-UPS, level at home at position p."""
+    home = np.eye(4)
+    home[:3, 3] = p
+    geometry = PUBLISHED[case]["geometry"]
+    return gough(geometry["base"], geometry["platform"], home, case)
+
+
+DIETMAIER_BASE = np.array(
+    [
+        [0.0, 0.0, 0.0],
+        [1.107915, 0.0, 0.0],
+        [0.549094, 0.756063, 0.0],
+        [0.735077, -0.223935, 0.525991],
+        [0.514188, -0.526063, -0.368418],
+        [0.590473, 0.094733, -0.205018],
+    ]
+)
+DIETMAIER_PLATFORM = np.array(
+    [
+        [0.0, 0.0, 0.0],
+        [0.542805, 0.0, 0.0],
+        [0.956919, -0.528915, 0.0],
+        [0.665885, -0.353482, 1.402538],
+        [0.478359, 1.158742, 0.107672],
+        [-0.137087, -0.235121, 0.353913],
+    ]
+)
+DIETMAIER_LENGTHS = np.array([1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071])
+"""P. Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures (1998)."""
+
+
+def dietmaier() -> tuple[Mechanism, Array]:
+    """The platform with 40 real assembly modes at `DIETMAIER_LENGTHS`, at home in one of them, and that home pose."""
+    poses, hits = fk_oracles.gough_modes(DIETMAIER_BASE, DIETMAIER_PLATFORM, DIETMAIER_LENGTHS, starts=100)
+    home = poses[hits.argmax()]
+    return gough(DIETMAIER_BASE, DIETMAIER_PLATFORM, home, "Dietmaier's platform"), home
+
+
+def similar_hexagons() -> Mechanism:
+    """A 6-UPS that is singular everywhere: base and platform are similar hexagons, corner above corner.
+
+    With its struts locked it still moves, from every pose; constructing it warns of that.
+    """
+    angles = np.radians([0.0, 40.0, 120.0, 160.0, 240.0, 280.0])
+    corners = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    home = np.eye(4)
+    home[:3, :3] = Rotation.from_rotvec([0.2, -0.1, 0.3]).as_matrix()
+    home[:3, 3] = 3.0, -2.0, 150.0
+    return gough(100.0 * corners, 60.0 * corners, home, "similar hexagons")

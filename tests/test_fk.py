@@ -1,0 +1,643 @@
+"""Forward kinematics against closed forms, published answers and inverse kinematics; and what an answer promises."""
+
+from __future__ import annotations
+
+import os
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import checking
+import fk_machines
+import fk_oracles
+import oracles
+import pfabrik as pf
+from fk_machines import PUBLISHED
+from machines import MACHINES
+from pfabrik import Status
+from pfabrik.errors import InvalidArgument
+
+CATALOGUE = ("five_bar", "stewart", "nrpm")
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+
+_MADE: dict[str, pf.Mechanism] = {}
+
+
+def machine(name: str) -> pf.Mechanism:
+    if name not in _MADE:
+        _MADE[name] = MACHINES[name]() if name in MACHINES else pf.load(name)
+    return _MADE[name]
+
+
+def home_values(mechanism: pf.Mechanism) -> np.ndarray:
+    return np.array([mechanism.home_coordinate(name) for name in mechanism.actuators])
+
+
+def deviation(mechanism: pf.Mechanism, values: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Difference of actuator values, lengths relative to L."""
+    slides = [mechanism.joint(name).type == "prismatic" for name in mechanism.actuators]
+    return np.subtract(values, asked) / np.where(slides, mechanism.characteristic_length, 1.0)
+
+
+def assert_feasible(mechanism: pf.Mechanism, asked: np.ndarray, answer: pf.Solution) -> None:
+    """What REACHED and PROJECTED promise, measured without the library."""
+    for name in ("pose", "actuators", "actuator_error", "residual", "limit_excess"):
+        assert np.isfinite(getattr(answer, name)).all(), name
+    assert np.max(answer.status) <= Status.PROJECTED
+    assert np.max(answer.residual) <= 1e-9 * mechanism.characteristic_length
+    assert np.max(answer.limit_excess) <= 1e-9
+    assert np.max(checking.worst_gap(mechanism, answer)) <= 1e-9
+    assert np.max(checking.worst_excess(mechanism, answer)) <= 1e-9
+    error = np.abs(deviation(mechanism, answer.actuators, asked)).max(axis=-1)
+    np.testing.assert_allclose(answer.actuator_error, error, rtol=1e-9, atol=1e-9)
+    assert np.all(error[np.asarray(answer.status) == Status.REACHED] <= 1e-9)
+
+
+def assert_same_pose(mechanism: pf.Mechanism, found: np.ndarray, expected: np.ndarray, atol: float = 1e-7) -> None:
+    """The same pose; of a joint that is placed, only the position counts. Lengths relative to L."""
+    length = mechanism.characteristic_length
+    np.testing.assert_allclose(found[..., :3, 3] / length, expected[..., :3, 3] / length, rtol=0, atol=atol)
+    if not mechanism.end_effector_is_joint:
+        np.testing.assert_allclose(found[..., :3, :3], expected[..., :3, :3], rtol=0, atol=atol)
+
+
+def is_same_pose(mechanism: pf.Mechanism, found: np.ndarray, expected: np.ndarray, atol: float = 1e-6) -> np.ndarray:
+    away = np.abs(found[..., :3, 3] - expected[..., :3, 3]).max(axis=-1) / mechanism.characteristic_length
+    if mechanism.end_effector_is_joint:
+        return away <= atol
+    return np.maximum(away, np.abs(found[..., :3, :3] - expected[..., :3, :3]).max(axis=(-1, -2))) <= atol
+
+
+# --- the oracles themselves ------------------------------------------------------------------------------------------
+
+
+def test_oracle_planar_3rpr_has_as_many_roots_as_its_sextic() -> None:
+    """f is a trigonometric polynomial of degree three: its roots are those of a sextic on the unit circle."""
+    rng = np.random.default_rng(1)
+    counts = []
+    for _ in range(60):
+        geometry = fk_oracles.Planar3RPR(*rng.uniform([2, 2, 0.3, 3, -1, 3], [4, 4, 2.5, 6, 2, 6]))
+        p = geometry.lengths(*rng.uniform([-3, -2, -2], [3, 4, 4]))
+        samples = geometry.f(2 * np.pi * np.arange(16) / 16, p)
+        harmonics = np.fft.fft(samples) / 16
+        assert np.abs(harmonics[4:13]).max() <= 1e-12 * np.abs(harmonics).max()
+        roots = np.roots([harmonics[k] for k in (3, 2, 1, 0, -1, -2, -3)])
+        real = np.sort(np.angle(roots[np.abs(np.abs(roots) - 1) < 1e-8]))
+        np.testing.assert_allclose(geometry.roots(p), real, atol=1e-6)
+        for solution in geometry.solutions(p):
+            np.testing.assert_allclose(geometry.lengths(*solution), p, atol=1e-9)
+        counts.append(len(real))
+    assert {2, 4} <= set(counts)
+
+
+@pytest.mark.parametrize("case", ["sauer_fig1_15", "sauer_p2_5"])
+def test_oracle_planar_3rpr_finds_the_published_poses(case: str) -> None:
+    geometry = fk_oracles.Planar3RPR(**PUBLISHED[case]["geometry"])
+    np.testing.assert_allclose(geometry.solutions(PUBLISHED[case]["p"]), PUBLISHED[case]["poses_theta_x_y"], atol=1e-12)
+
+
+def test_oracle_planar_3rpr_finds_two_positions_at_one_angle() -> None:
+    """Level, the platform's and the base's corners lie on parallel lines: f touches zero there, and y may be either."""
+    geometry = fk_oracles.Planar3RPR(L2=5.0, L3=3.0, gamma=0.4, x1=2.0, x2=5 * np.cos(0.4) - 2, y2=5 * np.sin(0.4))
+    found = geometry.solutions(geometry.lengths(0.0, 1.0, 2.0))
+    for expected in ((0.0, 1.0, 2.0), (0.0, 1.0, -2.0)):
+        assert min(np.abs(np.subtract(each, expected)).max() for each in found) <= 1e-6
+
+
+@pytest.mark.parametrize("transition, below, above", PUBLISHED["sauer_intervals"]["transitions_p2_from_to"])
+def test_oracle_planar_3rpr_counts_change_at_the_published_transitions(
+    transition: float, below: int, above: int
+) -> None:
+    geometry = fk_oracles.Planar3RPR(**PUBLISHED["sauer_p2_5"]["geometry"])
+    for p2, count in ((transition - 3e-6, below), (transition + 3e-6, above)):
+        assert len(geometry.solutions([5, p2, 3])) == count
+
+
+def test_oracle_five_bar_tips_are_a_forearm_from_both_elbows() -> None:
+    mechanism = machine("five_bar")
+    tips = fk_oracles.five_bar_tips(mechanism, [0.0, 0.0])
+    assert len(tips) == 2
+    assert min(np.linalg.norm(tip - mechanism.reference_point) for tip in tips) <= 1e-12 * 200
+    assert fk_oracles.five_bar_tips(mechanism, np.radians([60.0, -60.0])) == []
+
+
+def test_oracle_three_spheres_meet_in_two_points_at_their_radii() -> None:
+    radii = np.linalg.norm(fk_machines.TRIPOD_FEET - fk_machines.TRIPOD_TIP, axis=1)
+    found = fk_oracles.spheres_meet(fk_machines.TRIPOD_FEET, radii)
+    assert len(found) == 2
+    for point in found:
+        np.testing.assert_allclose(np.linalg.norm(fk_machines.TRIPOD_FEET - point, axis=1), radii)
+    assert fk_oracles.spheres_meet(fk_machines.TRIPOD_FEET, [10.0, 10.0, 10.0]) == []
+
+
+def test_oracle_six_struts_agree_with_a_solver_of_other_hands() -> None:
+    for case in ("gsp_mathworks_home", "gsp_linuxcnc_home"):
+        geometry, lengths = PUBLISHED[case]["geometry"], PUBLISHED[case]["L"]
+        ours, hits = fk_oracles.gough_modes(geometry["base"], geometry["platform"], lengths)
+        theirs = fk_oracles.gough_modes_by_least_squares(geometry["base"], geometry["platform"], lengths)
+        assert len(ours) == len(theirs) == 8
+        assert hits.min() >= 20
+        for pose in theirs:
+            assert np.abs(ours - pose).max(axis=(1, 2)).min() <= 1e-7
+
+
+def test_oracle_six_struts_finds_all_40_of_dietmaiers_postures() -> None:
+    found, _ = fk_oracles.gough_modes(
+        fk_machines.DIETMAIER_BASE, fk_machines.DIETMAIER_PLATFORM, fk_machines.DIETMAIER_LENGTHS, starts=8000
+    )
+    assert len(found) == 40
+    lengths = oracles.leg_lengths(fk_machines.DIETMAIER_BASE, fk_machines.DIETMAIER_PLATFORM, found)
+    np.testing.assert_allclose(lengths, np.tile(fk_machines.DIETMAIER_LENGTHS, (40, 1)), atol=1e-11)
+
+
+@pytest.mark.parametrize("row", PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"])
+def test_oracle_3rps_finds_the_published_pose(row: list[float]) -> None:
+    geometry = PUBLISHED["rps_leeshah"]["geometry"]
+    pose, lengths = lee_shah_pose(row), row[5:]
+    azimuth = np.radians(geometry["azimuth_deg"])
+    tops = geometry["platform_radius"] * np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=1)
+    tops = tops @ pose[:3, :3].T + pose[:3, 3]
+    side = np.sqrt(3.0) * geometry["platform_radius"]
+    found = fk_oracles.rps_tops(geometry["base_radius"], side, lengths)
+    assert min(np.abs(each - tops).max() for each in found) <= 1e-8
+    assert len(found) % 2 == 0  # each has its mirror image below the base
+
+
+@pytest.mark.parametrize("name", ["stewart", "nrpm", "five_bar", "tripod_rps", "hexaglide", "planar_rrr"])
+def test_oracle_of_joints_accepts_home_and_notices_one_wrong_joint(name: str) -> None:
+    mechanism = machine(name)
+    assert fk_oracles.unplaced(mechanism) == set()
+    joints = {
+        joint.name: np.array(mechanism.home_coordinate(joint.name), dtype=float)
+        if joint.type != "spherical"
+        else np.zeros(3)
+        for joint in mechanism.joints
+    }
+    answer = SimpleNamespace(pose=mechanism.home_pose, joints=joints)
+    assert fk_oracles.joint_gap(mechanism, answer) <= 1e-12
+    for joint in mechanism.joints:
+        if (joint.type == "universal" and joint.axes is None) or joint.name == mechanism.end_effector:
+            continue
+        wrong = joints | {joint.name: joints[joint.name] + 0.01}
+        assert fk_oracles.joint_gap(mechanism, SimpleNamespace(pose=mechanism.home_pose, joints=wrong)) > 1e-6
+
+
+# --- closed forms and published answers ------------------------------------------------------------------------------
+
+
+def lee_shah_pose(row: list[float]) -> np.ndarray:
+    a, b, pz, px, py = row[:5]
+    return pf.pose([px, py, pz], rotation=Rotation.from_euler("ZYZ", [a, b, -a]))
+
+
+@pytest.mark.parametrize("p, rpy, lengths", PUBLISHED["gsp_conroy"]["rows_p_rpy_L"])
+def test_published_leg_lengths_of_a_hexapod_both_ways(p: list, rpy: list, lengths: list) -> None:
+    mechanism = fk_machines.published_gough("gsp_conroy", PUBLISHED["gsp_conroy"]["rows_p_rpy_L"][0][0])
+    target = pf.pose(p, rpy=rpy)
+    np.testing.assert_allclose(pf.solve_ik(mechanism, target).actuators, lengths, rtol=0, atol=5e-5)
+    answer = pf.solve_fk(mechanism, lengths)
+    assert answer.status is Status.REACHED
+    # four digits of the lengths are worth 8e-5 of the pose, by the oracle
+    np.testing.assert_allclose(answer.pose, target, rtol=0, atol=1e-4)
+    geometry = PUBLISHED["gsp_conroy"]["geometry"]
+    found, _ = fk_oracles.gough_modes(geometry["base"], geometry["platform"], lengths, starts=300)
+    assert np.abs(found - answer.pose).max(axis=(1, 2)).min() <= 1e-9
+
+
+def test_published_home_of_a_machine_controller_both_ways() -> None:
+    case = PUBLISHED["gsp_linuxcnc_home"]
+    mechanism = fk_machines.published_gough("gsp_linuxcnc_home", case["p"])
+    target = pf.pose(case["p"])
+    ik = pf.solve_ik(mechanism, target)
+    np.testing.assert_allclose(ik.actuators, case["L"], rtol=0, atol=case["tol"])
+    np.testing.assert_allclose(pf.solve_fk(mechanism, ik.actuators).pose, target, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(pf.solve_fk(mechanism, case["L"]).pose, target, rtol=0, atol=case["tol"])
+
+
+@pytest.mark.parametrize("row", PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"])
+def test_published_parasitic_motion_of_a_3rps_from_its_leg_lengths(row: list[float]) -> None:
+    geometry = PUBLISHED["rps_leeshah"]["geometry"]
+    mechanism = fk_machines.rps(geometry["base_radius"], geometry["platform_radius"], 200.0)
+    answer = pf.solve_fk(mechanism, row[5:])
+    assert answer.status is Status.REACHED
+    np.testing.assert_allclose(answer.pose, lee_shah_pose(row), rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("case", ["sauer_fig1_15", "sauer_p2_5"])
+def test_planar_3rpr_is_one_of_the_published_poses_whatever_its_home(case: str) -> None:
+    geometry, p = fk_oracles.Planar3RPR(**PUBLISHED[case]["geometry"]), PUBLISHED[case]["p"]
+    mechanism, home = fk_machines.planar_3rpr(geometry, geometry.lengths(0.3, 0.5, 2.5))
+    answer = pf.solve_fk(mechanism, p)
+    assert answer.status is Status.REACHED
+    published = np.array([fk_machines.planar_pose(each, home) for each in PUBLISHED[case]["poses_theta_x_y"]])
+    assert np.abs(published - answer.pose).max(axis=(1, 2)).min() <= 1e-9
+
+
+def test_five_bar_tip_is_where_the_forearms_meet() -> None:
+    mechanism = machine("five_bar")
+    targets = oracles.inside_targets(mechanism, np.random.default_rng(2), 20 if INTERPRETED else 200)
+    turns = oracles.actuators(mechanism, targets)
+    answer = pf.solve_fk(mechanism, turns)
+    assert answer
+    for tip, turn in zip(answer.pose[:, :3, 3], turns, strict=True):
+        assert min(np.linalg.norm(tip - each) for each in fk_oracles.five_bar_tips(mechanism, turn)) <= 1e-7
+
+
+def test_struts_that_meet_in_a_point_meet_where_three_spheres_do() -> None:
+    """A leg that carries the tool's orientation, which positions alone cannot express."""
+    mechanism = fk_machines.tripod()
+    rng = np.random.default_rng(3)
+    for _ in range(3 if INTERPRETED else 20):
+        tip = fk_machines.TRIPOD_TIP + rng.uniform(-30, 30, 3)
+        lengths = np.linalg.norm(fk_machines.TRIPOD_FEET - tip, axis=1)
+        answer = pf.solve_fk(mechanism, lengths)
+        assert answer.status is Status.REACHED
+        points = fk_oracles.spheres_meet(fk_machines.TRIPOD_FEET, lengths)
+        assert min(np.linalg.norm(answer.pose[:3, 3] - point) for point in points) <= 1e-6
+        np.testing.assert_allclose(answer.pose[:3, 3], tip, rtol=0, atol=1e-6)
+
+
+def test_serial_arm_is_a_sum_of_its_links() -> None:
+    mechanism = fk_machines.planar_arm()
+    rng = np.random.default_rng(4)
+    angles = rng.uniform(-3, 3, (50, 3))
+    answer = pf.solve_fk(mechanism, angles)
+    assert answer
+    for found, turn in zip(answer.pose, angles, strict=True):
+        tip, heading = fk_oracles.planar_arm(fk_machines.ARM_LINKS, turn)
+        expected = pf.pose([*tip, 0.0], rotvec=[0, 0, heading - fk_machines.ARM_HOME.sum()])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * 600)
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_home_coordinates_give_home(name: str) -> None:
+    mechanism = machine(name)
+    answer = pf.solve_fk(mechanism, home_values(mechanism))
+    assert answer.status is Status.REACHED
+    assert_same_pose(mechanism, answer.pose, mechanism.home_pose, atol=1e-9)
+    for joint in mechanism.joints:
+        if joint.type != "fixed":
+            home = np.zeros(3) if joint.type == "spherical" else mechanism.home_coordinate(joint.name)
+            scale = mechanism.characteristic_length if joint.type == "prismatic" else 1.0
+            np.testing.assert_allclose(answer.joints[joint.name], home, rtol=0, atol=1e-8 * scale)
+
+
+# --- there and back --------------------------------------------------------------------------------------------------
+
+
+def assert_round_trip(mechanism: pf.Mechanism, targets: np.ndarray, least: float) -> None:
+    """From home, at least this share of the poses comes back; all do, from a configuration near by."""
+    reached = pf.solve_ik(mechanism, targets)
+    assert reached
+    back = pf.solve_fk(mechanism, reached.actuators)
+    assert_feasible(mechanism, reached.actuators, back)
+    same = is_same_pose(mechanism, back.pose, reached.pose)
+    assert same.mean() >= least
+    rng = np.random.default_rng(5)
+    near = np.array(targets)
+    near[:, :3, 3] += rng.normal(size=(len(near), 3)) * 1e-2 * mechanism.characteristic_length
+    seeds = pf.solve_ik(mechanism, near, seed=reached)
+    again = pf.solve_fk(mechanism, reached.actuators, seed=seeds)
+    assert again
+    assert is_same_pose(mechanism, again.pose, reached.pose).all()
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_forward_after_inverse_returns_the_pose(name: str) -> None:
+    mechanism = machine(name)
+    targets = oracles.inside_targets(mechanism, np.random.default_rng(6), 10 if INTERPRETED else 300)
+    assert_round_trip(mechanism, targets, least=0.99)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_forward_after_inverse_returns_10000_poses(name: str) -> None:
+    mechanism = machine(name)
+    targets = oracles.inside_targets(mechanism, np.random.default_rng(7), 10_000)
+    assert_round_trip(mechanism, targets, least=0.999)
+
+
+def tilted_targets(mechanism: pf.Mechanism, rng: np.random.Generator, n: int, tilt: float) -> np.ndarray:
+    """Poses within the workspace, turned by up to `tilt` [rad] about any axis."""
+    found = np.empty((0, 4, 4))
+    while len(found) < n:
+        steps = rng.uniform(-0.6, 0.6, (4 * n, 3)) * mechanism.characteristic_length
+        turns = rng.normal(size=(4 * n, 3))
+        turns *= (rng.uniform(0, tilt, 4 * n) / np.linalg.norm(turns, axis=1))[:, None]
+        drawn = oracles.poses(mechanism.reference_point + steps, Rotation.from_rotvec(turns).as_matrix())
+        found = np.concatenate([found, drawn[oracles.margin(mechanism, drawn) >= 0]])
+    return found[:n]
+
+
+@pytest.mark.slow
+def test_a_hexapod_tilted_up_to_30_degrees_is_found_from_home_without_a_seed() -> None:
+    mechanism = machine("stewart")
+    targets = tilted_targets(mechanism, np.random.default_rng(8), 10_000, np.radians(30.0))
+    lengths = oracles.actuators(mechanism, targets)
+    answer = pf.solve_fk(mechanism, lengths)
+    assert_feasible(mechanism, lengths, answer)
+    assert is_same_pose(mechanism, answer.pose, targets).mean() >= 0.999
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_joint_coordinates_place_every_body_where_the_pose_is(name: str) -> None:
+    """Answers near home, in or out of reach: all coordinates, passive ones included, walked through body by body."""
+    mechanism = machine(name)
+    rng = np.random.default_rng(9)
+    slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuators])
+    scale = np.where(slides, 0.05 * mechanism.characteristic_length, 0.1)
+    for _ in range(2 if INTERPRETED else 10):
+        asked = home_values(mechanism) + scale * rng.uniform(-1, 1, len(scale))
+        answer = pf.solve_fk(mechanism, asked)
+        assert_feasible(mechanism, asked, answer)
+        assert fk_oracles.joint_gap(mechanism, answer) <= 1e-8
+        assert pf.closure_residual(mechanism, answer) <= 1e-9 * mechanism.characteristic_length
+        driven = np.array([answer.joints[actuator] for actuator in mechanism.actuators])
+        assert np.abs(deviation(mechanism, driven, answer.actuators)).max() <= 1e-9
+
+
+def test_a_seed_keeps_its_assembly_mode() -> None:
+    case = PUBLISHED["sauer_p2_5"]
+    geometry = fk_oracles.Planar3RPR(**case["geometry"])
+    mechanism, home = fk_machines.planar_3rpr(geometry, case["p"])
+    modes = pf.assembly_modes(mechanism, case["p"])
+    assert len(modes) == 4
+    for mode in modes:
+        answer = pf.solve_fk(mechanism, np.add(case["p"], 0.01), seed=mode)
+        assert answer.status is Status.REACHED
+        expected = [fk_machines.planar_pose(each, home) for each in geometry.solutions(np.add(case["p"], 0.01))]
+        nearest = min(expected, key=lambda pose: np.abs(pose - mode.pose).max())
+        np.testing.assert_allclose(answer.pose, nearest, rtol=0, atol=1e-8)
+
+
+# --- values that cannot be -------------------------------------------------------------------------------------------
+
+
+def test_strokes_outside_their_range_are_projected_onto_it() -> None:
+    """All six struts asked for 290: 280 is the most, straight up, and the nearest in every strut."""
+    mechanism = machine("stewart")
+    asked = np.full(6, 290.0)
+    answer = pf.solve_fk(mechanism, asked)
+    assert answer.status is Status.PROJECTED
+    assert not answer
+    assert_feasible(mechanism, asked, answer)
+    assert answer.actuator_error == pytest.approx(10.0 / mechanism.characteristic_length, rel=1e-6)
+    height = np.sqrt(280.0**2 - 60.0**2 - 20.0**2)
+    np.testing.assert_allclose(answer.pose, pf.pose([0, 0, height]), rtol=0, atol=1e-4)
+    assert {limit.joint for limit in answer.active_limits} == set(mechanism.actuators)
+    assert {limit.bound for limit in answer.active_limits} == {"max"}
+
+
+@pytest.mark.parametrize("beyond, status", [(-1e-6, Status.REACHED), (1e-6, Status.PROJECTED)])
+def test_the_end_of_a_stroke_is_tested_on_both_sides(beyond: float, status: Status) -> None:
+    mechanism = machine("stewart")
+    asked = np.full(6, 280.0 + beyond * mechanism.characteristic_length)
+    answer = pf.solve_fk(mechanism, asked)
+    assert answer.status is status
+    assert_feasible(mechanism, asked, answer)
+
+
+def test_one_stroke_outside_is_named_and_the_others_are_kept() -> None:
+    """Struts of 165 and one of 155, its least, are well within the cones: the nearest to 150, whatever the measure."""
+    mechanism = machine("stewart")
+    asked = np.array([165.0, 150.0, 165.0, 165.0, 165.0, 165.0])
+    answer = pf.solve_fk(mechanism, asked)
+    assert answer.status is Status.PROJECTED
+    assert_feasible(mechanism, asked, answer)
+    assert answer.actuator_error == pytest.approx(5.0 / mechanism.characteristic_length, rel=1e-6)
+    assert [(limit.joint, limit.bound) for limit in answer.active_limits] == [(mechanism.actuators[1], "min")]
+
+
+def test_a_stroke_that_the_cones_do_not_allow_is_projected() -> None:
+    """One strut of 150 among struts of 205 would turn the platform out of its cones, at its least stroke as well."""
+    mechanism = machine("stewart")
+    asked = home_values(mechanism)
+    asked[1] = 150.0
+    answer = pf.solve_fk(mechanism, asked)
+    assert answer.status is Status.PROJECTED
+    assert_feasible(mechanism, asked, answer)
+    assert answer.actuator_error > 5.0 / mechanism.characteristic_length
+    assert any(limit.bound == "cone" for limit in answer.active_limits)
+
+
+def test_limits_of_passive_joints_are_kept() -> None:
+    """Strut lengths within their strokes whose platform would exceed a cone."""
+    mechanism = machine("stewart")
+    cones = {joint.name: None for joint in mechanism.joints if joint.cone is not None}
+    rng = np.random.default_rng(10)
+    free = mechanism.with_limits(cones)
+    drawn = oracles.random_targets(mechanism, rng, 4000)
+    held = (oracles.margin(free, drawn) >= 0.02) & (oracles.margin(mechanism, drawn) < -0.05)
+    lengths = oracles.actuators(mechanism, drawn[held][: 5 if INTERPRETED else 40])
+    answer = pf.solve_fk(mechanism, lengths)
+    assert_feasible(mechanism, lengths, answer)
+    assert (answer.status == Status.PROJECTED).mean() >= 0.9  # the others are within limits in another assembly mode
+    for status, limits in zip(answer.status, answer.active_limits, strict=True):
+        assert status == Status.REACHED or limits
+    assert any(limit.bound == "cone" for limits in answer.active_limits for limit in limits)
+
+
+def test_elbows_too_far_apart_come_together() -> None:
+    """Cranks of a 5-bar turned outwards, whose forearms do not meet; the nearest ones that let them, by a grid."""
+    mechanism = machine("five_bar")
+    asked = np.radians([60.0, -60.0])
+    assert fk_oracles.five_bar_tips(mechanism, asked) == []
+    answer = pf.solve_fk(mechanism, asked)
+    assert answer.status is Status.PROJECTED
+    assert_feasible(mechanism, asked, answer)
+    y, z = np.meshgrid(np.linspace(-150.1, 150, 121), np.linspace(0.1, 250, 101))
+    targets = oracles.poses(np.stack([0 * y.ravel(), y.ravel(), z.ravel()], axis=1))
+    inside = targets[oracles.reachable(mechanism, targets)]
+    nearest = np.linalg.norm(oracles.actuators(mechanism, inside) - asked, axis=1).min()
+    assert np.linalg.norm(answer.actuators - asked) <= 1.05 * nearest
+
+
+def test_struts_too_short_to_meet_end_in_a_closed_machine() -> None:
+    case = PUBLISHED["sauer_p2_5"]
+    geometry = fk_oracles.Planar3RPR(**case["geometry"])
+    mechanism, _ = fk_machines.planar_3rpr(geometry, case["p"])
+    asked = np.array([5.0, 3.0, 3.0])
+    answer = pf.solve_fk(mechanism, asked)
+    assert answer.status is Status.PROJECTED
+    assert_feasible(mechanism, asked, answer)
+    transition = PUBLISHED["sauer_intervals"]["transitions_p2_from_to"][0][0]
+    assert np.linalg.norm(deviation(mechanism, answer.actuators, asked)) <= 1.01 * (
+        (transition - 3.0) / mechanism.characteristic_length
+    )
+
+
+def test_a_hexapod_with_one_strut_far_too_short_ends_in_a_closed_machine() -> None:
+    mechanism = fk_machines.published_gough("gsp_conroy", [0, 0, 3])
+    asked = np.array([0.05, 3.5, 3.5, 3.5, 3.5, 30.0])
+    answer = pf.solve_fk(mechanism, asked)
+    assert answer.status is Status.PROJECTED
+    assert_feasible(mechanism, asked, answer)
+
+
+def test_twelve_values_that_agree_give_the_pose() -> None:
+    mechanism = machine("nrpm")
+    targets = oracles.inside_targets(mechanism, np.random.default_rng(11), 10 if INTERPRETED else 100, least=0.02)
+    values = oracles.actuators(mechanism, targets)
+    answer = pf.solve_fk(mechanism, values)
+    assert_feasible(mechanism, values, answer)
+    assert is_same_pose(mechanism, answer.pose, targets).mean() >= 0.99
+
+
+def test_an_arm_of_a_redundant_machine_is_not_turned_beyond_its_range() -> None:
+    mechanism = machine("nrpm")
+    asked = home_values(mechanism)
+    asked[mechanism.actuators.index("A1")] = np.radians(150.0)
+    answer = pf.solve_fk(mechanism, asked)
+    assert answer.status is Status.PROJECTED
+    assert_feasible(mechanism, asked, answer)
+    assert answer.actuator_error >= np.radians(15.0) - 1e-9
+
+
+def test_twelve_values_within_their_ranges_that_cannot_be_assembled_are_projected() -> None:
+    """Arms leaning out at full length put the crossbars' ends 242 from the axis, the platform's are 78 from its own.
+
+    Summed over the legs, outwards, a platform wherever it is leaves gaps of 164 on average; the struts are 95 long.
+    """
+    mechanism = machine("nrpm")
+    asked = home_values(mechanism)
+    for column, name in enumerate(mechanism.actuators):
+        low, high = mechanism.joint(name).range
+        asked[column] = high if name[0] in "AB" else low
+    answer = pf.solve_fk(mechanism, asked)
+    assert answer.status is Status.PROJECTED
+    assert_feasible(mechanism, asked, answer)
+    assert fk_oracles.joint_gap(mechanism, answer) <= 1e-8
+    assert answer.actuator_error > 0.01
+
+
+# --- calls -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "actuators",
+    [
+        [200.0] * 5,
+        [200.0] * 7,
+        [],
+        200.0,
+        [[200.0] * 5] * 2,
+        [200.0] * 5 + [np.nan],
+        [200.0] * 5 + [np.inf],
+        ["long"] * 6,
+        "home",
+        None,
+        [200.0 + 1j] * 6,
+        [True] * 6,
+        [[200.0, 200.0], [200.0]],
+    ],
+)
+def test_what_are_no_actuator_values_is_refused_by_name(actuators: object) -> None:
+    with pytest.raises(InvalidArgument, match="actuators"):
+        pf.solve_fk(machine("stewart"), actuators)
+
+
+def test_bad_rows_are_named_or_marked() -> None:
+    mechanism = machine("stewart")
+    asked = np.tile(home_values(mechanism), (5, 1))
+    asked[1, 0], asked[3, 5] = np.nan, np.inf
+    with pytest.raises(InvalidArgument, match="actuators") as caught:
+        pf.solve_fk(mechanism, asked)
+    assert caught.value.rows == (1, 3)
+    marked = pf.solve_fk(mechanism, asked, options=pf.Options(on_invalid="mark"))
+    assert list(marked.status) == [Status.REACHED, Status.INVALID, Status.REACHED, Status.INVALID, Status.REACHED]
+    assert np.isnan(marked.pose[[1, 3]]).all()
+    np.testing.assert_allclose(marked.pose[[0, 2, 4]], np.tile(mechanism.home_pose, (3, 1, 1)), atol=1e-7)
+    assert not marked
+
+
+def test_batch_axes_come_first_on_every_field() -> None:
+    mechanism = machine("stewart")
+    answer = pf.solve_fk(mechanism, np.tile(home_values(mechanism), (2, 3, 1)))
+    for name in ("status", "residual", "limit_excess", "actuator_error", "iterations"):
+        assert np.shape(getattr(answer, name)) == (2, 3), name
+    assert answer.pose.shape == (2, 3, 4, 4)
+    assert answer.actuators.shape == (2, 3, 6)
+    assert answer.points["CL1"].shape == (2, 3, 3)
+    assert answer.joints["BL1"].shape == (2, 3)
+    assert answer.joints["AL1"].shape == (2, 3, 2)
+    assert answer.joints["CL1"].shape == (2, 3, 3)
+    assert pf.closure_residual(mechanism, answer).shape == (2, 3)
+    assert answer[1].status.shape == (3,)
+    assert answer[1][2].status is Status.REACHED
+    assert np.shape(answer[1][2].joints["BL1"]) == ()
+    assert pf.solve_fk(mechanism, np.empty((0, 6))).pose.shape == (0, 4, 4)
+
+
+def test_integers_lists_and_strided_arrays_are_values() -> None:
+    mechanism = machine("stewart")
+    asked = np.tile(home_values(mechanism), (3, 1))
+    expected = pf.solve_fk(mechanism, asked).pose
+    np.testing.assert_array_equal(pf.solve_fk(mechanism, np.asfortranarray(asked)).pose, expected)
+    np.testing.assert_array_equal(pf.solve_fk(mechanism, np.repeat(asked, 2, axis=1)[:, ::2]).pose, expected)
+    np.testing.assert_array_equal(pf.solve_fk(mechanism, [205] * 6).pose, pf.solve_fk(mechanism, [205.0] * 6).pose)
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, "mixed", "hexapod_rus", "planar_rrr"])
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_a_row_alone_is_answered_as_in_a_batch(name: str) -> None:
+    mechanism = machine(name)
+    rng = np.random.default_rng(12)
+    slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuators])
+    scale = np.where(slides, 0.3 * mechanism.characteristic_length, 0.5)
+    asked = home_values(mechanism) + scale * rng.uniform(-1, 1, (4 if INTERPRETED else 60, len(scale)))
+    batch = pf.solve_fk(mechanism, asked)
+    for i, row in enumerate(asked):
+        alone = pf.solve_fk(mechanism, row)
+        assert alone.status == batch.status[i]
+        for field in ("pose", "actuators", "actuator_error"):  # stacked products round differently from single ones
+            np.testing.assert_allclose(getattr(alone, field), getattr(batch, field)[i], rtol=1e-8, atol=1e-8)
+        named = [
+            [(limit.joint, limit.bound) for limit in each] for each in (alone.active_limits, batch.active_limits[i])
+        ]
+        assert named[0] == named[1]
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_limits_are_kept_and_loops_closed_for_any_finite_values(name: str) -> None:
+    mechanism = machine(name)
+    rng = np.random.default_rng(13)
+    n = 4 if INTERPRETED else 60
+    slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuators])
+    size = rng.choice([0.1, 1.0, 10.0, 1e4], n)[:, None] * np.where(slides, mechanism.characteristic_length, 1.0)
+    asked = home_values(mechanism) + size * rng.uniform(-1, 1, (n, len(slides)))
+    assert_feasible(mechanism, asked, pf.solve_fk(mechanism, asked))
+
+
+def test_truth_is_reached_everywhere() -> None:
+    mechanism = machine("stewart")
+    inside, outside = home_values(mechanism), np.full(6, 400.0)
+    assert bool(pf.solve_fk(mechanism, inside)) is True
+    assert bool(pf.solve_fk(mechanism, outside)) is False
+    assert bool(pf.solve_fk(mechanism, [inside, inside])) is True
+    assert bool(pf.solve_fk(mechanism, [inside, outside])) is False
+
+
+def test_seeds_that_do_not_fit_are_refused() -> None:
+    mechanism = machine("stewart")
+    values = home_values(mechanism)
+    other = pf.solve_ik(machine("five_bar"), machine("five_bar").home_pose)
+    pair = pf.solve_fk(mechanism, np.tile(values, (2, 1)))
+    for seed in (other, pair, values):
+        with pytest.raises(InvalidArgument, match="seed"):
+            pf.solve_fk(mechanism, values, seed=seed)
+
+
+def test_answers_of_inverse_kinematics_carry_the_same_fields() -> None:
+    """One kind of Solution: joints and closure of an IK answer, seeds across both directions."""
+    mechanism = machine("stewart")
+    ik = pf.solve_ik(mechanism, pf.pose([5, -4, 200], rpy=[0.1, 0.05, -0.1]))
+    fk = pf.solve_fk(mechanism, ik.actuators, seed=ik)
+    assert_same_pose(mechanism, fk.pose, ik.pose)
+    assert pf.closure_residual(mechanism, ik) <= 1e-9 * mechanism.characteristic_length
+    assert fk_oracles.joint_gap(mechanism, ik) <= 1e-8
+    assert pf.solve_ik(mechanism, ik.pose, seed=fk)
