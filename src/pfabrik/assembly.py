@@ -25,10 +25,10 @@ Floats = NDArray[np.float64]
 BATCH = 512
 """Starts between two looks at what was found."""
 
-LEAST_STARTS = 2048
-"""Starts before a search may end: a mode that one start in 500 finds is missed by all of them once in 60 searches."""
+LEAST_STARTS = 4096
+"""Starts before a search may end: a mode that one start in 500 finds is missed by all of them once in 3600 searches."""
 
-HITS = 5
+HITS = 10
 """How often every mode is found before a search ends: an unseen mode as rare as the rarest seen is then unlikely."""
 
 STEPS = 80
@@ -76,8 +76,8 @@ class AssemblyModes(Sequence[Solution]):
 def assembly_modes(mechanism: Mechanism, actuators: Any, *, most_starts: int = 40_000) -> AssemblyModes:
     """All poses in which the mechanism can be assembled with given actuator values, limits or not.
 
-    Newton's method from random configurations of all joints, undamped, until every mode has been found five times and
-    at least 2048 starts have been made, or `most_starts`. This is a search, not a proof: each mode listed exists, its
+    Newton's method from random configurations of all joints, undamped, until every mode has been found ten times and
+    at least 4096 starts have been made, or `most_starts`. This is a search, not a proof: each mode listed exists, its
     loops are closed to machine precision, and it is listed once; a mode whose basin is far smaller than those of the
     others can be missed, and `unseen` of the result says how likely another start is to find one. The same call gives
     the same answer. Modes are told apart by the end effector's pose (its position, if it is a joint).
@@ -103,7 +103,8 @@ def assembly_modes(mechanism: Mechanism, actuators: Any, *, most_starts: int = 4
     coordinates = np.zeros((len(order), len(search.closure.scale)))
     for row, place in enumerate(order):
         coordinates[row] = search.coordinates[place]
-    modes = answered(mechanism, coordinates, np.repeat(values, len(order), axis=0))
+    polished = close(search.closure, coordinates, platform_poses(mechanism, coordinates), locked=search.locked)
+    modes = answered(mechanism, polished.coordinates, np.repeat(values, len(order), axis=0))
     return AssemblyModes(tuple(modes), tuple(search.hits[place] for place in order), search.starts)
 
 

@@ -38,6 +38,7 @@ class Closure:
     ----------
     scale : what a coordinate is multiplied by to be dimensionless: 1 / L for lengths, 1 for angles, (columns,).
     turning : 1 for angles, 0 for lengths, (columns,).
+    last_balls : ball joints at the platform, each at the end of a path that shares no joint.
     actuated, home : columns of the actuators, and their values at home, (n_a,).
     """
 
@@ -46,6 +47,7 @@ class Closure:
     scale: Floats
     turning: Floats
     actuated: NDArray[np.int64]
+    last_balls: frozenset[str]
     home: Floats
 
     def layout(self, locked: frozenset[str]) -> K.Layout:
@@ -65,7 +67,10 @@ def closure_of(mechanism: Mechanism) -> Closure:
     scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
     actuated = _ints(columns(mechanism)[name].start for name in mechanism.actuators)
     home = np.array([np.ravel(mechanism.home_coordinate(name))[0] for name in mechanism.actuators])
-    return Closure(mechanism, loops, scale, turning, actuated, home)
+    ending = loops.columns[loops.visits[loops.paths[1:] - 1, 0]][loops.last_balls == 1]
+    starts = {span.start: name for name, span in columns(mechanism).items() if span.stop > span.start}
+    balls = frozenset(starts[int(first)] for first in ending)
+    return Closure(mechanism, loops, scale, turning, actuated, balls, home)
 
 
 @lru_cache(maxsize=256)
@@ -149,6 +154,7 @@ def close(
     closeness : largest gap, excess and miss that ends the search [L or rad].
     """
     n = len(coordinates)
+    follow = centres is None and not limits
     length = closure.mechanism.characteristic_length
     groups = len(closure.loops.groups) - 1
     closed = K.Closed(
@@ -169,11 +175,13 @@ def close(
         limits=int(limits),
         margin=margin,
         chained=int(chained),
+        balls_follow=int(follow),
         plunging=int(plunging),
         closeness=closeness,
         max_iterations=max_iterations,
     )
-    _run(closure.loops, closure.layout(locked), wishes, closed)
+    layout = closure.layout(locked | closure.last_balls if follow else locked)
+    _run(closure.loops, layout, wishes, closed)
     return Closing(closed.coordinates / closure.scale, _in_lengths(closed.poses, length), *closed[2:])
 
 
@@ -262,6 +270,7 @@ class _Builder:
             paths=_ints(starts),
             groups=_ints(_starts(map(len, groups))),
             group_of=group_of,
+            last_balls=_ints(self._ends_with_own_ball(group) for group in groups for _ in group),
             end=np.array(self.mechanism.reference_point) / self.length,
             lo=lo,
             hi=hi,
@@ -269,6 +278,9 @@ class _Builder:
             path_marks=_ints(_starts(len(self.marks[path]) for path in order)),
             **self._cones(),
         )
+
+    def _ends_with_own_ball(self, group: list[int]) -> bool:
+        return len(group) == 1 and self.records[self.paths[group[0]][-1][0]][0] == K.BALL
 
     def _columns_of(self, k: int) -> range:
         kind, _, _, first = self.records[k]

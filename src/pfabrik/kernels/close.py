@@ -45,6 +45,7 @@ class Equations(NamedTuple):
     at: Floats  # (rows, 3): a point of the axis of each
     T: Floats  # (3, 4): the body a path has come to
     e: Floats  # (6,)
+    arm: Floats  # (3,): from the platform's reference point to a joint of it
     A: Floats  # (groups, m, m)
     C: Floats  # (groups, m, 6)
     b: Floats  # (groups, m)
@@ -73,6 +74,7 @@ def new_equations(loops: Loops, layout: Layout) -> Equations:
         np.zeros((rows, 3)),
         np.zeros((3, 4)),
         np.zeros(6),
+        np.zeros(3),
         np.zeros((groups, m, m)),
         np.zeros((groups, m, 6)),
         np.zeros((groups, m)),
@@ -133,13 +135,13 @@ def store_row(loops: Loops, row: int, state: State, closed: Closed) -> None:
 
 
 @inlined
-def walk_path(loops: Loops, path: int, state: State, eq: Equations) -> None:
-    """Pose a path's bodies from the base outward, noting the axis of every motion as it is passed."""
+def walk_path(loops: Loops, path: int, last: int, state: State, eq: Equations) -> None:
+    """Pose a path's bodies from the base outward up to a visit, noting the axis of every motion as it is passed."""
     T = eq.T
     for i in range(3):
         for j in range(4):
             T[i, j] = 1.0 if i == j else 0.0
-    for visit in range(loops.paths[path], loops.paths[path + 1]):
+    for visit in range(loops.paths[path], last):
         k, sign = loops.visits[visit, 0], float(loops.visits[visit, 1])
         row, axis, point, kind = loops.visit_rows[visit], loops.axes[k], loops.points[k], loops.kinds[k]
         if kind == SLIDE:
@@ -161,7 +163,6 @@ def walk_path(loops: Loops, path: int, state: State, eq: Equations) -> None:
         turn_about(T, point, w, sign * x, sign * y, sign * z)
         if sign < 0.0:
             note_axes(T, kind == BALL, sign, axis, point, row, eq.rows, eq.at)
-    end_of_path(loops, path, eq)
 
 
 @routine
@@ -191,12 +192,12 @@ def turn_about(T: Floats, point: Floats, w: float, x: float, y: float, z: float)
 
 
 @inlined
-def end_of_path(loops: Loops, path: int, eq: Equations) -> None:
-    """T's last column becomes the path's end; velocities of that end under each of the path's motions."""
-    T, end = eq.T, loops.end
+def end_path(loops: Loops, path: int, last: int, end: Floats, eq: Equations) -> None:
+    """T's last column becomes a point of the body a path has come to; its velocities under the path's motions."""
+    T = eq.T
     for i in range(3):
         T[i, 3] += T[i, 0] * end[0] + T[i, 1] * end[1] + T[i, 2] * end[2]
-    for visit in range(loops.paths[path], loops.paths[path + 1]):
+    for visit in range(loops.paths[path], last):
         if loops.kinds[loops.visits[visit, 0]] == SLIDE:
             continue
         for r in range(loops.visit_rows[visit], loops.visit_rows[visit + 1]):
@@ -242,6 +243,72 @@ def add_path(loops: Loops, slots: Ints, group: int, path: int, eq: Equations) ->
                     product += rows[r, i] * rows[r2, i]
                 A[max(s, s2), min(s, s2)] += product
     return square
+
+
+@inlined
+def add_last_ball(
+    loops: Loops, slots: Ints, group: int, path: int, last: int, state: State, eq: Equations
+) -> tuple[float, float]:
+    """The share of a path whose last ball joint follows the platform: its centre is all that must meet.
+
+    The square of its residual, and the residual.
+    """
+    point = loops.points[loops.visits[last, 0]]
+    end_path(loops, path, last, point, eq)
+    C, b, e, r, X, G = eq.C[group], eq.b[group], eq.e, eq.arm, state.X, eq.G
+    square = 0.0
+    for i in range(3):
+        r[i] = 0.0
+        for j in range(3):
+            r[i] += X[i, j] * (point[j] - loops.end[j])
+        e[i] = eq.T[i, 3] - X[i, 3] - r[i]
+        square += e[i] ** 2
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        G[i, i] += 1.0
+        G[i, 6] += e[i]
+        # the centre moves with the platform by v + w x r
+        G[3 + i, 6] += r[j] * e[k] - r[k] * e[j]
+        G[3 + i, j] -= r[k]
+        G[3 + i, k] += r[j]
+        G[3 + i, 3 + i] += r[j] ** 2 + r[k] ** 2
+        for j in range(i):
+            G[3 + i, 3 + j] -= r[i] * r[j]
+    A, rows = eq.A[group], eq.rows
+    first, stop = loops.visit_rows[loops.paths[path]], loops.visit_rows[last]
+    for q in range(first, stop):
+        s = slots[loops.row_columns[q]]
+        if s < 0:
+            continue
+        a = rows[q]
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            C[s, i] += a[i]
+            C[s, 3 + i] += r[j] * a[k] - r[k] * a[j]
+            b[s] += a[i] * e[i]
+        for q2 in range(first, q + 1):
+            s2 = slots[loops.row_columns[q2]]
+            if s2 >= 0:
+                product = a[0] * rows[q2, 0] + a[1] * rows[q2, 1] + a[2] * rows[q2, 2]
+                A[max(s, s2), min(s, s2)] += product
+    return square, math.sqrt(square)
+
+
+@inlined
+def follow_platform(loops: Loops, state: State, eq: Equations) -> None:
+    """Turn the last ball joints to where the platform has them."""
+    T, w = eq.T, eq.e
+    for path in range(len(loops.last_balls)):
+        if loops.last_balls[path] == 1:
+            last = loops.paths[path + 1] - 1
+            walk_path(loops, path, last, state, eq)
+            difference(state.X, T, w)
+            sign = float(loops.visits[last, 1])
+            x = sign * (T[0, 0] * w[0] + T[1, 0] * w[1] + T[2, 0] * w[2])
+            y = sign * (T[0, 1] * w[0] + T[1, 1] * w[1] + T[2, 1] * w[2])
+            z = sign * (T[0, 2] * w[0] + T[1, 2] * w[1] + T[2, 2] * w[2])
+            ball = state.balls[loops.visits[last, 0]]
+            ball[0], ball[1], ball[2], ball[3] = exponential(x, y, z)
 
 
 @inlined
@@ -431,7 +498,16 @@ def add_paths(loops: Loops, layout: Layout, wishes: Wishes, row: int, state: Sta
     for group in range(len(layout.sizes)):
         eq.gaps[group] = eq.misses[group] = 0.0
         for path in range(loops.groups[group], loops.groups[group + 1]):
-            walk_path(loops, path, state, eq)
+            last = loops.paths[path + 1]
+            follows = wishes.balls_follow == 1 and loops.last_balls[path] == 1
+            last -= 1 if follows else 0
+            walk_path(loops, path, last, state, eq)
+            if follows:
+                own, gap = add_last_ball(loops, layout.slots, group, path, last, state, eq)
+                square += own
+                eq.gaps[group] = max(eq.gaps[group], gap)
+                continue
+            end_path(loops, path, last, loops.end, eq)
             eq.gaps[group] = max(eq.gaps[group], compare_end(loops, state, eq))
             square += add_path(loops, layout.slots, group, path, eq)
             if wishes.centres.shape[1] > 0:
@@ -618,6 +694,8 @@ def close(loops: Loops, layout: Layout, wishes: Wishes, closed: Closed) -> None:
                 step = move(loops, layout, eq, trial)
                 iterations += 1
             elif turn == MEASURE:
+                if wishes.balls_follow == 1:
+                    follow_platform(loops, best, eq)
                 copy_state(best, trial)
         store_row(loops, row, best, closed)
         closed.iterations[row] = iterations

@@ -31,6 +31,7 @@ class Loops(NamedTuple):
     paths: Ints  # (paths + 1,): first visit of each path
     groups: Ints  # (groups + 1,): first path of each group
     group_of: Ints  # (columns,): group of each coordinate, or -1 where it is on no path
+    last_balls: Ints  # (paths,): 1 where a path that shares no joint ends with a ball joint
     end: Floats  # (3,): the reference point
     lo: Floats  # (columns,): ranges
     hi: Floats
@@ -64,6 +65,7 @@ class Wishes(NamedTuple):
     limits: int  # 1: limits are to be kept
     margin: float  # by how much inside
     chained: int  # 1: every row starts from the free coordinates of the one before
+    balls_follow: int  # 1: the ball joints of `last_balls` follow the platform; they are locked in the layout
     plunging: int  # 1: undamped steps, up and down: finds more of many solutions, but not the nearest
     closeness: float  # largest gap that ends the search
     max_iterations: int
