@@ -160,9 +160,9 @@ def close(
     closed = K.Closed(
         coordinates=coordinates * closure.scale,
         poses=_in_lengths(poses, 1.0 / length),
-        gaps=np.empty((n, groups)),
-        excesses=np.empty((n, groups)),
-        misses=np.empty((n, groups)),
+        gaps=np.full((n, groups), np.inf),
+        excesses=np.full((n, groups), np.inf),
+        misses=np.full((n, groups), np.inf),
         iterations=np.zeros(n, np.int64),
     )
     none = np.zeros((n, 0, 3))
@@ -226,9 +226,10 @@ class _Builder:
     def add_path(self, path: Path) -> None:
         visits: list[tuple[int, int]] = []
         marks: list[tuple[int, int]] = []
+        is_detour = len({passage.joint.name for passage in path}) < len(path)
         for passage in path:
             units = self._units_of(passage.joint)
-            if units and passage.joint.name in self.marked:
+            if units and passage.joint.name in self.marked and not is_detour:
                 marks.append((len(visits), self.marked[passage.joint.name]))
             visits += [(k, 1) for k in units] if passage.forward else [(k, -1) for k in reversed(units)]
         self.paths.append(visits)
@@ -356,15 +357,20 @@ def _connected(sets: Sequence[set[int]]) -> list[list[int]]:
 
 
 def _ranges(mechanism: Mechanism, n_columns: int) -> tuple[Floats, Floats]:
-    """Bounds of the deviations from home, (columns,) each, dimensionless; infinite where there are none."""
+    """Bounds of the deviations from home, (columns,) each, dimensionless; infinite where there are none.
+
+    A coordinate that is a distance has one even where the description gives none: it is not negative.
+    """
     lo, hi = np.full(n_columns, -np.inf), np.full(n_columns, np.inf)
     for joint in mechanism.joints:
-        if joint.range is None:
-            continue
         span = columns(mechanism)[joint.name]
+        home = np.reshape(mechanism.home_coordinate(joint.name), (-1, 1))
         lengths = np.array([kind == "length" for kind in KINDS[joint.type].coordinates])
-        bounds = np.reshape(joint.range, (-1, 2)) - np.reshape(mechanism.home_coordinate(joint.name), (-1, 1))
-        lo[span], hi[span] = (bounds / np.where(lengths, mechanism.characteristic_length, 1.0)[:, None]).T
+        units = np.where(lengths, mechanism.characteristic_length, 1.0)[:, None]
+        if joint.range is not None:
+            lo[span], hi[span] = ((np.reshape(joint.range, (-1, 2)) - home) / units).T
+        if joint.along is not None:
+            lo[span] = np.maximum(lo[span], -home[:, 0] / units[:, 0])
     return lo, hi
 
 
