@@ -36,6 +36,9 @@ STARTS = 48
 PROJECTIONS = 12
 """Random starts of the search for feasible values near those that no configuration has."""
 
+HORIZON = 1e100
+"""Values beyond this count as there while a search goes on: their squares are still numbers [length or rad]."""
+
 SIGHT = 3.0
 """How far off asked values are at most looked for, where they are too far for a search to end [L or rad]."""
 
@@ -73,7 +76,8 @@ def solve_fk(
         bad = np.flatnonzero(~known)[:5].tolist()
         raise InvalidArgument("actuators", "a value that is not finite", "finite values", rows=bad)
     coordinates, poses = _starts(mechanism, seed, shape, len(values))
-    closing = _assemble(mechanism, coordinates[known], poses[known], values[known], seeded=seed is not None)
+    asked = np.clip(values[known], -HORIZON, HORIZON)
+    closing = _assemble(mechanism, coordinates[known], poses[known], asked, seeded=seed is not None)
     return _as_solution(mechanism, closing, values, known, shape)
 
 
