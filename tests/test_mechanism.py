@@ -219,7 +219,7 @@ class TestFreedom:
         assert instantaneous_mobility(machine) == 3
 
     def test_fewer_actuators_than_freedoms_warn_with_the_numbers(self):
-        with pytest.warns(MobilityWarning, match="1 actuators leave the end effector 1 freedoms at home"):
+        with pytest.warns(MobilityWarning, match="1 actuators leave the end effector 1 freedom at home"):
             Mechanism("loose", changed(five_bar(), "b", actuated=False), "tip")
 
     @given(st.floats(1e-6, 1e6))

@@ -45,7 +45,7 @@ class AssemblyModes(Sequence[Solution]):
 
     Attributes
     ----------
-    modes : one Solution each: REACHED within all limits; FAILED where it exceeds some, which `active_limits` names.
+    modes : one Solution each: REACHED within all limits; EXCEEDED beyond some, which `active_limits` names.
     hits : how many starts led to each.
     starts : how many starts were made.
     """
@@ -140,18 +140,17 @@ class _Search:
 
     def _sort(self, found: Closing) -> None:
         """Count the closed ones among the known modes, or as new ones."""
-        closed = np.flatnonzero(found.gap <= TOLERANCES.position)
-        marks = self._marks(found.poses[closed])
+        marks = self._marks(found.poses)
         fresh = []
-        for row, mark in zip(closed, marks, strict=True):
-            place = self._known(mark)
+        for row in np.flatnonzero(found.gap <= TOLERANCES.position):
+            place = self._known(marks[row])
             if place is None:
-                self._add(mark, found.coordinates[row], found.poses[row])
-                fresh.append(len(self.marks) - 1)
-            else:
-                self.hits[place] += 1
-                if np.abs(found.coordinates[row]).sum() < np.abs(self.coordinates[place]).sum():
-                    self.coordinates[place] = found.coordinates[row]
+                place = self._add(found.coordinates[row], found.poses[row])
+            if place == len(self.hits) - 1 and self.hits[place] == 0:
+                fresh.append(place)
+            self.hits[place] += 1
+            if np.abs(found.coordinates[row]).sum() < np.abs(self.coordinates[place]).sum():
+                self.coordinates[place] = found.coordinates[row]
         self._refuse_continuum(fresh)
 
     def _known(self, mark: Floats) -> int | None:
@@ -161,14 +160,23 @@ class _Search:
         place = int(apart.argmin())
         return place if apart[place] <= TOLERANCES.same_mode else None
 
-    def _add(self, mark: Floats, coordinates: Floats, pose: Floats) -> None:
-        home = self.closure.mechanism.home_pose
-        offset = (pose - home)[:3]
+    def _add(self, coordinates: Floats, pose: Floats) -> int:
+        """Number of the mode that a closed configuration belongs to: a new one, unless it ends at a known one.
+
+        Near solutions that are singular the loops are as good as closed some way off: Newton's method goes on to them.
+        """
+        ended = close(self.closure, coordinates[None], pose[None], locked=self.locked, closeness=0.0)
+        mark = self._marks(ended.poses)[0]
+        known = self._known(mark)
+        if known is not None:
+            return known
+        offset = (ended.poses[0] - self.closure.mechanism.home_pose)[:3]
         offset[:, 3] /= self.closure.mechanism.characteristic_length
         self.marks.append(mark)
-        self.coordinates.append(coordinates)
-        self.hits.append(1)
+        self.coordinates.append(ended.coordinates[0])
+        self.hits.append(0)
         self.from_home.append(float(np.linalg.norm(offset)))
+        return len(self.hits) - 1
 
     def _refuse_continuum(self, fresh: list[int]) -> None:
         """Raise where a new mode is one of a continuum: a step along its free motion, closed again, stays away."""

@@ -50,6 +50,13 @@ class Closure:
     last_balls: frozenset[str]
     home: Floats
 
+    @property
+    def idle(self) -> NDArray[np.bool_]:
+        """Which coordinates are on no path (a tool's hinge): nothing but their limits asks anything of them."""
+        idle = np.ones(len(self.scale), bool)
+        idle[self.loops.row_columns] = False
+        return idle
+
     def layout(self, locked: frozenset[str]) -> K.Layout:
         """The layout in which some joints do not move."""
         return _layout(self.mechanism, locked)
@@ -61,13 +68,15 @@ def closure_of(mechanism: Mechanism) -> Closure:
     builder = _Builder(mechanism)
     for path in independent_paths(mechanism):
         builder.add_path(path)
+    for joint in mechanism.joints:
+        builder.add_joint(joint)
     loops = builder.build()
     kinds = [kind for joint in mechanism.joints for kind in KINDS[joint.type].coordinates]
     turning = np.array([float(kind == "angle") for kind in kinds])
     scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
     actuated = _ints(columns(mechanism)[name].start for name in mechanism.actuators)
     home = np.array([np.ravel(mechanism.home_coordinate(name))[0] for name in mechanism.actuators])
-    ending = loops.columns[loops.visits[loops.paths[1:] - 1, 0]][loops.last_balls == 1]
+    ending = loops.columns[loops.visits[loops.paths[1:][loops.last_balls == 1] - 1, 0]]
     starts = {span.start: name for name, span in columns(mechanism).items() if span.stop > span.start}
     balls = frozenset(starts[int(first)] for first in ending)
     return Closure(mechanism, loops, scale, turning, actuated, balls, home)
@@ -76,7 +85,7 @@ def closure_of(mechanism: Mechanism) -> Closure:
 @lru_cache(maxsize=256)
 def _layout(mechanism: Mechanism, locked: frozenset[str]) -> K.Layout:
     loops = closure_of(mechanism).loops
-    free = loops.group_of >= 0
+    free = np.ones(len(loops.group_of), bool)
     for name, span in columns(mechanism).items():
         if name in locked:
             free[span] = False
@@ -228,14 +237,14 @@ class _Builder:
         marks: list[tuple[int, int]] = []
         is_detour = len({passage.joint.name for passage in path}) < len(path)
         for passage in path:
-            units = self._units_of(passage.joint)
+            units = self.add_joint(passage.joint)
             if units and passage.joint.name in self.marked and not is_detour:
                 marks.append((len(visits), self.marked[passage.joint.name]))
             visits += [(k, 1) for k in units] if passage.forward else [(k, -1) for k in reversed(units)]
         self.paths.append(visits)
         self.marks.append(marks)
 
-    def _units_of(self, joint: Joint) -> list[int]:
+    def add_joint(self, joint: Joint) -> list[int]:
         """Numbers of a joint's unit motions, in the order from its first body to its second."""
         if joint.name not in self.units:
             first = self.columns[joint.name].start
@@ -252,7 +261,7 @@ class _Builder:
         starts = _starts(len(self.paths[path]) for path in order)
         widths = [3 if self.records[k][0] == K.BALL else 1 for k, _ in visits]
         n_columns = sum(len(KINDS[joint.type].coordinates) for joint in self.mechanism.joints)
-        group_of = np.full(n_columns, -1)
+        group_of = np.zeros(n_columns, np.int64)
         for number, group in enumerate(groups):
             for k in {k for path in group for k, _ in self.paths[path]}:
                 group_of[self._columns_of(k)] = number
@@ -281,14 +290,15 @@ class _Builder:
         )
 
     def _ends_with_own_ball(self, group: list[int]) -> bool:
-        return len(group) == 1 and self.records[self.paths[group[0]][-1][0]][0] == K.BALL
+        last = self.paths[group[0]][-1:]
+        return len(group) == 1 and any(self.records[k][0] == K.BALL for k, _ in last)
 
     def _columns_of(self, k: int) -> range:
         kind, _, _, first = self.records[k]
         return range(first, first + (3 if kind == K.BALL else 1))
 
     def _cones(self) -> dict[str, Any]:
-        joints = [joint for joint in self.mechanism.joints if joint.cone is not None and joint.name in self.units]
+        joints = [joint for joint in self.mechanism.joints if joint.cone is not None]
         lines = [cone_line(self.mechanism, joint) for joint in joints]
         offsets = [(np.asarray(end.at) - np.asarray(start.at)) / self.length for start, end in lines]
         slides = [

@@ -25,6 +25,12 @@ Mask = NDArray[np.bool_]
 STRIDES = 8
 """Steps in which the platform is taken from the seed's pose to the target where one step strays."""
 
+STRIDE = 0.25
+"""How far one step goes where the working mode is to be kept: a longer one may leap over a singularity [L or rad]."""
+
+SIGHT = 1e4
+"""How far off targets are looked for [L]: beyond, even the least weight of a wish would outweigh closed loops."""
+
 STARTS = 40
 """Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
 
@@ -77,7 +83,9 @@ def _answer(
     found = _reach(closure, wanted, start, begin, keep_mode)
     away = np.flatnonzero(~is_feasible(found))
     if len(away):
-        projected = _project(closure, wanted[away], found, away, start[away], begin[away], options)
+        ended = None if keep_mode else found.coordinates[away]
+        sought = _within_sight(closure, wanted[away], begin[away])
+        projected = _project(closure, sought, start[away], begin[away], ended, options)
         for array, own in zip(found, projected, strict=True):
             array[away] = own
     _fill(closure, found, wanted, which, options, rows)
@@ -98,7 +106,8 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
     wanted = _target_platform(mechanism, targets, begin)
     held = LOCK + FREE if mechanism.end_effector_is_joint else HELD
     found = close(closure, start, wanted, platform=held, limits=True, margin=MARGIN)
-    rest = np.flatnonzero(~is_feasible(found))
+    is_far = _distances(closure, begin, wanted, held) > STRIDE
+    rest = np.flatnonzero(~is_feasible(found) | (is_far if keep_mode else False))
     if len(rest):
         _take_better(found, rest, _led(closure, wanted[rest], start[rest], begin[rest], held))
     rng = np.random.default_rng(0)
@@ -144,58 +153,78 @@ def _off(found: Closing) -> Floats:
 def _legs_reached(closure: Closure, found: Closing, rows: NDArray[np.intp]) -> Mask:
     """Which coordinates belong to groups that are feasible, (m, columns)."""
     reached = _off(found)[rows] <= TOLERANCES.limit
-    group_of = closure.loops.group_of
-    return np.asarray(np.where(group_of >= 0, reached[:, group_of], True))
+    return np.asarray(reached[:, closure.loops.group_of])
 
 
 def _take_legs(closure: Closure, found: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
     """Take over the groups that came nearer."""
     better = _off(tried) < _off(found)[rest]
-    group_of = closure.loops.group_of
-    columns = np.where(group_of >= 0, better[:, group_of], False)
+    columns = better[:, closure.loops.group_of]
     found.coordinates[rest] = np.where(columns, tried.coordinates, found.coordinates[rest])
     for array, own in ((found.gaps, tried.gaps), (found.excesses, tried.excesses)):
         array[rest] = np.where(better, own, array[rest])
 
 
 def _take_better(found: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
-    better = np.flatnonzero(_off(tried).max(axis=1) < _off(found)[rest].max(axis=1))
+    """Take over the rows that are feasible, or came nearer."""
+    better = np.flatnonzero(is_feasible(tried) | (_off(tried).max(axis=1) < _off(found)[rest].max(axis=1)))
     for array, own in zip(found, tried, strict=True):
         array[rest[better]] = own[better]
 
 
 def _project(
-    closure: Closure,
-    targets: Floats,
-    found: Closing,
-    away: NDArray[np.intp],
-    start: Floats,
-    begin: Floats,
-    options: Options,
+    closure: Closure, targets: Floats, start: Floats, begin: Floats, ended: Floats | None, options: Options
 ) -> Closing:
-    """Feasible configurations near targets that are not reached; the start itself where nothing better is found."""
-    mechanism = closure.mechanism
+    """Feasible configurations near targets that are not reached; the start itself where nothing better is found.
+
+    Parameters
+    ----------
+    start, begin : where the search starts, (m, columns) and (m, 4, 4).
+    ended : where reaching ended, another start; None to stay in the working mode of the first.
+    """
     best = close(closure, start, begin, max_iterations=0)
-    nearest_yet = np.full(len(away), np.inf)
-    wanted = _target_platform(mechanism, targets, begin)
-    for platform in _ways(mechanism, options):
+    wanted = _target_platform(closure.mechanism, targets, begin)
+    starts = [(start, begin)] if ended is None else [(start, begin), (ended, wanted)]
+    nearest_yet = np.full(len(targets), np.inf)
+    for platform in _ways(closure.mechanism, options):
         waiting = np.flatnonzero(np.isinf(nearest_yet))
         if not len(waiting):
             break
-        held = np.array(platform) == LOCKED
-        for legs, poses in ((start, begin), (found.coordinates[away], wanted)):
-            placed = poses[waiting].copy()
-            if held[0]:
-                placed[:, :3, 3] = wanted[waiting, :3, 3]
-            if held[3]:
-                placed[:, :3, :3] = wanted[waiting, :3, :3]
-            tried = nearest(closure, legs[waiting], placed, platform=platform, targets=wanted[waiting])
-            distance = np.where(is_feasible(tried), _distances(closure, tried.poses, wanted[waiting], platform), np.inf)
+        if LOCKED not in platform:
+            nearest_yet[waiting] = _feasible_distances(closure, best, wanted, platform)[waiting]
+        for legs, poses in starts:
+            placed = np.where(_held_entries(platform), wanted, poses)[waiting]
+            tried = nearest(
+                closure, legs[waiting], placed, platform=platform, targets=wanted[waiting], gently=ended is None
+            )
+            distance = _feasible_distances(closure, tried, wanted[waiting], platform)
             better = np.flatnonzero(distance < nearest_yet[waiting])
             nearest_yet[waiting[better]] = distance[better]
-            for array, own in zip(best, tried, strict=True):
-                array[waiting[better]] = own[better]
+            for array, each in zip(best, tried, strict=True):
+                array[waiting[better]] = each[better]
     return best
+
+
+def _within_sight(closure: Closure, targets: Floats, begin: Floats) -> Floats:
+    """Targets no further from where the platform is than a search can tell from others in the same direction."""
+    offset = (targets - begin)[:, :3, 3]
+    far = SIGHT * closure.mechanism.characteristic_length
+    near = targets.copy()
+    near[:, :3, 3] = begin[:, :3, 3] + offset * np.minimum(1.0, far / np.maximum(_norms(offset), far))[:, None]
+    return near
+
+
+def _held_entries(platform: tuple[float, ...]) -> Mask:
+    """Which entries of a pose a projection keeps, (4, 4)."""
+    held = np.zeros((4, 4), bool)
+    held[:3, 3], held[:3, :3] = platform[0] == LOCKED, platform[3] == LOCKED
+    return held
+
+
+def _feasible_distances(closure: Closure, found: Closing, targets: Floats, platform: tuple[float, ...]) -> Floats:
+    """How far feasible rows are from their targets in what counts, (n,); infinite for the others."""
+    distances = _distances(closure, found.poses, targets, platform)
+    return np.asarray(np.where(is_feasible(found), distances, np.inf))
 
 
 def _ways(mechanism: Mechanism, options: Options) -> list[tuple[float, ...]]:
@@ -208,7 +237,7 @@ def _ways(mechanism: Mechanism, options: Options) -> list[tuple[float, ...]]:
 
 def _distances(closure: Closure, poses: Floats, others: Floats, platform: tuple[float, ...]) -> Floats:
     """How far poses are apart in what counts, (n,): lengths relative to L, rotations as the chord of their angle."""
-    position = np.linalg.norm((poses - others)[:, :3, 3], axis=1) / closure.mechanism.characteristic_length
+    position = _norms((poses - others)[:, :3, 3]) / closure.mechanism.characteristic_length
     rotation = np.linalg.norm((poses - others)[:, :3, :3], axis=(1, 2))
     return np.asarray(np.hypot(position, rotation if platform[3] != 0.0 else 0.0))
 
@@ -237,4 +266,9 @@ def pose_errors(poses: Floats, targets: Floats) -> tuple[Floats, Floats]:
     """Distances [length] and angles [rad] between poses, (n,) each."""
     turned = poses[:, :3, :3] @ np.swapaxes(targets[:, :3, :3], 1, 2)
     chord = np.linalg.norm(turned - np.eye(3), axis=(1, 2)) / np.sqrt(8.0)  # sine of half the angle
-    return np.linalg.norm((poses - targets)[:, :3, 3], axis=1), 2.0 * np.arcsin(np.minimum(chord, 1.0))
+    return _norms((poses - targets)[:, :3, 3]), 2.0 * np.arcsin(np.minimum(chord, 1.0))
+
+
+def _norms(vectors: Floats) -> Floats:
+    """Lengths of vectors (n, 3), (n,); however long they are, no square of them is too large to be represented."""
+    return np.asarray(np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2]))

@@ -121,7 +121,8 @@ def _settle(closure: Closure, begin: Floats, poses: Floats, centres: Floats, cha
         open_rows = np.flatnonzero(_off(closing) > TOLERANCES.position)
         if not len(open_rows):
             break
-        elsewhere = begin[open_rows] + rng.uniform(-np.pi, np.pi, begin.shape[1]) * closure.turning
+        turns = np.where(closure.idle, 0.0, rng.uniform(-np.pi, np.pi, begin.shape[1]) * closure.turning)
+        elsewhere = begin[open_rows] + turns
         set_actuators(closure.mechanism, elsewhere, actuators_of(closure.mechanism, begin[open_rows]))
         tried = close(
             closure, elsewhere, poses[open_rows], locked=locked, platform=platform, centres=centres[open_rows]

@@ -58,6 +58,31 @@ class UnsupportedMechanism(PfabrikError, ValueError):
         super().__init__(f"'{mechanism}' cannot be solved: " + "; ".join(self.reasons))
 
 
+class NoClosedForm(PfabrikError, ValueError):
+    """A valid mechanism whose topology has no closed form here; the engines may solve it all the same.
+
+    Attributes
+    ----------
+    mechanism : its name.
+    sub_chains : its sub-chains, as `decompose` prints them.
+    reason : what it lacks.
+    topologies : which topologies have a closed form.
+    """
+
+    def __init__(self, mechanism: str, sub_chains: Sequence[str], reason: str, topologies: Sequence[str]) -> None:
+        self.mechanism = mechanism
+        self.sub_chains = tuple(sub_chains)
+        self.reason = reason
+        self.topologies = tuple(topologies)
+        super().__init__(
+            f"'{mechanism}' has no closed form: found sub-chains {'; '.join(self.sub_chains)} ({reason}); "
+            f"expected only {', or only '.join(self.topologies)}"
+        )
+
+    def __reduce__(self) -> tuple[type, tuple[str, tuple[str, ...], str, tuple[str, ...]]]:
+        return type(self), (self.mechanism, self.sub_chains, self.reason, self.topologies)
+
+
 class ContinuumOfSolutions(PfabrikError, ValueError):
     """With its actuators locked the end effector still moves: there are no single solutions to list.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,9 @@ STRIDES = 8
 STARTS = 48
 """Random starts where nothing else assembles and no seed says in which mode to stay."""
 
+NEAR = 1e-2
+"""Actuators this near to the asked values need no search from elsewhere for nearer ones [L or rad]."""
+
 PROJECTIONS = 12
 """Random starts of the search for feasible values near those that no configuration has."""
 
@@ -56,7 +60,7 @@ def solve_fk(
     ----------
     actuators : actuated coordinates (..., n_a) in the order of `mechanism.actuators` [length or rad].
     seed : an answer to start from, single or one for each row. Default: home.
-    options : of these, `on_invalid`.
+    options : of these, `actuator_tolerance` and `on_invalid`.
 
     Returns
     -------
@@ -78,13 +82,13 @@ def solve_fk(
     coordinates, poses = _starts(mechanism, seed, shape, len(values))
     asked = np.clip(values[known], -HORIZON, HORIZON)
     closing = _assemble(mechanism, coordinates[known], poses[known], asked, seeded=seed is not None)
-    return _as_solution(mechanism, closing, values, known, shape)
+    return _as_solution(mechanism, closing, values, known, shape, options.actuator_tolerance)
 
 
 def answered(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:
     """Joint coordinates (n, columns) as the answer to actuated values (n, n_a): measured, not changed."""
     closing = close(closure_of(mechanism), coordinates, platform_poses(mechanism, coordinates), max_iterations=0)
-    return _as_solution(mechanism, closing, values, np.ones(len(values), bool), (len(values),))
+    return _as_solution(mechanism, closing, values, np.ones(len(values), bool), (len(values),), TOLERANCES.position)
 
 
 def as_values(mechanism: Mechanism, actuators: Any) -> tuple[Floats, tuple[int, ...]]:
@@ -203,18 +207,29 @@ def _project(
     ended = best.coordinates[rest], best.poses[rest]
     found = close(closure, *start, max_iterations=0)
     distance = np.full(len(rest), np.inf)
-    places = [ended, start, *([] if seeded else same_random_starts(closure, PROJECTIONS, len(rest)))]
-    for asked in (values, _within_sight(closure.mechanism, start[0], values)):
-        waiting = np.flatnonzero(np.isinf(distance))
-        for coordinates, poses in places if len(waiting) else []:
-            tried = _nearest_actuators(closure, coordinates[waiting], poses[waiting], asked[waiting])
-            error = _actuator_errors(closure, tried.coordinates, values[waiting])
-            distances = np.where(is_feasible(tried), np.linalg.norm(error, axis=1), np.inf)
-            better = np.flatnonzero(distances < distance[waiting])
-            distance[waiting[better]] = distances[better]
-            _take(found, waiting[better], tried, better)
+    others = () if seeded else same_random_starts(closure, PROJECTIONS, len(rest))
+    for coordinates, poses in chain([ended, start], others):
+        waiting = np.flatnonzero(distance > NEAR)
+        if len(waiting):
+            tried = _nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting])
+            _take_nearer(closure, found, distance, waiting, tried, values)
+    waiting = np.flatnonzero(np.isinf(distance))
+    if len(waiting):
+        asked = _within_sight(closure, start[0][waiting], values[waiting])
+        tried = _nearest_actuators(closure, start[0][waiting], start[1][waiting], asked)
+        _take_nearer(closure, found, distance, waiting, tried, values)
     feasible = np.flatnonzero(is_feasible(found))
     _take(best, rest[feasible], found, feasible)
+
+
+def _take_nearer(
+    closure: Closure, found: Closing, distance: Floats, rows: NDArray[np.intp], tried: Closing, values: Floats
+) -> None:
+    """Take over the rows that are feasible with actuators nearer to the values, and how near they are."""
+    errors = np.linalg.norm(_actuator_errors(closure, tried.coordinates, values[rows]), axis=1)
+    better = np.flatnonzero(is_feasible(tried) & (errors < distance[rows]))
+    distance[rows[better]] = errors[better]
+    _take(found, rows[better], tried, better)
 
 
 def _nearest_actuators(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
@@ -226,10 +241,10 @@ def _nearest_actuators(closure: Closure, coordinates: Floats, poses: Floats, val
     return nearest(closure, anchors, poses, weights=weights, anchors=anchors)
 
 
-def _within_sight(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Floats:
+def _within_sight(closure: Closure, coordinates: Floats, values: Floats) -> Floats:
     """Values no further than a few sizes of the machine, or radians, from where they are."""
-    far = SIGHT / closure_of(mechanism).scale[closure_of(mechanism).actuated]
-    present = actuators_of(mechanism, coordinates)
+    far = SIGHT / closure.scale[closure.actuated]
+    present = actuators_of(closure.mechanism, coordinates)
     return np.asarray(np.clip(values, present - far, present + far))
 
 
@@ -240,7 +255,12 @@ def _actuator_errors(closure: Closure, coordinates: Floats, values: Floats) -> F
 
 
 def _as_solution(
-    mechanism: Mechanism, closing: Closing, values: Floats, known: NDArray[np.bool_], shape: tuple[int, ...]
+    mechanism: Mechanism,
+    closing: Closing,
+    values: Floats,
+    known: NDArray[np.bool_],
+    shape: tuple[int, ...],
+    tolerance: float,
 ) -> Solution:
     """Wrap what was found for the values that are known; the other rows are INVALID, and NaN."""
     flat = flat_of(mechanism)
@@ -250,7 +270,7 @@ def _as_solution(
         array[:] = np.nan
     rows.status[:], rows.counters[:] = P.INVALID, 0
     own = P.Rows._make(array[known] for array in rows)
-    _fill(mechanism, closing, values[known], own)
+    _fill(mechanism, closing, values[known], tolerance, own)
     if flat is not None:
         positions_of(mechanism, flat, closing.coordinates, own)
     for array, part in zip((*rows, coordinates), (*own, closing.coordinates), strict=True):
@@ -258,7 +278,7 @@ def _as_solution(
     return Solution(mechanism, rows, shape, lambda: coordinates)
 
 
-def _fill(mechanism: Mechanism, closing: Closing, values: Floats, rows: P.Rows) -> None:
+def _fill(mechanism: Mechanism, closing: Closing, values: Floats, tolerance: float, rows: P.Rows) -> None:
     """Write answers with what was measured of them."""
     rows.counters[:, 0] = closing.iterations
     rows.poses[:] = closing.poses
@@ -270,5 +290,8 @@ def _fill(mechanism: Mechanism, closing: Closing, values: Floats, rows: P.Rows) 
     rows.measures[:, 3] = np.maximum(closing.excess, 0.0)
     error = _actuator_errors(closure_of(mechanism), closing.coordinates, values)
     rows.measures[:, 4] = np.abs(error).max(axis=1, initial=0.0)
-    asked = rows.measures[:, 4] <= TOLERANCES.position
-    rows.status[:] = np.where(is_feasible(closing), np.where(asked, P.REACHED, P.PROJECTED), P.FAILED)
+    asked = rows.measures[:, 4] <= tolerance
+    closed = closing.gap <= TOLERANCES.position
+    rows.status[:] = np.where(closed & asked, P.EXCEEDED, P.FAILED)
+    rows.status[is_feasible(closing)] = P.PROJECTED
+    rows.status[is_feasible(closing) & asked] = P.REACHED

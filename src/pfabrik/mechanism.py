@@ -135,7 +135,8 @@ class Mechanism:
             return
         left = end_effector_freedom(self, frozenset(self.actuators))
         if left > 0:
-            message = f"'{self.name}': {len(self.actuators)} actuators leave the end effector {left} freedoms at home"
+            freedoms = "1 freedom" if left == 1 else f"{left} freedoms"
+            message = f"'{self.name}': {len(self.actuators)} actuators leave the end effector {freedoms} at home"
             warnings.warn(message, MobilityWarning, stacklevel=4)
 
     def __hash__(self) -> int:
@@ -181,11 +182,13 @@ class Mechanism:
     def characteristic_length(self) -> float:
         """Radius of the smallest sphere around the home joint centres [length].
 
-        Where all centres coincide (a spherical wrist), the reference point is included. Where that coincides too, the
-        description contains no length, nothing scales with it, and 1 stands for "the unit".
+        Where all centres coincide (a spherical wrist), the reference point is included. Where that coincides too (a
+        gantry of slides), the longest stroke stands for it. Without one the description contains no length, nothing
+        scales with it, and 1 stands for "the unit".
         """
         centres = [joint.at for joint in self.joints if joint.at is not None]
-        return enclosing_radius(centres) or enclosing_radius([*centres, self.reference_point]) or 1.0
+        size = enclosing_radius(centres) or enclosing_radius([*centres, self.reference_point])
+        return size or max(map(_stroke, self.joints), default=0.0) or 1.0
 
     @cached_property
     def _by_name(self) -> dict[str, Joint]:
@@ -267,6 +270,14 @@ def _limited(joint: Joint, limit: Limit) -> Joint:
     if isinstance(limit, Cone):
         return dataclasses.replace(joint, cone=limit)
     return dataclasses.replace(joint, range=limit)
+
+
+def _stroke(joint: Joint) -> float:
+    """Length of a prismatic joint's range; 0 where it has none."""
+    if joint.type != "prismatic" or joint.range is None:
+        return 0.0
+    low, high = cast(Range, joint.range)
+    return high - low if math.isfinite(high - low) else 0.0
 
 
 def _centre_of(joints: Any, name: str) -> Vector | None:

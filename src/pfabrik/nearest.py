@@ -33,6 +33,7 @@ def nearest(
     targets: Floats | None = None,
     weights: Floats | None = None,
     anchors: Floats | None = None,
+    gently: bool = False,
 ) -> Closing:
     """Feasible configurations nearest to wishes for the platform or for coordinates: a local search.
 
@@ -42,6 +43,7 @@ def nearest(
     platform : what counts of the platform's distance from `targets`: six weights relative to each other; LOCKED keeps
         a part where it starts.
     weights, anchors : what counts of the coordinates' distances from anchors, (columns,), (n, columns).
+    gently : open the loops less on the way, so that the search stays in its working mode, and may end less near.
 
     Returns
     -------
@@ -49,7 +51,7 @@ def nearest(
     """
     wished, own = np.array(platform, dtype=float), np.zeros(len(closure.scale)) if weights is None else weights
     held = wished == LOCKED
-    for weight in WISHES:
+    for weight in WISHES[1:] if gently else WISHES:
         found = close(
             closure,
             coordinates,

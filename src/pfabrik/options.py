@@ -19,7 +19,7 @@ _CHOICES: dict[str, tuple[object, ...]] = {
 
 @dataclass(frozen=True)
 class Options:
-    """How `solve_ik` and `track` work.
+    """How `solve_ik` and `track` work, and `solve_fk`, for which only the last two count.
 
     Attributes
     ----------
@@ -36,6 +36,8 @@ class Options:
     projection : how the projected pose is chosen; "centroid" is the paper's.
     exact : closed forms and exact steps where they apply; False for the paper's passes alone, which end within
         `tolerance` and then only close the loops.
+    actuator_tolerance : how close actuated coordinates must come to the asked values to be REACHED [L or rad]. Readings
+        of more encoders than the mechanism has freedoms never agree better than they are exact.
     on_invalid : what a row of a batch that is no pose does: "raise", or "mark" the row INVALID.
     """
 
@@ -47,6 +49,7 @@ class Options:
     hold: Literal["orientation", "position"] | None = "orientation"
     projection: Literal["centroid"] = "centroid"
     exact: bool = True
+    actuator_tolerance: float = TOLERANCES.position
     on_invalid: Literal["raise", "mark"] = "raise"
 
     def __post_init__(self) -> None:
@@ -55,7 +58,7 @@ class Options:
                 raise InvalidArgument(f"options.{name}", repr(getattr(self, name)), f"one of {choices}")
         if not isinstance(self.exact, bool):
             raise InvalidArgument("options.exact", repr(self.exact), "True or False")
-        for name in ("tolerance", "rotation_tolerance"):
+        for name in ("tolerance", "rotation_tolerance", "actuator_tolerance"):
             value = getattr(self, name)
             optional = name == "tolerance" and value is None
             if not optional and not (_is_a(Real, value) and 0.0 < value < float("inf")):

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
+from itertools import chain
+from operator import xor
 
 from .errors import UnsupportedMechanism
 from .mechanism import Joint, Mechanism
@@ -33,10 +36,11 @@ def end_body(mechanism: Mechanism) -> str:
 
 
 def independent_paths(mechanism: Mechanism) -> tuple[Path, ...]:
-    """Paths from the base to the end effector that pass no body twice: enough that all others follow, shortest first.
+    """Paths from the base to the end effector: enough that every loop of the graph lies between two of them.
 
-    Paths count as sums of joints modulo two: those of all paths are spanned by as many as there are loops between
-    base and end effector, and one.
+    First those that pass no body twice, shortest first; then, for loops that none of them passes (a gripper's),
+    detours around these. Paths count as sums of joints modulo two: those of all are spanned by as many as there are
+    loops, and one.
 
     Raises
     ------
@@ -46,14 +50,43 @@ def independent_paths(mechanism: Mechanism) -> tuple[Path, ...]:
     number = {joint.name: 1 << place for place, joint in enumerate(mechanism.joints)}
     chosen: list[Path] = []
     basis: list[int] = []
-    for path in _paths(mechanism, end_body(mechanism)):
-        rest = _reduce(sum(number[passage.joint.name] for passage in path), basis)
+    direct = _paths(mechanism, end_body(mechanism))
+    for path in chain(direct, (_detour(mechanism, joint, chosen[0]) for joint in mechanism.joints)):
+        rest = _reduce(reduce(xor, (number[passage.joint.name] for passage in path), 0), basis)
         if rest:
             basis.append(rest)
             chosen.append(path)
         if len(chosen) == most:
             break
     return tuple(chosen)
+
+
+def _detour(mechanism: Mechanism, joint: Joint, path: Path) -> Path:
+    """A path that goes around a loop first: out to a joint, over it, and back from its other side."""
+    out, back = (_way(mechanism, body, path) for body in joint.connects)
+    walk: list[Passage] = []
+    for passage in (*out, Passage(joint, True), *_reversed(back), *path):
+        if walk and walk[-1] == Passage(passage.joint, not passage.forward):
+            walk.pop()  # there and back again
+        else:
+            walk.append(passage)
+    return tuple(walk)
+
+
+def _way(mechanism: Mechanism, body: str, path: Path) -> Path:
+    """A way from the base to a body, along a path as far as that leads."""
+    passed = [mechanism.base, *(passage.joint.connects[1 if passage.forward else 0] for passage in path)]
+    ways = {each: path[:place] for place, each in enumerate(passed)}
+    while body not in ways:
+        for joint in mechanism.joints:
+            for forward, (here, there) in ((True, joint.connects), (False, joint.connects[::-1])):
+                if here in ways and there not in ways:
+                    ways[there] = (*ways[here], Passage(joint, forward))
+    return ways[body]
+
+
+def _reversed(path: Path) -> Path:
+    return tuple(Passage(passage.joint, not passage.forward) for passage in reversed(path))
 
 
 def _reduce(path: int, basis: list[int]) -> int:

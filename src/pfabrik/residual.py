@@ -25,8 +25,12 @@ def closure_residual(mechanism: Mechanism, solution: Solution) -> Any:
     ------
     InvalidArgument : an answer of another mechanism.
     """
-    if not isinstance(solution, Solution) or solution.mechanism != mechanism:
-        raise InvalidArgument("solution", type(solution).__name__, f"an answer of '{mechanism.name}'")
+    if not isinstance(solution, Solution):
+        raise InvalidArgument("solution", type(solution).__name__, "a Solution")
+    if solution.mechanism != mechanism and solution.mechanism.without_limits() != mechanism.without_limits():
+        raise InvalidArgument(
+            "solution", f"an answer of another '{solution.mechanism.name}'", f"one of '{mechanism.name}'"
+        )
     length, rows, q = mechanism.characteristic_length, solution._rows, solution._coordinates
     known = np.isfinite(q).all(axis=1)
     found = np.full(len(q), np.nan)

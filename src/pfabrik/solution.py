@@ -23,10 +23,18 @@ Floats = NDArray[np.float64]
 
 
 class Status(IntEnum):
-    """What became of a target; the worst of a batch is the largest."""
+    """What became of a target; the worst of a batch is the largest.
+
+    REACHED : what was asked for, closed and within every limit.
+    PROJECTED : closed and within every limit, near what was asked for.
+    EXCEEDED : what was asked for, closed, but beyond a limit; only `assembly_modes` looks for such.
+    FAILED : no feasible configuration was found.
+    INVALID : what was asked for is no pose, or not finite; only where such rows are to be marked.
+    """
 
     REACHED = P.REACHED
     PROJECTED = P.PROJECTED
+    EXCEEDED = P.EXCEEDED
     FAILED = P.FAILED
     INVALID = P.INVALID
 
@@ -55,7 +63,7 @@ class Solution:
     residual : largest gap of any loop: open ends, stretched rigid links, links out of their plane, (...,) [length].
     limit_excess : largest excess over any limit, (...,); lengths relative to L, angles in rad; 0 if all are kept.
     iterations, rounds : passes over the chains, and revisions of the target, (...,).
-    active_limits : limits that a projected answer lies on, or a failed one exceeds; for a batch, one tuple a row, in
+    active_limits : limits that a projected answer lies on, or another one exceeds; for a batch, one tuple a row, in
         row order.
     """
 
@@ -151,7 +159,7 @@ class Solution:
     def active_limits(self) -> Any:
         rows = self._rows
         held: list[tuple[ActiveLimit, ...]] = [()] * len(rows.status)
-        projected = np.flatnonzero((rows.status == Status.PROJECTED) | (rows.status == Status.FAILED))
+        projected = np.flatnonzero((rows.status != Status.REACHED) & (rows.status != Status.INVALID))
         for row, found in zip(projected, active_limits(self.mechanism, self._coordinates[projected]), strict=True):
             held[row] = found
         return held[0] if self.shape == () else held

@@ -31,11 +31,12 @@ def same_random_starts(closure: Closure, starts: int, n: int) -> Iterator[tuple[
 
 
 def random_coordinates(closure: Closure, n: int, rng: np.random.Generator) -> Floats:
-    """Coordinates (n, columns) with any angles; lengths at home, from where they follow the platform."""
+    """Coordinates (n, columns) with any angles; idle ones at home, and lengths, from where they follow the platform."""
     coordinates = rng.uniform(-np.pi, np.pi, (n, len(closure.scale))) * closure.turning
     for name, span in columns(closure.mechanism).items():
         if closure.mechanism.joint(name).type == "spherical":
             coordinates[:, span] = _rotation_vectors(n, rng)
+    coordinates[:, closure.idle] = 0.0
     return np.asarray(coordinates)
 
 

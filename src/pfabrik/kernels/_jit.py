@@ -7,6 +7,7 @@ import hashlib
 import sys
 import threading
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, TypeVar
@@ -25,25 +26,33 @@ _Compiler: Any = getattr(compiler, "Compiler", object)
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _sources_digest() -> str:
-    """Hash of all kernel sources: Numba itself does not see an edit in another file's function."""
+@lru_cache
+def _sources_digest(folder: Path) -> str:
+    """Hash of all sources in a folder: Numba itself does not see an edit in another file's function."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(folder.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-_DIGEST = _sources_digest()
+_FOLDER = Path(__file__).parent
+_DIGEST = _sources_digest(_FOLDER)
+
+
+def _digest_for(function: Callable[..., Any]) -> tuple[str, ...]:
+    """What a compiled function depends on: the kernels and, elsewhere in the package, the folder it is written in."""
+    folder = Path(function.__code__.co_filename).parent
+    return (_DIGEST, _sources_digest(folder)) if _FOLDER.parent in folder.parents else (_DIGEST,)
 
 
 class _KernelCache(_Cache):  # type: ignore[misc]  # a class only at run time
-    """Numba's file cache, made stale by an edit to any kernel file; says so when it has to compile."""
+    """Numba's file cache, made stale by an edit to any file beside the kernel; says so when it has to compile."""
 
     _announced = threading.Event()
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self._cache_file._source_stamp = (self._cache_file._source_stamp, _DIGEST)
+        self._cache_file._source_stamp = (self._cache_file._source_stamp, *_digest_for(function))
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         overload = super().load_overload(signature, target_context)

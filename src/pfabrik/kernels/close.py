@@ -241,7 +241,8 @@ def add_path(loops: Loops, slots: Ints, group: int, path: int, eq: Equations) ->
                 product = 0.0
                 for i in range(6):
                     product += rows[r, i] * rows[r2, i]
-                A[max(s, s2), min(s, s2)] += product
+                twice = s == s2 and r != r2  # a joint that the path passes on its way out and back
+                A[max(s, s2), min(s, s2)] += 2.0 * product if twice else product
     return square
 
 
@@ -375,7 +376,7 @@ def add_ranges(loops: Loops, slots: Ints, state: State, margin: float, eq: Equat
         low, high = loops.lo[j] + margin, loops.hi[j] - margin
         over = state.q[j] - high if state.q[j] > high else min(state.q[j] - low, 0.0)
         s, group = slots[j], loops.group_of[j]
-        if over != 0.0 and group >= 0:
+        if over != 0.0:
             square += over * over
             eq.excesses[group] = max(eq.excesses[group], abs(over) - margin)
             if s >= 0:
@@ -392,8 +393,6 @@ def add_cones(loops: Loops, slots: Ints, state: State, margin: float, eq: Equati
     for cone in range(len(loops.cone_angles)):
         first, last = loops.cone_units[cone, 0], loops.cone_units[cone, 1]
         group = loops.group_of[loops.columns[first]]
-        if group < 0:
-            continue
         for i in range(3):
             for j in range(3):
                 T[i, j] = 1.0 if i == j else 0.0
@@ -608,10 +607,7 @@ def move(loops: Loops, layout: Layout, eq: Equations, state: State) -> float:
     scale = min(1.0, LONGEST_STEP / longest) if longest > 0.0 else 1.0
     for k in range(len(loops.kinds)):
         j = loops.columns[k]
-        group = loops.group_of[j]
-        if group < 0:
-            continue
-        Y = eq.Y[group]
+        Y = eq.Y[loops.group_of[j]]
         if loops.kinds[k] != BALL:
             if layout.slots[j] >= 0:
                 state.q[j] += scale * Y[layout.slots[j], 6]

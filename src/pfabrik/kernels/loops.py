@@ -30,7 +30,7 @@ class Loops(NamedTuple):
     row_columns: Ints  # (rows,): the coordinate of each of them
     paths: Ints  # (paths + 1,): first visit of each path
     groups: Ints  # (groups + 1,): first path of each group
-    group_of: Ints  # (columns,): group of each coordinate, or -1 where it is on no path
+    group_of: Ints  # (columns,): group of each coordinate; the first for one on no path
     last_balls: Ints  # (paths,): 1 where a path that shares no joint ends with a ball joint
     end: Floats  # (3,): the reference point
     lo: Floats  # (columns,): ranges

@@ -24,7 +24,7 @@ STROKE, RAIL, HINGE, END_HINGE, TRUNK = 0, 1, 2, 3, 4
 # Trunk joints.
 TURN, SLIDE = 0, 1
 # Status of a row; the same numbers as the public Status.
-REACHED, PROJECTED, FAILED, INVALID, PENDING = 0, 1, 2, 3, 9
+REACHED, PROJECTED, EXCEEDED, FAILED, INVALID, PENDING = 0, 1, 2, 3, 4, 9
 
 _vector = ("f8", (3,))
 

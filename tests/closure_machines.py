@@ -1,0 +1,460 @@
+"""Machines with chains that positions cannot express, and some that they can; dimensions are arbitrary."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from machines import ring
+from pfabrik import Cone, Joint, Mechanism
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+TURNS = (0.0, 120.0, 240.0)
+_TYPES = {
+    "R": "revolute",
+    "P": "prismatic",
+    "U": "universal",
+    "S": "spherical",
+    "C": "cylindrical",
+    "F": "fixed",
+}
+Step = tuple[Any, ...]
+
+
+def joint(kind: str, name: str, bodies: tuple[str, str], at: Any, direction: Any = None, **more: Any) -> Joint:
+    """A joint by the letter of its type, `*` if it is actuated; `direction` is its axis, its two axes, or None."""
+    field = {"U": "axes", "R": "axis", "P": "axis", "C": "axis"}.get(kind[0])
+    if field and direction is not None:
+        more[field] = direction
+    return Joint(name, _TYPES[kind[0]], bodies, at=at, actuated=kind.endswith("*"), **more)  # type: ignore[arg-type]
+
+
+def chain(leg: object, *steps: Step, start: str = "base", end: str = "platform") -> list[Joint]:
+    """A serial leg: joints (kind, at, direction, {more}) one after the other."""
+    bodies = [start, *(f"{leg}.{k}" for k in range(1, len(steps))), end]
+    joints = []
+    for k, (kind, at, *rest) in enumerate(steps):
+        direction, more = (*rest, None, {})[:2] if len(rest) < 2 else rest
+        joints.append(joint(kind, f"{kind[0]}{leg}.{k + 1}", (bodies[k], bodies[k + 1]), at, direction, **(more or {})))
+    return joints
+
+
+def _out(angle: float) -> np.ndarray:
+    return np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+
+
+def _tangent(angle: float) -> np.ndarray:
+    return np.cross(Z, _out(angle))
+
+
+def upu(radial: bool = False, stroke: Any = (120, 260)) -> Mechanism:
+    """3-UPU: a translating platform with tangential outer axes; with radial ones it wanders at home."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        a, c = 100 * _out(angle), (100 if radial else 60) * _out(angle) + [0, 0, 180]
+        outer = _out(angle) if radial else _tangent(angle)
+        inner = np.cross(c - a, outer)
+        joints += chain(
+            leg,
+            ("U", a, (outer, inner)),
+            ("P*", None, c - a, {"home": 190.0, "range": stroke}),
+            ("U", c, (inner, outer)),
+        )
+    return Mechanism("wandering 3-UPU" if radial else "3-UPU", joints, "platform", (0, 0, 180))
+
+
+def tricept() -> Mechanism:
+    """3-UPS/UP: a passive centre leg carries the platform."""
+    joints = chain(0, ("U", (0, 0, 0), (X, Y)), ("P", None, Z, {"range": (-70, 80)}))
+    for leg, angle in enumerate(TURNS, 1):
+        a, c = 120 * _out(angle + 10), 40 * _out(angle) + [0, 0, 200]
+        joints += chain(
+            leg,
+            ("U", a, (_tangent(angle), _out(angle)), {"cone": Cone(c - a, 0.8, "base")}),
+            ("P*", None, c - a, {"home": float(np.linalg.norm(c - a)), "range": (150, 290)}),
+            ("S", c),
+        )
+    return Mechanism("3-UPS/UP", joints, "platform", (0, 0, 230))
+
+
+def delta(rods: str = "SS", linear: bool = False, cone: float | None = 0.9) -> Mechanism:
+    """A delta with two rods to an arm, ball or universal joints at their ends; arms that turn, or carriages."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        out, side = _out(angle), _tangent(angle)
+        hip, elbow, wrist = 100 * out, 160 * out - [0, 0, 60], 40 * out - [0, 0, 240]
+        drive = ("P*", None, Z, {"range": (-90, 90)}) if linear else ("R*", hip, side, {"range": (-1.0, 1.2)})
+        joints.append(joint(drive[0], f"A{leg}", ("base", f"arm{leg}"), *drive[1:3], **drive[3]))
+        for end, offset in (("l", -20 * side), ("r", 20 * side)):
+            b, c = elbow + offset, wrist + offset
+            axes = (side, np.cross(c - b, side))
+            for place, at, bodies in (
+                ("B", b, (f"arm{leg}", f"rod{leg}{end}")),
+                ("C", c, (f"rod{leg}{end}", "platform")),
+            ):
+                kind = rods["BC".index(place)]
+                own = None if kind == "S" else axes if place == "B" else axes[::-1]
+                more = {} if cone is None else {"cone": Cone(c - b, cone, bodies[0])} if place == "B" else {}
+                joints.append(joint(kind, f"{place}{leg}{end}", bodies, at, own, **more))
+    return Mechanism(f"{'linear' if linear else 'rotary'} delta, {rods} rods", joints, "platform", (0, 0, -240))
+
+
+def _pin_parallelogram(leg: int, arm: str, b: np.ndarray, c: np.ndarray, side: np.ndarray, end: str) -> list[Joint]:
+    """Two rods between two bars, pinned: the bars hinged about `side` to the arm and to the platform."""
+    normal = np.cross(c - b, side)
+    joints = [joint("R", f"B{leg}", (arm, f"top{leg}"), b, side), joint("R", f"C{leg}", (f"low{leg}", end), c, side)]
+    for mark, offset in (("l", -20 * side), ("r", 20 * side)):
+        limit = {"range": (-1.2, 1.2)} if mark == "l" else {}
+        joints += [
+            joint("R", f"D{leg}{mark}", (f"top{leg}", f"rod{leg}{mark}"), b + offset, normal, **limit),
+            joint("R", f"E{leg}{mark}", (f"rod{leg}{mark}", f"low{leg}"), c + offset, normal),
+        ]
+    return joints
+
+
+def pinned_delta() -> Mechanism:
+    """A rotary delta whose forearms are parallelograms of pins."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        out, side = _out(angle), _tangent(angle)
+        hip, elbow, wrist = 100 * out, 160 * out - [0, 0, 60], 40 * out - [0, 0, 240]
+        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), hip, side, range=(-1.0, 1.2)))
+        joints += _pin_parallelogram(leg, f"arm{leg}", elbow, wrist, side, "platform")
+    return Mechanism("delta with pins", joints, "platform", (0, 0, -240))
+
+
+def orthoglide() -> Mechanism:
+    """3-PRPaR: three carriages along x, y and z."""
+    joints = []
+    for leg, (rail, side) in enumerate(((X, Y), (Y, Z), (Z, X)), 1):
+        rail, side = np.array(rail), np.array(side)
+        b, c = -250 * rail, -40 * rail
+        joints.append(joint("P*", f"A{leg}", ("base", f"carriage{leg}"), None, rail, range=(-90, 90)))
+        joints += _pin_parallelogram(leg, f"carriage{leg}", b, c, side, "platform")
+    return Mechanism("orthoglide", joints, "platform", (0, 0, 0))
+
+
+def puu() -> Mechanism:
+    """3-PUU: a translating platform on three vertical rails."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        side, b, c = _tangent(angle), 150 * _out(angle), 50 * _out(angle) + [0, 0, -160]
+        inner = np.cross(c - b, side)
+        joints += chain(leg, ("P*", None, Z, {"range": (-80, 100)}), ("U", b, (side, inner)), ("U", c, (inner, side)))
+    return Mechanism("3-PUU", joints, "platform", (0, 0, -160))
+
+
+def exechon() -> Mechanism:
+    """2-UPR/SPR."""
+    joints = []
+    for leg, y in ((1, -80.0), (2, 80.0)):
+        a, c = np.array([0.0, y, 0.0]), np.array([0.0, 0.4 * y, 180.0])
+        joints += chain(
+            leg,
+            ("U", a, (Y, X)),
+            ("P*", None, c - a, {"home": 200.0, "range": (130, 280)}),
+            ("R", c, X, {"range": (-1.2, 1.2)}),
+        )
+    a, c = np.array([110.0, 0, 0]), np.array([40.0, 0, 180.0])
+    joints += chain(3, ("S", a, None, {"cone": Cone(c - a, 0.7, "base")}), ("P*", None, c - a), ("R", c, Y))
+    return Mechanism("2-UPR/SPR", joints, "platform", (0, 0, 180))
+
+
+def cru() -> Mechanism:
+    """3-CRU: guides with cylindrical joints, limited in slide and turn, elbows driven."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        side, out = _tangent(angle), _out(angle)
+        a, b, c = 120 * out, 170 * out + [0, 0, 90], 50 * out + [0, 0, 170]
+        joints += chain(
+            leg,
+            ("C", a, side, {"home": (0.2, 5.0), "range": ((-0.8, 1.1), (-60, 70))}),
+            ("R*", b, side, {"home": 0.5, "range": (-0.8, 1.8)}),
+            ("U", c, (side, np.cross(c - b, side))),
+        )
+    return Mechanism("3-CRU", joints, "platform", (0, 0, 170))
+
+
+def planar_4rpr() -> Mechanism:
+    """A planar platform on four driven struts: one more than it has freedoms."""
+    joints = []
+    corners = [(-30, -20, 0), (30, -20, 0), (30, 20, 0), (-30, 20, 0)]
+    feet = [(-150, -130, 0), (160, -120, 0), (150, 140, 0), (-140, 120, 0)]
+    for leg, (a, c) in enumerate(zip(np.array(feet, float), np.array(corners, float), strict=True), 1):
+        home = float(np.linalg.norm(c - a))
+        joints += chain(
+            leg, ("R", a, Z), ("P*", None, c - a, {"home": home, "range": (home - 60, home + 60)}), ("R", c, Z)
+        )
+    return Mechanism("4-RPR", joints, "platform", (0, 0, 0))
+
+
+def canfield() -> Mechanism:
+    """3-RSR: a pointing joint, its two halves mirror images."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        side, out = _tangent(angle), _out(angle)
+        joints += chain(
+            leg,
+            ("R*", 50 * out, side, {"range": (-1.2, 1.2)}),
+            ("S", 80 * out + [0, 0, 60], None, {"cone": Cone((0, 0, 1), 1.2, f"{leg}.1")}),
+            ("R", 50 * out + [0, 0, 120], side),
+        )
+    return Mechanism("Canfield joint", joints, "platform", (0, 0, 120))
+
+
+def agile_eye(reference: Sequence[float] = (0, 0, 0)) -> Mechanism:
+    """A spherical 3-RRR: every axis passes through one point, neighbours at right angles."""
+    axes = (((1, 0, 0), (0, 0, -1), (0, 1, 0)), ((0, 1, 0), (-1, 0, 0), (0, 0, 1)), ((0, 0, 1), (0, -1, 0), (1, 0, 0)))
+    joints = []
+    for leg, (base, elbow, top) in enumerate(axes, 1):
+        joints += chain(
+            leg,
+            ("R*", (0, 0, 0), base, {"range": (-1.5, 1.5)}),
+            ("R", (0, 0, 0), elbow),
+            ("R", (0, 0, 0), top),
+        )
+    return Mechanism("agile eye", joints, "platform", tuple(reference))
+
+
+def ankle() -> Mechanism:
+    """2-UPS/U: a universal joint straight between base and platform."""
+    joints = [joint("U", "ankle", ("base", "platform"), (0, 0, 100), (X, Y), range=((-0.6, 0.7), (-0.5, 0.5)))]
+    for leg, (a, c) in enumerate((((-60, 40, 0), (-50, 35, 110)), ((-60, -40, 0), (-50, -35, 110))), 1):
+        joints += chain(
+            leg,
+            ("U", a, (X, Y)),
+            ("P*", None, np.subtract(c, a), {"home": 110.0, "range": (80, 150)}),
+            ("S", c, None, {"cone": Cone((0, 0, -1), 0.7, "platform")}),
+        )
+    return Mechanism("2-UPS/U", joints, "platform", (10, 0, 110))
+
+
+def four_bar_driven() -> Mechanism:
+    """A two-link arm whose first link is the rocker of a four-bar, its second driven by itself."""
+    joints = [
+        joint("R*", "crank", ("base", "wheel"), (0, 0, 0), Z),
+        joint("R", "pin", ("wheel", "coupler"), (0, 30, 0), Z),
+        joint("R", "pin2", ("coupler", "rocker"), (100, 70, 0), Z),
+        joint("R", "pivot", ("base", "rocker"), (110, 0, 0), Z, range=(-0.9, 0.9)),
+        joint("R*", "elbow", ("rocker", "arm"), (100, 180, 0), Z, home=0.4, range=(-1.5, 2.0)),
+        joint("R", "tip", ("arm", "tool"), (190, 210, 0), Z),
+    ]
+    return Mechanism("arm on a four-bar", joints, "tip")
+
+
+def ranged_stewart() -> Mechanism:
+    """A 6-UPS whose universal joints have ranges."""
+    joints = []
+    bases = ring(100, 0, [a + s for a in TURNS for s in (-14, 14)])
+    tops = ring(62, 180, [a + s for a in TURNS for s in (-46, 46)])
+    for leg, (a, c) in enumerate(zip(np.array(bases), np.array(tops), strict=True), 1):
+        joints += chain(
+            leg,
+            ("U", a, (X, Y), {"range": ((-0.35, 0.35), (-0.3, 0.4))}),
+            ("P*", None, c - a, {"home": 200.0, "range": (150, 260)}),
+            ("S", c, None, {"cone": Cone(a - c, 0.3, "platform")}),
+        )
+    return Mechanism("ranged 6-UPS", joints, "platform", (0, 0, 180))
+
+
+def five_bar_with_limited_tip() -> Mechanism:
+    joints = [
+        joint("R*", "A1", ("base", "a1"), (-50, 0, 0), Z),
+        joint("R", "B1", ("a1", "c1"), (-120, 60, 0), Z),
+        joint("R*", "A2", ("base", "a2"), (50, 0, 0), Z),
+        joint("R", "B2", ("a2", "c2"), (120, 60, 0), Z),
+        joint("R", "tip", ("c1", "c2"), (0, 130, 0), Z, range=(-0.5, 0.3)),
+    ]
+    return Mechanism("5-bar with a limited tip", joints, "tip")
+
+
+_ARM = (
+    ("R*", (0, 0, 100), Z, {"range": (-2.9, 2.9)}),
+    ("R*", (30, 0, 100), Y, {"range": (-1.9, 1.9), "home": 0.3}),
+    ("R*", (30, 0, 350), Y, {"range": (-2.4, 2.4)}),
+    ("R*", (200, 0, 380), X),
+    ("R*", (260, 0, 380), Y, {"range": (-2.0, 2.0)}),
+    ("R*", (300, 0, 370), Z),
+)
+
+
+def arm() -> Mechanism:
+    """A serial arm of six revolutes with a wrist that is none: no two last axes meet."""
+    return Mechanism("6R arm", chain(1, *_ARM), "platform", (300, 0, 340))
+
+
+def welded_tricept() -> Mechanism:
+    """The tricept with bodies welded together: the foot to the base, two plates to one."""
+    joints = [
+        joint("F", "foot", ("plinth", "base"), (0, 0, 0)),
+        joint("F", "flange", ("platform", "plate"), (0, 0, 210)),
+    ]
+    for each in tricept().joints:
+        bodies = tuple(
+            {"base": "plinth", "platform": "plate"}.get(body, body) if each.type != "spherical" else body
+            for body in each.connects
+        )
+        cone = each.cone and dataclasses.replace(each.cone, fixed_to={"base": "plinth"}.get(each.cone.fixed_to, "?"))
+        joints.append(dataclasses.replace(each, connects=bodies, cone=cone))
+    return Mechanism("welded 3-UPS/UP", joints, "platform", (0, 0, 230))
+
+
+def carried_tip(kind: str) -> Mechanism:
+    """The pinned delta with a tool: the joint between platform and tool is the end effector."""
+    direction = {"S": None, "U": (X, Y), "F": None, "R": Y}[kind]
+    more: dict[str, Any] = {"cone": Cone((0, 0, -1), 0.3, "platform")} if kind == "" else {}
+    joints = [*pinned_delta().joints, joint(kind, "tip", ("platform", "tool"), (5, 0, -260), direction, **more)]
+    return Mechanism(f"delta with a {_TYPES[kind]} tip", joints, "tip")
+
+
+def with_gripper() -> Mechanism:
+    """An arm whose gripper is a loop of its own, beyond the end effector, with a motor and limits."""
+    joints = [
+        *chain(1, *_ARM, end="hand"),
+        joint("R", "tip", ("hand", "palm"), (300, 0, 340), Z, range=(-0.5, 0.5)),
+        joint("R*", "g1", ("palm", "finger1"), (290, 0, 340), Y, range=(-0.4, 0.4)),
+        joint("R", "g2", ("palm", "finger2"), (310, 0, 340), Y, range=(-0.5, 0.5)),
+        joint("R", "g3", ("finger1", "tie"), (290, 0, 310), Y),
+        joint("R", "g4", ("finger2", "tie"), (310, 0, 310), Y),
+    ]
+    return Mechanism("arm with a gripper", joints, "tip")
+
+
+def gripper_on_platform() -> Mechanism:
+    """A tricept whose platform carries a driven four-bar that no path to it passes."""
+    joints = [
+        *tricept().joints,
+        joint("R*", "g1", ("platform", "finger1"), (-10, 0, 230), Y, range=(-0.4, 0.4)),
+        joint("R", "g2", ("platform", "finger2"), (10, 0, 230), Y, range=(-0.5, 0.5)),
+        joint("R", "g3", ("finger1", "tie"), (-10, 0, 260), Y),
+        joint("R", "g4", ("finger2", "tie"), (10, 0, 260), Y),
+    ]
+    return Mechanism("3-UPS/UP with a gripper", joints, "platform", (0, 0, 230))
+
+
+def hinge() -> Mechanism:
+    return Mechanism(
+        "hinge",
+        [joint("R*", "R", ("base", "platform"), (10, 0, 0), Z, home=0.3, range=(-1, 2))],
+        "platform",
+        (50, 0, 0),
+    )
+
+
+def slider() -> Mechanism:
+    return Mechanism(
+        "slider", [joint("P*", "P", ("platform", "base"), None, X, home=7, range=(-50, 90))], "platform", (50, 0, 0)
+    )
+
+
+def crooked_upr() -> Mechanism:
+    """A leg U-P-R of arbitrary axes and one R-U-P-U, between three of UPS."""
+    joints = []
+    for leg, (a, c) in enumerate(
+        (((100, 0, 0), (60, 10, 180)), ((-20, 90, 0), (-30, 50, 185)), ((-80, -60, 0), (-40, -40, 180))), 1
+    ):
+        vector = np.subtract(c, a)
+        joints += chain(leg, ("U", a, (X, Y)), ("P*", None, vector, {"range": (-60, 70)}), ("S", c))
+    joints += chain(
+        4,
+        ("R*", (30, -100, 0), (1, 0.2, 0.1), {"range": (-1, 1)}),
+        ("U", (32, -130, 40), (X, (0, 1, 0.5))),
+        ("P*", None, (0.1, 0.5, 1.0), {"range": (-60, 60)}),
+        ("U", (20, -55, 175), (Y, X)),
+    )
+    return Mechanism("crooked legs", joints, "platform", (0, 0, 180))
+
+
+MACHINES: dict[str, Callable[[], Mechanism]] = {
+    "upu": upu,
+    "wandering_upu": lambda: upu(radial=True),
+    "tricept": tricept,
+    "delta_ss": delta,
+    "delta_su": lambda: delta("SU"),
+    "delta_uu": lambda: delta("UU", cone=None),
+    "delta_small_cones": lambda: delta(cone=0.15),
+    "linear_delta": lambda: delta(linear=True),
+    "pinned_delta": pinned_delta,
+    "orthoglide": orthoglide,
+    "puu": puu,
+    "exechon": exechon,
+    "cru": cru,
+    "planar_4rpr": planar_4rpr,
+    "canfield": canfield,
+    "agile_eye": agile_eye,
+    "agile_eye_offset": lambda: agile_eye((0, 0, 50)),
+    "ankle": ankle,
+    "four_bar_driven": four_bar_driven,
+    "ranged_stewart": ranged_stewart,
+    "limited_tip": five_bar_with_limited_tip,
+    "arm": arm,
+    "welded_tricept": welded_tricept,
+    "spherical_tip": lambda: carried_tip("S"),
+    "universal_tip": lambda: carried_tip("U"),
+    "fixed_tip": lambda: carried_tip("F"),
+    "gripper": with_gripper,
+    "platform_gripper": gripper_on_platform,
+    "hinge": hinge,
+    "slider": slider,
+    "crooked": crooked_upr,
+}
+
+
+# --- the same machine, described otherwise ---------------------------------------------------------------------------
+
+
+def reversed_joints(mechanism: Mechanism) -> Mechanism:
+    """Every joint described from its other body; coordinates change sign."""
+    return _with_joints(mechanism, [_reversed(each) for each in mechanism.joints])
+
+
+def _reversed(each: Joint) -> Joint:
+    changes: dict[str, Any] = {"connects": each.connects[::-1]}
+    if each.along is None and each.type not in ("spherical", "fixed"):
+        swap = slice(None, None, -1 if each.type == "universal" else 1)
+        home = -np.ravel(each.home)[swap]
+        changes["home"] = tuple(home) if len(home) > 1 else float(home[0])
+        if each.range is not None:
+            pairs = -np.reshape(each.range, (-1, 2))[swap, ::-1]
+            changes["range"] = tuple(map(tuple, pairs)) if len(pairs) > 1 else tuple(pairs[0])
+    if each.axes is not None:
+        changes["axes"] = each.axes[::-1]
+    return dataclasses.replace(each, **changes)
+
+
+def shuffled(mechanism: Mechanism, seed: int = 0) -> Mechanism:
+    """Joints in another order, bodies with other names."""
+    rng = np.random.default_rng(seed)
+    names = {body: f"body{k}" for k, body in enumerate(rng.permutation(mechanism.bodies).tolist())}
+    joints = []
+    for each in mechanism.joints:
+        cone = each.cone and dataclasses.replace(each.cone, fixed_to=names[each.cone.fixed_to])
+        joints.append(dataclasses.replace(each, connects=tuple(names[b] for b in each.connects), cone=cone))
+    end = names.get(mechanism.end_effector, mechanism.end_effector)
+    order = [joints[k] for k in rng.permutation(len(joints))]
+    return Mechanism(mechanism.name, order, end, mechanism.reference_point, base=names[mechanism.base])
+
+
+def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
+    """All lengths in another unit."""
+    joints = [_scaled(each, factor) for each in mechanism.joints]
+    return _with_joints(mechanism, joints, tuple(factor * np.array(mechanism.reference_point)))
+
+
+def _scaled(each: Joint, factor: float) -> Joint:
+    changes: dict[str, Any] = {} if each.at is None else {"at": tuple(factor * np.array(each.at))}
+    if each.type == "prismatic":
+        changes["home"] = factor * each.home
+        changes["range"] = each.range and tuple(factor * np.array(each.range))
+    if each.type == "cylindrical":
+        changes["home"] = (each.home[0], factor * each.home[1])
+        changes["range"] = each.range and (each.range[0], tuple(factor * np.array(each.range[1])))
+    return dataclasses.replace(each, **changes)
+
+
+def _with_joints(mechanism: Mechanism, joints: list[Joint], reference: Any = None) -> Mechanism:
+    point = mechanism.reference_point if reference is None else reference
+    return Mechanism(mechanism.name, joints, mechanism.end_effector, point, base=mechanism.base)
