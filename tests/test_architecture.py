@@ -7,6 +7,7 @@ import importlib
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,7 +18,8 @@ import pfabrik as pf
 PACKAGE = Path(pf.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 KERNELS = sorted((PACKAGE / "kernels").glob("*.py"))
-COMMANDS = ("catalog", "info", "check", "ik", "track", "demo")
+COMMANDS = ("catalog", "info", "check", "ik", "fk", "track", "demo", "reproduce")
+LEAVES = ("cli", "view", "reproduce")
 HEAVY = ("numba", "pydantic", "matplotlib", "scipy")
 QUICK = 0.5  # seconds to start Python, import and answer
 # Runs a command line in this process, then reports what it loaded; the exit code is the command's.
@@ -71,9 +73,19 @@ def test_kernels_import_only_numpy_numba_and_each_other(source: Path) -> None:
     assert foreign == []
 
 
-def test_closed_forms_never_import_the_kernels() -> None:
-    sources = [source for source in SOURCES if "geometric" in source.relative_to(PACKAGE).parts]
-    assert not [name for source in sources for name in imports(source) if "kernels" in name or "numba" in name]
+def test_closed_forms_share_only_the_decorator_with_the_kernels() -> None:
+    names = {name for source in (PACKAGE / "geometric").glob("*.py") for name in imports(source)}
+    shared = {name for name in names if "numba" in name or name.startswith("pfabrik.kernels")}
+    assert shared == {f"pfabrik.kernels._jit.{decorator}" for decorator in ("kernel", "routine", "inlined")}
+    assert not {name for name in names if name.startswith(("pfabrik.flatten", "pfabrik.positions", "pfabrik.ik"))}
+
+
+def test_the_contract_of_closed_forms_names_every_kernel() -> None:
+    settings = tomllib.loads((PACKAGE.parents[1] / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = {each["name"]: each for each in settings["tool"]["importlinter"]["contracts"]}
+    forbidden = contracts["closed forms do not lean on what they check"]["forbidden_modules"]
+    others = {f"pfabrik.kernels.{source.stem}" for source in KERNELS} - {"pfabrik.kernels._jit"}
+    assert others - {"pfabrik.kernels.__init__"} <= set(forbidden)
 
 
 def test_pydantic_is_imported_for_files_only() -> None:
@@ -82,7 +94,7 @@ def test_pydantic_is_imported_for_files_only() -> None:
 
 
 def test_the_library_never_imports_its_command_or_its_pictures() -> None:
-    library = [source for source in SOURCES if source.parent.name not in ("cli", "view") and source.stem != "__main__"]
+    library = [source for source in SOURCES if source.parent.name not in LEAVES and source.stem != "__main__"]
     names = {name for source in library for name in imports(source)}
     assert not [
         name for name in names if name.startswith(("pfabrik.cli", "pfabrik.view", "click", "rich", "matplotlib"))
@@ -126,6 +138,8 @@ LINES = [
     ["ik", "stewart"],
     ["ik", "stewart", "--position", "1", "2"],
     ["ik", "stewart", "--position", "1", "2", "three"],
+    ["fk"],
+    ["fk", "stewart", "1", "two"],
     ["track", "stewart"],
     ["demo", "--steps", "0"],
 ]
@@ -157,4 +171,12 @@ def test_wrong_names_are_told_without_the_kernels() -> None:
     complaint, loaded = done.stderr.rsplit("\nloaded: ", 1)
     assert done.returncode == 2
     assert "did you mean 'stewart'" in complaint
+    assert "numba" not in loaded.split()
+
+
+@pytest.mark.parametrize("line", [["info", "stewart"], ["check", "stewart"], ["fk", "stewart", "1", "2"]])
+def test_a_mechanism_is_shown_and_checked_without_the_kernels(line: list[str]) -> None:
+    done = subprocess.run([sys.executable, "-c", PROBE, *line], capture_output=True, text=True, check=False)
+    complaint, loaded = done.stderr.rsplit("\nloaded: ", 1)
+    assert done.returncode == (2 if line[0] == "fk" else 0), complaint
     assert "numba" not in loaded.split()

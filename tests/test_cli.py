@@ -6,6 +6,8 @@ import csv
 import json
 import math
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -19,10 +21,12 @@ from click.testing import CliRunner, Result
 
 import pfabrik as pf
 from pfabrik.cli import main
-from pfabrik.report import rpy_angles
+from pfabrik.report import as_sentence, rpy_angles
 
 WITHIN_REACH = ["--position", "10", "0", "190"]
 BEYOND_REACH = ["--position", "0", "0", "300"]
+STRUTS = [197, 200, 202, 197, 202, 200]
+CLI_PAGE = Path(__file__).parents[1] / "docs" / "cli.md"
 
 
 @pytest.fixture
@@ -48,6 +52,39 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(handle))
 
 
+def upu(path: Path) -> Path:
+    """A file of a 3-UPU that translates; positions alone cannot express its legs."""
+    joints = []
+    for i, angle in enumerate(np.radians([0, 120, 240]), 1):
+        out = np.array([np.cos(angle), np.sin(angle), 0.0])
+        foot, head, tangent = 100 * out, 50 * out + [0, 0, 130], np.cross([0, 0, 1], out)
+        inner = np.cross(tangent, head - foot)
+        joints += [
+            pf.Joint(f"A{i}", "universal", ("base", f"c{i}"), at=foot, axes=(tangent, inner)),
+            pf.Joint(
+                f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"C{i}"), actuated=True, range=(90, 200)
+            ),
+            pf.Joint(f"C{i}", "universal", (f"r{i}", "platform"), at=head, axes=(inner, tangent)),
+        ]
+    pf.save(pf.Mechanism("3-UPU", joints, "platform", (0, 0, 130)), path)
+    return path
+
+
+def hexagons(path: Path) -> Path:
+    """A file of a 6-UPS whose platform is its base, smaller: it moves with its struts locked."""
+    joints = []
+    for i, angle in enumerate(np.radians([0, 40, 120, 160, 240, 280]), 1):
+        corner = np.array([np.cos(angle), np.sin(angle), 0.0])
+        joints += [
+            pf.Joint(f"A{i}", "universal", ("base", f"c{i}"), at=100 * corner),
+            pf.Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"C{i}"), actuated=True),
+            pf.Joint(f"C{i}", "spherical", (f"r{i}", "platform"), at=60 * corner + [0, 0, 150]),
+        ]
+    with pytest.warns(pf.errors.MobilityWarning):
+        pf.save(pf.Mechanism("similar hexagons", joints, "platform", (0, 0, 150)), path)
+    return path
+
+
 # What it says
 
 
@@ -65,6 +102,27 @@ def test_info_shows_every_joint_chain_and_actuator(run: Callable[..., Result], n
     assert all(str(chain) in text for chain in pf.decompose(mechanism))
     assert all(joint.name in text for joint in mechanism.joints)
     assert "…" not in text and "\x1b" not in text
+
+
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [
+        ("five_bar", ["2: 2 of the end effector, 0 internal, 0 idle", "0: actuators 2, freedoms 2"]),
+        ("stewart", ["6: 6 of the end effector, 0 internal, 0 idle", "0: actuators 6, freedoms 6"]),
+        ("nrpm", ["12: 6 of the end effector, 6 internal, 0 idle", "6: actuators 12, freedoms 6"]),
+    ],
+)
+def test_info_counts_mobility_and_redundancy(run: Callable[..., Result], name: str, lines: list[str]) -> None:
+    told = dict(line.split(maxsplit=1) for line in run("info", name).stdout.split("\n\n")[0].splitlines()[1:])
+    assert [told["mobility"], told["redundancy"]] == lines
+    assert "uncontrolled" not in told
+
+
+@pytest.mark.filterwarnings("always::pfabrik.errors.MobilityWarning")
+def test_info_says_what_the_actuators_do_not_hold(run: Callable[..., Result], tmp_path: Path) -> None:
+    result = run("info", hexagons(tmp_path / "hexagons.toml"))
+    assert re.search(r"^uncontrolled +1 of the freedoms", result.stdout, re.MULTILINE)
+    assert "6 actuators leave the end effector 3 freedoms at home" in result.stderr
 
 
 @pytest.mark.parametrize("name", pf.catalog())
@@ -103,8 +161,11 @@ def test_a_projection_names_its_distance_and_the_limits_that_hold_it(run: Callab
 def test_json_is_one_object_that_says_what_the_solution_says(run: Callable[..., Result]) -> None:
     result = run("ik", "stewart", *WITHIN_REACH, "--rpy", 0, 5, 0, "--json")
     solution = pf.solve_ik(pf.load("stewart"), pf.pose([10, 0, 190], rpy=[0, math.radians(5), 0]))
-    assert json.loads(result.stdout) == json.loads(json.dumps(solution.to_dict()))
+    answer = json.loads(result.stdout)
+    assert answer == json.loads(json.dumps(solution.to_dict()))
     assert result.stdout.count("\n") == 1
+    assert set(answer["joints"]) == {joint.name for joint in solution.mechanism.joints}
+    assert [len(np.ravel(answer["joints"][name])) for name in ("AL1", "BL1", "CL1")] == [2, 1, 3]
 
 
 def test_angles_are_degrees_for_people(run: Callable[..., Result]) -> None:
@@ -121,6 +182,181 @@ def test_rpy_is_the_inverse_of_pose() -> None:
     for rpy in ([0.1, -0.7, 2.0], [3.0, 1.5, -3.0], [0, math.pi / 2, 0.4], [0, -math.pi / 2, 0.4]):
         rotated = pf.pose([0, 0, 0], rpy=rpy)
         np.testing.assert_allclose(pf.pose([0, 0, 0], rpy=rpy_angles(rotated)), rotated, atol=1e-12)
+
+
+def test_a_machine_for_the_closure_engine_is_shown_checked_solved_and_tracked(
+    run: Callable[..., Result], tmp_path: Path
+) -> None:
+    path = upu(tmp_path / "upu.toml")
+    (tmp_path / "path.csv").write_text("x,y,z\n0,0,131\n3,4,135\n")
+    assert re.search(r"3 +U-P\*-U +closure", run("info", path).stdout)
+    checked = run("check", path)
+    assert (checked.exit_code, checked.stderr) == (0, "")
+    ik, fk = run("ik", path, "--position", 3, 4, 135), run("fk", path, 143.003, 143.365, 145.761)
+    assert [result.stdout.splitlines()[0] for result in (ik, fk)] == ["reached"] * 2
+    assert run("ik", path, "--position", 0, 0, 400).exit_code == 1
+    tracked = run("track", path, "path.csv", "-o", "answers.csv")
+    assert (tracked.exit_code, tracked.stdout) == (0, "2 reached\n")
+    foot, head = np.array([100, 0, 0]), np.array([50 + 3, 4, 135])
+    assert float(rows_of(tmp_path / "answers.csv")[1]["actuator_B1"]) == pytest.approx(np.linalg.norm(head - foot))
+
+
+# Forward kinematics
+
+
+@pytest.mark.parametrize("target", [(10, 0, 190), (0, -15, 200)])
+@pytest.mark.parametrize("name", ["stewart", "five_bar"])
+def test_fk_undoes_ik(run: Callable[..., Result], name: str, target: tuple[float, ...]) -> None:
+    target = (0, *target[1:]) if name == "five_bar" else target
+    solution = pf.solve_ik(pf.load(name), pf.pose(target))
+    shown = np.degrees(solution.actuators) if name == "five_bar" else solution.actuators
+    result = run("fk", name, *map(repr, shown.tolist()), "--json")
+    assert result.exit_code == 0
+    np.testing.assert_allclose(json.loads(result.stdout)["pose"], solution.pose, rtol=0, atol=1e-6)
+
+
+def test_fk_takes_negative_numbers_for_numbers(run: Callable[..., Result]) -> None:
+    expected = run("fk", "five_bar", "--json", "--", -20, "-3e-1")
+    assert expected.exit_code == 0
+    for line in ([-20, -0.3, "--json"], ["--json", "-2e1", "-.3"]):
+        assert run("fk", "five_bar", *line).stdout == expected.stdout
+    p1, p5 = json.loads(expected.stdout)["actuators"]
+    assert (p1, p5) == pytest.approx((math.radians(-20), math.radians(-0.3)), abs=1e-12)
+
+
+def test_fk_json_is_one_object_that_says_what_the_solution_says(run: Callable[..., Result]) -> None:
+    result = run("fk", "stewart", *STRUTS, "--json")
+    solution = pf.solve_fk(pf.load("stewart"), STRUTS)
+    assert json.loads(result.stdout) == json.loads(json.dumps(solution.to_dict()))
+    assert result.stdout.count("\n") == 1
+
+
+def test_fk_tells_how_far_the_actuators_are_and_what_holds_them(run: Callable[..., Result]) -> None:
+    result = run("fk", "stewart", *[300] * 6)
+    assert result.exit_code == 1
+    first_line, *_ = result.stdout.splitlines()
+    expected = (
+        "projected: actuators up to 20 mm from the values asked for; struts BL1, BL2, BL3, BR1, BR2, BR3 at their"
+    )
+    assert first_line == f"{expected} maximum 280 mm"
+    assert re.search(r"^BL1 +280 +300 +155 +280 +mm$", result.stdout, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_fk_tells_lengths_and_angles_apart(run: Callable[..., Result]) -> None:
+    first_line = run("fk", "nrpm", *[0] * 12).stdout.splitlines()[0]
+    solution = pf.solve_fk(pf.load("nrpm"), np.zeros(12))
+    turned, moved = math.degrees(abs(solution.actuators[:3]).max()), abs(solution.actuators[3:]).max()
+    assert f"actuators up to {turned:.3g} deg and {moved:.3g} mm from the values asked for; " in first_line
+    assert all(limit.joint in first_line for limit in solution.active_limits)
+
+
+def test_fk_without_limits_says_that_nothing_has_these_values(run: Callable[..., Result], tmp_path: Path) -> None:
+    pf.save(pf.load("five_bar").without_limits(), tmp_path / "free.toml")
+    result = run("fk", "free.toml", 53, -53)  # the elbows are 320 apart, the forearms reach 290
+    assert result.exit_code == 1
+    assert "no limit is active: no configuration with these values was found" in result.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("value", ["1e150", "-1e12", "0", "5e-324"])
+@pytest.mark.parametrize("name", pf.catalog())
+def test_any_finite_actuator_values_get_an_answer(run: Callable[..., Result], name: str, value: str) -> None:
+    result = run("fk", name, *[value] * len(pf.load(name).actuators), "--json")
+    status = json.loads(result.stdout)["status"]
+    assert (result.exit_code, status) in ((0, "REACHED"), (1, "PROJECTED"), (1, "FAILED"))
+
+
+@pytest.mark.slow
+def test_fk_lists_every_assembly_mode_and_the_limits_it_exceeds(run: Callable[..., Result]) -> None:
+    result = run("fk", "five_bar", -20, 20, "--all")
+    assert result.exit_code == 0
+    count, table, searched = result.stdout.strip().split("\n\n")
+    assert count == "2 assembly modes, 1 within all limits"
+    turn = math.radians(-20)  # of a crank of (-66, 88) about (-50, 0); the forearms, of 145, meet on the z axis
+    y = -50 - 66 * math.cos(turn) - 88 * math.sin(turn)
+    z = -66 * math.sin(turn) + 88 * math.cos(turn)
+    heights = [f"{z + side * math.sqrt(145**2 - y**2):.6g}" for side in (1, -1)]
+    modes = [line.split(maxsplit=8) for line in table.splitlines()[1:]]
+    assert [mode[:4] for mode in modes] == [["1", "0", "0", heights[0]], ["2", "0", "0", heights[1]]]
+    assert [mode[8] for mode in modes] == ["nothing", "min of p2; max of p4"]
+    found = pf.assembly_modes(pf.load("five_bar"), np.radians([-20, 20]))
+    assert [int(mode[7]) for mode in modes] == list(found.hits)
+    assert searched.startswith(f"{found.starts} starts; ")
+    assert searched.endswith(f" {found.unseen:.2%}")
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_a_cylindrical_joint_is_held_by_a_length_or_an_angle(run: Callable[..., Result], tmp_path: Path) -> None:
+    joints = [
+        pf.Joint("X", "prismatic", ("base", "cart"), axis=(1, 0, 0), actuated=True, range=(-50, 50)),
+        pf.Joint("C", "cylindrical", ("cart", "tool"), at=(0, 0, 9), axis=(0, 0, 1), range=((-0.5, 0.5), (-5, 5))),
+    ]
+    pf.save(pf.Mechanism("plotter", joints, "tool", (0, 0, 30)), tmp_path / "plotter.toml")
+    assert "joint C at its maximum 5 mm" in run("ik", "plotter.toml", "--position", 0, 0, 60).stdout
+    turned = run("ik", "plotter.toml", "--rpy", 0, 0, -40, "--hold", "position").stdout
+    assert f"joint C at its minimum {math.degrees(-0.5):.6g} deg" in turned
+
+
+@pytest.mark.slow
+def test_what_fails_with_closed_loops_fails_by_its_limits() -> None:
+    _, below = pf.assembly_modes(pf.load("five_bar"), np.radians([-20, 20]))
+    expected = "failed: no feasible configuration found; limits exceeded: min of p2; max of p4"
+    assert as_sentence(below) == expected
+
+
+@pytest.mark.slow
+def test_fk_all_as_json_has_the_modes_and_what_they_are_worth(run: Callable[..., Result]) -> None:
+    result = run("fk", "five_bar", -20, 20, "--all", "--json")
+    found = pf.assembly_modes(pf.load("five_bar"), np.radians([-20, 20]))
+    answer = json.loads(result.stdout)
+    assert answer["modes"] == json.loads(json.dumps([mode.to_dict() for mode in found]))
+    assert (answer["hits"], answer["starts"], answer["unseen"]) == (list(found.hits), found.starts, found.unseen)
+    assert result.stdout.count("\n") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("values", [[20] * 6, [300] * 6])
+def test_fk_all_is_not_reached_where_no_mode_keeps_all_limits(run: Callable[..., Result], values: list[int]) -> None:
+    result = run("fk", "stewart", *values, "--all")
+    assert result.exit_code == 1
+    no_mode, first_line = values[0] == 20, result.stdout.splitlines()[0]
+    assert first_line == "no assembly mode found" if no_mode else first_line.endswith("none within all limits")
+
+
+@pytest.mark.slow
+def test_a_mode_on_its_limit_does_not_exceed_it(run: Callable[..., Result]) -> None:
+    assert "max of" not in run("fk", "stewart", *[280] * 6, "--all").stdout
+    assert "max of BL1;" in run("fk", "stewart", 280.001, *[280] * 5, "--all").stdout
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("always::pfabrik.errors.MobilityWarning")
+def test_a_continuum_of_solutions_is_told_in_one_line(run: Callable[..., Result], tmp_path: Path) -> None:
+    path = hexagons(tmp_path / "hexagons.toml")
+    for options in (["--all"], ["--all", "--json"]):
+        result = run("fk", path, *[157] * 6, *options)
+        assert (result.exit_code, result.stdout) == (1, "")
+        warning, told = result.stderr.splitlines()
+        assert warning.startswith("pfabrik: warning: ")
+        assert told.startswith("pfabrik: 'similar hexagons' still moves with its actuators locked")
+
+
+@pytest.mark.slow
+def test_the_page_of_the_command_line_shows_what_fk_prints(run: Callable[..., Result]) -> None:
+    shown = re.findall(
+        r"^```\n\$ pfabrik (fk [^\n]*)\n(.*?)^```$", CLI_PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE
+    )
+    assert len(shown) == 3
+    for line, expected in shown:
+        found, told = (without_chance(text) for text in (run(*shlex.split(line)).stdout, expected))
+        assert found == told, line
+
+
+def without_chance(text: str) -> list[str]:
+    """The lines without what differs between processors, rounding errors and the luck of random starts."""
+    lucky = re.compile(r"^loops closed to.*|^\d+ starts;.*|\d+(?=  (nothing|min of|max of|cone of))")
+    return [lucky.sub("", line) for line in text.splitlines()]
 
 
 # Paths
@@ -240,6 +476,19 @@ def test_an_output_that_is_a_link_or_a_device_stays_one(run: Callable[..., Resul
         (["ik", "stewart", "--position", "0", "0", "-inf"], "finite"),
         (["ik", "stewart", *WITHIN_REACH, "--rpy", "0", "nan", "0"], "finite"),
         (["ik", "stewart", *WITHIN_REACH, "--hold", "both"], "orientation"),
+        (["fk"], "MECH"),
+        (["fk", "stewrt", "1"], "did you mean 'stewart'"),
+        (["fk", "nowhere/machine.toml", "1"], "machine.toml"),
+        (["fk", "five_bar"], "found 0 values; expected 2: p1 [deg], p5 [deg]"),
+        (["fk", "five_bar", "1", "2", "3"], "found 3 values; expected 2: p1 [deg], p5 [deg]"),
+        (["fk", "stewart", "1"], "expected 6: BL1 [mm], BL2 [mm]"),
+        (["fk", "five_bar", "1", "abc"], "found 'abc'; expected a finite number"),
+        (["fk", "five_bar", "1", ""], "found ''"),
+        (["fk", "five_bar", "1", "nan"], "found 'nan'"),
+        (["fk", "five_bar", "1", "-inf"], "found '-inf'"),
+        (["fk", "five_bar", "1", "1e999"], "found '1e999'"),
+        (["fk", "five_bar", "1", "2,5"], "found '2,5'"),
+        (["fk", "five_bar", "1", "2", "--jsn"], "found '--jsn'; expected a finite number, or an option"),
         (["track", "stewart", "missing.csv", "-o", "out.csv"], "missing.csv"),
         (["demo", "--steps", "2"], "steps"),
         (["--wrong"], "--wrong"),

@@ -37,6 +37,8 @@ _HOMES = {
     "singularity": "differential",
     "solve_fk": "fk",
 }
+# Modules that are themselves public.
+_MODULES = ("errors", "geometric")
 
 __all__ = [
     "ActiveLimit",
@@ -57,6 +59,7 @@ __all__ = [
     "decompose",
     "errors",
     "forward_jacobian",
+    "geometric",
     "inverse_jacobian",
     "load",
     "mobility",
@@ -69,7 +72,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from . import errors
+    from . import errors, geometric
     from .assembly import AssemblyModes, assembly_modes
     from .catalog import catalog
     from .decompose import SubChain, decompose
@@ -87,8 +90,8 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    if name == "errors":
-        return importlib.import_module(".errors", __name__)
+    if name in _MODULES:
+        return importlib.import_module(f".{name}", __name__)
     if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     value = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from .mechanism import Joint, Mechanism
     from .solution import Solution
 
+Floats = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Readout:
@@ -35,9 +37,13 @@ class Readout:
     unit: str
     limits: tuple[float, float]
 
-    def display(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def display(self, values: Floats) -> Floats:
         """Coordinates [rad or length] in `unit`."""
         return np.degrees(values) if self.is_angle else values
+
+    def coordinate(self, shown: float) -> float:
+        """The coordinate [rad or length] that is shown as a value in `unit`."""
+        return math.radians(shown) if self.is_angle else shown
 
 
 def readouts(mechanism: Mechanism) -> tuple[Readout, ...]:
@@ -53,7 +59,7 @@ def readout(joint: Joint, length_unit: str) -> Readout:
     return Readout(joint.name, is_angle, "deg" if is_angle else length_unit, limits)
 
 
-def rpy_angles(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+def rpy_angles(pose: Floats) -> Floats:
     """Roll, pitch, yaw [rad] of poses, the inverse of ``pose(..., rpy=...)``: R = Rz(yaw) Ry(pitch) Rx(roll).
 
     Parameters
@@ -78,17 +84,32 @@ def rpy_angles(pose: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([roll, pitch, yaw], axis=-1)
 
 
-def as_sentence(solution: Solution) -> str:
-    """What became of one target, in one sentence.
+def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
+    """What became of one target, or of the actuator values asked for, in one sentence.
 
     For instance ``projected: 12.3 mm from the target; strut B3 at its maximum 250 mm; joint C1's cone at 45 deg``.
+
+    Parameters
+    ----------
+    asked : actuator values (n_a,) [length or rad], where these were asked for and not a pose.
     """
     status = solution.status.name.lower()
     if status == "reached":
         return "reached"
+    if status == "projected" and asked is not None:
+        why = reasons(solution) or ["no limit is active: no configuration with these values was found"]
+        return "; ".join([f"projected: {actuator_distance(solution, asked)} from the values asked for", *why])
     if status == "projected":
-        return "; ".join([f"projected: {distance(solution)} from the target", *reasons(solution)])
-    return f"{status}: no feasible configuration found; loops open by {loop_gap(solution)}"
+        why = reasons(solution) or ["no limit is active: the links themselves do not reach"]
+        return "; ".join([f"projected: {distance(solution)} from the target", *why])
+    return f"{status}: no feasible configuration found; {what_is_wrong(solution)}"
+
+
+def what_is_wrong(solution: Solution) -> str:
+    """Open loops or, where they are closed, the limits that are exceeded."""
+    if solution.residual <= TOLERANCES.position * solution.mechanism.characteristic_length:
+        return f"limits exceeded: {by_bound(exceeded(solution))}"
+    return f"loops open by {loop_gap(solution)}"
 
 
 def distance(solution: Solution) -> str:
@@ -102,6 +123,14 @@ def distance(solution: Solution) -> str:
     return " and ".join(parts) or "a hair"
 
 
+def actuator_distance(solution: Solution, asked: Floats) -> str:
+    """The largest differences between actuator coordinates and the values asked for: ``up to 12.3 mm and 4 deg``."""
+    worst: dict[str, float] = {}
+    for readout, off in zip(readouts(solution.mechanism), np.abs(solution.actuators - asked), strict=True):
+        worst[readout.unit] = max(float(readout.display(off)), worst.get(readout.unit, 0.0))
+    return "actuators up to " + " and ".join(f"{off:.3g} {unit}" for unit, off in worst.items() if off > 0.0)
+
+
 def loop_gap(solution: Solution) -> str:
     """The largest loop gap with its unit."""
     return f"{float(solution.residual):.1g} {solution.mechanism.length_unit}"
@@ -112,18 +141,26 @@ def reasons(solution: Solution) -> list[str]:
     names: dict[tuple[str, str], list[str]] = {}
     for limit in solution.active_limits:
         names.setdefault(in_words(limit, solution.mechanism), []).append(limit.joint)
-    phrases = [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
-    return phrases or ["no limit is active: the links themselves do not reach"]
+    return [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
 
 
 def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
     """What kind of joint it is, and which of its bounds: ``("strut", "maximum 250 mm")``."""
     joint = mechanism.joint(limit.joint)
     noun = "joint" if joint.type != "prismatic" else "strut" if joint.along else "slider"
+    angle = math.degrees(limit.limit)
     if limit.bound == "cone":
-        return noun, f"cone at {math.degrees(limit.limit):.6g} deg"
+        return noun, f"cone at {angle:.6g} deg"
     bound = "maximum" if limit.bound == "max" else "minimum"
-    return noun, f"{bound} {show_coordinate(limit.limit, joint, mechanism.length_unit)}"
+    value = f"{limit.limit:.6g} {mechanism.length_unit}" if is_length(limit, joint) else f"{angle:.6g} deg"
+    return noun, f"{bound} {value}"
+
+
+def is_length(limit: ActiveLimit, joint: Joint) -> bool:
+    """Whether a limit is one of a length; a cylindrical joint limits its angle first, then its length."""
+    if joint.type == "cylindrical" and joint.range is not None:
+        return limit.limit not in np.reshape(joint.range, (2, 2))[0]
+    return joint.type == "prismatic"
 
 
 def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
@@ -136,13 +173,26 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
     return f"{subject} at {'their' if len(joints) > 1 else 'its'} {bound}"
 
 
-def show_coordinate(value: float, joint: Joint, length_unit: str) -> str:
-    """A coordinate of a joint with its unit."""
-    if joint.type == "prismatic":
-        return f"{value:.6g} {length_unit}"
-    return f"{math.degrees(value):.6g} deg"
-
-
 def short_names(limits: Iterable[ActiveLimit]) -> str:
     """Active limits in a cell of a table: ``B3 max; C1 cone``."""
     return "; ".join(f"{limit.joint} {limit.bound}" for limit in limits)
+
+
+def exceeded(solution: Solution) -> list[ActiveLimit]:
+    """The limits that a failed answer exceeds, not those that it only lies on."""
+    return [limit for limit in solution.active_limits if is_exceeded(limit, solution.mechanism)]
+
+
+def is_exceeded(limit: ActiveLimit, mechanism: Mechanism) -> bool:
+    """Whether the coordinate is beyond its bound by more than the tolerance."""
+    scale = mechanism.characteristic_length if is_length(limit, mechanism.joint(limit.joint)) else 1.0
+    excess = limit.limit - limit.value if limit.bound == "min" else limit.value - limit.limit
+    return excess > TOLERANCES.limit * scale
+
+
+def by_bound(limits: Iterable[ActiveLimit]) -> str:
+    """Limits in a few words: ``max of B1, B2; cone of C1``."""
+    names: dict[str, dict[str, None]] = {}
+    for limit in limits:
+        names.setdefault(limit.bound, {})[limit.joint] = None
+    return "; ".join(f"{bound} of {', '.join(joints)}" for bound, joints in names.items())

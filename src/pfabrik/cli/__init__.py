@@ -23,7 +23,9 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
 
 
 @click.command(
-    cls=CommandGroup, subcommands=("catalog", "info", "check", "ik", "track", "demo"), invoke_without_command=True
+    cls=CommandGroup,
+    subcommands=("catalog", "info", "check", "ik", "fk", "track", "demo", "reproduce"),
+    invoke_without_command=True,
 )
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=print_version, help="Show the version."

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ..reproduce.study import Case
     from ..solution import Solution
 
 QUICK_STEPS = 36
@@ -48,12 +49,12 @@ def demo(out: Path, steps: int, quick: bool) -> int:
     The upper arc of each circle is out of reach: there the answer is the feasible pose that the mechanism can take
     near the target, and every limit is still kept.
     """
-    from .circles import CIRCLES
+    from ..reproduce.study import cases
 
     if find_spec("matplotlib") is None:
         raise click.UsageError("the pictures need matplotlib; install it with: pip install 'pfabrik[view]'")
     with whole_folder(out) as folder:
-        runs = [follow(key, QUICK_STEPS if quick else steps) for key in CIRCLES]
+        runs = [follow(case, QUICK_STEPS if quick else steps) for case in cases()]
         for run in runs:
             write(run, folder)
         names = sorted(item.name for item in folder.iterdir())
@@ -62,20 +63,16 @@ def demo(out: Path, steps: int, quick: bool) -> int:
     return 0 if all(holds(run.solution) for run in runs) else 1
 
 
-def follow(key: str, steps: int) -> Run:
+def follow(case: Case, steps: int) -> Run:
     """Track one circle, and time it without the compilation of the kernels."""
-    import numpy as np
-
-    from .circles import CIRCLES
-
-    mechanism = pf.load(key)
-    targets = np.stack([pf.pose(point) for point in CIRCLES[key].points(steps)])
+    mechanism = case.mechanism
+    targets = case.leaving.poses(steps)
     pf.track(mechanism, targets[:2])
     with progress(f"{mechanism.name}: {steps} steps") as on_progress:
         start = time.perf_counter()
         solution = pf.track(mechanism, targets, on_progress=on_progress)
         seconds = time.perf_counter() - start
-    return Run(key, targets, solution, seconds)
+    return Run(case.key, targets, solution, seconds)
 
 
 def write(run: Run, folder: Path) -> None:

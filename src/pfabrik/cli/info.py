@@ -11,12 +11,12 @@ import click
 
 import pfabrik as pf
 
-from ..freedom import end_effector_freedom
 from ..joint_types import KINDS
 from .table import aligned
 
 if TYPE_CHECKING:
     from ..decompose import SubChain
+    from ..differential import Mobility
     from ..mechanism import Joint, Mechanism
 
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def info(mech: str) -> int:
     """Show what a mechanism is made of.
 
-    Its sub-chains in the field's notation and the engine that solves them, joints, limits, actuators, freedom and task.
+    Its joints, limits, actuators, mobility and task, and its sub-chains with the engine that each of them needs.
     """
     mechanism = pf.load(mech)
     click.echo(summary(mechanism) + "\n")
@@ -44,18 +44,22 @@ def summary(mechanism: Mechanism) -> str:
             f"end effector           {kind} {mechanism.end_effector}, reference point ({point})",
             f"task                   {' '.join(mechanism.task)}",
             f"actuators              {' '.join(mechanism.actuators)}",
-            f"freedom                {freedom(mechanism)}",
+            *freedom(pf.mobility(mechanism)),
             f"characteristic length  {mechanism.characteristic_length:.6g} {mechanism.length_unit}",
         ]
     )
 
 
-def freedom(mechanism: Mechanism) -> str:
-    """What the end effector can do at home, against what drives it; counted to first order."""
-    own, left = (end_effector_freedom(mechanism, frozenset(locked)) for locked in ((), mechanism.actuators))
-    n = len(mechanism.actuators)
-    text = f"{own} at home, {n} actuated" + (f", redundancy {n - own}" if n > own else "")
-    return text + (f"; {left} left free with all actuators locked" if left else "")
+def freedom(counted: Mobility) -> list[str]:
+    """What moves, what drives it, and what nothing holds; in general, where home may be special."""
+    parts = f"{counted.platform} of the end effector, {counted.internal} internal, {counted.idle} idle"
+    lines = [
+        f"mobility               {counted.mobility}: {parts}",
+        f"redundancy             {counted.redundancy}: actuators {counted.actuators}, freedoms {counted.platform}",
+    ]
+    if counted.uncontrolled:
+        lines.append(f"uncontrolled           {counted.uncontrolled} of the freedoms, with all actuators locked")
+    return lines
 
 
 def joint_table(mechanism: Mechanism) -> str:

@@ -1,0 +1,129 @@
+"""The first experiment: circles inside the workspace, followed, and verified by forward kinematics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fk import solve_fk
+from ..options import Options
+from ..solution import Solution, Status
+from ..track import track
+from .checking import Feasibility, feasibility
+from .study import Case, Extent, Tick
+
+Floats = NDArray[np.float64]
+
+SETTINGS = {"paper": Options.paper(), "default": Options()}
+"""The paper's E and passes alone; and what the library does unless told otherwise."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """One path with one set of options.
+
+    Attributes
+    ----------
+    solution : what `track` answered, n steps.
+    position_errors, orientation_errors : of the poses that Newton's method finds from the actuators of each step,
+        begun at the step before, against the targets, (n,) [length], [deg].
+    newton : iterations it took on average.
+    """
+
+    solution: Solution
+    position_errors: Floats
+    orientation_errors: Floats
+    newton: float
+    feasibility: Feasibility
+
+    @property
+    def position_rmse(self) -> float:
+        return rms(self.position_errors)
+
+    @property
+    def orientation_rmse(self) -> float:
+        return rms(self.orientation_errors)
+
+
+@dataclass(frozen=True)
+class Efficacy:
+    """The experiment on one machine, by the name of its options."""
+
+    case: Case
+    targets: Floats
+    runs: dict[str, Followed]
+
+
+def run(case: Case, extent: Extent, tick: Tick) -> Efficacy:
+    """Follow the circle inside the workspace with either set of options."""
+    targets = case.inside.poses(extent.steps)
+    runs = {name: follow(case, targets, options) for name, options in SETTINGS.items()}
+    tick()
+    return Efficacy(case, targets, runs)
+
+
+def follow(case: Case, targets: Floats, options: Options) -> Followed:
+    """Inverse kinematics along a path, then forward kinematics of every step from the step before."""
+    solution = track(case.mechanism, targets, options=options)
+    start = solve_fk(case.mechanism, solution[:1].actuators)
+    rest = solve_fk(case.mechanism, solution[1:].actuators, seed=solution[:-1])
+    poses = np.concatenate([start.pose, rest.pose])
+    return Followed(
+        solution=solution,
+        position_errors=np.linalg.norm(poses[:, :3, 3] - targets[:, :3, 3], axis=1),
+        orientation_errors=np.degrees(angles_between(poses, targets)),
+        newton=float(np.mean([*start.iterations, *rest.iterations])),
+        feasibility=feasibility(solution),
+    )
+
+
+def angles_between(poses: Floats, targets: Floats) -> Floats:
+    """Angles of the rotations that take one orientation to the other (n,) [rad], exact also where they are tiny."""
+    chord = np.linalg.norm((poses - targets)[:, :3, :3], axis=(1, 2))
+    return np.asarray(2.0 * np.arcsin(np.minimum(chord / np.sqrt(8.0), 1.0)))
+
+
+def rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def summary(found: Efficacy) -> list[dict[str, Any]]:
+    """One row for each set of options."""
+    return [
+        {
+            "mechanism": found.case.key,
+            "options": name,
+            "steps": len(found.targets),
+            "reached": int((run.solution.status == Status.REACHED).sum()),
+            "position_rmse": run.position_rmse,
+            "orientation_rmse_deg": None if is_point(found.case) else run.orientation_rmse,
+            "iterations": float(np.mean(run.solution.iterations)),
+            "newton_iterations": run.newton,
+            **run.feasibility._asdict(),
+        }
+        for name, run in found.runs.items()
+    ]
+
+
+def steps(found: Efficacy) -> list[dict[str, Any]]:
+    """One row for each step: errors after the round trip, with either set of options."""
+    return [
+        {
+            "step": i,
+            **dict(zip("xyz", found.targets[i, :3, 3], strict=True)),
+            **{
+                f"{name}_{what}": getattr(run, what)[i]
+                for name, run in found.runs.items()
+                for what in ("position_errors", "orientation_errors")
+            },
+        }
+        for i in range(len(found.targets))
+    ]
+
+
+def is_point(case: Case) -> bool:
+    """Whether the end effector has a position only."""
+    return case.mechanism.end_effector_is_joint

@@ -1,0 +1,196 @@
+"""The pictures of the three experiments: lines differ in dashes and lightness, so they stay apart without colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from ..report import Readout, readout
+from ..solution import Status
+from ..view.tracking import ACHIEVED, OFF_TARGET, SHADE, TARGET, common_keys, draw_limits, line_style, shade_steps
+from .efficacy import Efficacy, is_point
+from .efficiency import Efficiency
+from .robustness import Robustness
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Floats = NDArray[np.float64]
+
+DPI = 130
+OUTSIDE = "#f3f3f3"
+EDGE = "black"
+LIGHT, MIDDLE, DARK = "#d9d9d9", "#d55e00", "#00204d"
+BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "frameon": False, "fontsize": 9}
+
+
+def letters(axes: Sequence[Axes]) -> None:
+    """Name panels (a), (b), … in their titles."""
+    for letter, panel in zip("abcdefghijkl", axes, strict=False):
+        panel.set_title(f"({letter}) {panel.get_title()}", fontsize=10.5)
+
+
+# --- accuracy --------------------------------------------------------------------------------------------------------
+
+
+def draw_efficacy(found: Sequence[Efficacy], path: Path) -> None:
+    """One column a machine: errors of the round trip over the steps, with the paper's E and by default."""
+    figure = Figure(figsize=(13, 7), layout="constrained", dpi=DPI)
+    panels = figure.subplots(2, len(found), squeeze=False, sharex="col")
+    for column, each in zip(panels.T, found, strict=True):
+        unit, printed = each.case.mechanism.length_unit, each.case.printed
+        draw_errors(column[0], each, "position_errors", unit, printed.position_rmse)
+        column[0].set_title(f"{each.case.label}: position")
+        if is_point(each.case):
+            column[1].set_axis_off()
+            column[0].tick_params(labelbottom=True)
+            column[0].set_xlabel("step")
+            continue
+        draw_errors(column[1], each, "orientation_errors", "deg", printed.orientation_rmse)
+        column[1].set(title=f"{each.case.label}: orientation", xlabel="step")
+    letters([panel for panel in panels.ravel() if panel.axison])
+    figure.suptitle("Inside the workspace: error of the pose that forward kinematics finds from the actuators")
+    figure.legend(*panels[0, -1].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    figure.savefig(path)
+
+
+def draw_errors(axes: Axes, found: Efficacy, what: str, unit: str, printed: float | None) -> None:
+    """Errors over the steps on a logarithmic axis; what is exactly 0 is drawn at its lower end."""
+    least = 1e-17
+    names = {"paper": ("with the paper's E and passes alone", 0), "default": ("by default", 1)}
+    for name, (label, place) in names.items():
+        values = np.maximum(getattr(found.runs[name], what), least)
+        axes.plot(values, label=label, linewidth=1.4, **line_style(place))
+    if printed is not None:
+        axes.axhline(printed, color=EDGE, linewidth=1.2, linestyle=(0, (8, 3, 1, 3)), label="RMSE printed in the paper")
+    axes.set(yscale="log", ylim=(least / 2, 1), xlim=(0, len(found.targets) - 1), ylabel=f"error [{unit}]")
+    axes.grid(alpha=0.3)
+
+
+# --- cost ------------------------------------------------------------------------------------------------------------
+
+
+def draw_efficiency(found: Sequence[Efficiency], path: Path) -> None:
+    """Left the time over that of the geometric approach, right the passes; a group of bars for each machine."""
+    figure = Figure(figsize=(13, 5), layout="constrained", dpi=DPI)
+    left, right = figure.subplots(1, 2)
+    ratios = {
+        "paper": [each.case.printed.ratio for each in found],
+        "single, cold start": [each.ratio("default", "cold", "single") for each in found],
+        "single, warm start": [each.ratio("default", "warm", "single") for each in found],
+        "batch": [each.ratio("default", "cold", "batch") for each in found],
+    }
+    draw_bars(left, [each.case.label for each in found], ratios)
+    left.axhline(1.0, color=EDGE, linewidth=1)
+    left.set(yscale="log", ylabel="time of P-FABRIK ÷ geometric approach", title="time, one core")
+    passes = {
+        "paper": [each.case.printed.iterations for each in found],
+        "paper's E, cold start": [each.answers["paper", "cold"].iterations for each in found],
+        "paper's E, warm start": [each.answers["paper", "warm"].iterations for each in found],
+        "default, cold start": [each.answers["default", "cold"].iterations for each in found],
+        "default, warm start": [each.answers["default", "warm"].iterations for each in found],
+    }
+    draw_bars(right, [each.case.label for each in found], passes)
+    right.set(yscale="log", ylabel="passes, average over targets reached", title="iterations")
+    letters([left, right])
+    figure.suptitle(f"{len(found[0].targets)} random targets in the workspace of each machine")
+    figure.savefig(path)
+
+
+def draw_bars(axes: Axes, groups: Sequence[str], series: dict[str, list[float]]) -> None:
+    """Bars side by side, hatched so that they differ in grey, each with its number."""
+    looks = [(LIGHT, ""), (DARK, ""), (MIDDLE, "//"), ("white", ".."), ("#8c8c8c", "xx")]
+    width = 0.85 / len(series)
+    for place, ((name, values), (colour, hatch)) in enumerate(zip(series.items(), looks, strict=False)):
+        at = np.arange(len(groups)) + (place - (len(series) - 1) / 2) * width
+        bars = axes.bar(at, values, width, label=name, color=colour, hatch=hatch, edgecolor=EDGE, linewidth=0.8)
+        axes.bar_label(bars, fmt="{:.2g}", fontsize=8, padding=1)
+    axes.set_xticks(np.arange(len(groups)), groups)
+    axes.grid(axis="y", alpha=0.3)
+    axes.set_axisbelow(True)
+    axes.margins(y=0.12)
+    axes.legend(**(BELOW | {"bbox_to_anchor": (0.5, -0.07)}), ncols=3)
+
+
+# --- targets out of reach --------------------------------------------------------------------------------------------
+
+
+def draw_robustness(found: Sequence[Robustness], path: Path) -> None:
+    """Nine panels, a row for each machine: the path, joint values, the cost of each step."""
+    figure = Figure(figsize=(15.5, 4.8 * len(found)), layout="constrained", dpi=DPI)
+    grid = figure.add_gridspec(len(found), 3, width_ratios=(1, 1.25, 1))
+    titled = []
+    for row, each in enumerate(found):
+        kinds = joints_by_unit(each)
+        parts = grid[row, 1].subgridspec(len(kinds), 1, hspace=0.04).subplots(sharex=True, squeeze=False)[:, 0]
+        path_panel, cost_panel = figure.add_subplot(grid[row, 0]), figure.add_subplot(grid[row, 2])
+        draw_path(path_panel, each)
+        draw_joints(parts.tolist(), each, kinds)
+        draw_cost(cost_panel, each)
+        titled += [path_panel, parts[0], cost_panel]
+    letters(titled)
+    figure.suptitle("Circles that leave the workspace (grey bands: steps that are projected)")
+    figure.savefig(path)
+
+
+def draw_path(axes: Axes, found: Robustness) -> None:
+    """What was asked for, what was taken, and the edge of the workspace."""
+    unit, space = found.case.mechanism.length_unit, found.workspace
+    asked, taken, off = found.targets[:, 1:3, 3], found.solution.pose[:, 1:3, 3], found.projected
+    inside = space.reached.astype(float)
+    axes.contourf(space.y, space.z, inside, levels=[-0.5, 0.5], colors=[OUTSIDE])
+    axes.contour(space.y, space.z, inside, levels=[0.5], colors=[EDGE], linewidths=1)
+    axes.plot(*asked.T, color=TARGET, linestyle="--", linewidth=1.6, label="asked for")
+    axes.plot(*taken.T, color=ACHIEVED, linewidth=1.8, label="achieved")
+    axes.plot(*taken[off].T, "o", color=OFF_TARGET, markersize=2.5, label="projected step")
+    axes.set(xlabel=f"y [{unit}]", ylabel=f"z [{unit}]", title=f"{found.case.label}: path")
+    axes.set_aspect("equal")
+    handles = [*axes.get_legend_handles_labels()[0], Line2D([], [], color=EDGE, linewidth=1, label="workspace's edge")]
+    axes.legend(handles=handles, **BELOW, ncols=2)
+
+
+def joints_by_unit(found: Robustness) -> list[list[tuple[int, Readout]]]:
+    """The joints that are shown with their places, those of one unit together."""
+    mechanism = found.case.mechanism
+    shown = list(enumerate(readout(mechanism.joint(name), mechanism.length_unit) for name in found.case.shown))
+    units = dict.fromkeys(each.unit for _, each in shown)
+    return [[(place, each) for place, each in shown if each.unit == unit] for unit in units]
+
+
+def draw_joints(panels: Sequence[Axes], found: Robustness, groups: Sequence[list[tuple[int, Readout]]]) -> None:
+    """Values of the joints that are shown, with their limits; a panel for each unit."""
+    for axes, group in zip(panels, groups, strict=True):
+        shade_steps(axes, found.projected)
+        for place, each in group:
+            values = each.display(np.asarray(found.solution.joints[each.name]))
+            axes.plot(values, linewidth=1.5, label=each.name, **line_style(place))
+        draw_limits(axes, group)
+        first = group[0][1]
+        axes.set(ylabel=f"{'angle' if first.is_angle else 'length'} [{first.unit}]", xlim=(0, len(found.targets) - 1))
+        axes.margins(y=0.08)
+        axes.grid(alpha=0.3)
+    panels[0].set_title(f"{found.case.label}: joint values and limits")
+    panels[-1].set_xlabel("step")
+    handles = [handle for axes in panels for handle in axes.get_legend_handles_labels()[0]]
+    below = BELOW | {"bbox_to_anchor": (0.5, -0.16 * len(panels))}
+    panels[-1].legend(handles=[*handles, *common_keys()], **below, ncols=4)
+
+
+def draw_cost(axes: Axes, found: Robustness) -> None:
+    """Passes and time of each step; one time in a hundred, an interruption, may lie above the panel."""
+    shade_steps(axes, found.projected)
+    passes = axes.plot(found.solution.iterations, label="passes", linewidth=1.4, **line_style(0))
+    axes.set(xlim=(0, len(found.targets) - 1), xlabel="step", ylabel="passes", title=f"{found.case.label}: cost")
+    axes.set(ylim=(0, None))
+    axes.grid(alpha=0.3)
+    clock = axes.twinx()
+    times = clock.plot(1e6 * found.seconds, label="time of one call from Python", linewidth=1.2, **line_style(4))
+    clock.set(ylabel="time [µs]", ylim=(0, 1.15e6 * np.quantile(found.seconds, 0.99)))
+    band = Line2D([], [], color=SHADE, linewidth=7, label=Status.PROJECTED.name.lower())
+    axes.legend(handles=[*passes, *times, band], **BELOW, ncols=3)

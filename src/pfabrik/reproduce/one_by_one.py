@@ -1,0 +1,57 @@
+"""Single calls as compiled code makes them: a kernel called for one target after another, without Python in between.
+
+Every call is a whole one: it makes its own scratch memory, and takes one target, one seed and room for one answer.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels._jit import kernel
+from ..kernels.plan import Floats, Plan, Rows, Seeds, Settings
+from ..kernels.solve import solve_by_iteration, solve_directly
+
+_njit: Any = numba.njit(nogil=True, error_model="numpy")
+
+
+@kernel
+def p_fabrik_one_by_one(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, rows: Rows) -> int:
+    """Answer every target by a call of its own; returns how many the direct step left to the iterations."""
+    left = 0
+    for i in range(targets.shape[0]):
+        k = i if seeds.poses.shape[0] > 1 else 0
+        own_seeds = Seeds(seeds.poses[k : k + 1], seeds.nodes[k : k + 1], seeds.trunks[k : k + 1])
+        own = Rows(
+            rows.status[i : i + 1],
+            rows.counters[i : i + 1],
+            rows.poses[i : i + 1],
+            rows.nodes[i : i + 1],
+            rows.trunks[i : i + 1],
+            rows.actuators[i : i + 1],
+            rows.measures[i : i + 1],
+        )
+        if solve_directly(plan, targets[i : i + 1], own_seeds, settings, own) > 0:
+            left += solve_by_iteration(plan, targets[i : i + 1], own_seeds, settings, own)
+    return left
+
+
+@lru_cache(maxsize=8)
+def closed_form_one_by_one(closed_form: Any) -> Any:
+    """The compiled loop over the kernel of a closed form; returns how many targets are no poses."""
+
+    def loop(
+        plan: Any, targets: Floats, seeds: Floats, at_home: bool, actuators: Floats, status: NDArray[np.int8]
+    ) -> int:
+        invalid = 0
+        for i in range(targets.shape[0]):
+            k = i if seeds.shape[0] > 1 else 0
+            own, status_of_it = actuators[i : i + 1], status[i : i + 1]
+            invalid += closed_form(plan, targets[i : i + 1], seeds[k : k + 1], at_home, own, status_of_it)
+        return invalid
+
+    return _njit(loop)

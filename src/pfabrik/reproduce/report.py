@@ -1,0 +1,329 @@
+"""The findings in words and tables: next to what the paper printed, and with what must hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InvalidArgument
+from .checking import Feasibility
+from .efficacy import Efficacy, is_point
+from .efficiency import Efficiency
+from .robustness import Jump, Robustness
+from .tables import markdown, number, tiny
+from .timing import machine
+
+if TYPE_CHECKING:
+    from .everything import Findings
+
+Cells = dict[str, tuple[str, str]]
+"""What the paper printed and what we found, by the name of the row."""
+
+EXACT = 1e-8
+"""RMSE that the default tolerance must keep [length of the machine, and deg]."""
+
+SAME_ORDER = 10.0
+"""How many times the paper's RMSE ours may be with the paper's E."""
+
+SMOOTH = 3.0
+"""How many times the largest step of an actuator inside the workspace one outside may be."""
+
+NEAREST = 1.0 - 1e-5
+"""Least ratio of a projection's distance to the nearest feasible one: none can be nearer than the nearest."""
+
+BEGIN, END = "<!-- reproduce: begin -->", "<!-- reproduce: end -->"
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What must hold, what was measured, and whether it holds."""
+
+    text: str
+    measured: str
+    holds: bool
+
+
+def report(findings: Findings) -> str:
+    """The whole report, as Markdown."""
+    parts = [
+        "# The paper's experiments, run again",
+        "Written by `pfabrik reproduce`. *Paper*: as printed in P-FABRIK; it does not print the dimensions of its "
+        "machines, ours have others. *Paper's E*: `Options.paper()`, E = 0.01 mm and passes alone. *Default*: "
+        "`Options()`.",
+        f"Measured on {machine()}. {findings.extent.steps} steps a circle, {findings.extent.targets} random targets a "
+        "machine.",
+        "## What must hold",
+        markdown(("promise", "measured", "holds"), [(p.text, p.measured, yes(p.holds)) for p in promises(findings)]),
+        "## Accuracy inside the workspace",
+        efficacy_table(findings.efficacy),
+        "![errors](efficacy.png)",
+        "## Cost",
+        "Passes are averages over the targets that are reached. A warm start is the answer to the target before; the "
+        "targets are in an order in which each is the nearest one left. *Single*: one kernel call a target, in a "
+        "compiled loop. *Batch*: one call of the library, per target. Times are medians, one core, in µs.",
+        iterations_table(findings.efficiency),
+        times_table(findings.efficiency),
+        "![cost](efficiency.png)",
+        "## Circles that leave the workspace",
+        robustness_table(findings.robustness),
+        "Largest change of an actuator from one step to the next; *halved* is the same with twice as many steps, where "
+        "a continuous motion has half of it and a jump all.",
+        jumps_table(findings.robustness),
+        "![paths](robustness.png)",
+        "## Limits and loops, everywhere",
+        "The worst over all steps: `limit_excess` of the answers, `closure_residual` by the closure engine (over L), "
+        "and limits and loops by closed forms in NumPy that share no code with either.",
+        feasibility_table(findings),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def yes(holds: bool) -> str:
+    return "yes" if holds else "**no**"
+
+
+def promises(findings: Findings) -> list[Promise]:
+    """Everything that must hold."""
+    return [
+        exact_by_default(findings.efficacy),
+        accurate_with_the_papers_e(findings.efficacy),
+        all_feasible(findings),
+        all_reached(findings.efficiency),
+        continuous_outside(findings.robustness),
+        never_nearer_than_the_nearest(findings.robustness),
+    ]
+
+
+def exact_by_default(found: Sequence[Efficacy]) -> Promise:
+    worst = max(max(each.runs["default"].position_rmse, each.runs["default"].orientation_rmse) for each in found)
+    text = f"by default, RMSE of the round trip at most {EXACT:.0e} mm and {EXACT:.0e} deg"
+    return Promise(text, f"{worst:.1e} at most", worst <= EXACT)
+
+
+def accurate_with_the_papers_e(found: Sequence[Efficacy]) -> Promise:
+    pairs = [(each.runs["paper"].position_rmse, each.case.printed.position_rmse) for each in found]
+    pairs += [(e.runs["paper"].orientation_rmse, e.case.printed.orientation_rmse or np.inf) for e in found]
+    worst = max(ours / theirs for ours, theirs in pairs)
+    text = f"with the paper's E, RMSE at most {SAME_ORDER:g} times the paper's"
+    return Promise(text, f"{worst:.2g} times at most", worst <= SAME_ORDER)
+
+
+def all_feasible(findings: Findings) -> Promise:
+    found = [each for _, each in feasibilities(findings)]
+    excess = max(max(each.limit_excess, each.independent) for each in found)
+    closure, failed = max(each.closure for each in found), sum(each.failed for each in found)
+    text = "every answer of every experiment keeps all limits and closes all loops to 1e-9"
+    measured = f"excess {excess:.0e}, gap {closure:.0e} L, {failed} failed"
+    return Promise(text, measured, all(each.holds for each in found))
+
+
+def all_reached(found: Sequence[Efficiency]) -> Promise:
+    answers = [each.answers["default", start] for each in found for start in ("cold", "warm")]
+    reached, count = sum(each.reached for each in answers), sum(len(each.solution) for each in answers)
+    return Promise("by default, every random target is reached", f"{reached} of {count}", reached == count)
+
+
+def continuous_outside(found: Sequence[Robustness]) -> Promise:
+    worst = max(jump_ratio(parts) for each in found for parts in each.jumps.values())
+    text = f"outside, no step of an actuator is more than {SMOOTH:g} times the largest inside"
+    return Promise(text, f"{worst:.2f} times at most", worst <= SMOOTH)
+
+
+def never_nearer_than_the_nearest(found: Sequence[Robustness]) -> Promise:
+    least = min(float(each.ratios.min()) for each in found)
+    text = "no projection is nearer to its target than the nearest feasible pose"
+    return Promise(text, f"ratio {least:.6f} at least", least >= NEAREST)
+
+
+def jump_ratio(parts: dict[str, Jump]) -> float:
+    """Largest step outside, and across the edge, over the largest inside."""
+    return max(parts["outside"].size, parts["edge"].size) / parts["inside"].size
+
+
+def feasibilities(findings: Findings) -> Iterator[tuple[str, Feasibility]]:
+    """What was measured of every experiment, with its name."""
+    for inside in findings.efficacy:
+        for name, run in inside.runs.items():
+            yield f"{inside.case.label}, circle inside, {name} options", run.feasibility
+    for random in findings.efficiency:
+        for (name, start), answered in random.answers.items():
+            yield f"{random.case.label}, random targets, {name} options, {start}", answered.feasibility
+    for leaving in findings.robustness:
+        yield f"{leaving.case.label}, circle that leaves", leaving.feasibility
+
+
+def efficacy_table(found: Sequence[Efficacy]) -> str:
+    header = ("RMSE", "paper", "ours, paper's E", "ours, default")
+    rows = []
+    for each in found:
+        unit, printed = each.case.mechanism.length_unit, each.case.printed
+        ours = [each.runs[name].position_rmse for name in ("paper", "default")]
+        rows.append((f"{each.case.label}, position [{unit}]", number(printed.position_rmse), *map(number, ours)))
+        if not is_point(each.case):
+            ours = [each.runs[name].orientation_rmse for name in ("paper", "default")]
+            rows.append((f"{each.case.label}, orientation [deg]", number(printed.orientation_rmse), *map(number, ours)))
+    return markdown(header, rows)
+
+
+def iterations_table(found: Sequence[Efficiency]) -> str:
+    ways = [(name, start) for name in ("paper", "default") for start in ("cold", "warm")]
+    titles = [f"{'paper' + chr(39) + 's E' if name == 'paper' else name}, {start}" for name, start in ways]
+    rows = [
+        (each.case.label, number(each.case.printed.iterations), *[passes(each, *way) for way in ways]) for each in found
+    ]
+    return markdown(("passes (share reached)", "paper", *titles), rows)
+
+
+def passes(found: Efficiency, name: str, start: str) -> str:
+    answered = found.answers[name, start]
+    return f"{answered.iterations:.1f} ({100 * answered.reached / len(answered.solution):.4g} %)"
+
+
+def times_table(found: Sequence[Efficiency]) -> str:
+    ways = [("cold", "single"), ("warm", "single"), ("cold", "batch")]
+    rows = []
+    for each in found:
+        label, printed = each.case.label, each.case.printed
+        for method, name, paper in (
+            ("P-FABRIK", "default", 1e3 * printed.time),
+            ("P-FABRIK", "paper", None),
+            ("geometric", "", 1e3 * printed.geometric_time),
+        ):
+            times = [each.times.get((method, name, *way)) for way in ways]
+            shown = [number(None if seconds is None else 1e6 * seconds) for seconds in times]
+            options = {"default": ", default", "paper": ", paper's E", "": ""}[name]
+            rows.append((f"{label}, {method}{options}", number(paper), *shown))
+        ratios = [number(each.ratio("default", *way), 2) for way in ways]
+        rows.append((f"**{label}, P-FABRIK ÷ geometric**", number(printed.ratio, 2), *ratios))
+    return markdown(("time [µs]", "paper (MATLAB)", "single, cold", "single, warm", "batch, cold"), rows)
+
+
+def robustness_table(found: Sequence[Robustness]) -> str:
+    rows = []
+    for each in found:
+        unit, solution, off = each.case.mechanism.length_unit, each.solution, each.projected
+        rows.append(
+            (
+                each.case.label,
+                f"{100 * off.mean():.0f} %",
+                f"{solution.position_error.max():.3g} {unit}",
+                f"{np.median(each.ratios):.4f}",
+                f"{each.ratios.max():.4f}",
+                f"{len(each.compared)}",
+                f"{solution.iterations[~off].mean():.1f} / {solution.iterations[off].mean():.1f}",
+                f"{1e6 * each.seconds[~off].mean():.0f} / {1e6 * each.seconds[off].mean():.0f}",
+            )
+        )
+    header = (
+        "",
+        "steps projected",
+        "farthest from target",
+        "÷ nearest feasible, median",
+        "worst",
+        "steps compared",
+        "passes, inside / outside",
+        "µs a call, inside / outside",
+    )
+    return markdown(header, rows)
+
+
+def jumps_table(found: Sequence[Robustness]) -> str:
+    rows = []
+    for each in found:
+        for kind, parts in each.jumps.items():
+            unit = each.case.mechanism.length_unit if kind == "lengths" else "deg"
+            cells = [jump_cell(parts[part], kind) for part in ("inside", "outside", "edge")]
+            rows.append((f"{each.case.label}, {kind} [{unit}]", *cells, f"{jump_ratio(parts):.2f}"))
+    return markdown(("largest step (halved)", "inside", "outside", "across the edge", "÷ inside"), rows)
+
+
+def jump_cell(jump: Jump, kind: str) -> str:
+    scale = 1.0 if kind == "lengths" else np.degrees(1.0)
+    return f"{scale * jump.size:.3g} ({scale * jump.halved:.3g})"
+
+
+def feasibility_table(findings: Findings) -> str:
+    rows = [
+        (name, tiny(each.limit_excess), tiny(each.closure), tiny(each.independent), str(each.failed))
+        for name, each in feasibilities(findings)
+    ]
+    return markdown(("", "limit excess", "closure", "independent", "failed"), rows)
+
+
+def summary(findings: Findings) -> str:
+    """The table of the README: the paper's numbers next to ours, for each machine."""
+    groups = zip(findings.efficacy, findings.efficiency, findings.robustness, strict=True)
+    columns = [{**accuracy(inside), **cost(random), **out_of_reach(leaving)} for inside, random, leaving in groups]
+    header = ["", *[f"{each.case.label}, {who}" for each in findings.efficacy for who in ("paper", "ours")]]
+    rows = [[name, *[cell for column in columns for cell in column[name]]] for name in columns[0]]
+    extent = findings.extent
+    measured = f"{extent.targets} random targets and {extent.steps} steps a circle; {machine()}."
+    return f"{markdown(header, rows)}\n\n{measured}"
+
+
+def accuracy(found: Efficacy) -> Cells:
+    printed, point = found.case.printed, is_point(found.case)
+    ours = {
+        name: (number(run.position_rmse, 2), "–" if point else number(run.orientation_rmse, 2))
+        for name, run in found.runs.items()
+    }
+    return {
+        "position RMSE, paper's E [mm]": (number(printed.position_rmse, 2), ours["paper"][0]),
+        "position RMSE, default [mm]": ("–", ours["default"][0]),
+        "orientation RMSE, paper's E [deg]": (number(printed.orientation_rmse, 2), ours["paper"][1]),
+        "orientation RMSE, default [deg]": ("–", ours["default"][1]),
+    }
+
+
+def cost(found: Efficiency) -> Cells:
+    printed = found.case.printed
+
+    def both(name: str) -> str:
+        return " / ".join(f"{found.answers[name, start].iterations:.1f}" for start in ("cold", "warm"))
+
+    def reached(name: str) -> str:
+        answered = found.answers[name, "cold"]
+        return f"{100 * answered.reached / len(answered.solution):.4g} %"
+
+    ratios = [number(found.ratio("default", start, "single"), 2) for start in ("cold", "warm")]
+    times = [number(1e6 * found.times["P-FABRIK", "default", start, "single"], 2) for start in ("cold", "warm")]
+    return {
+        "random targets reached, paper's E": ("–", reached("paper")),
+        "random targets reached, default": ("–", reached("default")),
+        "passes, paper's E, cold / warm start": (number(printed.iterations), both("paper")),
+        "passes, default, cold / warm start": ("–", both("default")),
+        "time of a single answer, cold / warm start [µs]": (number(1e3 * printed.time), " / ".join(times)),
+        "the same ÷ geometric approach": (number(printed.ratio, 2), " / ".join(ratios)),
+        "batch: time ÷ geometric approach": ("–", number(found.ratio("default", "cold", "batch"), 2)),
+    }
+
+
+def out_of_reach(found: Robustness) -> Cells:
+    ratios = f"{np.median(found.ratios):.3f} / {found.ratios.max():.3f}"
+    return {
+        "out of reach: distance ÷ nearest feasible, median / worst": ("–", ratios),
+        "out of reach: largest limit excess": ("–", tiny(found.feasibility.limit_excess)),
+        "out of reach: largest loop gap ÷ L": ("–", tiny(found.feasibility.closure)),
+        "out of reach: largest actuator step ÷ largest inside": (
+            "–",
+            f"{max(jump_ratio(parts) for parts in found.jumps.values()):.2f}",
+        ),
+    }
+
+
+def put_into(path: Path, text: str) -> None:
+    """Replace what stands between the two marks of a file, and nothing else.
+
+    Raises
+    ------
+    InvalidArgument : the file does not have both marks, once each and in order.
+    """
+    before, begin, rest = path.read_text(encoding="utf-8").partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end) or BEGIN in rest or END in after:
+        raise InvalidArgument("readme", f"{path} without them", f"one line '{BEGIN}', then one line '{END}'")
+    path.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", encoding="utf-8")

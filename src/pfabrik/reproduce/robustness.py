@@ -1,0 +1,215 @@
+"""The third experiment: circles that leave the workspace, and what a figure of them cannot show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import geometric
+from ..ik import solve_ik
+from ..mechanism import Mechanism
+from ..report import short_names
+from ..solution import Solution, Status
+from ..track import track
+from .checking import Feasibility, feasibility
+from .closest import Comparison, compare
+from .study import Case, Circle, Extent, Tick
+from .timing import clock, one_core
+
+Floats = NDArray[np.float64]
+
+MARGIN = 0.6
+"""How far the drawn part of the workspace goes beyond the circle, in radii."""
+
+
+@dataclass(frozen=True)
+class Jump:
+    """The largest change of any actuator from one step to the next, in a part of the path.
+
+    Attributes
+    ----------
+    size : [length or rad].
+    step : the step it leads to; -1 where the part is empty.
+    halved : the largest change in that part where the path has twice as many steps. A motion that is continuous
+        halves; what stays as large is a jump.
+    """
+
+    size: float
+    step: int
+    halved: float
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Which positions of a plane x = constant can be reached at home orientation: (n, n), rows along z."""
+
+    y: Floats
+    z: Floats
+    reached: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """The experiment on one machine.
+
+    Attributes
+    ----------
+    solution : what `track` answered.
+    feasibility : of its steps.
+    jumps : by kind of actuator ("lengths", "angles"), then by part of the path: "inside", "outside", "edge" (between
+        a step that is reached and one that is not).
+    compared : projected steps next to the nearest feasible pose.
+    seconds : median time of each step, answered alone from the answer before it (n,).
+    """
+
+    case: Case
+    targets: Floats
+    solution: Solution
+    feasibility: Feasibility
+    jumps: dict[str, dict[str, Jump]]
+    compared: list[Comparison]
+    workspace: Workspace
+    seconds: Floats
+
+    @property
+    def projected(self) -> NDArray[np.bool_]:
+        return np.asarray(self.solution.status == Status.PROJECTED)
+
+    @property
+    def ratios(self) -> Floats:
+        """Distance to the target over that of the nearest feasible pose."""
+        return np.array([pair.distance / pair.nearest for pair in self.compared])
+
+
+def run(case: Case, extent: Extent, tick: Tick) -> Robustness:
+    """Follow the circle that leaves the workspace."""
+    mechanism = case.mechanism
+    targets = case.leaving.poses(extent.steps)
+    solution = track(mechanism, targets)
+    finer = track(mechanism, case.leaving.poses(2 * extent.steps - 1))
+    compared = compare(targets, solution, extent.searches, tick)
+    return Robustness(
+        case=case,
+        targets=targets,
+        solution=solution,
+        feasibility=feasibility(solution),
+        jumps=jumps(solution, finer),
+        compared=compared,
+        workspace=workspace(mechanism, case.leaving, extent.grid),
+        seconds=step_times(mechanism, targets, solution, extent.repeats),
+    )
+
+
+def jumps(solution: Solution, finer: Solution) -> dict[str, dict[str, Jump]]:
+    """The largest changes of the actuators of either kind, in each part of the path."""
+    mechanism = solution.mechanism
+    is_length = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuators])
+    kinds = {"lengths": is_length, "angles": ~is_length}
+    return {
+        kind: {part: _jump(solution, finer, chosen, part) for part in ("inside", "outside", "edge")}
+        for kind, chosen in kinds.items()
+        if chosen.any()
+    }
+
+
+def _jump(solution: Solution, finer: Solution, chosen: NDArray[np.bool_], part: str) -> Jump:
+    changes = _changes(solution, chosen, part)
+    step = int(changes.argmax()) + 1 if changes.max() > 0.0 else -1
+    return Jump(float(changes.max()), step, float(_changes(finer, chosen, part).max()))
+
+
+def _changes(solution: Solution, chosen: NDArray[np.bool_], part: str) -> Floats:
+    """Largest change of the chosen actuators into each step but the first; 0 outside the part."""
+    off = np.asarray(solution.status) != Status.REACHED
+    parts = {"inside": ~off[1:] & ~off[:-1], "outside": off[1:] & off[:-1], "edge": off[1:] != off[:-1]}
+    changes = np.abs(np.diff(solution.actuators[:, chosen], axis=0)).max(axis=1)
+    return np.asarray(np.where(parts[part], changes, 0.0))
+
+
+def workspace(mechanism: Mechanism, circle: Circle, grid: int) -> Workspace:
+    """What the closed form or the library reaches on a grid around the circle, in its plane.
+
+    The closed form of a redundant machine is a rule that can miss; an answer that is reached is feasible either way.
+    """
+    x, *center = circle.center
+    half = circle.radius * (1.0 + MARGIN)
+    y, z = (np.linspace(middle - half, middle + half, grid) for middle in center)
+    points = np.stack([np.full((grid, grid), x), *np.meshgrid(y, z)], axis=-1).reshape(-1, 3)
+    reached = np.array(geometric.solve_ik(mechanism, points).reached)
+    missed = np.flatnonzero(~reached)
+    reached[missed] = solve_ik(mechanism, points[missed]).status == Status.REACHED
+    return Workspace(y, z, reached.reshape(grid, grid))
+
+
+def step_times(mechanism: Mechanism, targets: Floats, solution: Solution, repeats: int) -> Floats:
+    """Median time of each step [s], on one core."""
+    taken = np.zeros((repeats, len(targets)))
+    seeds = [None, *solution[:-1]]
+    with one_core():
+        for row in taken:
+            for i, seed in enumerate(seeds):
+                start = clock()
+                track(mechanism, targets[i : i + 1], seed=seed)
+                row[i] = clock() - start
+    return np.asarray(np.median(taken, axis=0))
+
+
+def summary(found: Robustness) -> dict[str, Any]:
+    """One row."""
+    mechanism = found.case.mechanism
+    return {
+        "mechanism": found.case.key,
+        "steps": len(found.targets),
+        "projected": int(found.projected.sum()),
+        **found.feasibility._asdict(),
+        "largest_distance": float(found.solution.position_error.max()),
+        "orientation_given_up": int((found.solution.rotation_error > 1e-9).sum()),
+        "compared": len(found.compared),
+        "ratio_median": float(np.median(found.ratios)),
+        "ratio_worst": float(found.ratios.max()),
+        "ratio_least": float(found.ratios.min()),
+        "iterations_inside": float(np.mean(found.solution.iterations[~found.projected])),
+        "iterations_outside": float(np.mean(found.solution.iterations[found.projected])),
+        "length": mechanism.characteristic_length,
+    }
+
+
+def jump_rows(found: Robustness) -> list[dict[str, Any]]:
+    """One row for each kind of actuator and part of the path."""
+    return [
+        {"mechanism": found.case.key, "actuators": kind, "part": part, **vars(jump)}
+        for kind, parts in found.jumps.items()
+        for part, jump in parts.items()
+    ]
+
+
+def steps(found: Robustness) -> list[dict[str, Any]]:
+    """One row for each step."""
+    solution = found.solution
+    nearest = {pair.step: pair.nearest for pair in found.compared}
+    return [
+        {
+            "step": i,
+            **{f"target_{name}": found.targets[i, k, 3] for k, name in enumerate("xyz")},
+            **{name: solution.pose[i, k, 3] for k, name in enumerate("xyz")},
+            "status": Status(int(solution.status[i])).name,
+            "position_error": solution.position_error[i],
+            "rotation_error": solution.rotation_error[i],
+            "nearest_feasible": nearest.get(i, ""),
+            "iterations": solution.iterations[i],
+            "rounds": solution.rounds[i],
+            "residual": solution.residual[i],
+            "limit_excess": solution.limit_excess[i],
+            **dict(zip(solution.mechanism.actuators, solution.actuators[i], strict=True)),
+            "active_limits": short_names(solution.active_limits[i]),
+        }
+        for i in range(len(found.targets))
+    ]
+
+
+def step_time_rows(found: Robustness) -> list[dict[str, Any]]:
+    """One row for each step: how long it took."""
+    return [{"step": i, "microseconds": 1e6 * seconds} for i, seconds in enumerate(found.seconds)]

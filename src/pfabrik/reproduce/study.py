@@ -1,0 +1,128 @@
+"""What is run: for each machine its paths, how its random targets are drawn, and what the paper printed."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..files import load
+from ..mechanism import Mechanism
+from ..poses import pose
+
+Floats = NDArray[np.float64]
+Tick = Callable[[], None]
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circle in the y-z plane through its centre, traced once from its lowest point.
+
+    Attributes
+    ----------
+    center : (x, y, z) [length unit of the mechanism].
+    radius : in the same unit.
+    swing : how far roll, pitch and yaw swing on the way [deg]: as the sine and the cosine of the angle on the circle,
+        and the sine of twice that angle.
+    """
+
+    center: tuple[float, float, float]
+    radius: float
+    swing: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def poses(self, count: int) -> Floats:
+        """`count` poses (count, 4, 4), evenly spaced; the last one is the first one again."""
+        turn = np.linspace(0, 2 * np.pi, count)
+        around = np.stack([np.zeros(count), np.sin(turn), -np.cos(turn)], axis=-1)
+        points = np.asarray(self.center) + self.radius * around
+        angles = np.radians(self.swing) * np.stack([np.sin(turn), np.cos(turn), np.sin(2 * turn)], axis=-1)
+        return np.stack([pose(xyz, rpy=rpy) for xyz, rpy in zip(points, angles, strict=True)])
+
+
+@dataclass(frozen=True)
+class Printed:
+    """What the paper's tables say: RMSE [mm], [deg]; average passes; average times [ms]."""
+
+    position_rmse: float
+    iterations: float
+    time: float
+    geometric_time: float
+    orientation_rmse: float | None = None
+
+    @property
+    def ratio(self) -> float:
+        """Time of P-FABRIK over that of the geometric approach."""
+        return self.time / self.geometric_time
+
+
+@dataclass(frozen=True)
+class Case:
+    """One machine in the study."""
+
+    key: str
+    label: str
+    shown: tuple[str, ...]
+    inside: Circle
+    leaving: Circle
+    size: float
+    turn: float
+    printed: Printed
+
+    @property
+    def mechanism(self) -> Mechanism:
+        return _loaded(self.key)
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much is run."""
+
+    steps: int
+    """Targets on each circle."""
+    targets: int
+    """Random targets of each machine."""
+    repeats: int
+    """How often a time is taken; the median counts."""
+    searches: int
+    """Projected steps of each machine whose nearest feasible pose is searched; evenly spread."""
+    grid: int
+    """Points on an edge of the grid on which the workspace is drawn."""
+
+
+FULL = Extent(steps=361, targets=1000, repeats=31, searches=1000, grid=241)
+QUICK = Extent(steps=73, targets=100, repeats=5, searches=8, grid=121)
+
+
+@lru_cache(maxsize=1)
+def cases() -> tuple[Case, ...]:
+    """All machines of the study, in the paper's order."""
+    text = (files(__package__) / "paper.toml").read_text(encoding="utf-8")
+    return tuple(_case(key, entry) for key, entry in tomllib.loads(text).items())
+
+
+def _case(key: str, entry: dict[str, Any]) -> Case:
+    return Case(
+        key=key,
+        label=entry["label"],
+        shown=tuple(entry["shown"]),
+        inside=_circle(entry["inside"]),
+        leaving=_circle(entry["leaving"]),
+        size=float(entry["random"]["size"]),
+        turn=float(np.radians(entry["random"]["turn"])),
+        printed=Printed(**entry["printed"]),
+    )
+
+
+def _circle(entry: dict[str, Any]) -> Circle:
+    return Circle(tuple(entry["center"]), float(entry["radius"]), tuple(entry.get("swing", (0.0, 0.0, 0.0))))
+
+
+@lru_cache(maxsize=8)
+def _loaded(key: str) -> Mechanism:
+    return load(key)

@@ -1,0 +1,774 @@
+"""Closed forms: against other closed forms in NumPy, the library's own engines, published tables and brute force."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import importlib.util
+import os
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+import oracles
+import pfabrik as pf
+from fk_machines import PUBLISHED, published_gough
+from machines import MACHINES, hexapod_ups
+from pfabrik import Cone, Joint, Mechanism
+from pfabrik.errors import InvalidArgument, NoClosedForm
+from pfabrik.geometric import Geometric, arms, facts, targets
+from pfabrik.geometric.topologies import TOPOLOGIES, closed_form
+from pfabrik.kernels import _jit
+from pfabrik.tolerances import TOLERANCES
+
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+
+EXAMPLES: dict[str, Callable[[], Mechanism]] = {
+    "R*-R-R": lambda: pf.load("five_bar"),
+    "U-P*-S": lambda: pf.load("stewart"),
+    "R*-P*-[U-P*-S, U-P*-S]": lambda: pf.load("nrpm"),
+}
+"""A machine of every topology with a closed form."""
+NAMES = ("five_bar", "stewart", "nrpm")
+ON_THE_EDGE = 1e-8
+"""Margins that the oracle does not tell from 0."""
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+def some_targets(mechanism: Mechanism, n: int = 2000, seed: int = 11) -> oracles.Array:
+    return oracles.random_targets(mechanism, np.random.default_rng(seed), n // 20 if INTERPRETED else n)
+
+
+def relimited(mechanism: Mechanism, **limits: Any) -> Mechanism:
+    return mechanism.with_limits(limits)
+
+
+def redescribed(mechanism: Mechanism, **changes: dict[str, Any]) -> Mechanism:
+    """The mechanism with some fields of some joints replaced."""
+    joints = [dataclasses.replace(joint, **changes.get(joint.name, {})) for joint in mechanism.joints]
+    return dataclasses.replace(mechanism, joints=tuple(joints))
+
+
+# --- the registry ----------------------------------------------------------------------------------------------------
+
+
+def test_every_topology_of_the_registry_has_an_example_and_is_documented() -> None:
+    assert [topology.chain for topology in TOPOLOGIES] == list(EXAMPLES)
+    page = (DOCS / "geometric.md").read_text(encoding="utf-8")
+    for topology in TOPOLOGIES:
+        assert f"`{topology.chain}`" in page
+
+
+@pytest.mark.parametrize("topology", TOPOLOGIES, ids=str)
+def test_a_topology_is_told_from_its_sub_chains(topology: Any) -> None:
+    mechanism = EXAMPLES[topology.chain]()
+    assert {str(chain) for chain in pf.decompose(mechanism)} == {topology.chain}
+    assert closed_form(mechanism).kernel is topology.kernel
+    renamed = dataclasses.replace(mechanism, name="anything")
+    assert closed_form(renamed).kernel is topology.kernel
+
+
+def test_every_solving_kernel_is_in_the_registry() -> None:
+    folder = Path(pf.geometric.__file__).parent
+    modules = [importlib.import_module(f"pfabrik.geometric.{path.stem}") for path in folder.glob("[!_]*.py")]
+    solving = {name for module in modules for name in vars(module) if name.startswith("solve_")} - {"solve_ik"}
+    solved = {"solve_arm"}  # a part of `solve_arms`
+    assert solving - solved == {topology.kernel.__name__ for topology in TOPOLOGIES}
+
+
+@pytest.mark.parametrize("topology", TOPOLOGIES, ids=str)
+def test_every_kernel_says_how_many_solutions_which_branch_and_where_from(topology: Any) -> None:
+    said = getattr(topology.kernel, "py_func", topology.kernel).__doc__
+    references = (DOCS / "references.md").read_text(encoding="utf-8")
+    key = said.split("Source: ")[1].split()[0].rstrip(".")
+    assert "solution" in said
+    assert f"**{key}**" in references
+
+
+# --- agreement -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["five_bar", "stewart"])
+def test_reached_exactly_where_the_oracle_says(name: str) -> None:
+    mechanism = pf.load(name)
+    wanted = some_targets(mechanism, 4000)
+    answer = pf.geometric.solve_ik(mechanism, wanted)
+    margin = oracles.margin(mechanism, wanted)
+    clear = abs(margin) > ON_THE_EDGE
+    np.testing.assert_array_equal(answer.reached[clear], margin[clear] > 0)
+    assert 0.2 < answer.reached.mean() < 0.8
+    expected = oracles.actuators(mechanism, wanted)[answer.reached]
+    np.testing.assert_allclose(answer.actuators[answer.reached], expected, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("mechanism", [pf.load("five_bar"), pf.load("stewart"), hexapod_ups()], ids=lambda m: m.name)
+def test_the_solver_reaches_exactly_what_the_closed_form_reaches(mechanism: Mechanism) -> None:
+    wanted = some_targets(mechanism)
+    answer, solution = pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
+    np.testing.assert_array_equal(answer.reached, solution.status == pf.Status.REACHED)
+    assert 0 < answer.reached.sum() < len(wanted)
+    np.testing.assert_allclose(answer.actuators[answer.reached], solution.actuators[answer.reached], rtol=0, atol=1e-9)
+
+
+def test_the_solver_reaches_every_redundant_target_that_the_closed_form_reaches() -> None:
+    mechanism = pf.load("nrpm")
+    wanted = some_targets(mechanism)
+    answer, solution = pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
+    assert (solution.status[answer.reached] == pf.Status.REACHED).all()
+
+
+def test_a_grid_of_candidates_finds_nearly_every_reachable_target_and_no_other() -> None:
+    mechanism = pf.load("nrpm")
+    wanted = some_targets(mechanism)
+    reached = pf.geometric.solve_ik(mechanism, wanted).reached
+    margin = oracles.margin(mechanism, wanted)
+    assert not reached[margin < -ON_THE_EDGE].any()
+    assert reached[margin > 0].mean() > 0.97
+    assert margin[~reached].max() < 0.1
+
+
+def arm_slacks(mechanism: Mechanism, wanted: oracles.Array, values: oracles.Array) -> oracles.Array:
+    """Smallest slack of every arm at the swings and extensions among actuator values (n, n_a), shape (n, arms)."""
+    column = mechanism.actuators.index
+    slacks = []
+    for arm in oracles._arms(mechanism):
+        swing, extension = values[:, column(arm.hinge.name)], values[:, column(arm.slide.name)]
+        slacks.append(arm.lines(wanted, swing).slack(extension))
+    return np.stack(slacks, axis=1)
+
+
+def test_redundant_answers_close_and_keep_every_limit() -> None:
+    mechanism = pf.load("nrpm")
+    wanted = some_targets(mechanism)
+    answer = pf.geometric.solve_ik(mechanism, wanted)
+    wanted, values = wanted[answer.reached], answer.actuators[answer.reached]
+    assert (arm_slacks(mechanism, wanted, values) > -ON_THE_EDGE).all()
+    column = mechanism.actuators.index
+    for arm in oracles._arms(mechanism):
+        table = arm.lines(wanted, values[:, column(arm.hinge.name)]).table
+        extension = values[:, column(arm.slide.name)]
+        for j, strut in enumerate(arm.struts):
+            length = np.hypot(np.sqrt(table[:, j, 1]), table[:, j, 0] - extension)
+            np.testing.assert_allclose(values[:, column(strut.slide.name)], length, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("case", ["gsp_conroy", "gsp_linuxcnc_home"])
+def test_published_lengths_are_met(case: str) -> None:
+    published = PUBLISHED[case]
+    rows = published.get("rows_p_rpy_L") or [[published["p"], [0, 0, 0], published["L"]]]
+    mechanism = published_gough(case, rows[0][0])
+    wanted = [pf.pose(p, rpy=rpy) for p, rpy, _ in rows]
+    answer = pf.geometric.solve_ik(mechanism, wanted)
+    tolerance = published.get("tol", 1e-4)
+    np.testing.assert_allclose(answer.actuators, [lengths for *_, lengths in rows], rtol=0, atol=tolerance)
+    assert answer
+
+
+# --- branches --------------------------------------------------------------------------------------------------------
+
+
+def home_mode(mechanism: Mechanism, tips: oracles.Array) -> tuple[oracles.Array, oracles.Array]:
+    """Crank angles and margins of a 5-bar in home's working mode."""
+    legs = oracles._cranks(mechanism)
+    values = np.stack([leg.solve(tips)[0][:, 0, 0] for leg in legs], axis=1)
+    return values, np.min([leg.margins(tips)[:, 0] for leg in legs], axis=0)
+
+
+def test_no_other_working_mode_than_home_is_tried() -> None:
+    """Elbows that may bend to both sides: the oracle has other modes, the answer has home's."""
+    limits = {"p1": (-3.0, 3.0), "p5": (-3.0, 3.0), "p2": (-1.7, 2.5), "p4": (-2.5, 1.7)}
+    mechanism = relimited(pf.load("five_bar"), **limits)
+    wanted = some_targets(mechanism)
+    answer = pf.geometric.solve_ik(mechanism, wanted)
+    values, margin = home_mode(mechanism, wanted[:, :3, 3])
+    clear = abs(margin) > ON_THE_EDGE
+    np.testing.assert_array_equal(answer.reached[clear], margin[clear] > 0)
+    np.testing.assert_allclose(answer.actuators[answer.reached], values[answer.reached], rtol=0, atol=1e-9)
+    assert (oracles.margin(mechanism, wanted)[~answer.reached] > 0).any()
+
+
+@pytest.mark.parametrize("elbow", [(-3.4, -1.2), (-5.0, -1.0), (-6.0, 0.2), (-1.6, 4.2), (-7.0, 1.0), None])
+@pytest.mark.parametrize("crank", [(-0.5, 4.5), (-6.5, 0.4), (-8.0, 8.0), None])
+def test_ranges_wider_than_half_a_turn_allow_what_the_oracle_says(elbow: Any, crank: Any) -> None:
+    """An elbow may have two intervals of bends; a crank counts where its range has it."""
+    mechanism = relimited(pf.load("five_bar"), p1=crank, p5=None, p2=elbow, p4=None)
+    wanted = some_targets(mechanism, 500)
+    answer = pf.geometric.solve_ik(mechanism, wanted)
+    kept = np.ones(len(wanted), bool)
+    for leg in oracles._cranks(mechanism):
+        values, reach = leg.solve(wanted[:, :3, 3])
+        kept &= reach >= 0
+        for k, joint in enumerate((leg.shoulder, leg.elbow)):
+            turns = values[:, :1, k] + 2 * np.pi * np.arange(-3, 4)
+            low, high = joint.range or (-np.inf, np.inf)
+            kept &= ((turns >= low) & (turns <= high)).any(axis=1)
+    np.testing.assert_array_equal(answer.reached, kept)
+    assert kept.any()
+    inside = answer.actuators[kept][:, 0]
+    assert crank is None or ((inside >= crank[0]) & (inside <= crank[1])).all()
+    solution = pf.solve_ik(mechanism, wanted, options=pf.Options(working_mode="keep"))
+    np.testing.assert_allclose(answer.actuators[kept], solution.actuators[kept], rtol=0, atol=1e-9)
+
+
+def five_bar(crank: float = 100.0, forearm: float = 100.0, stretched: bool = False) -> Mechanism:
+    """A 5-bar without limits, its shoulders 60 apart; its first leg bent by a right angle at home, or stretched."""
+    tip = np.array([crank, forearm, 0.0]) if not stretched else np.array([0.6, 0.8, 0.0]) * (crank + forearm)
+    elbow = np.array([crank, 0.0, 0.0]) if not stretched else np.array([0.6, 0.8, 0.0]) * crank
+    z = (0, 0, 1)
+    joints = [
+        Joint("A1", "revolute", ("base", "crank1"), at=(0, 0, 0), axis=z, actuated=True),
+        Joint("B1", "revolute", ("crank1", "rod1"), at=elbow, axis=z),
+        Joint("T", "revolute", ("rod1", "rod2"), at=tip, axis=z),
+        Joint("B2", "revolute", ("rod2", "crank2"), at=tip + [120.0, -90.0, 0.0], axis=z),
+        Joint("A2", "revolute", ("crank2", "base"), at=(60.0, 0, 5.0), axis=z, actuated=True),
+    ]
+    return Mechanism("unlimited 5-bar", joints, "T")
+
+
+def test_a_leg_reaches_out_to_its_stretch_and_not_beyond() -> None:
+    mechanism = five_bar(110.0, 70.0)
+    slack = TOLERANCES.limit * mechanism.characteristic_length
+    direction = np.array([0.6, 0.8, 0.0])
+    for distance, reached in ((180 - 1e-3, True), (180 + 0.5 * slack, True), (180 + 2 * slack, False)):
+        assert pf.geometric.solve_ik(mechanism, distance * direction).reached is reached
+    for distance, reached in ((40 + 1e-3, True), (40 - 0.5 * slack, True), (40 - 2 * slack, False)):
+        assert pf.geometric.solve_ik(mechanism, distance * direction).reached is reached
+    answer = pf.geometric.solve_ik(mechanism, 180 * direction)
+    assert answer.actuators[0] == pytest.approx(np.arctan2(0.8, 0.6), abs=1e-6)
+
+
+def test_a_tip_off_its_plane_is_not_reached() -> None:
+    mechanism = five_bar()
+    slack = TOLERANCES.limit * mechanism.characteristic_length
+    assert pf.geometric.solve_ik(mechanism, [90, 80, 0.5 * slack])
+    assert not pf.geometric.solve_ik(mechanism, [90, 80, -2 * slack])
+
+
+def test_a_tip_on_its_shoulder_leaves_the_crank_where_home_has_it() -> None:
+    answer = pf.geometric.solve_ik(five_bar(), [0.0, 0, 0])
+    assert answer
+    assert answer.actuators[0] == 0.0
+
+
+def test_a_leg_that_is_stretched_at_home_bends_to_the_left() -> None:
+    mechanism = five_bar(stretched=True)
+    answer = pf.geometric.solve_ik(mechanism, 0.9 * np.array(mechanism.reference_point))
+    assert answer
+    assert answer.actuators[0] == pytest.approx(np.arccos(0.9))
+
+
+# --- redundant coordinates -------------------------------------------------------------------------------------------
+
+
+def grid_of(mechanism: Mechanism) -> oracles.Array:
+    """All candidates of an arm, (c, 2); the arms are alike."""
+    arm = oracles._arms(mechanism)[0]
+    sides = [np.linspace(*joint.range, arms.CANDIDATES_A_SIDE) for joint in (arm.hinge, arm.slide)]
+    return np.stack(np.meshgrid(*sides, indexing="ij")).reshape(2, -1).T
+
+
+@pytest.mark.parametrize("seeded", [False, True])
+def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(seeded: bool) -> None:
+    mechanism = pf.load("nrpm")
+    wanted = some_targets(mechanism, 200, seed=2)
+    column = mechanism.actuators.index
+    seeds = np.tile([mechanism.home_coordinate(name) for name in mechanism.actuators], (len(wanted), 1))
+    if seeded:
+        rng = np.random.default_rng(4)
+        for arm in oracles._arms(mechanism):
+            for joint in (arm.hinge, arm.slide):
+                seeds[:, column(joint.name)] = rng.uniform(*joint.range, len(wanted))
+    answer = pf.geometric.solve_ik(mechanism, wanted, seed=SimpleNamespace(actuators=seeds) if seeded else None)
+    grid = grid_of(mechanism)
+    found = np.ones(len(wanted), bool)
+    stayed = 0
+    for arm in oracles._arms(mechanism):
+        columns = [column(arm.hinge.name), column(arm.slide.name)]
+        size = np.ptp([arm.hinge.range, arm.slide.range], axis=1)
+        keeps = arm.lines(wanted, seeds[:, columns[0]]).slack(seeds[:, columns[1]]) >= 0
+        stayed += keeps.sum()
+        for row, target in enumerate(wanted):
+            options = seeds[row : row + 1, columns]
+            if not keeps[row]:
+                feasible = arm.lines(np.tile(target, (len(grid), 1, 1)), grid[:, 0]).slack(grid[:, 1]) >= -1e-9
+                options = grid[feasible]
+            found[row] &= len(options) > 0
+            if answer.reached[row]:
+                distance = (((options - seeds[row, columns]) / size) ** 2).sum(axis=1)
+                taken = options[np.isclose(distance, distance.min(), rtol=1e-9)]
+                assert np.isclose(taken, answer.actuators[row, columns], rtol=0, atol=1e-12).all(axis=1).any()
+    np.testing.assert_array_equal(answer.reached, found)
+    assert 0 < stayed < 3 * len(wanted)
+    assert 0 < found.sum() < len(wanted)
+
+
+def test_an_answer_as_seed_keeps_its_redundant_coordinates() -> None:
+    mechanism = pf.load("nrpm")
+    wanted = some_targets(mechanism, 400)
+    first = pf.geometric.solve_ik(mechanism, wanted)
+    wanted = wanted[first.reached]
+    first = pf.geometric.solve_ik(mechanism, wanted)
+    for again in (
+        pf.geometric.solve_ik(mechanism, wanted, seed=first),
+        pf.geometric.solve_ik(mechanism, wanted, seed=SimpleNamespace(actuators=first.actuators.tolist())),
+    ):
+        np.testing.assert_allclose(again.actuators, first.actuators, rtol=0, atol=1e-9)
+    solution = pf.solve_ik(mechanism, wanted)
+    from_solution = pf.geometric.solve_ik(mechanism, wanted, seed=solution)
+    np.testing.assert_allclose(from_solution.actuators, solution.actuators, rtol=0, atol=1e-6)
+
+
+def test_a_single_seed_serves_every_row_as_it_serves_one() -> None:
+    mechanism = pf.load("nrpm")
+    wanted = some_targets(mechanism, 400)
+    near = pf.geometric.solve_ik(mechanism, pf.pose([30, 20, 215]))
+    batch = pf.geometric.solve_ik(mechanism, wanted, seed=near)
+    rows = SimpleNamespace(actuators=np.tile(near.actuators, (len(wanted), 1)))
+    np.testing.assert_array_equal(batch.actuators, pf.geometric.solve_ik(mechanism, wanted, seed=rows).actuators)
+    for row in range(0, len(wanted), 37):
+        single = pf.geometric.solve_ik(mechanism, wanted[row], seed=near)
+        np.testing.assert_array_equal(single.actuators, batch.actuators[row])
+
+
+def test_a_seed_out_of_range_does_not_stay() -> None:
+    mechanism = pf.load("nrpm")
+    home = pf.geometric.solve_ik(mechanism, mechanism.home_pose).actuators
+    for joint, value, slack in (("A1", np.radians(135), 1e-9), ("B2", 130.0, 1e-9 * mechanism.characteristic_length)):
+        wide = relimited(mechanism, **{name: None for name in mechanism.actuators if name[0] == "D"})
+        wide = wide.with_limits(dict.fromkeys(("CL1", "CR1", "EL1", "ER1", "CL2", "CR2", "EL2", "ER2")))
+        column = mechanism.actuators.index(joint)
+        for beyond, stays in ((0.5 * slack, True), (2 * slack, False)):
+            seed = home.copy()
+            seed[column] = value + beyond
+            answer = pf.geometric.solve_ik(wide, mechanism.home_pose, seed=SimpleNamespace(actuators=seed))
+            assert answer
+            assert (answer.actuators[column] == seed[column]) == stays
+            assert answer.actuators[column] == pytest.approx(value)
+
+
+def test_arms_without_ranges_search_a_turn_and_a_length_to_either_side() -> None:
+    mechanism = relimited(pf.load("nrpm"), **{f"{name}{i}": None for name in "AB" for i in (1, 2, 3)})
+    wanted = some_targets(mechanism, 400)
+    limited = pf.geometric.solve_ik(pf.load("nrpm"), wanted)
+    answer, solution = pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
+    assert answer.reached.sum() > 0.9 * limited.reached.sum()
+    assert (solution.status[answer.reached] == pf.Status.REACHED).all()
+
+
+# --- limits on both sides of their thresholds ------------------------------------------------------------------------
+
+
+def cone_angle(mechanism: Mechanism, joint: str, other: str, target: oracles.Array) -> float:
+    """Angle between the axis of a cone, fixed to base or platform, and its line [rad]."""
+    at = {name: np.array(mechanism.joint(name).at) for name in (joint, other)}
+    for name, point in at.items():
+        if mechanism.end_effector in mechanism.joint(name).connects:
+            at[name] = target[:3, :3] @ (point - mechanism.reference_point) + target[:3, 3]
+    cone = mechanism.joint(joint).cone
+    axis = np.array(cone.axis)
+    if cone.fixed_to == mechanism.end_effector:
+        axis = target[:3, :3] @ axis
+    line = at[other] - at[joint]
+    return float(np.arctan2(np.linalg.norm(np.cross(axis, line)), axis @ line))
+
+
+BESIDE = {
+    "five_bar": pf.pose([0, 20, 190]),
+    "stewart": pf.pose([15, -10, 205], rpy=[0.1, 0.05, -0.2]),
+    "nrpm": pf.pose([6, -4, 204], rpy=[0.03, 0.02, -0.05]),
+}
+"""Targets near home, where every limit can be put on either side."""
+RANGED = [("five_bar", "p1"), ("five_bar", "p2"), ("five_bar", "p4"), ("five_bar", "p5"), ("stewart", "BL1")]
+RANGED += [("stewart", "BR3"), ("nrpm", "DL2"), ("nrpm", "DR1")]
+
+
+@pytest.mark.parametrize("name, joint", RANGED)
+def test_a_range_is_kept_to_its_tolerance_and_no_further(name: str, joint: str) -> None:
+    mechanism, target = pf.load(name), BESIDE[name]
+    value, home = pf.solve_ik(mechanism, target).joints[joint], mechanism.home_coordinate(joint)
+    slides = mechanism.joint(joint).type == "prismatic"
+    slack = TOLERANCES.limit * (mechanism.characteristic_length if slides else 1.0)
+    low, high = mechanism.joint(joint).range
+    for inside, stays in ((0.5 * slack, True), (2 * slack, False)):
+        limits = (low, value - inside) if value > home else (value + inside, high)
+        answer = pf.geometric.solve_ik(relimited(mechanism, **{joint: limits}), target)
+        if name == "nrpm":  # the arm moves, and so the limit is kept
+            assert (answer.actuators[mechanism.actuators.index(joint)] == pytest.approx(value, abs=1e-6)) == stays
+        else:
+            assert answer.reached is stays
+
+
+@pytest.mark.parametrize("joint, other", [("AL1", "CL1"), ("AR2", "CR2"), ("CL3", "AL3"), ("CR1", "AR1")])
+def test_a_cone_is_kept_to_its_tolerance_and_no_further(joint: str, other: str) -> None:
+    stewart = pf.load("stewart").with_limits(dict.fromkeys(pf.load("stewart").actuators))
+    aside = [BESIDE["stewart"] @ pf.pose([0, y, 0], rpy=[0.01 * y, 0, 0]) for y in (-40, 40)]
+    target = max(aside, key=lambda each: cone_angle(stewart, joint, other, each))
+    angle = cone_angle(stewart, joint, other, target)
+    assert angle > cone_angle(stewart, joint, other, stewart.home_pose)
+    cone = stewart.joint(joint).cone
+    wide = {each.name: None for each in stewart.joints if each.cone and each.name != joint}
+    for inside, reached in ((0.5e-9, True), (2e-9, False)):
+        limited = relimited(stewart, **wide, **{joint: dataclasses.replace(cone, half_angle=angle - inside)})
+        assert pf.geometric.solve_ik(limited, target).reached is reached
+
+
+@pytest.mark.parametrize("joint, other", [("CL1", "EL1"), ("CR3", "ER3"), ("EL2", "CL2")])
+def test_a_cone_on_a_crossbar_moves_the_arm_when_it_is_exceeded(joint: str, other: str) -> None:
+    nrpm, target = pf.load("nrpm"), BESIDE["nrpm"]
+    angle = cone_angle(nrpm, joint, other, target)  # at home's arms a crossbar is where it is at home
+    cone = nrpm.joint(joint).cone
+    columns = [nrpm.actuators.index(f"{letter}{joint[-1]}") for letter in "AB"]
+    at_home = [nrpm.home_coordinate(nrpm.actuators[column]) for column in columns]
+    for inside, stays in ((0.5e-9, True), (2e-9, False)):
+        limited = relimited(nrpm, **{joint: dataclasses.replace(cone, half_angle=angle - inside)})
+        answer = pf.geometric.solve_ik(limited, target)
+        assert (answer.actuators[columns] == at_home).all() == stays
+
+
+def test_cones_of_half_a_turn_and_more_limit_nothing() -> None:
+    stewart = pf.load("stewart")
+    wide = {
+        joint.name: dataclasses.replace(joint.cone, half_angle=np.pi) if joint.cone else None
+        for joint in stewart.joints
+    }
+    wanted = some_targets(stewart, 400)
+    for mechanism in (stewart.with_limits(wide), stewart.without_limits()):
+        assert pf.geometric.solve_ik(mechanism, wanted)
+
+
+def test_a_strut_without_length_keeps_every_cone() -> None:
+    stewart = pf.load("stewart").with_limits(dict.fromkeys(pf.load("stewart").actuators))
+    head = np.array(stewart.joint("CL1").at) - stewart.reference_point
+    only = {joint.name: None for joint in stewart.joints if joint.cone and joint.name not in ("AL1", "CL1")}
+    foot = np.array(stewart.joint("AL1").at)
+    answer = pf.geometric.solve_ik(stewart.with_limits(only), foot - head)
+    assert answer
+    assert answer.actuators[stewart.actuators.index("BL1")] == pytest.approx(0.0, abs=1e-12)
+
+
+# --- descriptions that count otherwise -------------------------------------------------------------------------------
+
+
+def test_a_strut_may_be_described_from_its_other_end_and_counted_from_home() -> None:
+    stewart = pf.load("stewart")
+    foot, head = (np.array(stewart.joint(name).at) for name in ("AL1", "CL1"))
+    counted = {"along": None, "axis": head - foot, "home": 10.0, "range": (-40.0, 85.0)}
+    backwards = {"along": None, "axis": foot - head, "home": 3.0, "range": (-72.0, 53.0)}
+    other = redescribed(
+        stewart,
+        AL1={"connects": ("cylinderL1", "base")},
+        BL1={"connects": ("rodL1", "cylinderL1")},
+        CL2={"connects": ("platform", "rodL2")},
+        BL2=counted | {"axis": np.subtract(stewart.joint("CL2").at, stewart.joint("AL2").at)},
+        BR1=backwards | {"axis": np.subtract(stewart.joint("AR1").at, stewart.joint("CR1").at)},
+    )
+    wanted = some_targets(stewart)
+    answer, solution = pf.geometric.solve_ik(other, wanted), pf.solve_ik(other, wanted)
+    plain = pf.geometric.solve_ik(stewart, wanted)
+    np.testing.assert_array_equal(answer.reached, solution.status == pf.Status.REACHED)
+    np.testing.assert_array_equal(answer.reached, plain.reached)
+    np.testing.assert_allclose(answer.actuators[answer.reached], solution.actuators[answer.reached], rtol=0, atol=1e-9)
+
+
+def test_arms_and_cranks_may_be_described_from_their_other_end() -> None:
+    nrpm, bar = pf.load("nrpm"), pf.load("five_bar")
+    turned_arm = redescribed(
+        nrpm,
+        A1={"connects": ("arm1", "base"), "axis": np.negative(nrpm.joint("A1").axis)},
+        B2={"connects": ("crossbar2", "arm2"), "axis": np.negative(nrpm.joint("B2").axis)},
+    )
+    turned_crank = redescribed(
+        bar,
+        p1={"connects": ("link1", "base"), "axis": np.negative(bar.joint("p1").axis)},
+        p4={"connects": ("link3", "link4"), "axis": np.negative(bar.joint("p4").axis)},
+        p5={"connects": ("link4", "base")},
+    )
+    for mechanism, other, signs in ((nrpm, turned_arm, {}), (bar, turned_crank, {"p5": -1.0})):
+        wanted = some_targets(mechanism, 400)
+        plain, answer = pf.geometric.solve_ik(mechanism, wanted), pf.geometric.solve_ik(other, wanted)
+        expected = plain.actuators * [signs.get(name, 1.0) for name in mechanism.actuators]
+        np.testing.assert_array_equal(answer.reached, plain.reached)
+        np.testing.assert_allclose(answer.actuators, expected, rtol=0, atol=1e-9)
+
+
+def test_an_arm_may_count_downwards() -> None:
+    """Candidates that are equally near come in another order: another answer, but none that breaks a limit."""
+    backwards = {"connects": ("arm3", "base"), "home": -np.radians(90), "range": tuple(-np.radians([135, 45]))}
+    nrpm, other = pf.load("nrpm"), redescribed(pf.load("nrpm"), A3=backwards)
+    wanted = some_targets(nrpm, 400)
+    answer = pf.geometric.solve_ik(other, wanted)
+    np.testing.assert_array_equal(answer.reached, pf.geometric.solve_ik(nrpm, wanted).reached)
+    assert (arm_slacks(other, wanted[answer.reached], answer.actuators[answer.reached]) > -ON_THE_EDGE).all()
+
+
+def test_bodies_that_are_fixed_to_the_base_count_as_the_base() -> None:
+    stewart = pf.load("stewart")
+    mount = {"connects": ("mount", "cylinderL1"), "cone": Cone((0, 0, 1), np.radians(50), "mount")}
+    joints = [dataclasses.replace(joint, **mount) if joint.name == "AL1" else joint for joint in stewart.joints]
+    mounted = dataclasses.replace(stewart, joints=(*joints, Joint("bolt", "fixed", ("base", "mount"), at=(90, 0, 0))))
+    wanted = some_targets(stewart, 400)
+    expected = pf.geometric.solve_ik(stewart, wanted)
+    np.testing.assert_array_equal(pf.geometric.solve_ik(mounted, wanted).actuators, expected.actuators)
+
+
+# --- batches and wrong calls -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_batch_is_answered_row_by_row(name: str) -> None:
+    mechanism = pf.load(name)
+    wanted = some_targets(mechanism, 300)[: 2 * (len(some_targets(mechanism, 300)) // 2)]
+    flat = pf.geometric.solve_ik(mechanism, wanted)
+    assert flat.shape == (len(wanted),)
+    assert not flat
+    np.testing.assert_array_equal(np.isnan(flat.actuators), np.tile(~flat.reached, (len(mechanism.actuators), 1)).T)
+    folded = pf.geometric.solve_ik(mechanism, wanted.reshape(2, -1, 4, 4))
+    assert folded.shape == folded.reached.shape == (2, len(wanted) // 2)
+    np.testing.assert_array_equal(folded.actuators.reshape(flat.actuators.shape), flat.actuators)
+    for row in range(0, len(wanted), 29):
+        single = pf.geometric.solve_ik(mechanism, wanted[row])
+        assert single.shape == ()
+        assert single.reached is bool(flat.reached[row]) is bool(single)
+        np.testing.assert_array_equal(single.actuators, flat.actuators[row])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_targets_come_in_every_form_that_the_solver_takes(name: str) -> None:
+    mechanism = pf.load(name)
+    wanted = some_targets(mechanism, 60)
+    expected = pf.geometric.solve_ik(mechanism, wanted)
+    locked = wanted.copy()
+    locked.setflags(write=False)
+    strided = np.asfortranarray(np.repeat(wanted, 2, axis=0))[::2]
+    for form in (wanted.tolist(), locked, strided, RigidTransform.from_matrix(wanted)):
+        answer = pf.geometric.solve_ik(mechanism, form)
+        np.testing.assert_allclose(answer.actuators, expected.actuators, rtol=0, atol=1e-9)
+    level = oracles.poses(wanted[:, :3, 3])
+    np.testing.assert_array_equal(
+        pf.geometric.solve_ik(mechanism, wanted[:, :3, 3]).actuators,
+        pf.geometric.solve_ik(mechanism, level).actuators,
+    )
+    if not INTERPRETED:
+        assert len(closed_form(mechanism).kernel.signatures) == 1
+
+
+def test_an_empty_batch_has_an_empty_answer() -> None:
+    answer = pf.geometric.solve_ik(pf.load("stewart"), np.empty((0, 4, 4)))
+    assert answer.reached.shape == (0,)
+    assert answer.actuators.shape == (0, 6)
+
+
+@pytest.mark.skipif(INTERPRETED, reason="slow")
+def test_blocks_on_several_cores_answer_as_one() -> None:
+    mechanism = pf.load("nrpm")
+    wanted = np.tile(some_targets(mechanism, 1000), (9, 1, 1))
+    answer = pf.geometric.solve_ik(mechanism, wanted)
+    np.testing.assert_array_equal(answer.actuators[:1000], answer.actuators[-1000:])
+    rows = pf.geometric.solve_ik(
+        mechanism, wanted, seed=SimpleNamespace(actuators=np.tile(closed_form(mechanism).home, (9000, 1)))
+    )
+    np.testing.assert_array_equal(rows.actuators, answer.actuators)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # of interpreted kernels
+@pytest.mark.parametrize("name", NAMES)
+def test_rows_that_are_no_poses_are_named_as_the_solver_names_them(name: str) -> None:
+    mechanism = pf.load(name)
+    wanted = np.tile(mechanism.home_pose, (90, 1, 1))
+    wanted[70, 0, 3] = np.nan
+    wanted[71, 0, 0] = np.inf
+    wanted[72, :3, :3] *= 1.01
+    wanted[73, :3, :3] *= -1
+    wanted[74, 3, 3] = 2.0
+    wanted[75, 3, 0] = np.nan
+    errors = []
+    for solve in (pf.geometric.solve_ik, pf.solve_ik):
+        with pytest.raises(InvalidArgument) as caught:
+            solve(mechanism, wanted)
+        errors.append(caught.value)
+    assert errors[0].rows == errors[1].rows == (70, 71, 72, 73, 74)
+    assert str(errors[0]) == str(errors[1])
+    for row in range(70, 76):
+        with pytest.raises(InvalidArgument):
+            pf.geometric.solve_ik(mechanism, wanted[row])
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_a_rotation_typed_with_few_digits_counts_as_the_solver_counts_it(factor: float) -> None:
+    stewart = pf.load("stewart")
+    assert TOLERANCES.rotation_matrix == targets.NOT_A_ROTATION
+    rough = BESIDE["stewart"].copy()
+    rough[:3, 0] *= np.sqrt(1 + factor * TOLERANCES.rotation_matrix)
+    if factor > 1:
+        with pytest.raises(InvalidArgument):
+            pf.geometric.solve_ik(stewart, rough)
+        return
+    for noise in (rough, np.round(BESIDE["stewart"], 7)):
+        expected = pf.solve_ik(stewart, noise).actuators
+        np.testing.assert_allclose(pf.geometric.solve_ik(stewart, noise).actuators, expected, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("distance", [1e4, 1e10, 1e12, 1e160, 1e308])
+@pytest.mark.parametrize("name", NAMES)
+def test_no_target_is_too_far_to_be_missed(name: str, distance: float) -> None:
+    for mechanism in (pf.load(name), pf.load(name).without_limits()):
+        length = mechanism.characteristic_length
+        answer = pf.geometric.solve_ik(mechanism, np.array([[0.0, 0.0, distance], [0.0, -distance, distance / 3]]))
+        may_reach = name != "five_bar" and mechanism == mechanism.without_limits() and distance < facts.HORIZON * length
+        assert answer.reached.tolist() == [may_reach, may_reach]
+        assert np.isnan(answer.actuators).all() == (not may_reach)
+
+
+@pytest.mark.parametrize("name", sorted(set(MACHINES) - {"hexapod_ups"}))
+def test_other_topologies_are_said_to_have_no_closed_form(name: str) -> None:
+    mechanism = MACHINES[name]()
+    with pytest.raises(NoClosedForm) as caught:
+        pf.geometric.solve_ik(mechanism, mechanism.home_pose)
+    error = caught.value
+    assert isinstance(error, ValueError)
+    assert error.mechanism == mechanism.name
+    assert error.sub_chains == tuple(map(str, pf.decompose(mechanism)))
+    assert [part in str(error) for part in (mechanism.name, *error.sub_chains, *EXAMPLES)].count(False) == 0
+    assert vars(pickle.loads(pickle.dumps(error))) == vars(error)
+
+
+STEWART, FIVE_BAR = pf.load("stewart"), pf.load("five_bar")
+
+
+def measured_from(weld: str) -> list[Joint]:
+    """The joints of a 6-UPS, one of whose struts stands on a mount and is measured from where that is welded on."""
+    changes = {"AL1": {"connects": ("base", "mount"), "cone": None}, "BL1": {"along": (weld, "CL1"), "range": None}}
+    changes["CL1"] = {"cone": None}
+    return [dataclasses.replace(joint, **changes.get(joint.name, {})) for joint in STEWART.joints]
+
+
+def two_struts(cone: Cone | None = None, tip: bool = False) -> Mechanism:
+    """Two struts on a platform that they do not hold, or that meet at a tip."""
+    joints = []
+    for i, foot in enumerate(([0, 0, 0], [200, 30, 0]), 1):
+        joints += [
+            Joint(f"A{i}", "universal", ("base", f"c{i}"), at=foot, cone=cone if i == 1 else None),
+            Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", "T" if tip else f"C{i}"), actuated=True),
+            Joint(f"C{i}", "spherical", (f"r{i}", "platform"), at=(80 + 20 * i, 60, 250)),
+        ]
+    if tip:
+        joints = [joint for joint in joints if joint.name[0] != "C"]
+        joints.append(Joint("T", "spherical", ("r1", "r2"), at=(80, 60, 250)))
+    return Mechanism("two struts", joints, "T" if tip else "platform", None if tip else (100, 60, 250))
+
+
+UNSUITABLE = {
+    "the cone of A1 turns with its strut": lambda: two_struts(Cone((1, 0, 0), 0.9, "c1")),
+    "AL1 has ranges about two axes": lambda: redescribed(
+        STEWART, AL1={"cone": None, "axes": ((1, 0, 0), (0, 1, 0)), "range": ((-1, 1), (-1, 1))}
+    ),
+    "BL1 is not measured along its strut": lambda: dataclasses.replace(
+        STEWART, joints=(Joint("weld", "fixed", ("mount", "cylinderL1"), at=(88, 24, 39)), *measured_from("weld"))
+    ),
+    "BL1 does not point along its strut": lambda: redescribed(
+        STEWART, BL1={"along": None, "axis": (0, 0, 1), "range": (-10, 10)}
+    ),
+    "the range of p3 ties its legs together": lambda: redescribed(FIVE_BAR, p3={"range": (-1, 1)}),
+    "its axes are not all parallel": lambda: redescribed(FIVE_BAR, p2={"axis": (1, 0.01, 0)}),
+    "actuated joint spin1 is in no sub-chain": lambda: dataclasses.replace(
+        STEWART,
+        joints=(
+            *STEWART.joints,
+            *(
+                Joint(f"spin{k}", "revolute", bodies, at=(0, 0, 200), axis=(0, 0, 1), actuated=k == 1)
+                for k, bodies in enumerate((("platform", "tool"), ("tool", "platform")), 1)
+            ),
+        ),
+    ),
+    "its end effector is a joint": lambda: two_struts(tip=True),
+    "its end effector is not the joint where the legs meet": lambda: MACHINES["planar_rrr"](),
+}
+
+
+@pytest.mark.parametrize("reason", UNSUITABLE)
+def test_right_chains_with_something_else_are_said_to_be_not_covered(reason: str) -> None:
+    mechanism = UNSUITABLE[reason]()
+    with pytest.raises(NoClosedForm) as caught:
+        pf.geometric.solve_ik(mechanism, mechanism.home_pose)
+    assert caught.value.reason == reason
+
+
+def test_wrong_calls_are_told() -> None:
+    stewart = pf.load("stewart")
+    for mechanism, target, seed, argument in (
+        ("stewart", [0, 0, 190], None, "mechanism"),
+        (stewart, [0, 190], None, "target"),
+        (stewart, "up", None, "target"),
+        (stewart, [0, 0, 190], "home", "seed"),
+        (stewart, [0, 0, 190], SimpleNamespace(actuators=[1, 2]), "seed"),
+        (stewart, [[0, 0, 190]] * 3, SimpleNamespace(actuators=np.ones((2, 6))), "seed"),
+        (stewart, [0, 0, 190], pf.geometric.solve_ik(stewart, [0, 0, 1e4]), "seed"),
+    ):
+        with pytest.raises(InvalidArgument) as caught:
+            pf.geometric.solve_ik(mechanism, target, seed=seed)
+        assert caught.value.argument == argument
+
+
+def test_an_answer_is_frozen_and_its_own() -> None:
+    stewart = pf.load("stewart")
+    answer = pf.geometric.solve_ik(stewart, stewart.home_pose)
+    assert isinstance(answer, Geometric)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        answer.reached = False
+    answer.actuators[:] = 0.0
+    assert pf.geometric.solve_ik(stewart, stewart.home_pose).actuators == pytest.approx([205] * 6)
+
+
+# --- the cache -------------------------------------------------------------------------------------------------------
+
+
+def test_a_closed_form_is_keyed_by_its_own_folder_and_the_kernels() -> None:
+    folder = Path(targets.__file__).parent
+    assert _jit._digest_for(closed_form(pf.load("nrpm")).kernel) == (_jit._DIGEST, _jit._sources_digest(folder))
+    assert _jit._digest_for(some_targets) == (_jit._DIGEST,)
+
+
+def load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.skipif(INTERPRETED, reason="nothing is cached")
+@pytest.mark.parametrize("edited", ["kernels/vectors.py", "closed/part.py"])
+def test_an_edit_beside_a_closed_form_or_in_the_kernels_makes_its_cache_stale(
+    edited: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder in ("kernels", "closed"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "kernels" / "_jit.py").write_bytes(Path(_jit.__file__).read_bytes())
+    caller = tmp_path / "closed" / "caller.py"
+    caller.write_text("def double(x):\n    return 2.0 * x\n")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
+    hits = []
+    for _ in range(2):
+        for _again in range(2):
+            double = load(tmp_path / "kernels" / "_jit.py").kernel(load(caller).double)
+            assert double(2.0) == 4.0
+            hits.append(sum(double.stats.cache_hits.values()))
+        (tmp_path / edited).write_text("# edited\n")
+    assert hits == [0, 1, 0, 1]
+
+
+def test_turned_targets_turn_nothing_that_has_no_orientation() -> None:
+    """A tip is a point: what orientation its target has does not matter."""
+    bar = pf.load("five_bar")
+    wanted = some_targets(bar, 100)
+    turned = wanted.copy()
+    turned[:, :3, :3] = Rotation.random(len(wanted), random_state=1).as_matrix()
+    np.testing.assert_array_equal(
+        pf.geometric.solve_ik(bar, turned).actuators, pf.geometric.solve_ik(bar, wanted).actuators
+    )

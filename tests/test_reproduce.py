@@ -1,0 +1,225 @@
+"""The paper's experiments keep their promises, and come out the same in every run."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import oracles
+import pfabrik as pf
+from pfabrik.cli import main
+from pfabrik.reproduce.closest import nearest_distance
+from pfabrik.reproduce.efficacy import angles_between
+from pfabrik.reproduce.feasible import model_of, worst_excess
+from pfabrik.reproduce.report import BEGIN, END, put_into
+from pfabrik.reproduce.study import cases
+
+MACHINES = ("five_bar", "stewart", "nrpm")
+SUMMARIES = ("efficacy.csv", "efficiency.csv", "robustness.csv")
+README = f"# Title\n\nbefore\n\n{BEGIN}\nstale numbers\n{END}\n\nafter\n"
+
+
+def reproduce(folder: Path) -> subprocess.CompletedProcess[str]:
+    (folder / "README.md").write_text(README, encoding="utf-8")
+    command = [sys.executable, "-m", "pfabrik", "reproduce", "--quick", "--out", "out", "--readme", "README.md"]
+    environment = os.environ | {"PYTHONPATH": str(Path(pf.__file__).parents[1])}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where one quick run has written everything."""
+    made = tmp_path_factory.mktemp("reproduce")
+    done = reproduce(made)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return made
+
+
+@pytest.fixture
+def rows(folder: Path) -> Callable[[str], list[dict[str, str]]]:
+    def read(name: str) -> list[dict[str, str]]:
+        with (folder / "out" / name).open(newline="", encoding="utf-8") as handle:
+            return list(csv.DictReader(handle))
+
+    return read
+
+
+Rows = Callable[[str], list[dict[str, str]]]
+
+
+@pytest.mark.slow
+def test_every_table_and_picture_is_written(folder: Path) -> None:
+    names = {path.name for path in (folder / "out").iterdir()}
+    assert names >= {"report.md", "efficacy.png", "efficiency.png", "robustness.png", *SUMMARIES}
+    for picture in (folder / "out").glob("*.png"):
+        assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_the_round_trip_is_exact_by_default(rows: Rows) -> None:
+    default = [row for row in rows("efficacy.csv") if row["options"] == "default"]
+    assert [row["mechanism"] for row in default] == list(MACHINES)
+    for row in default:
+        assert row["reached"] == row["steps"]
+        assert float(row["position_rmse"]) <= 1e-8
+        assert float(row["orientation_rmse_deg"] or 0.0) <= 1e-8
+
+
+@pytest.mark.slow
+def test_the_round_trip_with_the_papers_tolerance_is_as_good_as_the_papers(rows: Rows) -> None:
+    printed = {case.key: case.printed for case in cases()}
+    for row in rows("efficacy.csv"):
+        if row["options"] == "paper":
+            assert float(row["position_rmse"]) <= 10 * printed[row["mechanism"]].position_rmse
+            assert float(row["orientation_rmse_deg"] or 0.0) <= 10 * (printed[row["mechanism"]].orientation_rmse or 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SUMMARIES)
+def test_every_answer_of_every_experiment_is_feasible(rows: Rows, name: str) -> None:
+    for row in rows(name):
+        assert row["failed"] == "0", row
+        for measure in ("limit_excess", "closure", "independent"):
+            assert float(row[measure]) <= 1e-9, row
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", MACHINES)
+def test_every_step_out_of_reach_is_feasible_and_continuous(rows: Rows, key: str) -> None:
+    length = pf.load(key).characteristic_length
+    steps = rows(f"robustness_{key}.csv")
+    assert {row["status"] for row in steps} == {"REACHED", "PROJECTED"}
+    assert max(float(row["limit_excess"]) for row in steps) <= 1e-9
+    assert max(float(row["residual"]) for row in steps) <= 1e-9 * length
+    jumps = {
+        (row["actuators"], row["part"]): float(row["size"]) for row in rows("jumps.csv") if row["mechanism"] == key
+    }
+    for (kind, _), size in jumps.items():
+        assert size <= 3.0 * jumps[kind, "inside"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", MACHINES)
+def test_projections_are_near_the_nearest_feasible_pose_and_never_nearer(rows: Rows, key: str) -> None:
+    compared = [row for row in rows(f"robustness_{key}.csv") if row["nearest_feasible"]]
+    assert len(compared) >= 5
+    ratios = [float(row["position_error"]) / float(row["nearest_feasible"]) for row in compared]
+    assert min(ratios) >= 1.0 - 1e-5
+    assert max(ratios) <= 1.1
+
+
+@pytest.mark.slow
+def test_every_random_target_is_reached_as_the_closed_form_has_it(rows: Rows) -> None:
+    for row in rows("efficiency.csv"):
+        if row["options"] == "default":
+            assert row["reached"] == row["targets"]
+        if row["agreement"]:
+            assert float(row["agreement"]) <= 1e-9
+
+
+@pytest.mark.slow
+def test_the_readme_changes_between_its_marks_only(folder: Path) -> None:
+    text = (folder / "README.md").read_text(encoding="utf-8")
+    assert text.startswith(f"# Title\n\nbefore\n\n{BEGIN}\n|")
+    assert text.endswith(f"\n{END}\n\nafter\n")
+    assert "stale" not in text
+    assert "position RMSE" in text
+
+
+@pytest.mark.slow
+def test_the_same_numbers_come_out_of_every_run(folder: Path, tmp_path: Path) -> None:
+    assert reproduce(tmp_path).returncode == 0
+    first = {path.name: path.read_bytes() for path in (folder / "out").glob("*.csv")}
+    again = {path.name: path.read_bytes() for path in (tmp_path / "out").glob("*.csv")}
+    assert first.keys() == again.keys()
+    numbers = [name for name in first if not name.endswith("_times.csv")]
+    assert len(numbers) == len(first) - 4
+    for name in numbers:
+        assert first[name] == again[name], name
+
+
+@pytest.mark.parametrize("text", ["no marks", f"{BEGIN}\n", f"{END}\n{BEGIN}\n", README + README])
+def test_a_readme_without_its_two_marks_is_left_as_it_is(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "README.md"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(pf.errors.InvalidArgument, match="reproduce: begin"):
+        put_into(path, "new")
+    assert path.read_text(encoding="utf-8") == text
+
+
+def test_it_says_how_to_get_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pfabrik.cli.reproduce.find_spec", lambda name: None if name == "scipy" else name)
+    result = CliRunner().invoke(main, ["reproduce"])
+    assert result.exit_code == 2
+    assert "scipy; install it with: pip install 'pfabrik[reproduce]'" in result.output
+    assert "matplotlib" not in result.output
+
+
+def test_the_machines_of_the_study_are_those_of_the_paper() -> None:
+    assert tuple(case.key for case in cases()) == MACHINES
+    assert set(MACHINES) <= set(pf.catalog())
+    assert json.dumps([round(case.printed.ratio, 3) for case in cases()]) == "[2.2, 1.4, 0.764]"
+
+
+@pytest.mark.parametrize("case", cases(), ids=lambda case: case.key)
+def test_circles_are_closed_and_keep_their_radius(case: object) -> None:
+    for circle in (case.inside, case.leaving):
+        poses = circle.poses(25)
+        assert np.allclose(poses[0], poses[-1], atol=1e-12)
+        assert np.allclose(np.linalg.norm(poses[:, :3, 3] - circle.center, axis=1), circle.radius)
+
+
+def test_angles_between_orientations_are_exact_where_they_are_tiny() -> None:
+    for angle in (1e-14, 1e-7, 1.0, 3.0):
+        turned = np.stack([pf.pose([0, 0, 0], rotvec=np.array([0.6, 0.0, 0.8]) * angle)])
+        assert angles_between(turned, np.eye(4)[None])[0] == pytest.approx(angle, rel=1e-2 if angle < 1e-10 else 1e-8)
+
+
+@pytest.mark.parametrize("key", MACHINES)
+def test_the_closed_form_of_limits_and_loops_holds_at_home(key: str) -> None:
+    model = model_of(pf.load(key))
+    assert model.slacks(model.home, np.eye(3)).min() > 0.0
+    assert np.abs(model.gaps(model.home, np.eye(3))).max(initial=0.0) < 1e-12
+
+
+def test_the_closed_form_of_limits_agrees_with_another_about_what_is_reachable() -> None:
+    mechanism = pf.load("stewart")
+    model = model_of(mechanism)
+    targets = oracles.random_targets(mechanism, np.random.default_rng(3), 200)
+    margins = oracles.margin(mechanism, targets)
+    slacks = [model.slacks(T[:3, 3] / mechanism.characteristic_length, T[:3, :3]).min() for T in targets]
+    assert 20 < (margins > 0.0).sum() < 180
+    assert np.array_equal(np.array(slacks) >= 0.0, margins >= 0.0)
+
+
+@pytest.mark.parametrize(("key", "name"), [("five_bar", "p4"), ("stewart", "BR2"), ("nrpm", "A2"), ("nrpm", "DL3")])
+def test_answers_that_exceed_narrower_limits_are_told(key: str, name: str) -> None:
+    mechanism = pf.load(key)
+    targets = next(case for case in cases() if case.key == key).inside.poses(40)
+    solution = pf.track(mechanism, targets)
+    assert worst_excess(solution).max() <= 1e-9
+    home, values = mechanism.home_coordinate(name), solution.joints[name]
+    farthest = int(np.abs(values - home).argmax())
+    half = 0.5 * abs(values[farthest] - home)
+    narrow = model_of(mechanism.with_limits({name: (home - half, home + half)}))
+    slacks = narrow.slacks(narrow.variables(solution)[farthest], solution.pose[farthest, :3, :3])
+    unit = mechanism.characteristic_length if mechanism.joint(name).type == "prismatic" else 1.0
+    assert -slacks.min() == pytest.approx(half / unit, rel=1e-9)
+
+
+def test_the_nearest_feasible_pose_above_a_hexapod_is_straight_below_the_target() -> None:
+    mechanism = pf.load("stewart")
+    highest = np.sqrt(280.0**2 - 60.0**2 - 20.0**2)  # struts at full stroke, their ends that far apart sideways
+    model = model_of(mechanism)
+    target = pf.pose([0.0, 0.0, highest + 25.0])
+    start = np.array([5.0, -3.0, 200.0]) / mechanism.characteristic_length
+    assert nearest_distance(model, target, start) == pytest.approx(25.0, rel=1e-6)
