@@ -7,18 +7,17 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
 import pfabrik as pf
 from closed_forms import Array, FiveBar, Struts
+from closure_engine import closed_chains, forward, joint_coordinates, modes
 from table import Row, cells, machine, table
+from timing import Solve, best_times, draw, in_blocks, one_core
 
-Solve = Callable[[], object]
 HOLD_NOTHING = pf.Options(hold=None)
 
 USE_EVERYTHING = """
@@ -28,8 +27,11 @@ import pfabrik as pf
 for name in pf.catalog():
     m = pf.load(name)
     pf.solve_ik(m, m.home_pose)
-    pf.solve_ik(m, np.array(m.reference_point) * 3.0).active_limits
+    far = pf.solve_ik(m, np.array(m.reference_point) * 3.0)
+    far.active_limits
     pf.track(m, np.array([m.reference_point] * 2))
+    pf.solve_fk(m, far.actuators * 1.1).joints
+    pf.singularity(m, far)
 print(time.perf_counter() - start)
 """
 IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.perf_counter() - start)"
@@ -39,49 +41,10 @@ NOTE = """Times are the shortest of several runs, subject and baseline by turns;
 baseline. The closed forms (benchmarks/closed_forms.py) know their machine, use one core and blocks of 4096 poses, and
 return numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres only
 when `points` is read. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM: 0.4), those out of reach within 1 L
-and 0.5 rad. Times of new processes are for all of it, not for a pose."""
-
-
-def best_times(runs: int, *solves: Solve) -> list[float]:
-    """Shortest time of each [s], run by turns after one run to warm up."""
-    best = [float("inf")] * len(solves)
-    for solve in solves:
-        solve()
-    for _ in range(runs):
-        for i, solve in enumerate(solves):
-            start = time.perf_counter()
-            solve()
-            best[i] = min(best[i], time.perf_counter() - start)
-    return best
-
-
-@contextmanager
-def one_core() -> Iterator[None]:
-    """Keep this thread, and with it a batch, on one core."""
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(cores)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, cores)
-
-
-def draw(mechanism: pf.Mechanism, rng: np.random.Generator, n: int, size: float, tilt: float) -> Array:
-    """Poses (n, 4, 4) about home's: in a box of half width `size` L, turned by up to `tilt` [rad] about each axis."""
-    targets = np.tile(mechanism.home_pose, (n, 1, 1))
-    targets[:, :3, 3] += rng.uniform(-size, size, (n, 3)) * mechanism.characteristic_length
-    if mechanism.end_effector_is_joint:
-        axis = np.array(mechanism.joint(mechanism.end_effector).axis)
-        targets[:, :3, 3] -= ((targets[:, :3, 3] - mechanism.reference_point) @ axis)[:, None] * axis
-        return targets
-    for target in targets:
-        target[:3, :3] = pf.pose((0, 0, 0), rotvec=rng.uniform(-tilt, tilt, 3))[:3, :3]
-    return targets
-
-
-def in_blocks(solve: Callable[[Array], object], targets: Array, size: int = 4096) -> list[object]:
-    """A vectorised closed form at its best: in blocks whose intermediate arrays stay in the cache."""
-    return [solve(targets[start : start + size]) for start in range(0, len(targets), size)]
+and 0.5 rad. Newton's method in NumPy (benchmarks/newton.py) knows the hexapod, solves six equations in the pose for
+whole batches at a time, and looks at no passive joint and no limit; forward kinematics here closes all loops in all
+joint coordinates, and measures limits. Seeds are answers up to 0.01 L and 0.01 rad away. The platform with 40 modes is
+that of Dietmaier (1998). Times of modes and of new processes are for all of it, not for a pose."""
 
 
 def agree(solution: pf.Solution, values: Array) -> None:
@@ -186,6 +149,10 @@ def main() -> None:
         *single_calls(rng, runs),
         *batches(rng, runs, 10_000 if given.quick else 100_000),
         *projections(rng, runs, 100 if given.quick else 1000),
+        *forward(rng, runs, 200 if given.quick else 2000),
+        *joint_coordinates(rng, runs, 200 if given.quick else 2000),
+        *closed_chains(rng, runs, 100 if given.quick else 1000),
+        *modes(min(runs, 5)),
         *([] if given.quick else start_up(5)),
     ]
     if given.markdown:
