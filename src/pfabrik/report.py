@@ -102,6 +102,8 @@ def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
     if status == "projected":
         why = reasons(solution) or ["no limit is active: the links themselves do not reach"]
         return "; ".join([f"projected: {distance(solution)} from the target", *why])
+    if status == "exceeded":
+        return f"exceeded: assembled, but beyond limits: {by_bound(exceeded(solution))}"
     return f"{status}: no feasible configuration found; {what_is_wrong(solution)}"
 
 
