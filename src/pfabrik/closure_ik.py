@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,6 +36,9 @@ SIGHT = 1e4
 STARTS = 40
 """Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
 
+STEPS = 30
+"""Steps each of them may take: those that arrive need fewer."""
+
 FREE = (0.0, 0.0, 0.0)
 WISHED = (1.0, 1.0, 1.0)
 LOCK = (LOCKED, LOCKED, LOCKED)
@@ -45,33 +50,50 @@ def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
 
 
 def answer_by_closure(
-    mechanism: Mechanism, targets: Floats, start: Floats, options: Options, keep_mode: bool, chained: bool, rows: P.Rows
+    mechanism: Mechanism, targets: Floats, start: Floats, options: Options, keep_mode: bool, rows: P.Rows
 ) -> Floats:
     """Answer targets (n, 4, 4) from joint coordinates (n, columns) or (1, columns); fills `rows`.
 
     Parameters
     ----------
     keep_mode : stay in the working mode of the start.
-    chained : every row starts from the answer of the one before.
 
     Returns
     -------
     Joint coordinates of the answers, deviations from home, (n, columns); NaN for rows that are no poses.
     """
-    closure = closure_of(mechanism)
+    known, coordinates = _prepare(targets, start, rows)
+    begin = start[known] if len(start) > 1 else np.repeat(start, known.sum(), axis=0)
+    coordinates[known] = _answer(closure_of(mechanism), targets, known, begin, options, keep_mode, rows)
+    return coordinates
+
+
+def follow_by_closure(
+    mechanism: Mechanism,
+    targets: Floats,
+    start: Floats,
+    options: Options,
+    rows: P.Rows,
+    on_progress: Callable[[int, int], None] | None,
+) -> Floats:
+    """Answer a path from joint coordinates (1, columns): each target from the answer before it, in its working mode."""
+    known, coordinates = _prepare(targets, start, rows)
+    for i in range(len(targets)):
+        if known[i]:
+            only = np.arange(len(targets)) == i
+            start = coordinates[only] = _answer(closure_of(mechanism), targets, only, start, options, True, rows)
+        if on_progress is not None:
+            on_progress(i + 1, len(targets))
+    return coordinates
+
+
+def _prepare(targets: Floats, start: Floats, rows: P.Rows) -> tuple[Mask, Floats]:
+    """Which targets are poses, the others marked, and room for coordinates."""
     known = are_poses(targets)
-    coordinates = np.full((len(targets), start.shape[1]), np.nan)
     for array in (rows.poses, rows.actuators, rows.measures):
         array[~known] = np.nan
     rows.status[~known], rows.counters[~known] = P.INVALID, 0
-    if not chained:
-        begin = start[known] if len(start) > 1 else np.repeat(start, known.sum(), axis=0)
-        coordinates[known] = _answer(closure, targets, known, begin, options, keep_mode, rows)
-        return coordinates
-    for i in np.flatnonzero(known):
-        only = np.arange(len(targets)) == i
-        start = coordinates[only] = _answer(closure, targets, only, start, options, keep_mode, rows)
-    return coordinates
+    return known, np.full((len(targets), start.shape[1]), np.nan)
 
 
 def _answer(
@@ -119,7 +141,7 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
         if held == HELD:  # with the platform at rest, legs are found one by one
             reached = _legs_reached(closure, found, rest)
             scattered = np.where(reached, found.coordinates[rest], scattered)
-        tried = close(closure, scattered, wanted[rest], platform=held, limits=True, margin=MARGIN)
+        tried = close(closure, scattered, wanted[rest], platform=held, limits=True, margin=MARGIN, max_iterations=STEPS)
         if held == HELD:
             _take_legs(closure, found, rest, tried)
         else:

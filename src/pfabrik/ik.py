@@ -54,7 +54,10 @@ def solve_ik(
     rows = new_rows(mechanism, flat, len(targets))
     joints: Callable[[], NDArray[np.float64]] | None = None
     if flat is None:
-        joints = closed_rows(mechanism, targets, seed, shape, options, chained=False, rows=rows)
+        start = start_coordinates(mechanism, seed, shape)
+        mode = options.working_mode or ("any" if seed is None else "keep")
+        found = answer_by_closure(mechanism, targets, start, options, mode == "keep", rows)
+        joints = partial(np.asarray, found)
     else:
         seeds = seeds_of(mechanism, flat, seed, shape)
         solve_rows(flat, targets, seeds, settings_of(mechanism, options, seeded=seed is not None), rows)
@@ -64,23 +67,12 @@ def solve_ik(
     return Solution(mechanism, rows, shape, joints)
 
 
-def closed_rows(
-    mechanism: Mechanism,
-    targets: NDArray[np.float64],
-    seed: Solution | None,
-    shape: tuple[int, ...],
-    options: Options,
-    chained: bool,
-    rows: P.Rows,
-) -> Callable[[], NDArray[np.float64]]:
-    """Answer rows by the closure engine; where their joint coordinates are found."""
-    start = np.zeros((1, len(closure_of(mechanism).scale)))
-    if seed is not None:
-        seed_rows(mechanism, seed, shape)
-        start = seed._coordinates
-    mode = options.working_mode or ("keep" if chained or seed is not None else "any")
-    found = answer_by_closure(mechanism, targets, start, options, mode == "keep", chained, rows)
-    return lambda: found
+def start_coordinates(mechanism: Mechanism, seed: Solution | None, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Joint coordinates to start from: home's (1, columns), or those of a seed, as deviations from home."""
+    if seed is None:
+        return np.zeros((1, len(closure_of(mechanism).scale)))
+    seed_rows(mechanism, seed, shape)
+    return seed._coordinates
 
 
 def joints_near(mechanism: Mechanism, rows: P.Rows, seed: P.Rows | None, chained: bool = False) -> NDArray[np.float64]:

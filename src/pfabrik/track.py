@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from .closure_ik import follow_by_closure
 from .errors import InvalidArgument
 from .flatten import Flat, flat_of
-from .ik import checked, closed_rows, handle_invalid, joints_near, seeds_of, settings_of
+from .ik import checked, handle_invalid, joints_near, seeds_of, settings_of, start_coordinates
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
@@ -55,9 +56,9 @@ def track(
     flat = flat_of(mechanism)
     rows = new_rows(mechanism, flat, len(poses))
     if flat is None:
-        joints = closed_rows(mechanism, poses, seed, (), options, chained=True, rows=rows)
+        found = follow_by_closure(mechanism, poses, start_coordinates(mechanism, seed, ()), options, rows, on_progress)
         handle_invalid(poses, rows, options)
-        return Solution(mechanism, rows, shape, joints)
+        return Solution(mechanism, rows, shape, partial(np.asarray, found))
     seeds = seeds_of(mechanism, flat, seed, ())
     settings = settings_of(mechanism, options, seeded=True, chained=True)
     _follow(flat, poses, seeds, settings, rows, on_progress)

@@ -57,16 +57,17 @@ def solve_directly(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings
     first_modes = np.ones(plan.branches.shape[0])
     home_modes(plan, now, first_modes)
     wanted = np.zeros((4, 4))
-    table = np.zeros((LENGTHS + plan.branches.shape[0], BLOCK))
-    columns = np.full(BLOCK, -1)
     shared = seeds.poses.shape[0] == 1
+    in_blocks = shared and settings.exact == 1 and targets.shape[0] > 1 and is_all_struts(plan)
+    width = BLOCK if in_blocks else 1
+    table = np.zeros((LENGTHS + plan.branches.shape[0], width))
+    columns = np.full(width, -1)
     copy_row(first_modes, modes)
     if targets.shape[0] > 0:
         load_seed(plan, seeds, 0, now, modes)
-    in_blocks = shared and settings.exact == 1 and targets.shape[0] > 1 and is_all_struts(plan)
     pending = 0
-    for start in range(0, targets.shape[0], BLOCK):
-        end = min(start + BLOCK, targets.shape[0])
+    for start in range(0, targets.shape[0], width):
+        end = min(start + width, targets.shape[0])
         if in_blocks:
             lay_out_block(plan, targets, start, end, wanted, columns, now, table)
         for i in range(start, end):
