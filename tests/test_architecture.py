@@ -18,7 +18,7 @@ import pfabrik as pf
 PACKAGE = Path(pf.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 KERNELS = sorted((PACKAGE / "kernels").glob("*.py"))
-COMMANDS = ("catalog", "info", "check", "ik", "fk", "track", "demo", "reproduce")
+COMMANDS = ("catalog", "new", "info", "check", "ik", "fk", "track", "demo", "reproduce")
 LEAVES = ("cli", "view", "reproduce")
 HEAVY = ("numba", "pydantic", "matplotlib", "scipy")
 QUICK = 0.5  # seconds to start Python, import and answer

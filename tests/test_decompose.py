@@ -76,7 +76,7 @@ def test_machines_fall_apart_into_the_legs_the_field_writes(name: str) -> None:
 
 
 def test_every_machine_has_its_notation_checked() -> None:
-    assert set(NOTATION) == {*MACHINES, *pf.catalog()}
+    assert set(NOTATION) == {*MACHINES, "five_bar", "nrpm", "stewart"}
 
 
 def test_a_serial_chain_has_one_branch_and_no_trunk() -> None:

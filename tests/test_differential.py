@@ -196,7 +196,8 @@ def drives(machine: Mechanism) -> list[int]:
     return [columns(machine)[each].start for each in machine.actuators]
 
 
-EVERY = {**MACHINES, **{name: lambda name=name: pf.load(name) for name in pf.catalog()}, "tsai_upu": tsai_upu}
+CATALOGUE = ("five_bar", "nrpm", "stewart")
+EVERY = {**MACHINES, **{name: lambda name=name: pf.load(name) for name in CATALOGUE}, "tsai_upu": tsai_upu}
 CONTROLLED = [name for name in EVERY if name != "serial_spherical"]
 
 

@@ -13,6 +13,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "Cone": "mechanism",
     "Joint": "mechanism",
+    "Leg": "legs",
     "Mechanism": "mechanism",
     "load": "files",
     "save": "files",
@@ -45,6 +46,7 @@ __all__ = [
     "AssemblyModes",
     "Cone",
     "Joint",
+    "Leg",
     "Mechanism",
     "Mobility",
     "Options",
@@ -80,6 +82,7 @@ if TYPE_CHECKING:
     from .files import load, save
     from .fk import solve_fk
     from .ik import solve_ik
+    from .legs import Leg
     from .limits import ActiveLimit
     from .mechanism import Cone, Joint, Mechanism
     from .options import Options

@@ -136,6 +136,7 @@ def close(
     *,
     locked: frozenset[str] = frozenset(),
     platform: Sequence[float] = EVERYTHING_FREE,
+    framed: bool = False,
     targets: Floats | None = None,
     weights: Floats | None = None,
     anchors: Floats | None = None,
@@ -155,6 +156,7 @@ def close(
     locked : joints that keep their coordinates.
     platform : weights of the squares of the platform's distance from `targets` (default: `poses`), position [L], then
         rotation [rad]; `LOCKED` holds that part where it starts.
+    framed : the weights of the rotation are about the axes of the targets, not of the base.
     weights, anchors : weights of the squares of the coordinates' distances from anchors, (columns,), (n, columns).
     centres : wished joint centres, (n, joints, 3); NaN for none.
     limits : keep all limits too, by `margin` inside.
@@ -179,6 +181,7 @@ def close(
         weights=np.zeros(len(closure.scale)) if weights is None else weights,
         anchors=none[:, :, 0] if anchors is None else anchors * closure.scale,
         platform=np.array(platform, dtype=float),
+        framed=int(framed),
         targets=closed.poses.copy() if targets is None else _in_lengths(targets, 1.0 / length),
         centres=none if centres is None else centres / length,
         limits=int(limits),

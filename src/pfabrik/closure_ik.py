@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .closure import HELD, Closing, Closure, close, closure_of
+from .closure import Closing, Closure, close, closure_of
 from .completion import actuators_of
 from .displacements import displacements
 from .kernels import plan as P
@@ -19,6 +19,7 @@ from .options import Options
 from .paths import end_body
 from .poses import are_poses
 from .starts import random_coordinates
+from .task import Task, Weights, norms, task_of
 from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]
@@ -38,10 +39,6 @@ STARTS = 40
 
 STEPS = 30
 """Steps each of them may take: those that arrive need fewer."""
-
-FREE = (0.0, 0.0, 0.0)
-WISHED = (1.0, 1.0, 1.0)
-LOCK = (LOCKED, LOCKED, LOCKED)
 
 
 def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
@@ -105,7 +102,7 @@ def _answer(
     found = _reach(closure, wanted, start, begin, keep_mode)
     away = np.flatnonzero(~is_feasible(found))
     if len(away):
-        ended = None if keep_mode else found.coordinates[away]
+        ended = None if keep_mode else (found.coordinates[away], found.poses[away])
         sought = _within_sight(closure, wanted[away], begin[away])
         projected = _project(closure, sought, start[away], begin[away], ended, options)
         for array, own in zip(found, projected, strict=True):
@@ -114,47 +111,55 @@ def _answer(
     return found.coordinates
 
 
-def _target_platform(mechanism: Mechanism, targets: Floats, begin: Floats) -> Floats:
-    """Where the platform is to be: the targets, with the present rotation where only the position is asked for."""
-    wanted = targets.copy()
-    if mechanism.end_effector_is_joint:
-        wanted[:, :3, :3] = begin[:, :3, :3]
-    return wanted
-
-
 def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_mode: bool) -> Closing:
     """Close the legs below platforms on their targets, within limits; the rows that are feasible are reached."""
-    mechanism = closure.mechanism
-    wanted = _target_platform(mechanism, targets, begin)
-    held = LOCK + FREE if mechanism.end_effector_is_joint else HELD
-    found = close(closure, start, wanted, platform=held, limits=True, margin=MARGIN)
-    is_far = _distances(closure, begin, wanted, held) > STRIDE
+    task = task_of(closure.mechanism)
+    wanted = task.completed(targets, begin)
+    found = _close_below(closure, start, wanted)
+    is_far = _distances(closure, begin, wanted) > STRIDE
     rest = np.flatnonzero(~is_feasible(found) | (is_far if keep_mode else False))
     if len(rest):
-        _take_better(found, rest, _led(closure, wanted[rest], start[rest], begin[rest], held))
+        _take_better(found, rest, _led(closure, wanted[rest], start[rest], begin[rest]))
     rng = np.random.default_rng(0)
     for _ in range(0 if keep_mode else STARTS):
         rest = np.flatnonzero(~is_feasible(found))
         if not len(rest):
             break
         scattered = np.repeat(random_coordinates(closure, 1, rng), len(rest), axis=0)
-        if held == HELD:  # with the platform at rest, legs are found one by one
+        if task.is_whole_pose:  # with the platform at rest, legs are found one by one
             reached = _legs_reached(closure, found, rest)
             scattered = np.where(reached, found.coordinates[rest], scattered)
-        tried = close(closure, scattered, wanted[rest], platform=held, limits=True, margin=MARGIN, max_iterations=STEPS)
-        if held == HELD:
+        tried = _close_below(closure, scattered, wanted[rest], STEPS)
+        if task.is_whole_pose:
             _take_legs(closure, found, rest, tried)
         else:
             _take_better(found, rest, tried)
     return found
 
 
-def _led(closure: Closure, targets: Floats, start: Floats, begin: Floats, held: tuple[float, ...]) -> Closing:
+def _close_below(closure: Closure, start: Floats, wanted: Floats, max_iterations: int = 100) -> Closing:
+    """Close the legs, within limits, below platforms that are held in all that the task asks for."""
+    task = task_of(closure.mechanism)
+    return close(
+        closure,
+        start,
+        wanted,
+        platform=task.held,
+        framed=task.is_framed,
+        limits=True,
+        margin=MARGIN,
+        max_iterations=max_iterations,
+    )
+
+
+def _led(closure: Closure, targets: Floats, start: Floats, begin: Floats) -> Closing:
     """The platform led from where it is to its target."""
+    task = task_of(closure.mechanism)
+    present = begin
     for stride in range(1, STRIDES + 1):
-        between = _between(begin, targets, stride / STRIDES)
-        found = close(closure, start, between, platform=held, limits=True, margin=MARGIN)
-        start = found.coordinates
+        between = task.completed(_between(begin, targets, stride / STRIDES), present)
+        found = _close_below(closure, start, between)
+        start, present = found.coordinates, found.poses
     return found
 
 
@@ -195,31 +200,43 @@ def _take_better(found: Closing, rest: NDArray[np.intp], tried: Closing) -> None
 
 
 def _project(
-    closure: Closure, targets: Floats, start: Floats, begin: Floats, ended: Floats | None, options: Options
+    closure: Closure,
+    targets: Floats,
+    start: Floats,
+    begin: Floats,
+    ended: tuple[Floats, Floats] | None,
+    options: Options,
 ) -> Closing:
     """Feasible configurations near targets that are not reached; the start itself where nothing better is found.
 
     Parameters
     ----------
     start, begin : where the search starts, (m, columns) and (m, 4, 4).
-    ended : where reaching ended, another start; None to stay in the working mode of the first.
+    ended : where reaching ended, likewise, another start; None to stay in the working mode of the first.
     """
     best = close(closure, start, begin, max_iterations=0)
-    wanted = _target_platform(closure.mechanism, targets, begin)
-    starts = [(start, begin)] if ended is None else [(start, begin), (ended, wanted)]
+    task = task_of(closure.mechanism)
+    wanted = task.completed(targets, begin)
+    starts = [(start, begin)] if ended is None else [(start, begin), ended]
     nearest_yet = np.full(len(targets), np.inf)
-    for platform in _ways(closure.mechanism, options):
+    for platform in _ways(task, options):
         waiting = np.flatnonzero(np.isinf(nearest_yet))
         if not len(waiting):
             break
         if LOCKED not in platform:
-            nearest_yet[waiting] = _feasible_distances(closure, best, wanted, platform)[waiting]
+            nearest_yet[waiting] = _feasible_distances(closure, best, wanted)[waiting]
         for legs, poses in starts:
             placed = np.where(_held_entries(platform), wanted, poses)[waiting]
             tried = nearest(
-                closure, legs[waiting], placed, platform=platform, targets=wanted[waiting], gently=ended is None
+                closure,
+                legs[waiting],
+                placed,
+                platform=platform,
+                framed=task.is_framed,
+                targets=wanted[waiting],
+                gently=ended is None,
             )
-            distance = _feasible_distances(closure, tried, wanted[waiting], platform)
+            distance = _feasible_distances(closure, tried, wanted[waiting])
             better = np.flatnonzero(distance < nearest_yet[waiting])
             nearest_yet[waiting[better]] = distance[better]
             for array, each in zip(best, tried, strict=True):
@@ -232,36 +249,34 @@ def _within_sight(closure: Closure, targets: Floats, begin: Floats) -> Floats:
     offset = (targets - begin)[:, :3, 3]
     far = SIGHT * closure.mechanism.characteristic_length
     near = targets.copy()
-    near[:, :3, 3] = begin[:, :3, 3] + offset * np.minimum(1.0, far / np.maximum(_norms(offset), far))[:, None]
+    near[:, :3, 3] = begin[:, :3, 3] + offset * np.minimum(1.0, far / np.maximum(norms(offset), far))[:, None]
     return near
 
 
-def _held_entries(platform: tuple[float, ...]) -> Mask:
+def _held_entries(platform: Weights) -> Mask:
     """Which entries of a pose a projection keeps, (4, 4)."""
     held = np.zeros((4, 4), bool)
-    held[:3, 3], held[:3, :3] = platform[0] == LOCKED, platform[3] == LOCKED
+    held[:3, 3], held[:3, :3] = np.array(platform[:3]) == LOCKED, LOCKED in platform[3:]
     return held
 
 
-def _feasible_distances(closure: Closure, found: Closing, targets: Floats, platform: tuple[float, ...]) -> Floats:
+def _feasible_distances(closure: Closure, found: Closing, targets: Floats) -> Floats:
     """How far feasible rows are from their targets in what counts, (n,); infinite for the others."""
-    distances = _distances(closure, found.poses, targets, platform)
+    distances = _distances(closure, found.poses, targets)
     return np.asarray(np.where(is_feasible(found), distances, np.inf))
 
 
-def _ways(mechanism: Mechanism, options: Options) -> list[tuple[float, ...]]:
+def _ways(task: Task, options: Options) -> list[Weights]:
     """Weights of the platform's position and rotation, the ways to project in the order in which they are tried."""
-    if mechanism.end_effector_is_joint:
-        return [WISHED + FREE]
-    held = {"orientation": [WISHED + LOCK], "position": [LOCK + WISHED], None: []}[options.hold]
-    return [*held, WISHED + WISHED]
+    ways = {"orientation": [task.weights(1.0, LOCKED)], "position": [task.weights(LOCKED, 1.0)], None: []}[options.hold]
+    both = any(task.axes) and task.rotations > 0  # else there is nothing to give way, or nothing to hold
+    return [*(ways if both else []), task.weights(1.0, 1.0)]
 
 
-def _distances(closure: Closure, poses: Floats, others: Floats, platform: tuple[float, ...]) -> Floats:
-    """How far poses are apart in what counts, (n,): lengths relative to L, rotations as the chord of their angle."""
-    position = _norms((poses - others)[:, :3, 3]) / closure.mechanism.characteristic_length
-    rotation = np.linalg.norm((poses - others)[:, :3, :3], axis=(1, 2))
-    return np.asarray(np.hypot(position, rotation if platform[3] != 0.0 else 0.0))
+def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:
+    """How far poses are apart in what counts, (n,): lengths relative to L, angles in rad."""
+    position, rotation = task_of(closure.mechanism).errors(poses, others)
+    return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, rotation))
 
 
 def _fill(closure: Closure, found: Closing, wanted: Floats, which: Mask, options: Options, rows: P.Rows) -> None:
@@ -272,7 +287,7 @@ def _fill(closure: Closure, found: Closing, wanted: Floats, which: Mask, options
     poses = found.poses.copy()
     if mechanism.end_effector_is_joint:
         poses[:, :3, :3] = wanted[:, :3, :3]
-    position, rotation = pose_errors(poses, wanted)
+    position, rotation = task_of(mechanism).errors(poses, wanted)
     near = (position <= (options.tolerance or TOLERANCES.position * length)) & (rotation <= options.rotation_tolerance)
     rows.status[which] = np.where(is_feasible(found), np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
     rows.counters[which] = np.stack([found.iterations, np.zeros_like(found.iterations)], axis=1)
@@ -282,15 +297,3 @@ def _fill(closure: Closure, found: Closing, wanted: Floats, which: Mask, options
     rows.measures[which] = np.stack(
         [position, rotation, found.gap * length, np.maximum(found.excess, 0.0), zero], axis=1
     )
-
-
-def pose_errors(poses: Floats, targets: Floats) -> tuple[Floats, Floats]:
-    """Distances [length] and angles [rad] between poses, (n,) each."""
-    turned = poses[:, :3, :3] @ np.swapaxes(targets[:, :3, :3], 1, 2)
-    chord = np.linalg.norm(turned - np.eye(3), axis=(1, 2)) / np.sqrt(8.0)  # sine of half the angle
-    return _norms((poses - targets)[:, :3, 3]), 2.0 * np.arcsin(np.minimum(chord, 1.0))
-
-
-def _norms(vectors: Floats) -> Floats:
-    """Lengths of vectors (n, 3), (n,); however long they are, no square of them is too large to be represented."""
-    return np.asarray(np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2]))

@@ -10,7 +10,7 @@ from typing import Any
 
 from .errors import Fault, near_miss
 from .form_faults import is_name, is_pair_of_names, is_point
-from .mechanism import Cone, Joint, Vector
+from .joints import Cone, Joint, Vector
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,8 @@ def _copies(index: int, pattern: Pattern, bodies: frozenset[str], joints: frozen
         yield Copy(index, 0, pattern.joint)
         return
     for number in range(1, pattern.count + 1):
-        turned = _turned(pattern.joint, pattern.axis, number - 1, pattern.count)
-        yield Copy(index, number, _renamed(turned, number, bodies, joints))
+        copied = turned(pattern.joint, pattern.axis, number - 1, pattern.count)
+        yield Copy(index, number, _renamed(copied, number, bodies, joints))
 
 
 def _renamed(joint: Joint, number: int, bodies: frozenset[str], joints: frozenset[str]) -> Joint:
@@ -137,7 +137,7 @@ def _numbered(names: Any, number: int, copied: frozenset[str]) -> Any:
     return f"{names}{number}" if isinstance(names, str) and names in copied else names
 
 
-def _turned(joint: Joint, axis: Vector, step: int, steps: int) -> Joint:
+def turned(joint: Joint, axis: Vector, step: int, steps: int) -> Joint:
     """The joint turned by `step` of `steps` equal parts of a full turn; by none, it is the same to the last bit."""
     if step == 0:
         return joint

@@ -6,10 +6,11 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .errors import Fault
+from .errors import Fault, near_miss
 from .form_faults import is_name, joint_faults, name_faults, number_faults, shown
 from .graph_faults import graph_faults
 from .home_faults import home_faults
+from .joint_types import TASK_COORDINATES, WHOLE_TASK
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 _FIELDS = ("name", "type", "connects", "at", "axis", "axes", "along", "actuated", "home", "range", "cone")
 _FIELD = re.compile(r"joint\[\d+\]\.(\w+)")
 _JOINT = re.compile(r"joint\[(\d+)\]")
+_LEG = re.compile(r"leg\[(\d+)\](?:\.([A-Za-z]+))?")
+_LEG_FIELDS = ("chain", "name", "connects", "base", "via", "platform", "axis", "stroke", "copies")
 
 
 def find_faults(mechanism: Mechanism) -> list[Fault]:
@@ -34,8 +37,31 @@ def find_faults(mechanism: Mechanism) -> list[Fault]:
 
 
 def in_order(faults: Sequence[Fault]) -> list[Fault]:
-    """The faults in the order of a description: the head first, then joint by joint, field by field."""
-    return sorted(faults, key=lambda fault: (joint_index(fault.place), _field_rank(fault.place)))
+    """The faults in the order of a description: the head first, then joint by joint and leg by leg, field by field."""
+    return sorted(faults, key=lambda fault: _rank(fault.place))
+
+
+def merged(first: Sequence[Fault], second: Sequence[Fault]) -> list[Fault]:
+    """All faults in order, without those of the second list that only follow from one of the first."""
+    places = [fault.place for fault in first]
+    own = [fault for fault in second if not any(_same_place(fault.place, place) for place in places)]
+    return in_order([*first, *own])
+
+
+def _same_place(one: str, other: str) -> bool:
+    """Whether one place is the other, or within it."""
+    short, long = sorted((one, other), key=len)
+    return long == short or long.startswith(f"{short}.") or (short != "joint" and long.startswith(f"{short}["))
+
+
+def _rank(place: str) -> tuple[int, int, int, str]:
+    leg = _LEG.match(place)
+    if leg is None:
+        return (0, joint_index(place), _field_rank(place), "")
+    key = leg[2] or ""
+    if key in _LEG_FIELDS:
+        return (1, int(leg[1]), _LEG_FIELDS.index(key), "")
+    return (1, int(leg[1]), len(_LEG_FIELDS), key if len(key) == 1 else "~")  # joints by their letters
 
 
 def joint_index(place: str) -> int:
@@ -66,6 +92,25 @@ def _head_faults(mechanism: Mechanism) -> Iterator[Fault]:
     yield from name_faults("units.length", mechanism.length_unit)
     if mechanism.angle_unit not in ("deg", "rad"):
         yield Fault("units.angle", shown(mechanism.angle_unit), "'deg' or 'rad'")
+    yield from _task_faults(mechanism.task, mechanism)
+
+
+def _task_faults(task: Any, mechanism: Mechanism) -> Iterator[Fault]:
+    """Faults of what targets set: at least one coordinate, none twice, and of the rotation all or the tilt."""
+    expected = f"some of {', '.join(TASK_COORDINATES)}"
+    if not isinstance(task, tuple) or not task:
+        yield Fault("task", shown(task), expected)
+        return
+    for each in task:
+        if each not in TASK_COORDINATES:
+            yield Fault("task", f"{shown(each)}{near_miss(each, TASK_COORDINATES)}", expected)
+    if len(set(map(str, task))) < len(task):
+        yield Fault("task", shown(list(task)), f"{expected}, none of them twice")
+    turns = [each for each in task if each in ("rotation", "tilt")]
+    if len(turns) == 2:
+        yield Fault("task", "both rotation and tilt", "one of the two: the tilt is a part of the rotation")
+    if turns and mechanism.whole_task == WHOLE_TASK[:3]:
+        yield Fault("task", turns[0], "some of x, y, z: the end effector is a joint, of which only the position counts")
 
 
 def _point_faults(mechanism: Mechanism) -> Iterator[Fault]:

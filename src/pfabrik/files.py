@@ -15,8 +15,11 @@ from .catalog import catalog, catalog_file
 from .coercion import unit_vector
 from .copies import Copy, Layout, Pattern, count_of
 from .errors import Fault, InvalidArgument, InvalidMechanism, UnknownName
-from .faults import in_order, joint_index
+from .faults import in_order, joint_index, merged
 from .form_faults import direction_faults, joint_faults, shown
+from .leg_joints import LegJoint, at_legs, count_joints, placed_joints
+from .leg_tables import read_leg
+from .legs import Leg
 from .mechanism import Cone, Joint, Mechanism
 from .schema import MOST_JOINTS, HeadTable, JointTable, read_table
 from .units import in_radians
@@ -130,15 +133,20 @@ def _unusable(found: str, expected: str) -> InvalidMechanism:
 def _mechanism(table: dict[str, Any]) -> Mechanism:
     """The mechanism of a parsed file. Faults of single tables are found first, then those of the whole."""
     head, faults = read_table(HeadTable, table, "")
-    if len(head.joint) > MOST_JOINTS:
-        fault = Fault("joint", f"{len(head.joint)} joints", f"at most {MOST_JOINTS}")
-        raise InvalidMechanism([*faults, fault])
-    patterns = []
+    for kind, tables in (("joint", head.joint), ("leg", head.leg)):
+        if len(tables) > MOST_JOINTS:
+            noun = "joints" if kind == "joint" else "[[leg]] tables"
+            raise InvalidMechanism([*faults, Fault(kind, f"{len(tables)} {noun}", f"at most {MOST_JOINTS}")])
+    patterns, legs = [], []
     for index, joint in enumerate(head.joint):
         pattern, found = _pattern(joint, f"joint[{index}]", head.units.angle)
         patterns.append(pattern)
         faults += found
-    return _expanded(head, patterns, faults)
+    for index, leg in enumerate(head.leg):
+        read, found = read_leg(leg, f"leg[{index}]", head.units.angle)
+        legs.append(read)
+        faults += found
+    return _expanded(head, patterns, legs, faults)
 
 
 def _pattern(table: Any, place: str, angle_unit: str) -> tuple[Pattern, list[Fault]]:
@@ -168,17 +176,29 @@ def _joint(read: JointTable, angle_unit: str) -> Joint:
     return Joint(**values)
 
 
-def _expanded(head: HeadTable, patterns: Sequence[Pattern], faults: list[Fault]) -> Mechanism:
-    """The mechanism of all copies. When it is not clear what is copied, only the joints' own faults are looked for."""
-    layout = Layout(tuple(patterns), head.base, cast(str, head.end_effector))
-    unclear = head.end_effector is None or any(map(_hides_copies, faults))
-    if not unclear:
-        misfits = list(_misfits(layout))
+def _expanded(head: HeadTable, patterns: Sequence[Pattern], legs: Sequence[Leg], faults: list[Fault]) -> Mechanism:
+    """The mechanism of all copies and legs. When it is not clear what is copied, or where legs are, only the joints'
+    own faults are looked for."""
+    unclear = head.end_effector is None or any(map(_hides_joints, faults))
+    placed, found = _placed(head, patterns, legs)
+    faults = merged(faults, found)
+    joints = [*patterns, *(Pattern(each.joint) for each in placed)]
+    layout = Layout(tuple(joints), head.base, cast(str, head.end_effector))
+    if not unclear and not found:
+        misfits = at_legs(list(_misfits(layout)), len(patterns), placed)
         unclear, faults = bool(misfits), [*faults, *misfits]
-    if unclear:
-        alone = [fault for index, each in enumerate(patterns) for fault in joint_faults(f"joint[{index}]", each.joint)]
-        raise InvalidMechanism(_merged(faults, [*_missing(head), *alone]))
-    return _built(head, layout, faults)
+    if unclear or found:
+        alone = [fault for index, each in enumerate(joints) for fault in joint_faults(f"joint[{index}]", each.joint)]
+        raise InvalidMechanism(merged(faults, [*_missing(head), *at_legs(alone, len(patterns), placed)]))
+    return _built(head, layout, placed, faults)
+
+
+def _placed(head: HeadTable, patterns: Sequence[Pattern], legs: Sequence[Leg]) -> tuple[list[LegJoint], list[Fault]]:
+    """The joints of all legs, and the faults of what they are made from."""
+    count = sum(map(count_joints, legs))
+    if count > MOST_JOINTS:
+        return [], [Fault("leg", f"legs with {count} joints", f"at most {MOST_JOINTS}")]
+    return placed_joints(legs, head.base, head.end_effector or "platform", [each.joint.name for each in patterns])
 
 
 def _misfits(layout: Layout) -> Iterator[Fault]:
@@ -189,10 +209,12 @@ def _misfits(layout: Layout) -> Iterator[Fault]:
         yield from layout.faults()
 
 
-def _hides_copies(fault: Fault) -> bool:
+def _hides_joints(fault: Fault) -> bool:
     """Whether a fault leaves open which joints and bodies there are, or what their numbers mean."""
-    root = fault.place.partition(".")[0]
-    return root in ("base", "end_effector", "units", "joint") or ".copies" in fault.place
+    root, _, field = fault.place.partition(".")
+    if root.startswith("leg["):
+        return field.partition(".")[0] in ("", "chain", "name", "connects", "copies")
+    return root in ("base", "end_effector", "units", "joint", "leg") or ".copies" in fault.place
 
 
 def _missing(head: HeadTable) -> Iterator[Fault]:
@@ -202,7 +224,7 @@ def _missing(head: HeadTable) -> Iterator[Fault]:
         yield Fault("end_effector", "nothing", "a text that is not empty")
 
 
-def _built(head: HeadTable, layout: Layout, faults: list[Fault]) -> Mechanism:
+def _built(head: HeadTable, layout: Layout, placed: Sequence[LegJoint], faults: list[Fault]) -> Mechanism:
     copies = layout.expanded()
     try:
         with warnings.catch_warnings():
@@ -216,9 +238,11 @@ def _built(head: HeadTable, layout: Layout, faults: list[Fault]) -> Mechanism:
                 base=head.base,
                 length_unit=head.units.length,
                 angle_unit=head.units.angle,
+                task=cast(Any, head.task),
             )
     except InvalidMechanism as error:
-        faults = _merged(faults, _as_written(error.faults, layout, copies))
+        own = len(layout.patterns) - len(placed)
+        faults = merged(faults, at_legs(_as_written(error.faults, layout, copies), own, placed))
     if faults:
         raise InvalidMechanism(in_order(faults))
     return mechanism
@@ -237,16 +261,3 @@ def _as_written(faults: Sequence[Fault], layout: Layout, copies: Sequence[Copy])
         if reporter.setdefault(place, copy.number) == copy.number:
             written.append(Fault(place, layout.as_written(fault.found, copy), layout.as_written(fault.expected, copy)))
     return written
-
-
-def _merged(first: Sequence[Fault], second: Sequence[Fault]) -> list[Fault]:
-    """All faults in order, without those of the second list that only follow from one of the first."""
-    places = [fault.place for fault in first]
-    own = [fault for fault in second if not any(_same_place(fault.place, place) for place in places)]
-    return in_order([*first, *own])
-
-
-def _same_place(one: str, other: str) -> bool:
-    """Whether one place is the other, or within it."""
-    short, long = sorted((one, other), key=len)
-    return long == short or long.startswith(f"{short}.") or (short != "joint" and long.startswith(f"{short}["))

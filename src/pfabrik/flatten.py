@@ -69,7 +69,9 @@ def flatten(mechanism: Mechanism) -> Flat:
 
 @lru_cache(maxsize=64)
 def flat_of(mechanism: Mechanism) -> Flat | None:
-    """The mechanism, compiled; None if it is one for the closure engine."""
+    """The mechanism, compiled; None if it is one for the closure engine: for a chain's sake, or the task's."""
+    if mechanism.task != mechanism.whole_task:
+        return None
     try:
         return flatten(mechanism)
     except UnsupportedMechanism:

@@ -47,7 +47,7 @@ def _duplicate_faults(mechanism: Mechanism) -> Iterator[Fault]:
 
 def _actuator_faults(mechanism: Mechanism) -> Iterator[Fault]:
     if mechanism.joints and all(joint.actuated is False for joint in mechanism.joints):
-        yield Fault("joint", "no actuated joint", "at least one joint with `actuated = true`")
+        yield Fault("joint", "no actuated joint", "at least one joint with `actuated = true`, or `*` in a chain")
 
 
 def _bodies(mechanism: Mechanism) -> Counter[str]:

@@ -8,6 +8,10 @@ from typing import Literal, TypeAlias, get_args
 JointType: TypeAlias = Literal["revolute", "prismatic", "universal", "spherical", "cylindrical", "fixed"]
 JOINT_TYPES: tuple[JointType, ...] = get_args(JointType)
 
+WHOLE_TASK = ("x", "y", "z", "rotation")
+TASK_COORDINATES = (*WHOLE_TASK, "tilt")
+"""What a target may set of a pose: its position, its rotation, or of that the direction of the platform's z axis."""
+
 Coordinate: TypeAlias = Literal["angle", "length"]
 
 

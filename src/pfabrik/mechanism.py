@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, TypeAlias, cast
@@ -13,81 +13,21 @@ from typing import Any, Literal, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .coercion import home_value, items, numbers, text, texts, truth, unit_vector, unit_vectors
+from .coercion import items, numbers, text, texts, unit_vector
 from .enclosing import enclosing_radius
 from .errors import InvalidMechanism, MobilityWarning, UnknownName
-from .faults import find_faults
+from .faults import find_faults, in_order, merged
+from .form_faults import joint_faults
 from .freedom import end_effector_freedom
-from .joint_types import JOINT_TYPES, KINDS, JointType
+from .joint_types import JOINT_TYPES, KINDS, TASK_COORDINATES, WHOLE_TASK, JointType
+from .joints import Cone, Joint, Range, Vector, set_fields
+from .leg_joints import at_legs, legs_name, placed_joints
+from .legs import Leg, as_legs
 
 __all__ = ["JOINT_TYPES", "Cone", "Joint", "JointType", "Limit", "Mechanism", "Range", "Vector"]
 
-Vector: TypeAlias = tuple[float, float, float]
-Range: TypeAlias = tuple[float, float]
-
 MOST_JOINTS_FOR_FREEDOM = 200
 """Most joints for which construction counts freedoms: the cost grows with the cube, and reaches a second here."""
-
-
-@dataclass(frozen=True)
-class Cone:
-    """A limit on a universal or spherical joint: a line of one body stays near an axis of the other.
-
-    The angle between `axis` (a unit vector, given at home, fixed to the body `fixed_to`) and the line from this joint
-    to the next joint of the *other* body is at most `half_angle` [rad].
-    """
-
-    axis: Vector
-    half_angle: float
-    fixed_to: str
-
-    def __post_init__(self) -> None:
-        _set(self, axis=unit_vector(self.axis), half_angle=numbers(self.half_angle), fixed_to=text(self.fixed_to))
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint between two bodies, at home, in base coordinates. Angles in radians.
-
-    Vectors and pairs may be any sequence or array; they become tuples of floats, and directions become unit vectors.
-
-    Attributes
-    ----------
-    connects : the two bodies; coordinates move the second relative to the first.
-    at : the joint's centre [length]; None only for a prismatic joint, which has no centre of its own.
-    axis : the axis of R, P and C.
-    axes : the two axes of U, optional; the first is fixed in the first body.
-    along : the two joints whose distance is the coordinate of a prismatic joint.
-    home : value of the coordinate in the home configuration; two values for C (angle, displacement) and U.
-    range : (lo, hi) for R and P; two such pairs for C (angle, displacement) and U.
-    """
-
-    name: str
-    type: JointType
-    connects: tuple[str, str]
-    at: Vector | None = None
-    axis: Vector | None = None
-    axes: tuple[Vector, Vector] | None = None
-    along: tuple[str, str] | None = None
-    actuated: bool = False
-    home: float | tuple[float, float] = 0.0
-    range: Range | tuple[Range, Range] | None = None
-    cone: Cone | None = None
-
-    def __post_init__(self) -> None:
-        _set(
-            self,
-            name=text(self.name),
-            type=text(self.type),
-            connects=texts(self.connects),
-            at=numbers(self.at),
-            axis=unit_vector(self.axis),
-            axes=unit_vectors(self.axes),
-            along=texts(self.along),
-            actuated=truth(self.actuated),
-            home=home_value(self.home, self.type),
-            range=numbers(self.range),
-        )
 
 
 Limit: TypeAlias = Range | tuple[Range, Range] | Cone | None
@@ -106,6 +46,8 @@ class Mechanism:
     reference_point : the point of the end-effector body that targets place, at home [length]; the centre of the joint
         when the end effector is a joint, and then left out.
     length_unit, angle_unit : labels for people and files; nothing is ever converted by them.
+    task : what a target sets, of "x", "y", "z", "rotation" and "tilt" (the direction of the platform's z axis); by
+        default everything. What it leaves out follows from the mechanism.
     """
 
     name: str
@@ -115,15 +57,82 @@ class Mechanism:
     base: str = "base"
     length_unit: str = "mm"
     angle_unit: Literal["deg", "rad"] = field(default="deg", compare=False)
+    task: tuple[str, ...] = None  # type: ignore[assignment]  # never None once constructed
 
     def __post_init__(self) -> None:
         joints = items(self.joints)
-        _set(self, joints=joints, reference_point=numbers(self.reference_point))
-        _set(self, **{name: text(getattr(self, name)) for name in _TEXT_FIELDS})
+        set_fields(self, joints=joints, reference_point=numbers(self.reference_point))
+        set_fields(self, **{name: text(getattr(self, name)) for name in _TEXT_FIELDS})
         if cast(Any, self.reference_point) is None:
-            _set(self, reference_point=_centre_of(joints, self.end_effector))
+            set_fields(self, reference_point=_centre_of(joints, self.end_effector))
+        if cast(Any, self.task) is None:
+            set_fields(self, task=self.whole_task)
+        set_fields(self, task=_in_order(texts(self.task)))
         self._check()
         self._warn_of_freedom()
+
+    @classmethod
+    def from_legs(
+        cls,
+        legs: str | Leg | Sequence[Leg],
+        /,
+        *,
+        base: Any = None,
+        platform: Any = None,
+        via: Any = None,
+        axis: Any = None,
+        stroke: Range | None = None,
+        copies: Mapping[str, Any] | None = None,
+        name: str | None = None,
+        end_effector: str = "platform",
+        reference_point: Any = None,
+        task: Sequence[str] | None = None,
+        base_body: str = "base",
+        joints: Iterable[Joint] = (),
+        length_unit: str = "mm",
+        angle_unit: Literal["deg", "rad"] = "deg",
+        **by_letter: Mapping[str, Any],
+    ) -> Mechanism:
+        """A mechanism of legs: chains from its base to its end effector, one for each pair of points.
+
+        Parameters
+        ----------
+        legs : a chain such as "U-P*-S"; or a `Leg`, or several, which then have the points and all else up to `copies`.
+        base, platform, via, axis, stroke, copies : as of a `Leg`; lengths, and angles in radians.
+        by_letter : what is said of single joints of the chain: `A={"axis": "radial", "range": (-1, 1)}`.
+        name : by default what the field calls it, such as "6-UPS".
+        end_effector, reference_point, task, length_unit, angle_unit : as of a `Mechanism`.
+        base_body : the name of the body that does not move.
+        joints : joints beside those of the legs, before which they come.
+
+        Raises
+        ------
+        InvalidMechanism : with every fault; places such as `leg[0].platform` are those of a file.
+        InvalidArgument : neither a chain nor legs, or both.
+        """
+        parts = {"base": base, "platform": platform, "via": via, "axis": axis, "stroke": stroke, "copies": copies}
+        described = as_legs(legs, parts | {"by_letter": by_letter})
+        own = tuple(joints)
+        tips = [joint.name for joint in own if isinstance(joint, Joint)]
+        placed, faults = placed_joints(described, base_body, end_effector, tips)
+        made = own + tuple(each.joint for each in placed)
+        if faults:
+            sound = ((index, joint) for index, joint in enumerate(made) if isinstance(joint, Joint))
+            alone = [fault for index, joint in sound for fault in joint_faults(f"joint[{index}]", joint)]
+            raise InvalidMechanism(merged(faults, at_legs(alone, len(own), placed)))
+        try:
+            return cls(
+                name=legs_name(described, placed) if name is None else name,
+                joints=made,
+                end_effector=end_effector,
+                reference_point=reference_point,
+                base=base_body,
+                length_unit=length_unit,
+                angle_unit=angle_unit,
+                task=cast(Any, task),
+            )
+        except InvalidMechanism as error:
+            raise InvalidMechanism(in_order(at_legs(error.faults, len(own), placed))) from None
 
     def _check(self) -> None:
         faults = find_faults(self)
@@ -166,9 +175,9 @@ class Mechanism:
         return self.end_effector not in self.bodies
 
     @cached_property
-    def task(self) -> tuple[str, ...]:
-        """What a target sets: the position of the reference point and, for a body, its rotation."""
-        return ("x", "y", "z") if self.end_effector_is_joint else ("x", "y", "z", "rotation")
+    def whole_task(self) -> tuple[str, ...]:
+        """All that a target can set: the position of the reference point and, for a body, its rotation."""
+        return WHOLE_TASK[:3] if _has_joint(self.joints, self.end_effector) else WHOLE_TASK
 
     @cached_property
     def home_pose(self) -> NDArray[np.float64]:
@@ -256,7 +265,7 @@ class Mechanism:
     def _with_joints(self, joints: Iterable[Joint]) -> Mechanism:
         """A checked copy; freedoms do not depend on limits, so it does not warn of them again."""
         copy = object.__new__(Mechanism)
-        _set(copy, **(self.__getstate__() | {"joints": tuple(joints)}))
+        set_fields(copy, **(self.__getstate__() | {"joints": tuple(joints)}))
         copy._check()
         return copy
 
@@ -272,6 +281,17 @@ def _limited(joint: Joint, limit: Limit) -> Joint:
     return dataclasses.replace(joint, range=limit)
 
 
+def _has_joint(joints: Any, name: str) -> bool:
+    joints = joints if isinstance(joints, tuple) else ()
+    return any(isinstance(joint, Joint) and joint.name == name for joint in joints)
+
+
+def _in_order(task: Any) -> Any:
+    """A task's coordinates in their usual order; anything else as it is, for `find_faults` to name."""
+    known = isinstance(task, tuple) and all(each in TASK_COORDINATES for each in task)
+    return tuple(sorted(task, key=TASK_COORDINATES.index)) if known else task
+
+
 def _stroke(joint: Joint) -> float:
     """Length of a prismatic joint's range; 0 where it has none."""
     if joint.type != "prismatic" or joint.range is None:
@@ -283,8 +303,3 @@ def _stroke(joint: Joint) -> float:
 def _centre_of(joints: Any, name: str) -> Vector | None:
     joints = joints if isinstance(joints, tuple) else ()
     return next((joint.at for joint in joints if isinstance(joint, Joint) and joint.name == name), None)
-
-
-def _set(frozen: object, **values: object) -> None:
-    for name, value in values.items():
-        object.__setattr__(frozen, name, value)

@@ -30,6 +30,7 @@ def nearest(
     poses: Floats,
     *,
     platform: Sequence[float] = EVERYTHING_FREE,
+    framed: bool = False,
     targets: Floats | None = None,
     weights: Floats | None = None,
     anchors: Floats | None = None,
@@ -42,6 +43,7 @@ def nearest(
     coordinates, poses : where to start; need not be closed, nor within limits.
     platform : what counts of the platform's distance from `targets`: six weights relative to each other; LOCKED keeps
         a part where it starts.
+    framed : the weights of the rotation are about the axes of the targets, not of the base.
     weights, anchors : what counts of the coordinates' distances from anchors, (columns,), (n, columns).
     gently : open the loops less on the way, so that the search stays in its working mode, and may end less near.
 
@@ -57,6 +59,7 @@ def nearest(
             coordinates,
             poses,
             platform=np.where(held, LOCKED, weight * wished).tolist(),
+            framed=framed,
             targets=targets,
             weights=weight * own,
             anchors=anchors,
@@ -66,7 +69,16 @@ def nearest(
             max_iterations=STEPS,
         )
         coordinates, poses = found.coordinates, found.poses
-    return close(closure, coordinates, poses, platform=np.where(held, LOCKED, 0.0).tolist(), limits=True, margin=MARGIN)
+    return close(
+        closure,
+        coordinates,
+        poses,
+        platform=np.where(held, LOCKED, 0.0).tolist(),
+        framed=framed,
+        targets=targets,
+        limits=True,
+        margin=MARGIN,
+    )
 
 
 def is_feasible(closing: Closing) -> NDArray[np.bool_]:

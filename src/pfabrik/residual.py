@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from .closure_ik import pose_errors
 from .completion import joint_values
 from .displacements import end_effector_pose, gaps
 from .errors import InvalidArgument
 from .mechanism import Mechanism
 from .solution import Solution
+from .task import Task
 
 
 def closure_residual(mechanism: Mechanism, solution: Solution) -> Any:
@@ -34,9 +34,8 @@ def closure_residual(mechanism: Mechanism, solution: Solution) -> Any:
     length, rows, q = mechanism.characteristic_length, solution._rows, solution._coordinates
     known = np.isfinite(q).all(axis=1)
     found = np.full(len(q), np.nan)
-    position, rotation = pose_errors(end_effector_pose(mechanism, q[known]), rows.poses[known])
-    if mechanism.end_effector_is_joint:
-        rotation = np.zeros_like(rotation)
+    compared = Task((True, True, True), 0 if mechanism.end_effector_is_joint else 3)
+    position, rotation = compared.errors(end_effector_pose(mechanism, q[known]), rows.poses[known])
     found[known] = np.max([gaps(mechanism, q[known]), position, rotation * length], axis=0)
     values = joint_values(mechanism, q[known])
     for column, name in enumerate(mechanism.actuators):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -25,6 +25,9 @@ class Table(BaseModel):
     """A TOML table: no unknown keys, and no value taken for another type."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
+
+    others: ClassVar[str] = ""
+    """What a table may hold beside its keys, for faults."""
 
 
 Three = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -75,8 +78,44 @@ class JointTable(Table):
     copies: CopiesTable | None = Field(None, description="a table: count, axis")
 
 
+class LegConeTable(Table):
+    """The `cone` of one joint of a leg. Directions are looked at with the points of the leg."""
+
+    axis: Any = Field(None, description="a direction")
+    half_angle: float | None = Field(None, description="a number")
+    fixed_to: str | None = Field(None, description="the name of a body")
+
+
+class LegJointTable(Table):
+    """What a `[[leg]]` says of one joint of its chain."""
+
+    axis: Any = Field(None, description="a direction")
+    axes: Any = Field(None, description="two directions")
+    home: float | Two | None = Field(None, description="a number, or two for a joint with two coordinates")
+    range: Two | Annotated[list[Two], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="two numbers, or two pairs of them for a joint with two coordinates"
+    )
+    cone: LegConeTable | None = Field(None, description="a table: half_angle, axis, fixed_to")
+
+
+class LegTable(Table):
+    """`[[leg]]` without the tables of single joints. Its chain, points and directions are looked at together."""
+
+    others: ClassVar[str] = ", or the letter of one of its joints: A, B, ..."
+
+    chain: str | None = Field(None, description="joints from the base outward, such as 'U-P*-S'")
+    name: str = Field("", description="a text")
+    connects: TwoNames | None = Field(None, description="the names of two bodies")
+    base: Any = Field(None, description="points")
+    via: Any = Field(None, description="points")
+    platform: Any = Field(None, description="points")
+    axis: Any = Field(None, description="a direction")
+    stroke: Two | None = Field(None, description="two numbers, the range of its prismatic joint")
+    copies: CopiesTable | None = Field(None, description="a table: count, axis")
+
+
 class HeadTable(Table):
-    """All of a file but its joints."""
+    """All of a file but its joints and legs."""
 
     version: int = Field(alias="schema", ge=1, le=1, description="1")
     name: str | None = Field(None, description="a text")
@@ -84,7 +123,9 @@ class HeadTable(Table):
     base: str = Field("base", description="the name of a body")
     end_effector: str | None = Field(None, description="the name of a body or joint")
     reference_point: Three | None = Field(None, description="three numbers")
+    task: list[str] | None = Field(None, description="a list of some of x, y, z, rotation, tilt")
     joint: list[Any] = Field(default_factory=list, description="[[joint]] tables")
+    leg: list[Any] = Field(default_factory=list, description="[[leg]] tables")
 
 
 AnyTable = TypeVar("AnyTable", bound=Table)
@@ -130,7 +171,8 @@ def _fault(model: type[Table], table: dict[str, Any], place: str, path: tuple[st
     where = ".".join([place] * bool(place) + [_shown_key(key) for key in path])
     key = path[-1]
     if key not in expected:
-        return Fault(where, f"an unknown key{near_miss(key, expected)}", f"one of {', '.join(expected)}")
+        known = f"one of {', '.join(expected)}{model.others}"
+        return Fault(where, f"an unknown key{near_miss(key, expected)}", known)
     return Fault(where, shown(table.get(key)), expected[key])
 
 

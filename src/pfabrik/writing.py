@@ -30,6 +30,8 @@ def _head(mechanism: Mechanism, angle_unit: str) -> Iterator[str]:
     yield f"end_effector = {_value(mechanism.end_effector)}"
     if not mechanism.end_effector_is_joint:
         yield f"reference_point = {_value(mechanism.reference_point)}"
+    if mechanism.task != mechanism.whole_task:
+        yield f"task = {_value(mechanism.task)}"
 
 
 def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:
@@ -37,7 +39,8 @@ def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:
         value = getattr(joint, field)
         if field in ("home", "range"):
             value = converted(value, joint.type, convert)
-        if value is not None and value is not False and value not in (0.0, (0.0, 0.0)):
+        left_out = value is None or value is False or (field == "home" and value in (0.0, (0.0, 0.0)))
+        if not left_out:
             yield f"{field} = {_value(value)}"
     if joint.cone is not None:
         cone = joint.cone

@@ -21,3 +21,9 @@ def catalog_file(name: str) -> Traversable:
     if name not in catalog():
         raise UnknownName("catalogue machine", name, catalog())
     return files(__name__) / f"{name}{_SUFFIX}"
+
+
+def description(name: str) -> str:
+    """What a catalogue machine is, in one line: the first of its file."""
+    with catalog_file(name).open(encoding="utf-8") as file:
+        return file.readline().removeprefix("#").strip()

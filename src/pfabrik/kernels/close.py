@@ -462,6 +462,8 @@ def add_platform(row: int, state: State, wishes: Wishes, eq: Equations) -> float
     """The platform's distance from its target, in its own equations; the weighted square."""
     square = 0.0
     difference(state.X, wishes.targets[row], eq.e[3:])
+    if wishes.framed == 1:
+        into_frame(wishes.targets[row], eq.e[3:])
     for i in range(6):
         weight = wishes.platform[i]
         if weight == LOCKED:
@@ -472,6 +474,41 @@ def add_platform(row: int, state: State, wishes: Wishes, eq: Equations) -> float
             eq.G[i, i] += weight
             eq.G[i, 6] -= weight * off
     return square
+
+
+@inlined
+def into_frame(F: Floats, v: Floats) -> None:
+    """Three components of a vector in base axes, in place, as those along the axes of a pose."""
+    x, y, z = v[0], v[1], v[2]
+    for i in range(3):
+        v[i] = F[0, i] * x + F[1, i] * y + F[2, i] * z
+
+
+@inlined
+def out_of_frame(F: Floats, twist: Floats) -> None:
+    """The angular part of a twist along the axes of a pose, in place, in base axes."""
+    x, y, z = twist[3], twist[4], twist[5]
+    for i in range(3):
+        twist[3 + i] = F[i, 0] * x + F[i, 1] * y + F[i, 2] * z
+
+
+@routine
+def turn_equations(F: Floats, layout: Layout, eq: Equations) -> None:
+    """Make the platform's angular velocity one about the axes of a pose, in all equations in which it occurs."""
+    for group in range(len(layout.sizes)):
+        for s in range(layout.sizes[group]):
+            into_frame(F, eq.C[group, s, 3:])
+    G = eq.G
+    for i in range(3, 6):  # only the lower triangle is filled: that of the angular part is completed first
+        for j in range(i + 1, 6):
+            G[i, j] = G[j, i]
+    for j in range(7):
+        if j < 3 or j == 6:
+            into_frame(F, G[3:, j])
+    for j in range(3, 6):
+        into_frame(F, G[3:, j])
+    for i in range(3, 6):
+        into_frame(F, G[i, 3:6])
 
 
 @inlined
@@ -667,6 +704,8 @@ def close(loops: Loops, layout: Layout, wishes: Wishes, closed: Closed) -> None:
                     closed.excesses[row, group] = eq.excesses[group]
                 break
             found += add_anchors(loops, layout.slots, row, trial, wishes, eq)
+            if wishes.framed == 1:
+                turn_equations(wishes.targets[row], layout, eq)
             found += add_platform(row, trial, wishes, eq)
             if turn == TRY:
                 if found < cost or plunging:
@@ -687,6 +726,8 @@ def close(loops: Loops, layout: Layout, wishes: Wishes, closed: Closed) -> None:
                 turn = MEASURE
             if turn == TRY:
                 solve(layout, damping, eq)
+                if wishes.framed == 1:
+                    out_of_frame(wishes.targets[row], eq.twist)
                 step = move(loops, layout, eq, trial)
                 iterations += 1
             elif turn == MEASURE:

@@ -60,6 +60,7 @@ class Wishes(NamedTuple):
     weights: Floats  # (columns,): of the distance of each free coordinate from its anchor
     anchors: Floats  # (n, columns)
     platform: Floats  # (6,): weights of the pose's distance from its target, position then rotation; LOCKED holds it
+    framed: int  # 1: the weights of the rotation are about the target's own axes, not the base's
     targets: Floats  # (n, 4, 4)
     centres: Floats  # (n, joints, 3): where joint centres are wished to be; NaN where they are not
     limits: int  # 1: limits are to be kept

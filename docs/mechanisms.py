@@ -1,0 +1,116 @@
+"""Write docs/mechanisms.md and docs/pictures/: what is in the catalogue. Run it as `python docs/mechanisms.py`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+import pfabrik as pf
+from pfabrik.catalog import catalog_file, description
+from pfabrik.view.drawing import draw
+
+PAGE = Path(__file__).with_suffix(".md")
+PICTURES = PAGE.parent / "pictures"
+COLOURS = 64  # of a picture: enough for smooth edges, and a third of the file
+HEAD = """# Mechanisms of the catalogue
+
+Each is loaded by its name, as in `pf.load("stewart")`. The pictures show home, the base grey and the end effector blue:
+actuated joints are filled, dashed lines are rails, a cross marks the reference point. In the sub-chains, `*` marks the
+actuated joint; [How it works](how-it-works.md) tells the engines apart. [Adding a mechanism](adding-a-mechanism.md)
+says how to bring your own.
+
+| name | mechanism | freedoms | actuators |
+|---|---|---|---|
+"""
+
+
+def main() -> None:
+    """Write the page and its pictures; pictures of what is no longer in the catalogue go."""
+    PICTURES.mkdir(exist_ok=True)
+    for stale in set(PICTURES.glob("*.png")) - {picture(name) for name in pf.catalog()}:
+        stale.unlink()
+    for name in pf.catalog():
+        draw_picture(name)
+    PAGE.write_text(page(), encoding="utf-8")
+
+
+def page() -> str:
+    """The text of the page."""
+    names = pf.catalog()
+    return HEAD + "".join(map(row, names)) + "".join(map(section, names))
+
+
+def row(name: str) -> str:
+    """A machine's line in the table of contents."""
+    counted = pf.mobility(pf.load(name))
+    kind = description(name).partition(":")[0]
+    return f"| [{name}](#{name}) | {kind} | {counted.platform} | {counted.actuators} |\n"
+
+
+def section(name: str) -> str:
+    """What the file says of a machine, its picture, and what follows from its joints."""
+    mechanism = pf.load(name)
+    first, *rest = header(name)
+    facts = {
+        "mobility": mobility(pf.mobility(mechanism)),
+        "sub-chains": sub_chains(mechanism),
+        "actuators": ", ".join(f"`{actuator}`" for actuator in mechanism.actuators),
+        "task": " ".join(mechanism.task),
+    }
+    lines = [
+        f"\n## {name}\n",
+        f"**{first}**\n",
+        *[f"{' '.join(rest)}\n"] * bool(rest),
+        f"![{mechanism.name}]({PICTURES.name}/{name}.png)\n",
+        "| | |\n|---|---|",
+        *[f"| {key} | {fact} |" for key, fact in facts.items()],
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def header(name: str) -> list[str]:
+    """The comment that a file begins with, line by line: what the machine is, where its dimensions are from."""
+    lines = catalog_file(name).read_text(encoding="utf-8").splitlines()
+    end = next(place for place, line in enumerate(lines) if not line.startswith("#"))
+    return [line.removeprefix("#").strip() for line in lines[:end]]
+
+
+def mobility(counted: pf.Mobility) -> str:
+    """Motions of the whole, those of the end effector among them, and actuators beyond its freedoms."""
+    parts = f"{counted.platform} of the end effector, {counted.internal} internal, {counted.idle} idle"
+    return f"{counted.mobility}: {parts}; redundancy {counted.redundancy}"
+
+
+def sub_chains(mechanism: pf.Mechanism) -> str:
+    """The distinct sub-chains, how often each occurs, and its engine."""
+    counts = Counter((str(chain), chain.engine) for chain in pf.decompose(mechanism))
+    return ", ".join(f"{count} × `{notation}` ({engine})" for (notation, engine), count in counts.items())
+
+
+def picture(name: str) -> Path:
+    """The picture of a machine."""
+    return PICTURES / f"{name}.png"
+
+
+def draw_picture(name: str) -> None:
+    """Draw a machine at home, 400 x 320 pixels in few colours; the file names neither program nor time."""
+    figure = Figure(figsize=(4, 3.2), dpi=100)
+    axes = figure.add_axes((0.02, 0.06, 0.9, 0.92), projection="3d")
+    axes.tick_params(labelsize=6, pad=-2)
+    draw(pf.load(name), axes=axes)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.label.set_size(7)
+        axis.labelpad = -4
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    image.quantize(COLOURS, method=Image.Quantize.FASTOCTREE).save(picture(name), optimize=True)
+
+
+if __name__ == "__main__":
+    main()

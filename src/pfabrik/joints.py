@@ -1,0 +1,81 @@
+"""One joint of a mechanism, and the cone that may limit it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from .coercion import home_value, numbers, text, texts, truth, unit_vector, unit_vectors
+from .joint_types import JointType
+
+__all__ = ["Cone", "Joint", "Range", "Vector", "set_fields"]
+
+Vector: TypeAlias = tuple[float, float, float]
+Range: TypeAlias = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A limit on a universal or spherical joint: a line of one body stays near an axis of the other.
+
+    The angle between `axis` (a unit vector, given at home, fixed to the body `fixed_to`) and the line from this joint
+    to the next joint of the *other* body is at most `half_angle` [rad].
+    """
+
+    axis: Vector
+    half_angle: float
+    fixed_to: str
+
+    def __post_init__(self) -> None:
+        set_fields(self, axis=unit_vector(self.axis), half_angle=numbers(self.half_angle), fixed_to=text(self.fixed_to))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint between two bodies, at home, in base coordinates. Angles in radians.
+
+    Vectors and pairs may be any sequence or array; they become tuples of floats, and directions become unit vectors.
+
+    Attributes
+    ----------
+    connects : the two bodies; coordinates move the second relative to the first.
+    at : the joint's centre [length]; None only for a prismatic joint, which has no centre of its own.
+    axis : the axis of R, P and C.
+    axes : the two axes of U, optional; the first is fixed in the first body.
+    along : the two joints whose distance is the coordinate of a prismatic joint.
+    home : value of the coordinate in the home configuration; two values for C (angle, displacement) and U.
+    range : (lo, hi) for R and P; two such pairs for C (angle, displacement) and U.
+    """
+
+    name: str
+    type: JointType
+    connects: tuple[str, str]
+    at: Vector | None = None
+    axis: Vector | None = None
+    axes: tuple[Vector, Vector] | None = None
+    along: tuple[str, str] | None = None
+    actuated: bool = False
+    home: float | tuple[float, float] = 0.0
+    range: Range | tuple[Range, Range] | None = None
+    cone: Cone | None = None
+
+    def __post_init__(self) -> None:
+        set_fields(
+            self,
+            name=text(self.name),
+            type=text(self.type),
+            connects=texts(self.connects),
+            at=numbers(self.at),
+            axis=unit_vector(self.axis),
+            axes=unit_vectors(self.axes),
+            along=texts(self.along),
+            actuated=truth(self.actuated),
+            home=home_value(self.home, self.type),
+            range=numbers(self.range),
+        )
+
+
+def set_fields(frozen: object, **values: object) -> None:
+    """Set fields of a frozen object that is still being made."""
+    for name, value in values.items():
+        object.__setattr__(frozen, name, value)

@@ -1,0 +1,308 @@
+"""The catalogue: every machine loads, has the freedoms that the literature gives it, and keeps what answers promise."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import joint_checking
+import pfabrik as pf
+from fk_machines import PUBLISHED, moved_from_home
+from pfabrik import Mechanism, Solution, Status
+from pfabrik.catalog import catalog_file, description
+from pfabrik.freedom import universal_axes
+
+Array = NDArray[np.float64]
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+KEPT = 1e-9  # what a result promises, of L or in radians
+NAMES = pf.catalog()
+
+FREEDOMS = {
+    "agile_eye": (3, 3),  # Gosselin and Hamel 1994: three rotations
+    "ankle_rss": (2, 4),  # and two rods that spin between their ball joints
+    "ankle_ups": (2, 2),
+    "canfield": (3, 3),  # Canfield 1997: two rotations and the plunge
+    "delta": (3, 3),  # Clavel 1988: three translations
+    "five_bar": (2, 2),
+    "hexaglide": (6, 6),
+    "linear_delta": (3, 9),  # and six rods that spin between their ball joints
+    "nrpm": (6, 12),  # the paper: twelve actuators for six freedoms
+    "orthoglide": (3, 3),  # Chablat and Wenger 2003: three translations
+    "prr": (3, 3),
+    "prs": (3, 3),
+    "psu": (3, 3),
+    "rpr": (3, 3),
+    "rps": (3, 3),  # Lee and Shah 1988
+    "rrr": (3, 3),
+    "serial_arm": (4, 4),
+    "servo_hexapod": (6, 6),
+    "stewart": (6, 6),
+    "tricept": (3, 3),  # Neumann 1988: a tilt in two directions and a distance
+    "ucu": (6, 6),
+}
+"""Freedoms of the end effector and of the whole machine, as the literature counts them."""
+
+OVER_CONSTRAINTS = {"five_bar": 3, "rrr": 6, "rpr": 6, "prr": 6, "agile_eye": 6, "orthoglide": 12}
+"""Loop conditions that follow from others: three of every planar or spherical loop, such as the Orthoglide's three
+parallelograms; and three more there, because three legs hold two rotations each. None elsewhere."""
+
+
+@cache
+def machine(name: str) -> Mechanism:
+    return pf.load(name)
+
+
+def drawn_actuators(mechanism: Mechanism, count: int, seed: int) -> Array:
+    """Actuator values (count, n_a) between home and somewhere in their ranges; a joint without one gets any angle.
+
+    Few combinations of values from the ends of their ranges belong to a pose; to find that out takes the interpreter
+    minutes.
+    """
+    farthest = 0.15 if INTERPRETED else 1.0
+    random = np.random.default_rng(seed)
+    ranges = [mechanism.joint(name).range or (-np.pi, np.pi) for name in mechanism.actuators]
+    home = np.array([mechanism.home_coordinate(name) for name in mechanism.actuators])
+    away = random.uniform(*np.transpose(ranges), (count, len(ranges))) - home
+    return home + random.uniform(0, farthest, (count, 1)) * away
+
+
+@cache
+def inside(name: str, count: int) -> Array:
+    """Poses (count, 4, 4) that the machine can take: those of actuator values drawn within their ranges."""
+    mechanism, poses = machine(name), np.zeros((0, 4, 4))
+    for seed in range(8):
+        found = pf.solve_fk(mechanism, drawn_actuators(mechanism, count, seed))
+        poses = np.concatenate([poses, found.pose[found.status == Status.REACHED]])[:count]
+        if len(poses) == count:
+            break
+    return poses
+
+
+def random_poses(mechanism: Mechanism, count: int, seed: int) -> Array:
+    """Poses (count, 4, 4) around home, up to 1.5 L and half a turn away: few of them are of any use to a machine."""
+    random = np.random.default_rng(seed)
+    poses, scale = np.tile(mechanism.home_pose, (count, 1, 1)), random.uniform(0, 1, (count, 1))
+    poses[:, :3, 3] += scale * mechanism.characteristic_length * random.uniform(-1.5, 1.5, (count, 3))
+    if not mechanism.end_effector_is_joint:
+        turn = random.standard_normal((count, 3))
+        turn *= np.pi * scale / np.linalg.norm(turn, axis=1, keepdims=True)
+        poses[:, :3, :3] = Rotation.from_rotvec(turn).as_matrix()
+    return poses
+
+
+def distance(mechanism: Mechanism, poses: Array, others: Array) -> Array:
+    """Largest of position [L] and rotation [rad] between poses, (n,); position alone for a joint end effector."""
+    moved = np.linalg.norm((poses - others)[:, :3, 3], axis=1) / mechanism.characteristic_length
+    turned = np.linalg.norm((poses - others)[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
+    return moved if mechanism.end_effector_is_joint else np.maximum(moved, turned)
+
+
+def with_axes(mechanism: Mechanism) -> Mechanism:
+    """The same machine, with the axes of its universal joints written out where the library chooses them."""
+    joints = [
+        dataclasses.replace(joint, axes=universal_axes(mechanism, joint)) if joint.type == "universal" else joint
+        for joint in mechanism.joints
+    ]
+    return dataclasses.replace(mechanism, joints=tuple(joints))
+
+
+def assert_feasible(mechanism: Mechanism, solution: Solution) -> None:
+    assert np.isfinite(solution.pose).all()
+    assert np.isfinite(solution.actuators).all()
+    assert (solution.status <= Status.PROJECTED).all()
+    assert pf.closure_residual(mechanism, solution).max() <= KEPT * mechanism.characteristic_length
+    explicit = with_axes(mechanism)
+    assert joint_checking.worst_opening(explicit, solution).max() <= 2 * KEPT
+    assert joint_checking.worst_excess(explicit, solution).max() <= 2 * KEPT
+
+
+def counts(few: int, many: int) -> list[object]:
+    return [few if not INTERPRETED else 2, pytest.param(many, marks=pytest.mark.slow)]
+
+
+def test_every_machine_has_its_freedoms_checked() -> None:
+    assert set(FREEDOMS) == set(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_file_begins_with_a_line_that_says_what_the_machine_is(name: str) -> None:
+    line, second = catalog_file(name).read_text(encoding="utf-8").splitlines()[:2]
+    assert description(name) == line.removeprefix("# ")
+    assert line.startswith("# ")
+    assert line.endswith(".")
+    assert second.startswith("# ")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_saved_machine_is_the_same(name: str, tmp_path: object) -> None:
+    path = f"{tmp_path}/{name}.toml"
+    pf.save(machine(name), path)
+    assert pf.load(path) == machine(name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_machines_have_the_freedoms_that_the_literature_counts(name: str) -> None:
+    counted = pf.mobility(machine(name))
+    assert (counted.platform, counted.mobility) == FREEDOMS[name]
+    assert counted.uncontrolled == 0
+    assert counted.over_constraints == OVER_CONSTRAINTS.get(name, 0)
+    assert counted.internal == (6 if name == "nrpm" else 0)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_home_is_reached_and_is_where_the_file_says(name: str) -> None:
+    mechanism = machine(name)
+    home = pf.solve_ik(mechanism, mechanism.home_pose)
+    assert home.status is Status.REACHED
+    expected = [mechanism.home_coordinate(actuator) for actuator in mechanism.actuators]
+    np.testing.assert_allclose(home.actuators, expected, atol=1e-9 * mechanism.characteristic_length)
+
+
+@pytest.mark.parametrize("count", counts(200, 2000))
+@pytest.mark.parametrize("name", NAMES)
+def test_poses_that_a_machine_has_are_reached(name: str, count: int) -> None:
+    mechanism, poses = machine(name), inside(name, count)
+    assert len(poses) == count
+    found = pf.solve_ik(mechanism, poses)
+    assert_feasible(mechanism, found)
+    assert (found.status == Status.REACHED).all()
+    assert distance(mechanism, found.pose, poses).max() <= KEPT
+
+
+@pytest.mark.parametrize("count", counts(200, 2000))
+@pytest.mark.parametrize("name", NAMES)
+def test_forward_kinematics_undoes_inverse_kinematics(name: str, count: int) -> None:
+    mechanism, poses = machine(name), inside(name, count)
+    found = pf.solve_ik(mechanism, poses)
+    back = pf.solve_fk(mechanism, found.actuators, seed=found)
+    assert (back.status == Status.REACHED).all()
+    assert distance(mechanism, back.pose, poses).max() <= 1e-8
+
+
+@pytest.mark.parametrize("count", counts(200, 2000))
+@pytest.mark.parametrize("name", NAMES)
+def test_limits_are_kept_and_loops_closed_for_any_target(name: str, count: int) -> None:
+    mechanism = machine(name)
+    assert_feasible(mechanism, pf.solve_ik(mechanism, random_poses(mechanism, count, 1)))
+
+
+# Published numbers
+
+
+TROSSEN = np.array(
+    [
+        [0, 19.403, 19.403, 19.403],
+        [10, 19.553, 14.119, 24.683],
+        [20, 20.0, 8.858, 29.938],
+        [30, 20.743, 3.657, 35.155],
+        [40, 21.78, -1.436, 40.325],
+        [50, 23.107, -6.366, 45.448],
+        [60, 24.721, -11.073, 50.524],
+        [70, 26.619, -15.488, 55.559],
+        [80, 28.8, -19.547, 60.563],
+        [90, 31.263, -23.191, 65.546],
+        [100, 34.009, -26.372, 70.524],
+    ]
+)
+"""x [mm] and the arms' angles [deg] at y = 0, 50 mm below level arms. Source: the tests of firepick's
+DeltaCalculator.js, of the machine of the Trossen tutorial; printed to 0.001 degrees."""
+
+
+def test_the_delta_turns_its_arms_as_the_tutorials_program_says() -> None:
+    mechanism = machine("delta")
+    targets = mechanism.home_pose[:3, 3] + np.outer(TROSSEN[:, 0], [1, 0, 0]) - [0, 0, 50]
+    found = pf.solve_ik(mechanism, targets)
+    assert found
+    np.testing.assert_allclose(np.degrees(found.actuators), TROSSEN[:, 1:], atol=1.1e-3)
+
+
+def test_the_delta_sinks_by_the_published_amount_for_one_degree() -> None:
+    mechanism = machine("delta")
+    assert mechanism.home_pose[2, 3] == pytest.approx(-96.859, abs=1e-3)
+    sunk = pf.solve_fk(mechanism, np.radians([1.0, 1.0, 1.0])).pose[2, 3] - mechanism.home_pose[2, 3]
+    assert sunk == pytest.approx(-1.992, abs=1.5e-3)
+
+
+@pytest.mark.parametrize("row", PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"])
+def test_the_3rps_shifts_sideways_as_lee_and_shah_say(row: list[float]) -> None:
+    azimuth, tilt, height = row[:3]
+    about_z = Rotation.from_rotvec([0, 0, azimuth])
+    turn = about_z * Rotation.from_rotvec([0, tilt, 0]) * about_z.inv()
+    found = pf.solve_ik(machine("rps"), pf.pose([*row[3:5], height], rotation=turn))
+    assert found
+    np.testing.assert_allclose(found.actuators, row[5:], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("target", "lengths"),
+    [
+        ((0, 0, 0), (310.5828541230249, 310.5828541230249, 310.5828541230249)),
+        ((50, -30, 20), (358.482915694, 275.87858584, 325.060173204)),
+    ],
+)
+def test_the_orthoglide_slides_as_published(target: tuple[float, ...], lengths: tuple[float, ...]) -> None:
+    found = pf.solve_ik(machine("orthoglide"), target)
+    assert found
+    np.testing.assert_allclose(found.actuators, lengths, atol=1e-6)
+
+
+@pytest.mark.parametrize(("corner", "factors"), [(73.20508076, (0.8, 0.8, 2)), (-126.79491924, (0.5, 2, 2))])
+def test_the_orthoglide_is_within_its_transmission_factors_just_so(corner: float, factors: tuple[float, ...]) -> None:
+    """Chablat and Wenger chose its dimensions so that these two corners of the cube meet the bounds 1/2 and 2."""
+    mechanism = machine("orthoglide")
+    found = pf.solve_ik(mechanism, [corner] * 3)
+    assert found
+    gains = np.linalg.svd(pf.forward_jacobian(mechanism, found)[:3], compute_uv=False)
+    np.testing.assert_allclose(sorted(gains), factors, atol=1e-6)
+
+
+def test_servo_angles_are_those_of_the_notebook() -> None:
+    """Of a twist by 30 degrees at height 12.4: positive lifts a horn there as here; legs 1, 3, 5, then 2, 4, 6."""
+    found = pf.solve_ik(machine("servo_hexapod"), pf.pose([0, 0, 12.4], rpy=[0, 0, np.pi / 6]))
+    assert found
+    np.testing.assert_allclose(found.actuators, [0.60882972] * 3 + [0.22676629] * 3, atol=1e-8)
+
+
+@pytest.mark.parametrize("p, rpy, lengths", PUBLISHED["gsp_conroy"]["rows_p_rpy_L"])
+def test_struts_of_the_ucu_hexapod_are_as_long_as_printed(
+    p: list[float], rpy: list[float], lengths: list[float]
+) -> None:
+    found = pf.solve_ik(machine("ucu"), pf.pose(p, rpy=rpy))
+    assert found
+    np.testing.assert_allclose(found.actuators, [*lengths[::2], *lengths[1::2]], atol=6e-5)
+
+
+@pytest.mark.slow
+def test_the_planar_3rpr_has_the_two_poses_of_the_book() -> None:
+    mechanism = machine("rpr")
+    modes = pf.assembly_modes(mechanism, [np.sqrt(5)] * 3)
+    home = pf.pose([0, 0, 0], rotvec=[0, 0, PUBLISHED["sauer_fig1_15"]["poses_theta_x_y"][0][0]])
+    expected = [
+        moved_from_home(pf.pose([x, y, 0], rotvec=[0, 0, theta]), home)
+        for theta, x, y in PUBLISHED["sauer_fig1_15"]["poses_theta_x_y"]
+    ]
+    assert len(modes) == len(expected)
+    for pose, mode in zip(expected, sorted(modes, key=lambda mode: mode.pose[0, 3]), strict=True):
+        np.testing.assert_allclose(mode.pose, pose, atol=1e-9)
+
+
+def test_the_scara_moves_its_tool_as_its_parameters_say() -> None:
+    """Denavit-Hartenberg by hand: 325 and 275 mm in the plane, 387 mm above the base."""
+    mechanism = machine("serial_arm")
+    first, second, drop, wrist = drawn_actuators(mechanism, 50, 3).T
+    expected = np.tile(np.eye(4), (50, 1, 1))
+    expected[:, 0, 3] = 325 * np.cos(first) + 275 * np.cos(first + second)
+    expected[:, 1, 3] = 325 * np.sin(first) + 275 * np.sin(first + second)
+    expected[:, 2, 3] = 387 - drop
+    home = [mechanism.home_coordinate(name) for name in mechanism.actuators]
+    about_z = first + second - wrist - (home[0] + home[1] - home[3])
+    expected[:, :3, :3] = Rotation.from_rotvec(np.outer(about_z, [0, 0, 1])).as_matrix()
+    found = pf.solve_fk(mechanism, np.stack([first, second, drop, wrist], axis=1))
+    assert found
+    np.testing.assert_allclose(found.pose, expected, atol=1e-9 * 600)

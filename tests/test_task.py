@@ -1,0 +1,180 @@
+"""Machines that are asked for a part of a pose: what is asked is met, the rest follows."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import closure_machines
+import pfabrik as pf
+from pfabrik import Joint, Mechanism, Status
+from pfabrik.errors import InvalidMechanism
+from pfabrik.files import dumps, loads
+from pfabrik.task import Task, task_of
+
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
+N = 4 if INTERPRETED else 100
+
+# 3-RPS: base and platform radius [mm]; rows of azimuth a and tilt b [rad], height, parasitic x and y, strut lengths.
+# The parasitic formula, and geometry, are those of Lee and Shah (1988).
+BASE_RADIUS, PLATFORM_RADIUS = 83.2358, 86.614
+PARASITIC = (
+    (0.3, 0.2, 203.835, -0.7124765104, 0.4874314058, 187.399173916, 207.690520708, 216.471509487),
+    (1.0, 0.25, 203.835, 0.5602625447, 1.2241959941, 192.282896017, 194.04141297, 225.240717896),
+    (-0.7, 0.15, 210, -0.0826534796, -0.4792152635, 200.118891036, 222.18144935, 207.763423258),
+    (2.5, 0.3, 190, -0.5486715017, -1.854792245, 210.506507305, 166.485057808, 193.083365189),
+)
+
+
+def rps(task: tuple[str, ...] | None = ("z", "tilt"), stroke: tuple[float, float] = (100.0, 300.0)) -> Mechanism:
+    joints = []
+    for i, angle in enumerate(np.radians([0, 120, 240]), 1):
+        outward = np.array([np.cos(angle), np.sin(angle), 0.0])
+        tangent = np.array([-outward[1], outward[0], 0.0])
+        joints += [
+            Joint(f"A{i}", "revolute", ("base", f"c{i}"), at=BASE_RADIUS * outward, axis=tangent),
+            Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"C{i}"), actuated=True, range=stroke),
+            Joint(f"C{i}", "spherical", (f"r{i}", "platform"), at=PLATFORM_RADIUS * outward + [0, 0, 200.0]),
+        ]
+    return Mechanism("3-RPS", joints, "platform", (0, 0, 200), task=task)
+
+
+def asked_of(mechanism: Mechanism, task: tuple[str, ...]) -> Mechanism:
+    return dataclasses.replace(mechanism, task=task)
+
+
+@pytest.mark.parametrize("spin", [0.0, 0.4, -2.0])
+@pytest.mark.parametrize("row", PARASITIC)
+def test_parasitic_motion_is_the_published_one_whatever_the_target_says_of_it(
+    row: tuple[float, ...], spin: float
+) -> None:
+    azimuth, tilt, z, x, y, *lengths = row
+    turn = (
+        Rotation.from_euler("z", azimuth) * Rotation.from_euler("y", tilt) * Rotation.from_euler("z", -azimuth + spin)
+    )
+    answer = pf.solve_ik(rps(), pf.pose([7.0, -3.0, z], rotation=turn))
+    assert answer.status is Status.REACHED
+    np.testing.assert_allclose(answer.pose[:3, 3], (x, y, z), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(answer.pose[:3, 2], turn.as_matrix()[:, 2], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(answer.actuators, lengths, rtol=0, atol=1e-8)
+    assert max(answer.position_error, answer.rotation_error) <= 1e-9 * 200
+    assert pf.closure_residual(rps(), answer) <= 1e-9
+
+
+def test_the_whole_pose_is_out_of_reach_where_the_task_is_not() -> None:
+    target = pf.pose([0, 0, 203.835], rpy=[0.1, 0.15, 0])
+    assert pf.solve_ik(rps(), target).status is Status.REACHED
+    assert pf.solve_ik(rps(task=None), target).status is Status.PROJECTED
+
+
+@pytest.mark.parametrize(
+    "build, task, freedoms",
+    [
+        (closure_machines.delta, ("x", "y", "z"), 3),
+        (closure_machines.pinned_delta, ("x", "y", "z"), 3),
+        (closure_machines.orthoglide, ("x", "y", "z"), 3),
+        (closure_machines.ankle, ("tilt",), 2),
+        (closure_machines.tricept, ("x", "y", "z"), 3),
+        (rps, ("z", "tilt"), 3),
+    ],
+)
+def test_forward_kinematics_returns_what_was_asked(build, task: tuple[str, ...], freedoms: int) -> None:
+    mechanism = asked_of(build(), task)
+    assert pf.mobility(mechanism).platform == freedoms
+    rng = np.random.default_rng(3)
+    home = [np.ravel(mechanism.home_coordinate(name))[0] for name in mechanism.actuators]
+    turning = np.array([mechanism.joint(name).type == "revolute" for name in mechanism.actuators])
+    size = np.where(turning, 0.25, 0.08 * mechanism.characteristic_length)
+    assembled = pf.solve_fk(mechanism, home + size * rng.uniform(-1, 1, (N, len(home))))
+    assembled = assembled[assembled.status == Status.REACHED]
+    assert len(assembled) >= 0.6 * N
+    answer = pf.solve_ik(mechanism, assembled.pose)
+    assert answer
+    assert answer.limit_excess.max() <= 1e-9
+    assert pf.closure_residual(mechanism, answer).max() <= 1e-9 * mechanism.characteristic_length
+    position, rotation = task_of(mechanism).errors(answer.pose, assembled.pose)
+    assert position.max() <= 1e-9 * mechanism.characteristic_length
+    assert rotation.max() <= 1e-9
+    back = pf.solve_fk(mechanism, answer.actuators, seed=answer)
+    np.testing.assert_allclose(back.pose, answer.pose, rtol=0, atol=1e-7)
+
+
+def test_what_is_out_of_reach_is_projected_and_measured_in_the_task_alone() -> None:
+    mechanism = rps(stroke=(180.0, 220.0))
+    target = pf.pose([50, 60, 260], rpy=[0.02, 0.03, 1.0])
+    answer = pf.solve_ik(mechanism, target)
+    assert answer.status is Status.PROJECTED
+    assert answer.limit_excess <= 1e-9
+    assert pf.closure_residual(mechanism, answer) <= 1e-7
+    assert answer.position_error == pytest.approx(260 - answer.pose[2, 3], abs=1e-6)  # x and y do not count
+    assert answer.rotation_error <= 1e-9  # held
+    assert {limit.bound for limit in answer.active_limits} == {"max"}
+    free = pf.solve_ik(mechanism, target, options=pf.Options(hold=None))
+    assert free.status is Status.PROJECTED
+    assert free.position_error <= answer.position_error
+
+
+def test_a_path_is_followed_without_leaps() -> None:
+    mechanism = rps()
+    angles = np.linspace(0, 2 * np.pi, 8 if INTERPRETED else 80)
+    path = np.array([pf.pose([0, 0, 200], rpy=[0.2 * np.cos(a), 0.2 * np.sin(a), 0]) for a in angles])
+    answer = pf.track(mechanism, path)
+    assert answer
+    lengths = np.linalg.norm(np.diff(answer.actuators, axis=0), axis=1)
+    assert lengths.max() <= 2.0 * np.median(lengths)
+    np.testing.assert_allclose(answer.actuators[-1], answer.actuators[0], atol=1e-7)
+
+
+def test_a_file_says_what_is_asked() -> None:
+    mechanism = rps()
+    written = dumps(mechanism)
+    assert 'task = ["z", "tilt"]' in written
+    assert loads(written) == mechanism
+    assert "task" not in dumps(rps(task=None))
+
+
+def test_the_whole_pose_is_the_default_in_any_order() -> None:
+    assert rps(task=("rotation", "z", "x", "y")) == rps(task=None)
+    assert rps(task=None).task == ("x", "y", "z", "rotation")
+    assert pf.load("five_bar").task == ("x", "y", "z")
+
+
+@pytest.mark.parametrize(
+    "task, message",
+    [
+        (("z", "tlt"), "did you mean 'tilt'"),
+        ((), "some of x, y, z"),
+        (("z", "z"), "none of them twice"),
+        (("rotation", "tilt"), "one of the two"),
+        (("z", 3), "some of x, y, z"),
+        ("z", "some of x, y, z"),
+    ],
+)
+def test_a_task_that_is_none_is_named(task, message: str) -> None:
+    with pytest.raises(InvalidMechanism, match=message):
+        rps(task=task)
+
+
+def test_a_joint_end_effector_has_no_rotation_to_ask_for() -> None:
+    with pytest.raises(InvalidMechanism, match="only the position counts"):
+        dataclasses.replace(pf.load("five_bar"), task=("x", "tilt"))
+    assert pf.solve_ik(dataclasses.replace(pf.load("five_bar"), task=("y", "z")), (5.0, 10.0, 180.0))
+
+
+def test_tilts_are_told_by_the_z_axis_and_turned_the_shortest_way() -> None:
+    task = Task((False, False, True), 2)
+    rng = np.random.default_rng(1)
+    begin, targets = (np.tile(np.eye(4), (50, 1, 1)) for _ in range(2))
+    begin[:, :3, :3] = Rotation.random(50, random_state=rng).as_matrix()
+    targets[:, :3, :3] = Rotation.random(50, random_state=rng).as_matrix()
+    targets[0, :3, :3] = begin[0, :3, :3] @ np.diag([1.0, -1.0, -1.0])  # upside down: half a turn about any normal
+    wanted = task.completed(targets, begin)
+    np.testing.assert_allclose(wanted[:, :3, 2], targets[:, :3, 2], atol=1e-9)
+    turned = Rotation.from_matrix(wanted[:, :3, :3] @ begin[:, :3, :3].swapaxes(1, 2)).magnitude()
+    between = np.arccos(np.clip((begin[:, :3, 2] * targets[:, :3, 2]).sum(axis=1), -1, 1))
+    np.testing.assert_allclose(turned, between, atol=1e-7)
+    assert task.errors(wanted, targets)[1].max() <= 1e-9
