@@ -393,3 +393,43 @@ def test_a_joint_described_the_other_way_around_flips_its_coordinate_and_nothing
         np.testing.assert_allclose(answer.actuators, expected.actuators * signs, rtol=0, atol=1e-9 * length)
         for joint, points in expected.points.items():
             np.testing.assert_allclose(answer.points[joint], points, rtol=0, atol=1e-9 * length)
+
+
+def hexapod_with(*wrist: Joint) -> Mechanism:
+    """Six struts; the joints of each at the platform are those given, numbered, at its upper end."""
+    joints = []
+    feet = ring(100, 0, (-12, 12, 108, 132, 228, 252))
+    heads = ring(60, 150, (-45, 45, 75, 165, 195, 285))
+    for i, (foot, head) in enumerate(zip(feet, heads, strict=True), 1):
+        joints += [
+            Joint(f"A{i}", "spherical", ("base", f"c{i}"), at=foot),
+            Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"{wrist[0].name}{i}"), actuated=True),
+        ]
+        bodies = [f"r{i}", *(f"{each.name}x{i}" for each in wrist[1:]), "platform"]
+        for place, each in enumerate(wrist):
+            own = (bodies[place], bodies[place + 1])
+            joints.append(dataclasses.replace(each, name=f"{each.name}{i}", connects=own, at=head))
+    return Mechanism("hexapod", joints, "platform", (0, 0, 150))
+
+
+@pytest.mark.parametrize(
+    "wrist, engine",
+    [
+        ([Joint("U", "universal", ("", ""), axes=((1, 0, 0), (0, 1, 0))), Joint("R", "revolute", ("", ""), axis=(0, 0, 1))], "reaching"),
+        ([Joint("U", "universal", ("", ""), axes=((1, 0, 0), (0, 1, 0))), Joint("R", "revolute", ("", ""), axis=(0, 1, 2))], "closure"),
+        ([Joint("U", "universal", ("", "")), Joint("R", "revolute", ("", ""), axis=(0.5, 0.5, 1))], "closure"),
+        ([Joint("R", "revolute", ("", ""), axis=(0, 0, 1)), Joint("U", "universal", ("", ""), axes=((1, 0, 1), (0, 1, 0)))], "closure"),
+        ([Joint("U", "universal", ("", ""), axes=((1, 0, 0), (1, 2, 0)))], "closure"),
+        ([Joint(n, "revolute", ("", ""), axis=a) for n, a in zip("PQR", ((1, 0, 0), (0, 1, 0), (0, 0, 1)), strict=True)], "reaching"),
+        ([Joint(n, "revolute", ("", ""), axis=a) for n, a in zip("PQR", ((1, 0, 0), (0, 1, 0), (0, 1, 1)), strict=True)], "closure"),
+        ([Joint(n, "revolute", ("", ""), axis=a) for n, a in zip("PQR", ((1, 0, 0), (1, 1, 0), (0, 0, 1)), strict=True)], "closure"),
+    ],
+)  # fmt: skip
+def test_joints_act_as_one_only_about_axes_that_are_square(wrist: list[Joint], engine: str) -> None:
+    """About others they do not turn everywhere: positions would promise what no joint can do."""
+    mechanism = hexapod_with(*wrist)
+    assert {chain.engine for chain in pf.decompose(mechanism)} == {engine}
+    rng = np.random.default_rng(1)
+    targets = np.array([pf.pose((0, 0, 150), rotvec=turn) for turn in rng.uniform(-1.0, 1.0, (12, 3))])
+    answer = pf.solve_ik(mechanism, targets)
+    assert pf.closure_residual(mechanism, answer).max() <= 1e-9 * mechanism.characteristic_length

@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from .forms import FREE, Array, BranchForm, ConeForm, Coordinate, Interval, NodeForm, NotExpressible, TrunkForm
+from .freedom import universal_axes
 from .mechanism import Joint, Mechanism
 from .tolerances import TOLERANCES
 
@@ -70,7 +72,7 @@ def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> TrunkForm:
 def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -> BranchForm:
     """One branch, from the base (or from the body it hangs on) to the end effector."""
     near = TOLERANCES.alignment * mechanism.characteristic_length
-    draft = _Draft(_merge(_spots(steps, mechanism.end_effector_is_joint), near))
+    draft = _Draft(_merge(mechanism, _spots(steps, mechanism.end_effector_is_joint), near))
     if steps[0].joint.type == "prismatic" and len(draft.spots) > 0:
         if not on_base:
             raise NotExpressible(f"joint {steps[0].joint.name} slides on a moving body")
@@ -137,6 +139,8 @@ def _spots(steps: Sequence[Step], ends_in_point: bool) -> list[_Spot]:
         else:
             if joint.type == "universal" and joint.range is not None:
                 raise NotExpressible(f"joint {joint.name} has ranges about two axes")
+            if joint.axes is not None and not _are_square(*map(np.array, joint.axes)):
+                raise NotExpressible(f"joint {joint.name} turns about axes that are not square to each other")
             kind = _SPOT_KINDS[joint.type]
             axis = np.array(joint.axis) if joint.type == "revolute" else None
             spots.append(_Spot(kind, [step], np.array(joint.at), axis, slider))
@@ -146,8 +150,11 @@ def _spots(steps: Sequence[Step], ends_in_point: bool) -> list[_Spot]:
     return spots
 
 
-def _merge(spots: list[_Spot], near: float) -> list[_Spot]:
-    """Joints whose centres are no farther apart than `near` act as one: R+R = U, R+R+R = U+R = R+U = S."""
+def _merge(mechanism: Mechanism, spots: list[_Spot], near: float) -> list[_Spot]:
+    """Joints whose centres are no farther apart than `near` act as one: R+R = U, R+R+R = U+R = R+U = S.
+
+    They do only if each axis is square to the next: about others they do not turn everywhere.
+    """
     merged: list[_Spot] = []
     for spot in spots:
         last = merged[-1] if merged else None
@@ -160,6 +167,9 @@ def _merge(spots: list[_Spot], near: float) -> list[_Spot]:
                 raise NotExpressible(
                     f"joint {step.joint.name} shares its centre with a neighbour and has a motor or a limit of its own"
                 )
+        for (one, axis), (other, next_axis) in pairwise(_turns(mechanism, last.steps + spot.steps)):
+            if not _are_square(axis, next_axis):
+                raise NotExpressible(f"joints {one} and {other} turn about axes that are not square to each other")
         kind: Literal["U", "S"] = "U" if last.kind == spot.kind == "R" else "S"
         merged[-1] = _Spot(kind, last.steps + spot.steps, centre, None, last.slider)
     return merged
@@ -180,20 +190,22 @@ def _common_centre(a: _Spot, b: _Spot, near: float) -> Array | None:
         along_a = float(np.cross(apart, b.axis) @ across) / sine**2
         return np.asarray(a.at + along_a * a.axis)
     if {a.kind, b.kind} == {"R", "U"} and float(np.linalg.norm(a.at - b.at)) <= near:
-        own, other = (a, b) if a.kind == "R" else (b, a)
-        inner = own is a  # the axis of U that is next to R: its first if R comes before it on the way out
-        axes = [axis for step in other.steps for axis in (step.joint.axes or ())][
-            :: 1 if _first_is_inward(other) else -1
-        ]
-        if axes and _is_parallel(np.array(axes[0 if inner else -1]), own.axis if own.axis is not None else np.zeros(3)):
-            raise NotExpressible(f"joint {own.steps[0].joint.name} turns about an axis of its neighbour")
         return a.at
     return None
 
 
-def _first_is_inward(spot: _Spot) -> bool:
-    """Whether the first axis of a universal joint is the one fixed to the inward body."""
-    return spot.steps[0].forward
+def _turns(mechanism: Mechanism, steps: Sequence[Step]) -> list[tuple[str, Array]]:
+    """The axes of revolute and universal joints in a row, outward, with the names of their joints."""
+    turns: list[tuple[str, Array]] = []
+    for step in steps:
+        joint = step.joint
+        axes = [np.array(joint.axis)] if joint.type == "revolute" else list(universal_axes(mechanism, joint))
+        turns += [(joint.name, axis) for axis in (axes if step.forward else reversed(axes))]
+    return turns
+
+
+def _are_square(axis: Array, other: Array) -> bool:
+    return abs(float(axis @ other)) <= TOLERANCES.alignment
 
 
 def _classify(draft: _Draft) -> None:
