@@ -412,24 +412,56 @@ def hexapod_with(*wrist: Joint) -> Mechanism:
     return Mechanism("hexapod", joints, "platform", (0, 0, 150))
 
 
+def turning(name: str, *axes: tuple[float, float, float]) -> Joint:
+    """A joint to be placed: universal about two axes or about its default ones, revolute about one."""
+    if len(axes) == 1:
+        return Joint(name, "revolute", ("", ""), axis=axes[0])
+    return Joint(name, "universal", ("", ""), axes=axes or None)
+
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
 @pytest.mark.parametrize(
     "wrist, engine",
     [
-        ([Joint("U", "universal", ("", ""), axes=((1, 0, 0), (0, 1, 0))), Joint("R", "revolute", ("", ""), axis=(0, 0, 1))], "reaching"),
-        ([Joint("U", "universal", ("", ""), axes=((1, 0, 0), (0, 1, 0))), Joint("R", "revolute", ("", ""), axis=(0, 1, 2))], "closure"),
-        ([Joint("U", "universal", ("", "")), Joint("R", "revolute", ("", ""), axis=(0.5, 0.5, 1))], "closure"),
-        ([Joint("R", "revolute", ("", ""), axis=(0, 0, 1)), Joint("U", "universal", ("", ""), axes=((1, 0, 1), (0, 1, 0)))], "closure"),
-        ([Joint("U", "universal", ("", ""), axes=((1, 0, 0), (1, 2, 0)))], "closure"),
-        ([Joint(n, "revolute", ("", ""), axis=a) for n, a in zip("PQR", ((1, 0, 0), (0, 1, 0), (0, 0, 1)), strict=True)], "reaching"),
-        ([Joint(n, "revolute", ("", ""), axis=a) for n, a in zip("PQR", ((1, 0, 0), (0, 1, 0), (0, 1, 1)), strict=True)], "closure"),
-        ([Joint(n, "revolute", ("", ""), axis=a) for n, a in zip("PQR", ((1, 0, 0), (1, 1, 0), (0, 0, 1)), strict=True)], "closure"),
+        ([turning("U", X, Y), turning("R", Z)], "reaching"),
+        ([turning("U", X, Y), turning("R", (0, 1, 2))], "closure"),
+        ([turning("U"), turning("R", (0.5, 0.5, 1))], "closure"),
+        ([turning("R", Z), turning("U", (1, 0, 1), Y)], "closure"),
+        ([turning("U", X, (1, 2, 0))], "closure"),
+        ([turning("P", X), turning("Q", Y), turning("R", Z)], "reaching"),
+        ([turning("P", X), turning("Q", Y), turning("R", (0, 1, 1))], "closure"),
+        ([turning("P", X), turning("Q", (1, 1, 0)), turning("R", Z)], "closure"),
     ],
-)  # fmt: skip
+)
 def test_joints_act_as_one_only_about_axes_that_are_square(wrist: list[Joint], engine: str) -> None:
     """About others they do not turn everywhere: positions would promise what no joint can do."""
     mechanism = hexapod_with(*wrist)
     assert {chain.engine for chain in pf.decompose(mechanism)} == {engine}
     rng = np.random.default_rng(1)
     targets = np.array([pf.pose((0, 0, 150), rotvec=turn) for turn in rng.uniform(-1.0, 1.0, (12, 3))])
+    answer = pf.solve_ik(mechanism, targets)
+    assert pf.closure_residual(mechanism, answer).max() <= 1e-9 * mechanism.characteristic_length
+
+
+@pytest.mark.parametrize("half_angle, engine", [(None, "closure"), (60.0, "reaching"), (85.0, "closure")])
+def test_a_strut_oblique_to_the_axis_it_carries_does_not_point_anywhere(half_angle: float | None, engine: str) -> None:
+    """Unless its cone keeps it away from the other axis by more than it is oblique."""
+    stewart = pf.load("stewart").without_limits()
+    joints = []
+    for joint in stewart.joints:
+        if joint.type == "universal":
+            cone = None if half_angle is None else Cone((0, 0, 1), np.radians(half_angle), "base")
+            joint = dataclasses.replace(joint, axes=((1, 0, 0), (0, 1, 0)), cone=cone)
+        joints.append(joint)
+    mechanism = dataclasses.replace(stewart, joints=tuple(joints))
+    chains = pf.decompose(mechanism)
+    assert engine in {chain.engine for chain in chains}
+    rng = np.random.default_rng(0)
+    n = 4 if INTERPRETED else 400
+    turns = rng.uniform(-1.2, 1.2, (n, 3))
+    targets = np.array([pf.pose(mechanism.reference_point, rotvec=turn) for turn in turns])
+    targets[:, :3, 3] += rng.uniform(-1, 1, (n, 3)) * mechanism.characteristic_length
     answer = pf.solve_ik(mechanism, targets)
     assert pf.closure_residual(mechanism, answer).max() <= 1e-9 * mechanism.characteristic_length
