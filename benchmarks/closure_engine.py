@@ -12,8 +12,9 @@ import numpy as np
 import pfabrik as pf
 from closed_forms import Array, Struts
 from newton import StrutNewton
+from pfabrik.reproduce.timing import one_core
 from table import Row
-from timing import best_times, draw, one_core
+from timing import best_times, draw
 
 DIETMAIER_FEET = np.array(
     [

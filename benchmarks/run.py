@@ -15,8 +15,9 @@ import numpy as np
 import pfabrik as pf
 from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
+from pfabrik.reproduce.timing import one_core
 from table import Row, cells, machine, table
-from timing import Solve, best_times, draw, in_blocks, one_core
+from timing import Solve, best_times, draw, in_blocks
 
 HOLD_NOTHING = pf.Options(hold=None)
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,17 +25,6 @@ def best_times(runs: int, *solves: Solve) -> list[float]:
             solve()
             best[i] = min(best[i], time.perf_counter() - start)
     return best
-
-
-@contextmanager
-def one_core() -> Iterator[None]:
-    """Keep this thread, and with it a batch, on one core."""
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(cores)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, cores)
 
 
 def draw(mechanism: pf.Mechanism, rng: np.random.Generator, n: int, size: float, tilt: float) -> Array:

@@ -386,75 +386,77 @@ def add_ranges(loops: Loops, slots: Ints, state: State, margin: float, eq: Equat
 
 
 @inlined
-def add_cones(loops: Loops, slots: Ints, state: State, margin: float, eq: Equations) -> float:
-    """Cones that are exceeded, as rows of their groups; the sum of their squares. Uses T, e and C's neighbours."""
-    square = 0.0
-    T, line, turn = eq.T, eq.e, eq.twist
-    for cone in range(len(loops.cone_angles)):
-        first, last = loops.cone_units[cone, 0], loops.cone_units[cone, 1]
-        group = loops.group_of[loops.columns[first]]
+def pose_cone(loops: Loops, cone: int, state: State, eq: Equations) -> float:
+    """Pose the joint of a cone in its first body; the length of its line.
+
+    T's rotation becomes the joint's, S's first rows the axes of its motions, at most three. The first half of the twist
+    becomes what turns with the second body, the line or the cone's axis, and the second half the one that stays.
+    """
+    T, line, pair = eq.T, eq.e, eq.twist
+    for i in range(3):
+        for j in range(3):
+            T[i, j] = 1.0 if i == j else 0.0
+        line[i] = loops.cone_lines[cone, i]
+    for slide in range(loops.cone_slides[cone, 0], loops.cone_slides[cone, 1]):
         for i in range(3):
-            for j in range(3):
-                T[i, j] = 1.0 if i == j else 0.0
-            line[i] = loops.cone_lines[cone, i]
-        for slide in range(loops.cone_slides[cone, 0], loops.cone_slides[cone, 1]):
+            line[i] += state.q[loops.slides[slide]] * loops.slide_axes[slide, i]
+    for k in range(loops.cone_units[cone, 0], loops.cone_units[cone, 1]):
+        if loops.kinds[k] == BALL:
             for i in range(3):
-                line[i] += state.q[loops.slides[slide]] * loops.slide_axes[slide, i]
-        length = math.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
-        # axes of the joint's motions in its first body, into the last rows' room: at most three
-        for k in range(first, last):
-            n = k - first
-            if loops.kinds[k] == BALL:
-                for i in range(3):
-                    for j in range(3):
-                        eq.S[j, i] = 1.0 if i == j else 0.0
-                w, x, y, z = state.balls[k, 0], state.balls[k, 1], state.balls[k, 2], state.balls[k, 3]
-            else:
-                axis, half = loops.axes[k], 0.5 * state.q[loops.columns[k]]
-                for i in range(3):
-                    eq.S[n, i] = T[i, 0] * axis[0] + T[i, 1] * axis[1] + T[i, 2] * axis[2]
-                sine = math.sin(half)
-                w, x, y, z = math.cos(half), sine * axis[0], sine * axis[1], sine * axis[2]
-            rotate_by(T, w, x, y, z)
-        # what turns with the second body, seen from the first; what stays
-        outward = loops.cone_outward[cone] == 1
-        for i in range(3):
-            moved = line if outward else loops.cone_axes[cone]
-            turn[i] = T[i, 0] * moved[0] + T[i, 1] * moved[1] + T[i, 2] * moved[2]
-            turn[3 + i] = loops.cone_axes[cone, i] if outward else line[i]
-        cx = turn[1] * turn[5] - turn[2] * turn[4]
-        cy = turn[2] * turn[3] - turn[0] * turn[5]
-        cz = turn[0] * turn[4] - turn[1] * turn[3]
-        sine = math.sqrt(cx * cx + cy * cy + cz * cz)
-        angle = math.atan2(sine, turn[0] * turn[3] + turn[1] * turn[4] + turn[2] * turn[5])
+                for j in range(3):
+                    eq.S[j, i] = 1.0 if i == j else 0.0
+            w, x, y, z = state.balls[k, 0], state.balls[k, 1], state.balls[k, 2], state.balls[k, 3]
+        else:
+            axis, half = loops.axes[k], 0.5 * state.q[loops.columns[k]]
+            for i in range(3):
+                own = T[i, 0] * axis[0] + T[i, 1] * axis[1] + T[i, 2] * axis[2]
+                eq.S[k - loops.cone_units[cone, 0], i] = own
+            sine = math.sin(half)
+            w, x, y, z = math.cos(half), sine * axis[0], sine * axis[1], sine * axis[2]
+        rotate_by(T, w, x, y, z)
+    outward = loops.cone_outward[cone] == 1
+    for i in range(3):
+        moved = line if outward else loops.cone_axes[cone]
+        pair[i] = T[i, 0] * moved[0] + T[i, 1] * moved[1] + T[i, 2] * moved[2]
+        pair[3 + i] = loops.cone_axes[cone, i] if outward else line[i]
+    return math.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
+
+
+@inlined
+def add_cones(loops: Loops, slots: Ints, state: State, margin: float, eq: Equations) -> float:
+    """Cones that are exceeded, as rows of their groups; the sum of the squares of the excesses."""
+    square = 0.0
+    for cone in range(len(loops.cone_angles)):
+        length = pose_cone(loops, cone, state, eq)
+        moved, stayed = eq.twist[:3], eq.twist[3:]
+        x = moved[1] * stayed[2] - moved[2] * stayed[1]
+        y = moved[2] * stayed[0] - moved[0] * stayed[2]
+        z = moved[0] * stayed[1] - moved[1] * stayed[0]
+        sine = math.sqrt(x * x + y * y + z * z)
+        angle = math.atan2(sine, moved[0] * stayed[0] + moved[1] * stayed[1] + moved[2] * stayed[2])
         over = angle - (loops.cone_angles[cone] - margin)
         if over <= 0.0:
             continue
+        first = loops.cone_units[cone, 0]
+        column = loops.columns[first]
+        group = loops.group_of[column]
         square += over * over
         eq.excesses[group] = max(eq.excesses[group], over - margin)
         if sine < 1e-12 * length:  # straight against the axis: no direction leads out
             continue
         # d angle = -(rate x moved) . stayed / sine = -rate . (moved x stayed) / sine
-        gradient = eq.S[5]
-        n = 0
-        column = loops.columns[first]
-        for j in range(column, column + (3 if loops.kinds[first] == BALL else 2)):
-            gradient[n] = -(eq.S[n, 0] * cx + eq.S[n, 1] * cy + eq.S[n, 2] * cz) / sine
-            add_entry(slots[j], gradient[n], over, eq.A[group], eq.b[group])
-            n += 1
-        for m in range(n):
-            for m2 in range(m):
-                s, s2 = slots[column + m], slots[column + m2]
-                if s >= 0 and s2 >= 0:
-                    eq.A[group, max(s, s2), min(s, s2)] += gradient[m] * gradient[m2]
+        gradient, A = eq.S[5], eq.A[group]
+        for m in range(3 if loops.kinds[first] == BALL else 2):
+            gradient[m] = -(eq.S[m, 0] * x + eq.S[m, 1] * y + eq.S[m, 2] * z) / sine
+            s = slots[column + m]
+            if s < 0:
+                continue
+            eq.b[group, s] += gradient[m] * over
+            for m2 in range(m + 1):
+                s2 = slots[column + m2]
+                if s2 >= 0:
+                    A[max(s, s2), min(s, s2)] += gradient[m] * gradient[m2]
     return square
-
-
-@inlined
-def add_entry(s: int, gradient: float, over: float, A: Floats, b: Floats) -> None:
-    if s >= 0:
-        A[s, s] += gradient * gradient
-        b[s] += gradient * over
 
 
 @inlined
