@@ -83,9 +83,7 @@ def test_excesses_are_those_of_the_limits_themselves(name: str) -> None:
     start = around_home(mechanism, 60, 1.5, seed=4)
     found = close(closure_of(mechanism), start, platform_poses(mechanism, start))
     closed = found.gap <= 1e-12
-    if any(
-        mechanism.joint(each).along for each in mechanism.actuators
-    ):  # pulled through its foot, a strut points back
+    if any(mechanism.joint(each).along for each in mechanism.actuators):  # pulled through its foot, a strut points back
         closed &= (actuators_of(mechanism, found.coordinates) > 0.0).all(axis=1)
     excess = found.excess[closed]
     length = mechanism.characteristic_length
