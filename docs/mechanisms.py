@@ -12,6 +12,7 @@ from PIL import Image
 
 import pfabrik as pf
 from pfabrik.catalog import catalog_file, description
+from pfabrik.decompose import closure_reason, engine_of
 from pfabrik.view.drawing import draw
 
 PAGE = Path(__file__).with_suffix(".md")
@@ -21,8 +22,8 @@ HEAD = """# Mechanisms of the catalogue
 
 Each is loaded by its name, as in `pf.load("stewart")`. The pictures show home, the base grey and the end effector blue:
 actuated joints are filled, dashed lines are rails, a cross marks the reference point. In the sub-chains, `*` marks the
-actuated joint; [How it works](how-it-works.md) tells the engines apart. [Adding a mechanism](adding-a-mechanism.md)
-says how to bring your own.
+actuated joint and `Pa` a parallelogram of pins; [How it works](how-it-works.md) has more on them, and tells the engines
+apart. [Adding a mechanism](adding-a-mechanism.md) says how to bring your own.
 
 | name | mechanism | freedoms | actuators |
 |---|---|---|---|
@@ -59,6 +60,7 @@ def section(name: str) -> str:
     facts = {
         "mobility": mobility(pf.mobility(mechanism)),
         "sub-chains": sub_chains(mechanism),
+        "engine": engine(mechanism),
         "actuators": ", ".join(f"`{actuator}`" for actuator in mechanism.actuators),
         "task": " ".join(mechanism.task),
     }
@@ -87,9 +89,22 @@ def mobility(counted: pf.Mobility) -> str:
 
 
 def sub_chains(mechanism: pf.Mechanism) -> str:
-    """The distinct sub-chains, how often each occurs, and its engine."""
-    counts = Counter((str(chain), chain.engine) for chain in pf.decompose(mechanism))
-    return ", ".join(f"{count} × `{notation}` ({engine})" for (notation, engine), count in counts.items())
+    """The distinct sub-chains, how often each occurs, and how long the rods of its parallelograms are."""
+    counts = Counter((str(chain), rods(chain, mechanism)) for chain in pf.decompose(mechanism))
+    return ", ".join(f"{count} × `{notation}`{rods}" for (notation, rods), count in counts.items())
+
+
+def rods(chain: pf.SubChain, mechanism: pf.Mechanism) -> str:
+    """The parallelograms of a sub-chain in words; nothing where it has none."""
+    unit = mechanism.length_unit
+    words = [f"{each.length:.6g} {unit} long, {each.width:.6g} {unit} apart" for each in chain.parallelograms]
+    return f" (parallelogram of rods {'; '.join(words)})" if words else ""
+
+
+def engine(mechanism: pf.Mechanism) -> str:
+    """The engine that answers targets, and why it is not the quick one."""
+    reason = closure_reason(mechanism)
+    return engine_of(mechanism) + (f": {reason}" if reason else "")
 
 
 def picture(name: str) -> Path:

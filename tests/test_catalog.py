@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import joint_checking
+import joint_search
 import pfabrik as pf
 from fk_machines import PUBLISHED, moved_from_home
 from pfabrik import Mechanism, Solution, Status
 from pfabrik.catalog import catalog_file, description
+from pfabrik.errors import NoClosedForm
 from pfabrik.freedom import universal_axes
 
 Array = NDArray[np.float64]
@@ -59,12 +61,12 @@ def machine(name: str) -> Mechanism:
 
 
 def drawn_actuators(mechanism: Mechanism, count: int, seed: int) -> Array:
-    """Actuator values (count, n_a) between home and somewhere in their ranges; a joint without one gets any angle.
+    """Actuator values (count, n_a) between home and halfway to somewhere in their ranges; without one, to any angle.
 
-    Few combinations of values from the ends of their ranges belong to a pose; to find that out takes the interpreter
-    minutes.
+    Few combinations of values from the ends of their ranges belong to a pose, and to find that out takes long, the
+    interpreter minutes; the limits are met by what is projected.
     """
-    farthest = 0.15 if INTERPRETED else 1.0
+    farthest = 0.15 if INTERPRETED else 0.5
     random = np.random.default_rng(seed)
     ranges = [mechanism.joint(name).range or (-np.pi, np.pi) for name in mechanism.actuators]
     home = np.array([mechanism.home_coordinate(name) for name in mechanism.actuators])
@@ -72,27 +74,28 @@ def drawn_actuators(mechanism: Mechanism, count: int, seed: int) -> Array:
     return home + random.uniform(0, farthest, (count, 1)) * away
 
 
-@cache
-def inside(name: str, count: int) -> Array:
-    """Poses (count, 4, 4) that the machine can take: those of actuator values drawn within their ranges."""
-    mechanism, poses = machine(name), np.zeros((0, 4, 4))
-    for seed in range(8):
-        found = pf.solve_fk(mechanism, drawn_actuators(mechanism, count, seed))
-        poses = np.concatenate([poses, found.pose[found.status == Status.REACHED]])[:count]
-        if len(poses) == count:
-            break
-    return poses
-
-
 def random_poses(mechanism: Mechanism, count: int, seed: int) -> Array:
-    """Poses (count, 4, 4) around home, up to 1.5 L and half a turn away: few of them are of any use to a machine."""
+    """Poses (count, 4, 4) around home, up to 1.5 L and half a turn away.
+
+    Every other one goes only where home's first motions lead: of whole poses few others are of any use to a machine
+    that moves in a plane.
+    """
     random = np.random.default_rng(seed)
-    poses, scale = np.tile(mechanism.home_pose, (count, 1, 1)), random.uniform(0, 1, (count, 1))
-    poses[:, :3, 3] += scale * mechanism.characteristic_length * random.uniform(-1.5, 1.5, (count, 3))
+    scale = random.uniform(0, 1, (count, 1))
+    turn = random.standard_normal((count, 3))
+    turn *= np.pi * scale / np.linalg.norm(turn, axis=1, keepdims=True)
+    moved = np.hstack([1.5 * scale * random.uniform(-1, 1, (count, 3)), turn])
+    rates = pf.forward_jacobian(mechanism, pf.solve_ik(mechanism, mechanism.home_pose))
+    if mechanism.end_effector_is_joint:
+        moved, rates = moved[:, :3], rates[:3]
+    rates = rates / np.where(np.arange(len(rates)) < 3, mechanism.characteristic_length, 1.0)[:, None]
+    left, values, _ = np.linalg.svd(rates, full_matrices=False)
+    own = left[:, values > 1e-6 * values[0]]
+    moved[::2] = moved[::2] @ own @ own.T
+    poses = np.tile(mechanism.home_pose, (count, 1, 1))
+    poses[:, :3, 3] += mechanism.characteristic_length * moved[:, :3]
     if not mechanism.end_effector_is_joint:
-        turn = random.standard_normal((count, 3))
-        turn *= np.pi * scale / np.linalg.norm(turn, axis=1, keepdims=True)
-        poses[:, :3, :3] = Rotation.from_rotvec(turn).as_matrix()
+        poses[:, :3, :3] = Rotation.from_rotvec(moved[:, 3:]).as_matrix()
     return poses
 
 
@@ -101,6 +104,16 @@ def distance(mechanism: Mechanism, poses: Array, others: Array) -> Array:
     moved = np.linalg.norm((poses - others)[:, :3, 3], axis=1) / mechanism.characteristic_length
     turned = np.linalg.norm((poses - others)[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
     return moved if mechanism.end_effector_is_joint else np.maximum(moved, turned)
+
+
+def pose_errors(mechanism: Mechanism, poses: Array, targets: Array) -> Array:
+    """Largest error [L or rad] in what the task counts, (n,)."""
+    off = np.zeros((len(poses), 1))
+    at = (poses - targets)[:, :3, 3] / mechanism.characteristic_length
+    turned = (poses - targets)[:, :3, :3]
+    counted = {"x": at[:, :1], "y": at[:, 1:2], "z": at[:, 2:], "rotation": turned.reshape(-1, 9) / np.sqrt(2)}
+    counted["tilt"] = turned[:, :, 2]
+    return np.max([off[:, 0], *(np.linalg.norm(counted[name], axis=1) for name in mechanism.task)], axis=0)
 
 
 def with_axes(mechanism: Mechanism) -> Mechanism:
@@ -122,8 +135,110 @@ def assert_feasible(mechanism: Mechanism, solution: Solution) -> None:
     assert joint_checking.worst_excess(explicit, solution).max() <= 2 * KEPT
 
 
-def counts(few: int, many: int) -> list[object]:
-    return [few if not INTERPRETED else 2, pytest.param(many, marks=pytest.mark.slow)]
+# Any target: half of the rows anywhere, half where a feasible configuration puts the end effector
+
+FEW, MANY = (2 if INTERPRETED else 100), 2000
+COUNTS = [FEW, pytest.param(MANY, marks=pytest.mark.slow)]
+SEARCHED = {FEW: 2, MANY: 20}
+"""How many of the targets called out of reach are searched for, where no closed form tells of all."""
+
+
+@cache
+def anywhere(name: str, count: int) -> tuple[Array, Solution]:
+    """Targets drawn blindly, and their answers."""
+    targets = random_poses(machine(name), count // 2, 1)
+    return targets, pf.solve_ik(machine(name), targets)
+
+
+@cache
+def assembled(name: str, count: int) -> Solution:
+    """Configurations with actuator values drawn within their ranges, or values near these where no pose has them."""
+    return pf.solve_fk(machine(name), drawn_actuators(machine(name), count // 2, 0))
+
+
+@cache
+def inside(name: str, count: int) -> tuple[Array, Solution]:
+    """Poses of configurations that are feasible whatever solver found them, and the answers to these as targets."""
+    poses = assembled(name, count).pose
+    return poses, pf.solve_ik(machine(name), poses)
+
+
+@cache
+def at_bounds(name: str, count: int) -> tuple[Array, Solution]:
+    """The same of configurations as far out as they go: what targets out of reach were projected to."""
+    _, found = anywhere(name, count)
+    poses = found.pose[found.status == Status.PROJECTED][: count // 4]
+    return poses, pf.solve_ik(machine(name), poses)
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", NAMES)
+def test_limits_are_kept_and_loops_closed_for_any_target(name: str, count: int) -> None:
+    for found in (anywhere(name, count)[1], assembled(name, count), inside(name, count)[1], at_bounds(name, count)[1]):
+        assert_feasible(machine(name), found)
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", NAMES)
+def test_whatever_a_feasible_configuration_reaches_is_reached(name: str, count: int) -> None:
+    for poses, found in (inside(name, count), at_bounds(name, count)):
+        assert np.flatnonzero(found.status != Status.REACHED).tolist() == []
+        off = pose_errors(machine(name), found.pose, poses)
+        assert off.max(initial=0.0) <= KEPT
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_called_out_of_reach_is(name: str, count: int) -> None:
+    """Of all targets by the closed form, where there is one; else of some, by search from the answer and beyond."""
+    mechanism = machine(name)
+    targets, found = anywhere(name, count)
+    missed = np.flatnonzero(found.status != Status.REACHED)
+    try:
+        reached = np.asarray(pf.geometric.solve_ik(mechanism, targets).reached)
+    except NoClosedForm:
+        searched = in_turn(missed, found.position_error, SEARCHED[count])
+        assert [row for row in searched if search_reaches(mechanism, targets[row], found[row])] == []
+    else:
+        assert np.flatnonzero(reached & (found.status != Status.REACHED)).tolist() == []
+
+
+def in_turn(rows: NDArray[np.intp], errors: Array, count: int) -> list[int]:
+    """Some of the rows: by turns those with the least errors, where a miss is likely, and the others in order."""
+    nearest = rows[np.argsort(errors[rows])]
+    return list(dict.fromkeys(np.stack([nearest, rows], axis=1).ravel().tolist()))[:count]
+
+
+def search_reaches(mechanism: Mechanism, target: Array, answer: Solution) -> bool:
+    """Whether blind search finds a configuration, from the answer's, home's and two drawn around it."""
+    explicit = with_axes(mechanism)
+    moved = joint_checking.deviations(explicit, answer)
+    own = np.concatenate([moved[joint.name][0] for joint in explicit.joints]) / joint_search.units(explicit)
+    drawn = np.random.default_rng(0).normal(0, 0.3, (2, len(own)))
+    return joint_search.can_reach(explicit, target, [own, np.zeros(len(own)), *drawn])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_blind_search_finds_what_is_within_reach(name: str) -> None:
+    """From home alone: so that it means something if it finds nothing."""
+    explicit = with_axes(machine(name))
+    poses = inside(name, FEW)[0][:3]
+    start = np.zeros(joint_search.columns(explicit))
+    assert [joint_search.can_reach(explicit, pose, [start]) for pose in poses].count(True) >= len(poses) - 1
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", NAMES)
+def test_forward_kinematics_undoes_inverse_kinematics(name: str, count: int) -> None:
+    for _, found in (anywhere(name, count), inside(name, count), at_bounds(name, count)):
+        reached = found[found.status == Status.REACHED]
+        if len(reached):
+            back = pf.solve_fk(machine(name), reached.actuators, seed=reached)
+            assert (back.status == Status.REACHED).all()
+            assert distance(machine(name), back.pose, reached.pose).max() <= 1e-8
+
+
+# Each machine
 
 
 def test_every_machine_has_its_freedoms_checked() -> None:
@@ -162,34 +277,6 @@ def test_home_is_reached_and_is_where_the_file_says(name: str) -> None:
     assert home.status is Status.REACHED
     expected = [mechanism.home_coordinate(actuator) for actuator in mechanism.actuators]
     np.testing.assert_allclose(home.actuators, expected, atol=1e-9 * mechanism.characteristic_length)
-
-
-@pytest.mark.parametrize("count", counts(200, 2000))
-@pytest.mark.parametrize("name", NAMES)
-def test_poses_that_a_machine_has_are_reached(name: str, count: int) -> None:
-    mechanism, poses = machine(name), inside(name, count)
-    assert len(poses) == count
-    found = pf.solve_ik(mechanism, poses)
-    assert_feasible(mechanism, found)
-    assert (found.status == Status.REACHED).all()
-    assert distance(mechanism, found.pose, poses).max() <= KEPT
-
-
-@pytest.mark.parametrize("count", counts(200, 2000))
-@pytest.mark.parametrize("name", NAMES)
-def test_forward_kinematics_undoes_inverse_kinematics(name: str, count: int) -> None:
-    mechanism, poses = machine(name), inside(name, count)
-    found = pf.solve_ik(mechanism, poses)
-    back = pf.solve_fk(mechanism, found.actuators, seed=found)
-    assert (back.status == Status.REACHED).all()
-    assert distance(mechanism, back.pose, poses).max() <= 1e-8
-
-
-@pytest.mark.parametrize("count", counts(200, 2000))
-@pytest.mark.parametrize("name", NAMES)
-def test_limits_are_kept_and_loops_closed_for_any_target(name: str, count: int) -> None:
-    mechanism = machine(name)
-    assert_feasible(mechanism, pf.solve_ik(mechanism, random_poses(mechanism, count, 1)))
 
 
 # Published numbers

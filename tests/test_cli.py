@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
+import itertools
 import json
 import math
 import os
@@ -21,6 +23,7 @@ from click.testing import CliRunner, Result
 
 import pfabrik as pf
 from pfabrik.cli import main
+from pfabrik.cli.answer import describe_modes
 from pfabrik.files import loads
 from pfabrik.report import as_sentence, rpy_angles
 from pfabrik.templates import template, templates
@@ -342,6 +345,89 @@ def test_a_continuum_of_solutions_is_told_in_one_line(run: Callable[..., Result]
         warning, told = result.stderr.splitlines()
         assert warning.startswith("pfabrik: warning: ")
         assert told.startswith("pfabrik: 'similar hexagons' still moves with its actuators locked")
+
+
+@pytest.mark.slow
+def test_ik_lists_every_working_mode_and_the_limits_it_exceeds(run: Callable[..., Result]) -> None:
+    result = run("ik", "five_bar", "--position", 0, 10, 180, "--all")
+    assert result.exit_code == 0
+    count, table, searched = result.stdout.strip().split("\n\n")
+    assert count == "4 working modes, 1 within all limits"
+    turns = []  # of cranks of (∓66, 88) about (∓50, 0), whose forearms of 145 end in (10, 180)
+    for side in (-1, 1):
+        reach = np.array([10 - 50 * side, 180])
+        bend = math.acos((110**2 + reach @ reach - 145**2) / (2 * 110 * np.linalg.norm(reach)))
+        angles = math.atan2(reach[1], reach[0]) + np.array([bend, -bend]) - math.atan2(88, 66 * side)
+        turns.append([f"{math.degrees((angle + math.pi) % math.tau - math.pi):.6g}" for angle in angles])
+    rows = [line.split(maxsplit=4) for line in table.splitlines()[1:]]
+    assert {(row[1], row[2]) for row in rows} == set(itertools.product(*turns))
+    assert [row[0] for row in rows] == ["1", "2", "3", "4"]
+    assert rows[0][4] == "nothing"
+    assert all("p" in row[4] for row in rows[1:])
+    found = pf.working_modes(pf.load("five_bar"), (0, 10, 180))
+    assert [int(row[3]) for row in rows] == list(found.hits)
+    assert searched.startswith(f"{found.starts} starts; ")
+
+
+@pytest.mark.slow
+def test_ik_all_shows_the_pose_that_a_task_leaves_open(run: Callable[..., Result]) -> None:
+    result = run("ik", "rps", "--rpy", 3, 0, 0, "--all")
+    header, first, *_ = result.stdout.split("\n\n")[1].splitlines()
+    assert header.split()[:9:2] == ["mode", "[mm]", "[mm]", "[mm]", "[mm]"]
+    assert first.endswith("nothing")
+    for column in ("x [mm]", "z [mm]", "roll [deg]", "yaw [deg]"):
+        assert column in header
+
+
+@pytest.mark.slow
+def test_ik_all_as_json_has_the_modes_and_what_they_are_worth(run: Callable[..., Result]) -> None:
+    result = run("ik", "five_bar", "--position", 0, 10, 180, "--all", "--json")
+    found = pf.working_modes(pf.load("five_bar"), (0, 10, 180))
+    answer = json.loads(result.stdout)
+    assert answer["modes"] == json.loads(json.dumps([mode.to_dict() for mode in found]))
+    assert [answer[key] for key in ("total", "hits", "starts", "unseen")] == [
+        found.total,
+        list(found.hits),
+        found.starts,
+        found.unseen,
+    ]
+
+
+def test_a_list_that_was_cut_says_so() -> None:
+    found = pf.working_modes(pf.load("serial_arm"), pf.load("serial_arm").home_pose, most_starts=512)
+    cut = dataclasses.replace(found, modes=found.modes[:1], hits=found.hits[:1])
+    text = describe_modes(cut, "working", [], lambda mode: [])
+    assert text.startswith("2 working modes, of the 1 nearest to home 1 within all limits\n")
+
+
+@pytest.mark.slow
+def test_ik_all_is_not_reached_where_no_mode_keeps_all_limits(run: Callable[..., Result]) -> None:
+    beyond = run("ik", "stewart", *BEYOND_REACH, "--all")
+    assert beyond.exit_code == 1
+    assert beyond.stdout.startswith("1 working mode, none within all limits")
+    nowhere = run("ik", "five_bar", "--position", 0, 0, 900, "--all", "--hold", "none")
+    assert nowhere.exit_code == 1
+    assert nowhere.stdout.startswith("no working mode found\n")
+    assert nowhere.stderr == "pfabrik: note: --hold has no effect with --all: nothing is projected\n"
+
+
+@pytest.mark.slow
+def test_a_target_on_which_actuators_still_move_is_told_in_one_line(run: Callable[..., Result]) -> None:
+    result = run("ik", "nrpm", "--rpy", 0, 0, 0, "--all")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "still moves with its end effector on the target (6 freedoms of the actuators A1" in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_the_page_of_the_command_line_shows_what_ik_all_prints(run: Callable[..., Result]) -> None:
+    shown = re.findall(
+        r"^```\n\$ pfabrik (ik [^\n]* --all)\n(.*?)^```$", CLI_PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE
+    )
+    assert shown
+    for line, expected in shown:
+        found, told = (without_chance(text) for text in (run(*shlex.split(line)).stdout, expected))
+        assert found == told, line
 
 
 @pytest.mark.slow

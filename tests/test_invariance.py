@@ -154,8 +154,9 @@ def assert_same_answers(
     assert np.maximum(place, turn)[reached].max(initial=0) <= 2e-9
     assert np.count_nonzero(miss[~reached] > AS_NEAR) <= (0 if name in STRUTS else ELSEWHERE)
     if name in STRUTS:
-        assert np.maximum(place, turn)[~reached].max(initial=0) <= 1e-9
-        assert coordinate[~reached].max(initial=0) <= 1e-8
+        # a distance known to 1e-16 tells the place of its minimum to the root of that, 1e-8
+        assert np.maximum(place, turn)[~reached].max(initial=0) <= 1e-8
+        assert coordinate[~reached].max(initial=0) <= 3e-8
     if name not in WITH_A_CHOICE:
         assert coordinate[reached].max(initial=0) <= 1e-8
 

@@ -222,6 +222,19 @@ class TestFreedom:
         with pytest.warns(MobilityWarning, match="1 actuators leave the end effector 1 freedom at home"):
             Mechanism("loose", changed(five_bar(), "b", actuated=False), "tip")
 
+    @pytest.mark.parametrize("tilt", [1e-11, 1e-8, 1e-6, 1e-4])
+    def test_axes_that_are_hardly_parallel_warn_that_the_loops_lock(self, tilt):
+        with pytest.warns(MobilityWarning, match="need more digits"):
+            Mechanism("5", changed(five_bar(), "b", axis=(0, math.sin(tilt), math.cos(tilt))), "tip")
+
+    @pytest.mark.parametrize("tilt", [0.0, 1e-13])
+    def test_axes_that_are_parallel_to_the_last_digit_do_not(self, tilt):
+        Mechanism("5", changed(five_bar(), "b", axis=(0, math.sin(tilt), math.cos(tilt))), "tip")
+
+    def test_loops_that_hold_the_end_effector_warn_that_it_cannot_move(self):
+        with pytest.warns(MobilityWarning, match="it cannot move"):
+            Mechanism("s", changed(slider(), "o", axis=(1, 0, 1)), "block", (3, 0, 0))
+
     @given(st.floats(1e-6, 1e6))
     @settings(max_examples=20, deadline=None)
     def test_freedoms_do_not_depend_on_the_unit(self, scale):

@@ -126,7 +126,7 @@ def test_plain_data_says_what_the_fields_say(batch: Solution) -> None:
     single = batch[0, 2].to_dict()
     assert single["status"] == "PROJECTED"
     first, limit = batch[0, 2].active_limits[0], single["active_limits"][0]
-    assert limit == {"joint": first.joint, "bound": first.bound, "value": first.value, "limit": first.limit}
+    assert limit == vars(first)
 
 
 def test_the_representation_counts_what_became_of_the_rows(batch: Solution) -> None:

@@ -27,8 +27,13 @@ _HOMES = {
     "decompose": "decompose",
     "solve_ik": "ik",
     "track": "track",
+    "Track": "tracked",
+    "reach": "reach",
+    "margins": "margins",
     "AssemblyModes": "assembly",
     "assembly_modes": "assembly",
+    "WorkingModes": "working",
+    "working_modes": "working",
     "closure_residual": "residual",
     "Mobility": "differential",
     "Singularity": "differential",
@@ -54,6 +59,8 @@ __all__ = [
     "Solution",
     "Status",
     "SubChain",
+    "Track",
+    "WorkingModes",
     "__version__",
     "assembly_modes",
     "catalog",
@@ -64,13 +71,16 @@ __all__ = [
     "geometric",
     "inverse_jacobian",
     "load",
+    "margins",
     "mobility",
     "pose",
+    "reach",
     "save",
     "singularity",
     "solve_fk",
     "solve_ik",
     "track",
+    "working_modes",
 ]
 
 if TYPE_CHECKING:
@@ -84,12 +94,16 @@ if TYPE_CHECKING:
     from .ik import solve_ik
     from .legs import Leg
     from .limits import ActiveLimit
+    from .margins import margins
     from .mechanism import Cone, Joint, Mechanism
     from .options import Options
     from .poses import pose
+    from .reach import reach
     from .residual import closure_residual
     from .solution import Solution, Status
     from .track import track
+    from .tracked import Track
+    from .working import WorkingModes, working_modes
 
 
 def __getattr__(name: str) -> Any:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,61 +15,16 @@ from .differential import stepped_freely
 from .errors import ContinuumOfSolutions, InvalidArgument
 from .fk import answered, as_values
 from .mechanism import Mechanism
-from .solution import Solution
+from .modes import ALONG, BATCH, LEAST_STARTS, STEPS, Modes, Sightings
 from .starts import random_starts
 from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]
 
-BATCH = 512
-"""Starts between two looks at what was found."""
-
-LEAST_STARTS = 4096
-"""Starts before a search may end: a mode that one start in 500 finds is missed by all of them once in 3600 searches."""
-
-HITS = 10
-"""How often every mode is found before a search ends: an unseen mode as rare as the rarest seen is then unlikely."""
-
-STEPS = 80
-"""Newton steps a start may take; most need fewer than 20."""
-
-ALONG = 1e-3
-"""How far a singular solution is moved along its free motion to see whether that goes on [L or rad]: far enough to
-tell a continuum from a double root, not so far as to meet another solution."""
-
 
 @dataclass(frozen=True)
-class AssemblyModes(Sequence[Solution]):
-    """The modes that were found, nearest to home first, and what that is worth.
-
-    Attributes
-    ----------
-    modes : one Solution each: REACHED within all limits; EXCEEDED beyond some, which `active_limits` names.
-    hits : how many starts led to each.
-    starts : how many starts were made.
-    """
-
-    modes: tuple[Solution, ...]
-    hits: tuple[int, ...]
-    starts: int
-
-    @property
-    def unseen(self) -> float:
-        """Probability, about, that another start would find a new mode: those found once over all starts (Good-Turing).
-
-        Where all were found more often, the 95 % bound for something not yet seen, three over all starts.
-        """
-        return max(3, sum(hits == 1 for hits in self.hits)) / self.starts
-
-    @overload
-    def __getitem__(self, index: int) -> Solution: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Solution, ...]: ...
-    def __getitem__(self, index: int | slice) -> Solution | tuple[Solution, ...]:
-        return self.modes[index]
-
-    def __len__(self) -> int:
-        return len(self.modes)
+class AssemblyModes(Modes):
+    """The assembly modes that were found, nearest to home first, and what that is worth: see `Modes`."""
 
 
 def assembly_modes(mechanism: Mechanism, actuators: Any, *, most_starts: int = 40_000) -> AssemblyModes:
@@ -102,10 +56,10 @@ def assembly_modes(mechanism: Mechanism, actuators: Any, *, most_starts: int = 4
     order = np.argsort(search.from_home, kind="stable")
     coordinates = np.zeros((len(order), len(search.closure.scale)))
     for row, place in enumerate(order):
-        coordinates[row] = search.coordinates[place]
+        coordinates[row] = search.found.coordinates[place]
     polished = close(search.closure, coordinates, platform_poses(mechanism, coordinates), locked=search.locked)
     modes = answered(mechanism, polished.coordinates, np.repeat(values, len(order), axis=0))
-    return AssemblyModes(tuple(modes), tuple(search.hits[place] for place in order), search.starts)
+    return AssemblyModes(tuple(modes), tuple(search.found.hits[place] for place in order), search.starts)
 
 
 class _Search:
@@ -117,14 +71,17 @@ class _Search:
         self.locked = frozenset(closure.mechanism.actuators)
         self.rng = np.random.default_rng(0)
         self.starts = 0
-        self.coordinates: list[Floats] = []
-        self.marks: list[Floats] = []
-        self.hits: list[int] = []
-        self.from_home: list[float] = []
+        self.found = Sightings()
 
     @property
     def is_done(self) -> bool:
-        return self.starts >= LEAST_STARTS and min(self.hits, default=HITS) >= HITS
+        return self.starts >= LEAST_STARTS and self.found.are_well_known
+
+    @property
+    def from_home(self) -> Floats:
+        """How far the end effector of each mode is from home, (modes,)."""
+        home = self._marks(self.closure.mechanism.home_pose[None])
+        return np.asarray(np.linalg.norm(np.reshape(self.found.marks, (-1, home.size)) - home, axis=1))
 
     def go_on(self, n: int) -> None:
         """Try n more starts."""
@@ -140,53 +97,28 @@ class _Search:
 
     def _sort(self, found: Closing) -> None:
         """Count the closed ones among the known modes, or as new ones."""
-        marks = self._marks(found.poses)
-        fresh = []
-        for row in np.flatnonzero(found.gap <= TOLERANCES.position):
-            place = self._known(marks[row])
-            if place is None:
-                place = self._add(found.coordinates[row], found.poses[row])
-            if place == len(self.hits) - 1 and self.hits[place] == 0:
-                fresh.append(place)
-            self.hits[place] += 1
-            if np.abs(found.coordinates[row]).sum() < np.abs(self.coordinates[place]).sum():
-                self.coordinates[place] = found.coordinates[row]
-        self._refuse_continuum(fresh)
+        closed = found.gap <= TOLERANCES.position
+        coordinates, poses = found.coordinates[closed], found.poses[closed]
 
-    def _known(self, mark: Floats) -> int | None:
-        if not self.marks:
-            return None
-        apart = np.abs(np.array(self.marks) - mark).max(axis=1)
-        place = int(apart.argmin())
-        return place if apart[place] <= TOLERANCES.same_mode else None
+        def settle(row: int) -> tuple[Floats, Floats]:
+            ended = close(self.closure, coordinates[[row]], poses[[row]], locked=self.locked, closeness=0.0)
+            return self._marks(ended.poses)[0], ended.coordinates[0]
 
-    def _add(self, coordinates: Floats, pose: Floats) -> int:
-        """Number of the mode that a closed configuration belongs to: a new one, unless it ends at a known one.
+        known = len(self.found.hits)
+        places = self.found.count(self._marks(poses), settle)
+        for row, place in enumerate(places):
+            self.found.prefer(int(place), coordinates[row], (float(np.abs(coordinates[row]).sum()),))
+        self._refuse_continuum(range(known, len(self.found.hits)))
 
-        Near solutions that are singular the loops are as good as closed some way off: Newton's method goes on to them.
-        """
-        ended = close(self.closure, coordinates[None], pose[None], locked=self.locked, closeness=0.0)
-        mark = self._marks(ended.poses)[0]
-        known = self._known(mark)
-        if known is not None:
-            return known
-        offset = (ended.poses[0] - self.closure.mechanism.home_pose)[:3]
-        offset[:, 3] /= self.closure.mechanism.characteristic_length
-        self.marks.append(mark)
-        self.coordinates.append(ended.coordinates[0])
-        self.hits.append(0)
-        self.from_home.append(float(np.linalg.norm(offset)))
-        return len(self.hits) - 1
-
-    def _refuse_continuum(self, fresh: list[int]) -> None:
+    def _refuse_continuum(self, fresh: range) -> None:
         """Raise where a new mode is one of a continuum: a step along its free motion, closed again, stays away."""
         mechanism = self.closure.mechanism
         for place in fresh:
-            moved = stepped_freely(mechanism, self.coordinates[place], ALONG)
+            moved = stepped_freely(mechanism, self.found.coordinates[place], ALONG)
             if not len(moved):
                 continue
             closed = close(self.closure, moved, platform_poses(mechanism, moved), locked=self.locked)
-            apart = np.abs(self._marks(closed.poses) - self.marks[place]).max(axis=1)
+            apart = np.abs(self._marks(closed.poses) - self.found.marks[place]).max(axis=1)
             gone_on = (apart > 0.1 * ALONG) & (apart < 2.0 * ALONG) & (closed.gap <= TOLERANCES.position)
             if gone_on.any():
                 raise ContinuumOfSolutions(mechanism.name, int(gone_on.sum()))

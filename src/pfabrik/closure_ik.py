@@ -7,19 +7,20 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .closure import Closing, Closure, close, closure_of
+from .assemblies import differences, follows_task, has_parasitic_motion
+from .closure import HELD, Closing, Closure, close, closure_of
 from .completion import actuators_of
 from .displacements import displacements
 from .kernels import plan as P
-from .kernels.loops import LOCKED
 from .limits import within_turns
 from .mechanism import Mechanism
-from .nearest import MARGIN, is_feasible, nearest
+from .nearest import MARGIN, is_feasible
 from .options import Options
 from .paths import end_body
-from .poses import are_poses
+from .poses import are_poses, between, made_exact
+from .projection import project, ways_of
 from .starts import random_coordinates
-from .task import Task, Weights, norms, task_of
+from .task import Weights, norms, task_of
 from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]
@@ -31,8 +32,11 @@ STRIDES = 8
 STRIDE = 0.25
 """How far one step goes where the working mode is to be kept: a longer one may leap over a singularity [L or rad]."""
 
-SIGHT = 1e4
-"""How far off targets are looked for [L]: beyond, even the least weight of a wish would outweigh closed loops."""
+SIGHT = 1e8
+"""How far off targets are looked for [L]: farther ones in the same direction have the same nearest pose."""
+
+STRANGE = 0.1
+"""How far what a task leaves out may be from where it was before its way is looked at [L or rad]."""
 
 STARTS = 40
 """Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
@@ -84,6 +88,12 @@ def follow_by_closure(
     return coordinates
 
 
+def reached_by_closure(mechanism: Mechanism, targets: Floats, start: Floats) -> tuple[Floats, Mask]:
+    """Joint coordinates at targets (n, 4, 4), in the working mode of those to start from, and which are reached."""
+    found = _reach(closure_of(mechanism), targets, start, platform_poses(mechanism, start), keep_mode=True)
+    return found.coordinates, is_feasible(found)
+
+
 def _prepare(targets: Floats, start: Floats, rows: P.Rows) -> tuple[Mask, Floats]:
     """Which targets are poses, the others marked, and room for coordinates."""
     known = are_poses(targets)
@@ -97,79 +107,113 @@ def _answer(
     closure: Closure, targets: Floats, which: Mask, start: Floats, options: Options, keep_mode: bool, rows: P.Rows
 ) -> Floats:
     """Answer the rows `which` of the targets from (m, columns)."""
-    wanted, mechanism = targets[which], closure.mechanism
+    wanted, mechanism = made_exact(targets[which]), closure.mechanism
     begin = platform_poses(mechanism, start)
     found = _reach(closure, wanted, start, begin, keep_mode)
+    holds = np.full(len(wanted), P.HOLD_NOTHING)
     away = np.flatnonzero(~is_feasible(found))
     if len(away):
-        ended = None if keep_mode else (found.coordinates[away], found.poses[away])
+        stays = keep_mode or follows_task(mechanism)
+        starts = [start[away]] if stays else [start[away], found.coordinates[away]]
         sought = _within_sight(closure, wanted[away], begin[away])
-        projected = _project(closure, sought, start[away], begin[away], ended, options)
-        for array, own in zip(found, projected, strict=True):
+        answers = project(
+            closure, sought, starts, ways_of(mechanism, options.hold, options.rotation_length), corners=not keep_mode
+        )
+        holds[away] = answers.holds
+        for array, own in zip(found, answers.closing, strict=True):
             array[away] = own
     _fill(closure, found, wanted, which, options, rows)
+    rows.counters[which, 2] = holds
     return found.coordinates
 
 
 def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_mode: bool) -> Closing:
     """Close the legs below platforms on their targets, within limits; the rows that are feasible are reached."""
-    task = task_of(closure.mechanism)
+    task, follows = task_of(closure.mechanism), follows_task(closure.mechanism)
     wanted = task.completed(targets, begin)
-    found = _close_below(closure, start, wanted)
+    rows = np.arange(len(targets))
+    if follows:
+        assembled = _assembled(closure, wanted, start, begin)
+        wanted, rows = assembled.poses, np.flatnonzero(assembled.gap <= TOLERANCES.position)
+    held = HELD if follows else task.held
+    found = _close_below(closure, start, wanted, held)
     is_far = _distances(closure, begin, wanted) > STRIDE
     rest = np.flatnonzero(~is_feasible(found) | (is_far if keep_mode else False))
     if len(rest):
-        _take_better(found, rest, _led(closure, wanted[rest], start[rest], begin[rest]))
-    rng = np.random.default_rng(0)
-    for _ in range(0 if keep_mode else STARTS):
-        rest = np.flatnonzero(~is_feasible(found))
-        if not len(rest):
-            break
-        scattered = np.repeat(random_coordinates(closure, 1, rng), len(rest), axis=0)
-        if task.is_whole_pose:  # with the platform at rest, legs are found one by one
-            reached = _legs_reached(closure, found, rest)
-            scattered = np.where(reached, found.coordinates[rest], scattered)
-        tried = _close_below(closure, scattered, wanted[rest], STEPS)
-        if task.is_whole_pose:
-            _take_legs(closure, found, rest, tried)
-        else:
-            _take_better(found, rest, tried)
+        _take_better(found, rest, _led(closure, wanted[rest], start[rest], begin[rest], held, limits=True))
+    if not keep_mode:
+        _search(closure, found, rows, wanted, held, at_rest=follows or task.is_whole_pose)
+    if not keep_mode and follows and has_parasitic_motion(closure.mechanism):
+        anywhere = task.completed(targets, begin)  # in other ways of assembly, where this one does not reach
+        _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
     return found
 
 
-def _close_below(closure: Closure, start: Floats, wanted: Floats, max_iterations: int = 100) -> Closing:
-    """Close the legs, within limits, below platforms that are held in all that the task asks for."""
+def _search(
+    closure: Closure, found: Closing, rows: NDArray[np.intp], wanted: Floats, held: Weights, *, at_rest: bool
+) -> None:
+    """Look for the legs that do not reach yet from random configurations; with the platform `at_rest`, one by one."""
+    rng = np.random.default_rng(0)
+    for _ in range(STARTS):
+        rest = rows[~is_feasible(found)[rows]]
+        if not len(rest):
+            break
+        scattered = np.repeat(random_coordinates(closure, 1, rng), len(rest), axis=0)
+        if at_rest:
+            reached = _legs_reached(closure, found, rest)
+            scattered = np.where(reached, found.coordinates[rest], scattered)
+        tried = _close_below(closure, scattered, wanted[rest], held, STEPS)
+        if at_rest:
+            _take_legs(closure, found, rest, tried)
+        else:
+            _take_better(found, rest, tried)
+
+
+def _assembled(closure: Closure, wanted: Floats, start: Floats, begin: Floats) -> Closing:
+    """The whole poses that the loops, without limits, make of targets, (n, 4, 4), in the assembly of the start.
+
+    Rows that are left open have none.
+    """
     task = task_of(closure.mechanism)
+    if not has_parasitic_motion(closure.mechanism):
+        return close(closure, start, wanted, platform=HELD)
+    found = close(closure, start, wanted, platform=task.held, framed=task.is_framed)
+    strange = np.flatnonzero((found.gap > TOLERANCES.position) | (differences(closure, found.poses, wanted) > STRANGE))
+    if len(strange):
+        led = _led(closure, wanted[strange], start[strange], begin[strange], task.held, limits=False)
+        for array, own in zip(found, led, strict=True):
+            array[strange] = own
+    return found
+
+
+def _close_below(
+    closure: Closure, start: Floats, wanted: Floats, held: Weights, max_iterations: int = 100, limits: bool = True
+) -> Closing:
+    """Close the legs, within limits, below platforms that are held where they are wanted."""
     return close(
         closure,
         start,
         wanted,
-        platform=task.held,
-        framed=task.is_framed,
-        limits=True,
+        platform=held,
+        framed=task_of(closure.mechanism).is_framed and held != HELD,
+        limits=limits,
         margin=MARGIN,
         max_iterations=max_iterations,
     )
 
 
-def _led(closure: Closure, targets: Floats, start: Floats, begin: Floats) -> Closing:
-    """The platform led from where it is to its target."""
-    task = task_of(closure.mechanism)
-    present = begin
+def _led(closure: Closure, targets: Floats, start: Floats, begin: Floats, held: Weights, *, limits: bool) -> Closing:
+    """The platform led from where it is to its target; where what is not held leaps on the way, nothing is found."""
+    task, present = task_of(closure.mechanism), begin
+    leapt = np.zeros(len(targets), bool)
     for stride in range(1, STRIDES + 1):
-        between = task.completed(_between(begin, targets, stride / STRIDES), present)
-        found = _close_below(closure, start, between)
+        way = between(begin, targets, stride / STRIDES)
+        way = way if held == HELD else task.completed(way, present)
+        found = _close_below(closure, start, way, held, limits=limits)
+        leapt |= differences(closure, found.poses, way) > STRANGE + differences(closure, way, present)
         start, present = found.coordinates, found.poses
+    found.gaps[leapt] = np.inf
     return found
-
-
-def _between(begin: Floats, end: Floats, share: float) -> Floats:
-    """Poses a share of the way from one to another: straight positions, the shortest turn."""
-    between = begin + (end - begin) * share
-    U, _, Vt = np.linalg.svd(between[:, :3, :3])  # the rotation nearest to the blend of the two
-    proper = np.linalg.det(U @ Vt) > 0.0
-    between[:, :3, :3] = np.where(proper[:, None, None], U @ Vt, begin[:, :3, :3])
-    return between
 
 
 def _off(found: Closing) -> Floats:
@@ -199,51 +243,6 @@ def _take_better(found: Closing, rest: NDArray[np.intp], tried: Closing) -> None
         array[rest[better]] = own[better]
 
 
-def _project(
-    closure: Closure,
-    targets: Floats,
-    start: Floats,
-    begin: Floats,
-    ended: tuple[Floats, Floats] | None,
-    options: Options,
-) -> Closing:
-    """Feasible configurations near targets that are not reached; the start itself where nothing better is found.
-
-    Parameters
-    ----------
-    start, begin : where the search starts, (m, columns) and (m, 4, 4).
-    ended : where reaching ended, likewise, another start; None to stay in the working mode of the first.
-    """
-    best = close(closure, start, begin, max_iterations=0)
-    task = task_of(closure.mechanism)
-    wanted = task.completed(targets, begin)
-    starts = [(start, begin)] if ended is None else [(start, begin), ended]
-    nearest_yet = np.full(len(targets), np.inf)
-    for platform in _ways(task, options):
-        waiting = np.flatnonzero(np.isinf(nearest_yet))
-        if not len(waiting):
-            break
-        if LOCKED not in platform:
-            nearest_yet[waiting] = _feasible_distances(closure, best, wanted)[waiting]
-        for legs, poses in starts:
-            placed = np.where(_held_entries(platform), wanted, poses)[waiting]
-            tried = nearest(
-                closure,
-                legs[waiting],
-                placed,
-                platform=platform,
-                framed=task.is_framed,
-                targets=wanted[waiting],
-                gently=ended is None,
-            )
-            distance = _feasible_distances(closure, tried, wanted[waiting])
-            better = np.flatnonzero(distance < nearest_yet[waiting])
-            nearest_yet[waiting[better]] = distance[better]
-            for array, each in zip(best, tried, strict=True):
-                array[waiting[better]] = each[better]
-    return best
-
-
 def _within_sight(closure: Closure, targets: Floats, begin: Floats) -> Floats:
     """Targets no further from where the platform is than a search can tell from others in the same direction."""
     offset = (targets - begin)[:, :3, 3]
@@ -251,26 +250,6 @@ def _within_sight(closure: Closure, targets: Floats, begin: Floats) -> Floats:
     near = targets.copy()
     near[:, :3, 3] = begin[:, :3, 3] + offset * np.minimum(1.0, far / np.maximum(norms(offset), far))[:, None]
     return near
-
-
-def _held_entries(platform: Weights) -> Mask:
-    """Which entries of a pose a projection keeps, (4, 4)."""
-    held = np.zeros((4, 4), bool)
-    held[:3, 3], held[:3, :3] = np.array(platform[:3]) == LOCKED, LOCKED in platform[3:]
-    return held
-
-
-def _feasible_distances(closure: Closure, found: Closing, targets: Floats) -> Floats:
-    """How far feasible rows are from their targets in what counts, (n,); infinite for the others."""
-    distances = _distances(closure, found.poses, targets)
-    return np.asarray(np.where(is_feasible(found), distances, np.inf))
-
-
-def _ways(task: Task, options: Options) -> list[Weights]:
-    """Weights of the platform's position and rotation, the ways to project in the order in which they are tried."""
-    ways = {"orientation": [task.weights(1.0, LOCKED)], "position": [task.weights(LOCKED, 1.0)], None: []}[options.hold]
-    both = any(task.axes) and task.rotations > 0  # else there is nothing to give way, or nothing to hold
-    return [*(ways if both else []), task.weights(1.0, 1.0)]
 
 
 def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:
@@ -290,7 +269,7 @@ def _fill(closure: Closure, found: Closing, wanted: Floats, which: Mask, options
     position, rotation = task_of(mechanism).errors(poses, wanted)
     near = (position <= (options.tolerance or TOLERANCES.position * length)) & (rotation <= options.rotation_tolerance)
     rows.status[which] = np.where(is_feasible(found), np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
-    rows.counters[which] = np.stack([found.iterations, np.zeros_like(found.iterations)], axis=1)
+    rows.counters[which] = np.stack([found.iterations, *np.zeros((2, len(poses)), np.int64)], axis=1)
     rows.poses[which] = poses
     rows.actuators[which] = actuators_of(mechanism, found.coordinates)
     zero = np.zeros(len(poses))

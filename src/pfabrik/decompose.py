@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
-from typing import Literal
+from functools import lru_cache
+from typing import Literal, TypeAlias
 
 from .forms import BranchForm, NotExpressible, TrunkForm
+from .graph import TIP, Edge, Stage, components, graph_of, is_tree, leads, stages
 from .joint_types import KINDS
 from .mechanism import Joint, Mechanism
+from .parallelograms import Parallelogram, parallelogram_of
 from .positions import express_branch, express_trunk
 
-TIP = "(tip)"
+Engine: TypeAlias = Literal["reaching", "closure"]
 
 
 @dataclass(frozen=True)
@@ -33,35 +35,91 @@ class Step:
         """The body nearer to the base."""
         return self.joint.connects[0 if self.forward else 1]
 
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """Itself, as the only joint of this part."""
+        return (self,)
+
     def __str__(self) -> str:
         return KINDS[self.joint.type].letter + ("*" if self.joint.actuated else "")
 
 
 @dataclass(frozen=True)
-class SubChain:
-    """One sub-chain: a trunk common to all its branches (empty for a serial one), and the branches.
+class Split:
+    """Several ways from one body to another: branches, if that is the end effector, or a loop within the sub-chain.
 
     Attributes
     ----------
-    trunk, branches : the joints in order, from the base outward.
-    reason : why positions alone cannot express it, or None.
+    ways : the parts of each way in order, from the base outward.
+    parallelogram : what the ways form, if they are two equal and parallel rods.
     """
 
-    trunk: tuple[Step, ...]
-    branches: tuple[tuple[Step, ...], ...]
-    reason: str | None
-    trunk_form: TrunkForm | None
-    branch_forms: tuple[BranchForm, ...]
-
-    @property
-    def engine(self) -> Literal["reaching", "closure"]:
-        """The engine that serves this chain."""
-        return "reaching" if self.reason is None else "closure"
+    ways: tuple[tuple[Part, ...], ...]
+    parallelogram: Parallelogram | None
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """All joints of the sub-chain, the trunk's first."""
-        return self.trunk + tuple(step for branch in self.branches for step in branch)
+        """All its joints, way by way."""
+        return tuple(step for way in self.ways for part in way for step in part.steps)
+
+    def __str__(self) -> str:
+        if self.parallelogram and self.parallelogram.pinned:
+            return "Pa" + "*" * any(step.joint.actuated for step in self.steps)
+        return f"[{', '.join(map(_written, self.ways))}]"
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Joints between two bodies that are neither in series nor side by side, such as a bridge."""
+
+    steps: tuple[Step, ...]
+
+    def __str__(self) -> str:
+        return f"{{{', '.join(map(str, self.steps))}}}"
+
+
+Part: TypeAlias = Step | Split | Mesh
+
+
+@dataclass(frozen=True)
+class SubChain:
+    """One sub-chain: its parts in series, from the base to the end effector.
+
+    Attributes
+    ----------
+    parts : joints, and splits where the chain branches or holds a loop.
+    reason : why positions alone cannot express it, or None.
+    """
+
+    parts: tuple[Part, ...]
+    reason: str | None
+    trunk_form: TrunkForm | None = None
+    branch_forms: tuple[BranchForm, ...] = ()
+
+    @property
+    def engine(self) -> Engine:
+        """The engine that could serve this chain; `engine_of` tells which one answers for the whole mechanism."""
+        return "reaching" if self.reason is None else "closure"
+
+    @property
+    def trunk(self) -> tuple[Step, ...]:
+        """The joints before the body at which a tree branches; empty for other chains."""
+        return _trunk_and_branches(self.parts)[0]
+
+    @property
+    def branches(self) -> tuple[tuple[Step, ...], ...]:
+        """The joints of each branch of a tree that branches once; one branch with all joints for other chains."""
+        return _trunk_and_branches(self.parts)[1]
+
+    @property
+    def parallelograms(self) -> tuple[Parallelogram, ...]:
+        """Those in it, branches that end on the end effector included."""
+        return tuple(_parallelograms(self.parts))
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """All joints of the sub-chain, from the base outward, branch by branch."""
+        return tuple(step for part in self.parts for step in part.steps)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -69,139 +127,114 @@ class SubChain:
         return tuple(step.joint.name for step in self.steps)
 
     def __str__(self) -> str:
-        written = ["-".join(map(str, branch)) for branch in self.branches]
-        ends = written[0] if len(written) == 1 else f"[{', '.join(written)}]"
-        return "-".join([*map(str, self.trunk), ends])
+        return _written(self.parts)
 
 
-@dataclass(frozen=True)
-class _Edge:
-    joint: Joint
-    bodies: tuple[str, str]
+def _written(parts: Sequence[Part]) -> str:
+    return "-".join(map(str, parts))
 
-    def other(self, body: str) -> str:
-        return self.bodies[1] if self.bodies[0] == body else self.bodies[0]
+
+def _trunk_and_branches(parts: tuple[Part, ...]) -> tuple[tuple[Step, ...], tuple[tuple[Step, ...], ...]]:
+    *trunk, last = parts
+    if isinstance(last, Split) and _are_steps(trunk) and all(map(_are_steps, last.ways)):
+        return _steps(trunk), tuple(map(_steps, last.ways))
+    return (), (_steps(parts),)
+
+
+def _are_steps(parts: Sequence[Part]) -> bool:
+    return all(isinstance(part, Step) for part in parts)
+
+
+def _steps(parts: Sequence[Part]) -> tuple[Step, ...]:
+    return tuple(step for part in parts for step in part.steps)
+
+
+def _parallelograms(parts: Sequence[Part]) -> Iterator[Parallelogram]:
+    for part in parts:
+        if isinstance(part, Split):
+            if part.parallelogram:
+                yield part.parallelogram
+            for way in part.ways:
+                yield from _parallelograms(way)
 
 
 def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
     """Split a mechanism into its sub-chains, in the order of their first joints.
 
     The graph is cut at the base and at the end effector (a joint end effector is cut in two, and stands for a point).
-    Every connected rest with one joint to the base and no loop of its own is a sub-chain, branched where several of
-    its joints lead to the end effector. Each says which engine serves it, and why.
+    Every connected rest that leads from one to the other is a sub-chain. It is decomposed again, the same way, between
+    the bodies that all its ways pass: where several ways leave a body, they are branches if they end at the end
+    effector, else a loop of its own. Each sub-chain says which engine could serve it, and why.
 
     Source: the paper's TDS; DESIGN of restrictions on positions in `pfabrik.positions`.
     """
-    edges = _edges(mechanism)
-    weld = _welded(mechanism)
-    base = weld[mechanism.base]
-    end = TIP if mechanism.end_effector_is_joint else weld[mechanism.end_effector]
-    found = [_sub_chain(mechanism, group, base, end) for group in _components(edges, base, end)]
-    return tuple(sub_chain for sub_chain in found if sub_chain is not None)
+    graph = graph_of(mechanism)
+    groups = components(graph.edges, graph.base, graph.end)
+    on_base = (group for group in groups if any(graph.base in edge.bodies for edge in group))
+    return tuple(_sub_chain(mechanism, group, graph.base, graph.end) for group in on_base)
 
 
-def _welded(mechanism: Mechanism) -> dict[str, str]:
-    """Each body's representative: bodies joined by fixed joints are one."""
-    root = {body: body for body in mechanism.bodies}
-
-    def find(body: str) -> str:
-        while root[body] != body:
-            body = root[body]
-        return body
-
-    for joint in mechanism.joints:
-        if joint.type == "fixed" and joint.name != mechanism.end_effector:
-            keep, drop = (find(body) for body in joint.connects)
-            if drop == find(mechanism.base):
-                keep, drop = drop, keep
-            root[drop] = keep
-    return {body: find(body) for body in root}
+def _sub_chain(mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str) -> SubChain:
+    """The sub-chain made of edges that hang together, one of them at least on the base."""
+    if not leads(edges, base, end):
+        return SubChain(tuple(Step(edge.joint) for edge in edges), "does not lead to the end effector")
+    parts = _parts(mechanism, edges, base, end)
+    if not is_tree(edges, base, end):
+        return SubChain(parts, "has a loop of its own")
+    return _express(mechanism, SubChain(parts, None))
 
 
-def _edges(mechanism: Mechanism) -> list[_Edge]:
-    """The graph's edges between welded bodies; a joint that is the end effector becomes two, each to the tip."""
-    weld = _welded(mechanism)
-    edges = []
-    for joint in mechanism.joints:
-        first, second = (weld[body] for body in joint.connects)
-        if mechanism.end_effector_is_joint and joint.name == mechanism.end_effector:
-            edges += [_Edge(joint, (first, TIP)), _Edge(joint, (second, TIP))]
-        elif joint.type != "fixed":
-            edges.append(_Edge(joint, (first, second)))
-    return edges
+def _parts(mechanism: Mechanism, edges: Sequence[Edge], start: str, goal: str) -> tuple[Part, ...]:
+    """What lies between two bodies, in series."""
+    return tuple(_part(mechanism, stage) for stage in stages(edges, start, goal))
 
 
-def _components(edges: list[_Edge], base: str, end: str) -> list[list[_Edge]]:
-    """Groups of edges that hang together without passing through the base or the end effector."""
-    group_of: dict[str, int] = {}
-    groups: dict[int, list[_Edge]] = {}
-    for number, edge in enumerate(edges):
-        inner = [body for body in edge.bodies if body not in (base, end)]
-        found = sorted({group_of[body] for body in inner if body in group_of})
-        target = found[0] if found else number
-        merged = [*chain.from_iterable(groups.pop(old) for old in found), edge]
-        groups[target] = merged
-        for member in merged:
-            group_of.update({body: target for body in member.bodies if body not in (base, end)})
-    return [groups[number] for number in sorted(groups)]
+def _part(mechanism: Mechanism, stage: Stage) -> Part:
+    """A joint alone; ways side by side, each decomposed again; or a mesh, if they cannot be told apart."""
+    steps = tuple(Step(edge.joint, edge.bodies[0] == stage.inward, TIP in edge.bodies) for edge in stage.edges)
+    if len(steps) == 1:
+        return steps[0]
+    ways = components(stage.edges, stage.inward, stage.outward)
+    if len(ways) == 1:
+        return Mesh(steps)
+    parts = tuple(_parts(mechanism, way, stage.inward, stage.outward) for way in ways)
+    joints = [[step.joint for step in _steps(way)] for way in parts]
+    return Split(parts, parallelogram_of(joints, mechanism.characteristic_length))
 
 
-def _sub_chain(mechanism: Mechanism, edges: list[_Edge], base: str, end: str) -> SubChain | None:
-    """The sub-chain made of `edges`; None for a tool that hangs on the end effector alone."""
-    bodies = {body for edge in edges for body in edge.bodies} - {base, end}
-    to_base = [edge for edge in edges if base in edge.bodies]
-    if not to_base:
-        return None
-    between = [edge for edge in edges if end not in edge.bodies]  # a tree on n bodies and the base has n of them
-    if len(to_base) > 1 or len(between) != len(bodies):
-        steps = tuple(Step(edge.joint) for edge in edges)
-        return SubChain((), (steps,), "has a loop of its own", None, ())
-    paths = _paths(edges, base, end)
-    if not paths:
-        steps = tuple(Step(edge.joint) for edge in edges)
-        return SubChain((), (steps,), "does not lead to the end effector", None, ())
-    return _express(mechanism, *_split(paths))
-
-
-def _paths(edges: list[_Edge], base: str, end: str) -> list[tuple[Step, ...]]:
-    """The ways from base to end effector through a tree, in the order of the description."""
-    at: dict[str, list[_Edge]] = defaultdict(list)
-    for edge in edges:
-        for body in edge.bodies:
-            at[body].append(edge)
-    paths: list[tuple[Step, ...]] = []
-    open_paths: list[tuple[str, tuple[Step, ...]]] = [(base, ())]
-    while open_paths:
-        body, path = open_paths.pop(0)
-        if body == end:
-            paths.append(path)
-            continue
-        came_by = path[-1].joint if path else None
-        for edge in at[body]:
-            if edge.joint is not came_by:
-                open_paths.append(
-                    (edge.other(body), (*path, Step(edge.joint, edge.bodies[0] == body, TIP in edge.bodies)))
-                )
-    return paths
-
-
-def _split(paths: list[tuple[Step, ...]]) -> tuple[tuple[Step, ...], tuple[tuple[Step, ...], ...]]:
-    """What all paths share, and what is left of each."""
-    if len(paths) == 1:
-        return (), (paths[0],)
-    shared = 0
-    while len({path[shared].joint.name for path in paths}) == 1:
-        shared += 1
-    return paths[0][:shared], tuple(path[shared:] for path in paths)
-
-
-def _express(mechanism: Mechanism, trunk: tuple[Step, ...], branches: tuple[tuple[Step, ...], ...]) -> SubChain:
-    names = [step.joint.name for branch in branches for step in branch if not step.ends]
+def _express(mechanism: Mechanism, chain: SubChain) -> SubChain:
+    """A tree in positions, or with the reason why not."""
+    splits = [part for part in chain.parts if isinstance(part, Split)]
     try:
-        if len(set(names)) != len(names):
+        if splits and not chain.trunk:
             raise NotExpressible("branches more than once")
-        trunk_form = express_trunk(mechanism, trunk) if trunk else None
-        forms = tuple(express_branch(mechanism, branch, on_base=not trunk) for branch in branches)
+        trunk_form = express_trunk(mechanism, chain.trunk) if chain.trunk else None
+        forms = tuple(express_branch(mechanism, branch, on_base=not chain.trunk) for branch in chain.branches)
     except NotExpressible as reason:
-        return SubChain(trunk, branches, str(reason), None, ())
-    return SubChain(trunk, branches, None, trunk_form, forms)
+        return SubChain(chain.parts, str(reason))
+    return SubChain(chain.parts, None, trunk_form, forms)
+
+
+def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
+    """Why positions alone cannot express a mechanism: sub-chains with their reasons, or motors in none of them."""
+    chains = decompose(mechanism)
+    reasons = tuple(f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None)
+    forms = (form for chain in chains for form in (chain.trunk_form, *chain.branch_forms) if form is not None)
+    known = {coordinate.joint for form in forms for coordinate in form.coordinates}
+    missing = (f"actuated joint {name} is in no sub-chain" for name in mechanism.actuators if name not in known)
+    return reasons or tuple(missing)
+
+
+@lru_cache(maxsize=64)
+def closure_reason(mechanism: Mechanism) -> str | None:
+    """Why the closure engine answers targets of a mechanism, for its task's sake or a chain's; else None."""
+    if mechanism.task != mechanism.whole_task:
+        return "the task leaves some of the pose free"
+    if any(chain.reason is not None for chain in decompose(mechanism)):
+        return "some sub-chain needs more than positions"
+    return next(iter(beyond_positions(mechanism)), None)
+
+
+def engine_of(mechanism: Mechanism) -> Engine:
+    """The engine that answers targets of a mechanism: one for all its sub-chains."""
+    return "reaching" if closure_reason(mechanism) is None else "closure"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 
 def near_miss(name: str, known: Iterable[str]) -> str:
@@ -102,6 +103,31 @@ class ContinuumOfSolutions(PfabrikError, ValueError):
 
     def __reduce__(self) -> tuple[type, tuple[str, int]]:
         return type(self), (self.mechanism, self.freedoms)
+
+
+class ContinuumOfWorkingModes(ContinuumOfSolutions):
+    """With its end effector on the target, actuators still move: there are no single working modes to list.
+
+    Attributes
+    ----------
+    mechanism : its name.
+    freedoms : how many independent motions of the actuators there are.
+    moving : names of the actuators that take part.
+    """
+
+    def __init__(self, mechanism: str, freedoms: int, moving: Iterable[str]) -> None:
+        self.mechanism = mechanism
+        self.freedoms = freedoms
+        self.moving = tuple(moving)
+        PfabrikError.__init__(
+            self,
+            f"'{mechanism}' still moves with its end effector on the target ({freedoms} freedom"
+            f"{'s' if freedoms > 1 else ''} of the actuators {', '.join(self.moving)}): a continuum of solutions, none "
+            "of which stands alone",
+        )
+
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        return type(self), (self.mechanism, self.freedoms, self.moving)
 
 
 class InvalidArgument(PfabrikError, ValueError):

@@ -34,7 +34,7 @@ STRIDES = 8
 STARTS = 48
 """Random starts where nothing else assembles and no seed says in which mode to stay."""
 
-NEAR = 1e-2
+NEAR = 1e-6
 """Actuators this near to the asked values need no search from elsewhere for nearer ones [L or rad]."""
 
 PROJECTIONS = 12

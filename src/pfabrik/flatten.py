@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .decompose import SubChain, decompose
+from .decompose import SubChain, beyond_positions, decompose, engine_of
 from .errors import UnsupportedMechanism
 from .forms import BranchForm, Coordinate, TrunkForm
 from .kernels import plan as P
@@ -55,27 +55,23 @@ class Flat:
 @lru_cache(maxsize=64)
 def flatten(mechanism: Mechanism) -> Flat:
     """Compile a mechanism; `UnsupportedMechanism` names every sub-chain that positions cannot express."""
-    chains = decompose(mechanism)
-    reasons = [f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None]
-    builder = _Builder(mechanism)
-    if not reasons:
-        for chain in chains:
-            builder.add_chain(chain)
-        reasons = builder.missing_actuators()
+    reasons = beyond_positions(mechanism)
     if reasons:
         raise UnsupportedMechanism(mechanism.name, reasons)
+    builder = _Builder(mechanism)
+    for chain in decompose(mechanism):
+        builder.add_chain(chain)
     return builder.build()
 
 
 @lru_cache(maxsize=64)
 def flat_of(mechanism: Mechanism) -> Flat | None:
     """The mechanism, compiled; None if it is one for the closure engine: for a chain's sake, or the task's."""
-    if mechanism.task != mechanism.whole_task:
-        return None
-    try:
-        return flatten(mechanism)
-    except UnsupportedMechanism:
-        return None
+    return flatten(mechanism) if engine_of(mechanism) == "reaching" else None
+
+
+ROOM = 1e-6
+"""Range that leaves room to move [L or rad]: what is rigid is no strut."""
 
 
 class _Builder:
@@ -206,10 +202,6 @@ class _Builder:
             turning = -1 if at_end else carrier
             self.points += [JointPoint(name, first + k, node.shift, axis, turning) for name in node.joints]
 
-    def missing_actuators(self) -> list[str]:
-        known = {coordinate.joint for coordinate, _ in self.coordinates}
-        return [f"actuated joint {name} is in no sub-chain" for name in self.mechanism.actuators if name not in known]
-
     def build(self) -> Flat:
         order = {name: number for number, name in enumerate(self.mechanism.actuators)}
         coordinates = sorted(self.coordinates, key=lambda pair: order.get(pair[0].joint, len(order)))
@@ -244,7 +236,22 @@ class _Builder:
         ends = np.array([branch["end"] for branch in self.branches])
         span = float(np.sqrt(((ends - ends.mean(axis=0)) ** 2).sum(axis=1).mean()))
         is_point = float(self.mechanism.end_effector_is_joint)
-        return np.array([length, span if span > 0.0 else length, is_point, *self.mechanism.reference_point])
+        on_struts = float(self._is_on_struts())
+        span = span if span > 0.0 else length
+        return np.array([length, span, is_point, *self.mechanism.reference_point, on_struts])
+
+    def _is_on_struts(self) -> bool:
+        """Whether every branch is a strut, and every range leaves room to move."""
+        least = ROOM * self.mechanism.characteristic_length
+        struts = all(
+            branch["kind"] == P.STRUT
+            and branch["last"] > branch["first"]
+            and not any(branch[name] for name in ("planar", "end_plane", "align", "rail"))
+            and self.nodes[branch["last"]]["hi"] - self.nodes[branch["last"]]["lo"] > least
+            for branch in self.branches
+        )
+        room = all(j["hi"] - j["lo"] > (ROOM if j["kind"] == P.TURN else least) for j in self.trunk_joints)
+        return struts and room and all(cone["kind"] != P.LINK_CONE for cone in self.cones)
 
 
 def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,6 +21,16 @@ from .tolerances import TOLERANCES
 if TYPE_CHECKING:
     from .mechanism import Joint, Mechanism
 
+NEARLY_IMPLIED = 1e-3
+"""Singular value [L and rad] below which a condition of the loops is hardly one of its own: in machines that move, such
+conditions have 0.02 and more; directions written with three digits leave up to 1e-3 of what should follow from others.
+"""
+
+ROUNDING = 1e-12
+"""Singular value [L and rad] up to which a condition follows from the others exactly: rounding leaves 1e-15. From 1e-11
+on, searches for nearest poses take conditions that miss each other for ones to keep, and stop early.
+"""
+
 
 @dataclass(frozen=True)
 class Tree:
@@ -115,6 +125,21 @@ def end_effector_freedom(mechanism: Mechanism, locked: frozenset[str]) -> int:
         return _rank(twist @ motions)
     centre = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
     return _rank((twist[3:] + np.cross(twist[:3], centre, axisa=0, axisc=0)) @ motions)
+
+
+def inexactness(mechanism: Mechanism) -> float:
+    """By how much conditions of the loops at home fail to follow from the others, and yet hardly are their own.
+
+    Returns
+    -------
+    The largest singular value of this kind [L and rad], 0 if there is none. Where there is one, axes that should be
+    parallel, or meet, do so up to the digits of the description only: loops that close to `TOLERANCES.position` hinder
+    the joints, or keep them from moving. Or home is next to a configuration in which the mechanism gains a motion.
+    """
+    _, closure = _home_motion(mechanism, frozenset())
+    values = np.linalg.svd(closure, compute_uv=False) if closure.size else np.zeros(0)
+    unclear = values[(values > ROUNDING) & (values < NEARLY_IMPLIED)]
+    return float(unclear.max(initial=0.0))
 
 
 def end_effector_body(mechanism: Mechanism) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,17 +16,15 @@ from .flatten import Flat, flat_of
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
-from .parallel import run_in_blocks
 from .poses import as_targets, what_is_wrong
+from .reaching import draw_near, settings_of, solve_rows
 from .rows import new_rows
-from .solution import Solution
-from .tolerances import TOLERANCES
+from .solution import Solution, Wanted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 DEFAULT = Options()
-_HOLDS = {None: P.HOLD_NOTHING, "orientation": P.HOLD_ORIENTATION, "position": P.HOLD_POSITION}
 
 
 def solve_ik(
@@ -60,11 +58,13 @@ def solve_ik(
         joints = partial(np.asarray, found)
     else:
         seeds = seeds_of(mechanism, flat, seed, shape)
-        solve_rows(flat, targets, seeds, settings_of(mechanism, options, seeded=seed is not None), rows)
+        settings = settings_of(mechanism, options, seeded=seed is not None)
+        solve_rows(flat, targets, seeds, settings, rows)
+        draw_near(mechanism, flat, targets, partial(start_coordinates, mechanism, seed, shape), settings, options, rows)
         if seed is not None:
             joints = partial(joints_near, mechanism, rows, seed._rows)
     handle_invalid(targets, rows, options)
-    return Solution(mechanism, rows, shape, joints)
+    return Solution(mechanism, rows, shape, joints, Wanted(targets, options.hold, options.rotation_length))
 
 
 def start_coordinates(mechanism: Mechanism, seed: Solution | None, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -88,36 +88,6 @@ def checked(mechanism: Mechanism, options: Options | None) -> Options:
     if not isinstance(options, Options | None):
         raise InvalidArgument("options", type(options).__name__, "Options, or None")
     return options or DEFAULT
-
-
-def solve_rows(flat: Flat, targets: NDArray[np.float64], seeds: P.Seeds, settings: P.Settings, rows: P.Rows) -> None:
-    """Answer independent rows: directly where closed forms reach, by iteration where not."""
-    from .kernels.solve import solve_by_iteration, solve_directly
-
-    if len(targets) == 1:
-        if solve_directly(flat.plan, targets, seeds, settings, rows):
-            solve_by_iteration(flat.plan, targets, seeds, settings, rows)
-        return
-    if run_in_blocks(solve_directly, flat.plan, targets, seeds, settings, rows, rows_a_block=4096):
-        run_in_blocks(solve_by_iteration, flat.plan, targets, seeds, settings, rows, rows_a_block=64)
-
-
-@lru_cache(maxsize=256)
-def settings_of(mechanism: Mechanism, options: Options, seeded: bool, chained: bool = False) -> P.Settings:
-    """Options as the kernels take them."""
-    length = mechanism.characteristic_length
-    mode = options.working_mode or ("keep" if seeded or chained else "any")
-    return P.Settings(
-        tolerance=float(options.tolerance or TOLERANCES.position * length),
-        rotation_tolerance=float(options.rotation_tolerance),
-        slack=0.1 * TOLERANCES.limit * length,
-        max_iterations=int(options.max_iterations),
-        max_rounds=int(options.max_rounds),
-        exact=int(options.exact),
-        any_mode=int(mode == "any"),
-        hold=_HOLDS[options.hold],
-        chained=int(chained),
-    )
 
 
 def seeds_of(mechanism: Mechanism, flat: Flat, seed: Solution | None, shape: tuple[int, ...]) -> P.Seeds:

@@ -26,29 +26,72 @@ class ActiveLimit:
     ----------
     joint, bound : which limit of which joint.
     value, limit : the coordinate (or the angle at the cone) and its bound [length or rad].
+    multiplier : by how much the answer to a target comes nearer to it, at most, per unit by which the limit gives way
+        [length per length or rad]; rotations count as lengths by `Options.rotation_length`. By just so much where the
+        limits that hold are independent; those that act as one (two rods side by side) share what they hold, and
+        neither alone brings the answer nearer. None where no pose was asked for.
     """
 
     joint: str
     bound: Literal["min", "max", "cone"]
     value: float
     limit: float
+    multiplier: float | None = None
 
 
 def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[ActiveLimit, ...]]:
     """The limits that each row of joint coordinates (n, columns), deviations from home, lies on; ranges first."""
     found: list[list[ActiveLimit]] = [[] for _ in coordinates]
     for joint in mechanism.joints:
-        for values, bounds, scale in _ranged(mechanism, joint, coordinates):
+        for values, bounds, scale in ranged(mechanism, joint, coordinates):
             near = TOLERANCES.active * scale
             low, high = values - bounds[0] <= near, bounds[1] - values <= near
             for row in np.flatnonzero(low):
                 found[row].append(ActiveLimit(joint.name, "min", float(values[row]), bounds[0]))
             for row in np.flatnonzero(high & ~low):
                 found[row].append(ActiveLimit(joint.name, "max", float(values[row]), bounds[1]))
-    for joint, angles, half_angle in _coned(mechanism, coordinates):
+    for joint, angles, half_angle in coned(mechanism, coordinates):
         for row in np.flatnonzero(half_angle - angles <= TOLERANCES.active):
             found[row].append(ActiveLimit(joint.name, "cone", float(angles[row]), half_angle))
     return [tuple(each) for each in found]
+
+
+def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Floats) -> list[tuple[ActiveLimit, ...]]:
+    """The limits that hold each row of joint coordinates (n, columns) back, the hardest first.
+
+    Parameters
+    ----------
+    multipliers : (n, 2 columns + cones), as of `weighed_limits`.
+    """
+    found: list[list[ActiveLimit]] = [[] for _ in coordinates]
+    bounded, n = _bounds(mechanism), coordinates.shape[1]
+    angles = list(coned(mechanism, coordinates))
+    hardest_first = np.argsort(-multipliers, axis=1, kind="stable")
+    for row, place in ((row, int(place)) for row, places in enumerate(hardest_first) for place in places):
+        if multipliers[row, place] <= TOLERANCES.holding:
+            continue
+        if place < 2 * n:
+            name, home, bounds, unit = bounded[place // 2]
+            value, limit = float(coordinates[row, place // 2]) + home, bounds[place % 2]
+            bound: Literal["min", "max", "cone"] = "max" if place % 2 else "min"
+        else:
+            joint, values, limit = angles[place - 2 * n]
+            name, value, bound, unit = joint.name, float(values[row]), "cone", mechanism.characteristic_length
+        found[row].append(ActiveLimit(name, bound, value, limit, float(multipliers[row, place]) * unit))
+    return [tuple(each) for each in found]
+
+
+def _bounds(mechanism: Mechanism) -> list[tuple[str, float, tuple[float, float], float]]:
+    """Of every coordinate: its joint, its value at home, its bounds, and L if it is an angle, else 1."""
+    found = []
+    for joint in mechanism.joints:
+        kinds = KINDS[joint.type].coordinates
+        least = 0.0 if joint.along is not None else -np.inf  # a distance is not negative
+        bounds = [(least, np.inf)] * len(kinds) if joint.range is None else np.reshape(joint.range, (-1, 2)).tolist()
+        for kind, home, (low, high) in zip(kinds, np.ravel(mechanism.home_coordinate(joint.name)), bounds, strict=True):
+            unit = 1.0 if kind == "length" else mechanism.characteristic_length
+            found.append((joint.name, float(home), (max(low, least), high), unit))
+    return found
 
 
 def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
@@ -64,7 +107,7 @@ def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
         values[:] = np.where(outside & (least <= high), least, values)
 
 
-def _ranged(
+def ranged(
     mechanism: Mechanism, joint: Joint, coordinates: Floats
 ) -> Iterator[tuple[Floats, tuple[float, float], float]]:
     """Values (n,), bounds and unit of every ranged coordinate of a joint."""
@@ -77,7 +120,7 @@ def _ranged(
         yield values, (bounds[0], bounds[1]), mechanism.characteristic_length if kind == "length" else 1.0
 
 
-def _coned(mechanism: Mechanism, coordinates: Floats) -> Iterator[tuple[Joint, Floats, float]]:
+def coned(mechanism: Mechanism, coordinates: Floats) -> Iterator[tuple[Joint, Floats, float]]:
     """Every joint with a cone, the angles (n,) of its line to the cone's axis, and the half angle."""
     joints = [joint for joint in mechanism.joints if joint.cone is not None]
     if not joints:

@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from .completion import positions_of
 from .flatten import Flat, flat_of
-from .ik import settings_of
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
+from .reaching import settings_of
 from .rows import new_rows
 
 Floats = NDArray[np.float64]
 
-FREE = Options(hold=None, working_mode="any")
+FREE = Options(hold=None, working_mode="any", projection="centroid")
 
 
 def reached_with_locked_legs(mechanism: Mechanism, coordinates: Floats, poses: Floats, values: Floats) -> P.Rows | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, TypeAlias, cast
@@ -18,7 +18,7 @@ from .enclosing import enclosing_radius
 from .errors import InvalidMechanism, MobilityWarning, UnknownName
 from .faults import find_faults, in_order, merged
 from .form_faults import joint_faults
-from .freedom import end_effector_freedom
+from .freedom import end_effector_freedom, inexactness
 from .joint_types import JOINT_TYPES, KINDS, TASK_COORDINATES, WHOLE_TASK, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import at_legs, legs_name, placed_joints
@@ -38,7 +38,7 @@ class Mechanism:
     """A closed-loop machine: joints between named bodies, one body fixed, one body (or joint) to be placed.
 
     Construction checks everything and raises `InvalidMechanism` with every fault; afterwards nothing changes. A
-    `MobilityWarning` says when the actuators do not hold the end effector.
+    `MobilityWarning` says when the actuators do not hold the end effector, or the loops keep it from moving.
 
     Attributes
     ----------
@@ -142,11 +142,22 @@ class Mechanism:
     def _warn_of_freedom(self) -> None:
         if len(self.joints) > MOST_JOINTS_FOR_FREEDOM:
             return
+        for doubt in self._doubts_of_freedom():
+            warnings.warn(f"'{self.name}': {doubt}", MobilityWarning, stacklevel=4)
+
+    def _doubts_of_freedom(self) -> Iterator[str]:
         left = end_effector_freedom(self, frozenset(self.actuators))
         if left > 0:
             freedoms = "1 freedom" if left == 1 else f"{left} freedoms"
-            message = f"'{self.name}': {len(self.actuators)} actuators leave the end effector {freedoms} at home"
-            warnings.warn(message, MobilityWarning, stacklevel=4)
+            yield f"{len(self.actuators)} actuators leave the end effector {freedoms} at home"
+        missed_by = inexactness(self)
+        if missed_by > 0.0:
+            yield (
+                f"the loops all but lock at home, by {missed_by:.0e}: axes that should be parallel, or meet, need more "
+                "digits, or home is next to a singularity"
+            )
+        elif left == 0 and end_effector_freedom(self, frozenset()) == 0:
+            yield "the loops hold the end effector at home: it cannot move"
 
     def __hash__(self) -> int:
         return self._hash
@@ -198,6 +209,17 @@ class Mechanism:
         centres = [joint.at for joint in self.joints if joint.at is not None]
         size = enclosing_radius(centres) or enclosing_radius([*centres, self.reference_point])
         return size or max(map(_stroke, self.joints), default=0.0) or 1.0
+
+    @cached_property
+    def rotation_length(self) -> float:
+        """Length by which a rotation of the end effector counts as a distance [length per rad].
+
+        The root mean square distance of the joints on the end effector from their centre: turning it by a small angle
+        moves them by about that much. The characteristic length where it has fewer than two, or all in one place.
+        """
+        centres = np.array([j.at for j in self.joints if self.end_effector in j.connects and j.at is not None])
+        spread = float(np.sqrt(centres.var(axis=0).sum())) if len(centres) else 0.0
+        return spread or self.characteristic_length
 
     @cached_property
     def _by_name(self) -> dict[str, Joint]:

@@ -12,7 +12,7 @@ from .tolerances import TOLERANCES
 _CHOICES: dict[str, tuple[object, ...]] = {
     "working_mode": (None, "any", "keep"),
     "hold": (None, "orientation", "position"),
-    "projection": ("centroid",),
+    "projection": ("nearest", "centroid"),
     "on_invalid": ("raise", "mark"),
 }
 
@@ -47,7 +47,8 @@ class Options:
     max_rounds: int = 12
     working_mode: Literal["any", "keep"] | None = None
     hold: Literal["orientation", "position"] | None = "orientation"
-    projection: Literal["centroid"] = "centroid"
+    projection: Literal["nearest", "centroid"] = "nearest"
+    rotation_length: float | None = None
     exact: bool = True
     actuator_tolerance: float = TOLERANCES.position
     on_invalid: Literal["raise", "mark"] = "raise"

@@ -166,6 +166,14 @@ def are_poses(targets: Floats) -> NDArray[np.bool_]:
     return np.asarray(finite & (error <= near) & (last <= near) & (np.linalg.det(R) > 0.0))
 
 
+def made_exact(poses: Floats) -> Floats:
+    """Poses (n, 4, 4) with the rotations nearest to theirs: targets are typed with a few digits."""
+    U, _, Vt = np.linalg.svd(poses[:, :3, :3])
+    exact = np.zeros_like(poses)
+    exact[:, :3, :3], exact[:, :3, 3], exact[:, 3, 3] = U @ Vt, poses[:, :3, 3], 1.0
+    return exact
+
+
 def what_is_wrong(target: Floats) -> str:
     """Why a (4, 4) array is not a pose, in words."""
     if not np.isfinite(target).all():
@@ -173,3 +181,12 @@ def what_is_wrong(target: Floats) -> str:
     if not np.allclose(target[3], (0, 0, 0, 1), atol=TOLERANCES.rotation_matrix, rtol=0):
         return f"a last row {target[3].tolist()}"
     return "a matrix that is not a rotation"
+
+
+def between(begin: Floats, end: Floats, share: Any) -> Floats:
+    """Poses a share of the way from one to another: straight positions, the shortest turn."""
+    way = begin + (end - begin) * share
+    U, _, Vt = np.linalg.svd(way[:, :3, :3])  # the rotation nearest to the blend of the two
+    proper = np.linalg.det(U @ Vt) > 0.0
+    way[:, :3, :3] = np.where(proper[:, None, None], U @ Vt, begin[:, :3, :3])
+    return np.asarray(way)

@@ -14,7 +14,7 @@ def new_rows(mechanism: Mechanism, flat: Flat | None, n: int) -> P.Rows:
     nodes, trunks = (0, 0) if flat is None else (flat.home_seed.nodes.shape[1], flat.home_seed.trunks.shape[1])
     return P.Rows(
         status=np.empty(n, np.int64),
-        counters=np.empty((n, 2), np.int64),
+        counters=np.zeros((n, 3), np.int64),
         poses=np.empty((n, 4, 4)),
         nodes=np.zeros((n, nodes, 3)),
         trunks=np.zeros((n, trunks)),

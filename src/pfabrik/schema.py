@@ -152,6 +152,9 @@ def read_table(model: type[AnyTable], table: dict[str, Any], place: str) -> tupl
 
 _DEFAULTS: dict[type[Table], dict[str, Any]] = {HeadTable: {"schema": 1}}
 
+_HEAD_KEYS = {field.alias or name for name, field in HeadTable.model_fields.items()}
+"""Keys of the file itself, which TOML takes for those of the last table when they come after one."""
+
 
 def _path(table: Any, location: tuple[int | str, ...]) -> tuple[str, ...]:
     """The keys that lead to a fault; not further than a value that is no table, nor than a key that is missing."""
@@ -172,7 +175,9 @@ def _fault(model: type[Table], table: dict[str, Any], place: str, path: tuple[st
     key = path[-1]
     if key not in expected:
         known = f"one of {', '.join(expected)}{model.others}"
-        return Fault(where, f"an unknown key{near_miss(key, expected)}", known)
+        of_the_file = model is not HeadTable and key in _HEAD_KEYS
+        hint = " here: it is one of the file, above its first table" if of_the_file else near_miss(key, expected)
+        return Fault(where, f"an unknown key{hint}", known)
     return Fault(where, shown(table.get(key)), expected[key])
 
 

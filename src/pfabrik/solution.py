@@ -6,18 +6,22 @@ from collections.abc import Callable, Iterator, Mapping
 from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .approach import weighed_limits
+from .closure import closure_of
 from .completion import coordinates_of, joint_values
 from .displacements import centres
 from .flatten import flat_of
 from .kernels import plan as P
-from .limits import ActiveLimit, active_limits
+from .limits import ActiveLimit, active_limits, holding_limits
 from .mechanism import Mechanism
 from .points import joint_points
+from .projection import ways_of
+from .task import task_of
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +31,7 @@ class Status(IntEnum):
 
     REACHED : what was asked for, closed and within every limit.
     PROJECTED : closed and within every limit, near what was asked for.
-    EXCEEDED : what was asked for, closed, but beyond a limit; only `assembly_modes` looks for such.
+    EXCEEDED : what was asked for, closed, but beyond a limit; only `assembly_modes` and `working_modes` look for such.
     FAILED : no feasible configuration was found.
     INVALID : what was asked for is no pose, or not finite; only where such rows are to be marked.
     """
@@ -37,6 +41,14 @@ class Status(IntEnum):
     EXCEEDED = P.EXCEEDED
     FAILED = P.FAILED
     INVALID = P.INVALID
+
+
+class Wanted(NamedTuple):
+    """Poses that were asked for, (n, 4, 4), and how the distance from them counts; see `Options`."""
+
+    targets: Floats
+    hold: str | None
+    rotation_length: float | None
 
 
 class Solution:
@@ -62,9 +74,12 @@ class Solution:
         angles in rad; 0 where a pose was asked for.
     residual : largest gap of any loop: open ends, stretched rigid links, links out of their plane, (...,) [length].
     limit_excess : largest excess over any limit, (...,); lengths relative to L, angles in rad; 0 if all are kept.
+    held : what of the target a projected answer has all the same: "orientation", "position", or None; for a batch an
+        array of them, (...,). It is what `Options.hold` asked for, or None where no feasible pose has that.
     iterations, rounds : passes over the chains, and revisions of the target, (...,).
-    active_limits : limits that a projected answer lies on, or another one exceeds; for a batch, one tuple a row, in
-        row order.
+    active_limits : limits that hold a projected answer back, the hardest first, or that another one exceeds; for a
+        batch, one tuple a row, in row order. A projected answer may lie on other limits too; were one of those a little
+        wider, it would not come nearer. Where a chain is at full stretch there may be none.
     """
 
     def __init__(
@@ -73,20 +88,29 @@ class Solution:
         rows: P.Rows,
         shape: tuple[int, ...],
         joints_from: Callable[[], Floats] | None = None,
+        wanted: Wanted | None = None,
     ) -> None:
-        """Wrap rows; `joints_from` gives all joint coordinates where they are not those nearest to home."""
+        """Wrap rows.
+
+        Parameters
+        ----------
+        joints_from : gives all joint coordinates where they are not those nearest to home.
+        wanted : the poses that were asked for, if any were.
+        """
         self.mechanism = mechanism
         self.shape = shape
         self._rows = rows
         self._joints_from = joints_from
+        self._wanted = wanted
 
-    def __getstate__(self) -> tuple[Mechanism, P.Rows, tuple[int, ...], Floats | None]:
+    def __getstate__(self) -> tuple[Mechanism, P.Rows, tuple[int, ...], Floats | None, Wanted | None]:
         """What an answer is made of; all else follows again where it is unpickled."""
-        return self.mechanism, self._rows, self.shape, self._coordinates if self._joints_from else None
+        return self.mechanism, self._rows, self.shape, self._coordinates if self._joints_from else None, self._wanted
 
-    def __setstate__(self, state: tuple[Mechanism, P.Rows, tuple[int, ...], Floats | None]) -> None:
-        mechanism, rows, shape, coordinates = state
-        self.__init__(mechanism, rows, shape, coordinates if coordinates is None else lambda: coordinates)  # type: ignore[misc]
+    def __setstate__(self, state: tuple[Mechanism, P.Rows, tuple[int, ...], Floats | None, Wanted | None]) -> None:
+        mechanism, rows, shape, coordinates, wanted = state
+        joints_from = coordinates if coordinates is None else lambda: coordinates
+        Solution.__init__(self, mechanism, rows, shape, joints_from, wanted)
 
     @cached_property
     def _coordinates(self) -> Floats:
@@ -136,6 +160,12 @@ class Solution:
         return self._shaped(self._rows.counters[:, 1])
 
     @property
+    def held(self) -> Any:
+        names = np.array([None, "orientation", "position"], dtype=object)
+        held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, 2], P.HOLD_NOTHING)]
+        return held[0] if self.shape == () else held.reshape(self.shape)
+
+    @property
     def actuator_error(self) -> Any:
         return self._shaped(self._rows.measures[:, 4])
 
@@ -159,10 +189,26 @@ class Solution:
     def active_limits(self) -> Any:
         rows = self._rows
         held: list[tuple[ActiveLimit, ...]] = [()] * len(rows.status)
-        projected = np.flatnonzero((rows.status != Status.REACHED) & (rows.status != Status.INVALID))
-        for row, found in zip(projected, active_limits(self.mechanism, self._coordinates[projected]), strict=True):
+        away = np.flatnonzero((rows.status != Status.REACHED) & (rows.status != Status.INVALID))
+        named = active_limits(self.mechanism, self._coordinates[away])
+        for row, found in zip(away, named, strict=True):
             held[row] = found
+        projected = np.flatnonzero(rows.status == Status.PROJECTED)
+        if self._wanted is not None and len(projected):
+            for row, found in zip(projected, self._holding(self._wanted, projected), strict=True):
+                held[row] = found
         return held[0] if self.shape == () else held
+
+    def _holding(self, wanted: Wanted, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
+        """The limits that hold projected rows back from the poses that were asked for."""
+        found: dict[int, tuple[ActiveLimit, ...]] = {}
+        closure, task = closure_of(self.mechanism), task_of(self.mechanism)
+        for way in ways_of(self.mechanism, wanted.hold, wanted.rotation_length):
+            rows = projected[self._rows.counters[projected, 2] == way.hold]
+            q = self._coordinates[rows]
+            weights = weighed_limits(closure, q, wanted.targets[rows], platform=way.weights, framed=task.is_framed)
+            found.update(zip(rows.tolist(), holding_limits(self.mechanism, q, weights), strict=True))
+        return [found[row] for row in projected.tolist()]
 
     def __bool__(self) -> bool:
         """Whether the target, or every target of the batch, is REACHED."""
@@ -181,7 +227,8 @@ class Solution:
         places = np.ravel(chosen)
         rows = P.Rows._make(np.ascontiguousarray(array[places]) for array in self._rows)
         own = None if self._joints_from is None else lambda: self._coordinates[places]
-        return Solution(self.mechanism, rows, np.shape(chosen), own)
+        wanted = None if self._wanted is None else self._wanted._replace(targets=self._wanted.targets[places])
+        return Solution(self.mechanism, rows, np.shape(chosen), own, wanted)
 
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))

@@ -18,11 +18,15 @@ class Tolerances:
         home on a bound must not be refused for its last digit.
     active : distance from a bound below which a limit is reported as active [L or rad]; above the inward margin that
         projected answers keep, below anything a machine could resolve.
+    holding : multiplier above which a limit holds an answer back: by how much of the distance it gives way the answer
+        comes nearer, cosines of angles; below it there is the rounding of answers that touch a limit by chance.
     rotation_matrix : largest deviation of R^T R from I accepted in a target: matrices typed with 7 digits pass,
         scaled or sheared ones do not.
     alignment : sine of the angle up to which two axes of a description count as parallel, and offset [L] up to which
         points count as aligned: descriptions are often typed with four to six digits. For the same reason the
         singular value [L and rad] up to which a condition of the loops counts as following from the others.
+    speed : share by which an actuator may be faster than its limit: a path that just keeps it must not be refused for
+        the rounding of its answers.
     rank : sine or singular value [L and rad] up to which a direction of motion counts as lost at a configuration: its
         loops are closed to 1e-9, so that below there is nothing but their error.
     singular : measure of singularity [L and rad] below which a configuration counts as singular: at the border of a
@@ -36,9 +40,11 @@ class Tolerances:
     limit: float = 1e-9
     home_slack: float = 1e-9
     active: float = 1e-7
+    holding: float = 1e-6
     rotation_matrix: float = 1e-6
     alignment: float = 1e-6
     same_mode: float = 1e-5
+    speed: float = 1e-6
     rank: float = 1e-9
     singular: float = 1e-4
 

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from .closure_ik import follow_by_closure
+from .completion import coordinates_of
 from .errors import InvalidArgument
 from .flatten import Flat, flat_of
-from .ik import checked, handle_invalid, joints_near, seeds_of, settings_of, start_coordinates
+from .ik import checked, handle_invalid, joints_near, seeds_of, start_coordinates
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
 from .poses import as_targets
+from .reaching import draw_near, leaves_projections, settings_of
 from .rows import new_rows
-from .solution import Solution
+from .solution import Solution, Wanted
 from .tolerances import TOLERANCES
+from .tracked import Track, pace_of
 
 _STEPS_A_REPORT = 16
 
@@ -29,7 +32,10 @@ def track(
     seed: Solution | None = None,
     options: Options | None = None,
     on_progress: Callable[[int, int], None] | None = None,
-) -> Solution:
+    *,
+    sample_time: float | None = None,
+    speed_limits: float | Mapping[str, float] | None = None,
+) -> Track:
     """Follow a path: warm-started from step to step, in the working mode it starts in.
 
     Parameters
@@ -37,11 +43,15 @@ def track(
     targets : poses (n, 4, 4) in the base frame [length], or positions (n, 3) at home orientation.
     seed : a single answer to start from; default home.
     on_progress : called with (steps done, steps in all) every few steps.
+    sample_time : from one target to the next [s].
+    speed_limits : highest speeds of the actuators, by name or the same for all [length/s or rad/s]; those not named may
+        be as fast as they like.
 
     Returns
     -------
-    Solution : batch shape (n,). Revolute actuators that may turn more than once are counted on through
-        full turns, as far as their range goes.
+    Track : a Solution of batch shape (n,), which also tells where answers leap, and which actuators would have to be
+        too fast. Revolute actuators that may turn more than once are counted on through full turns, as far as their
+        range goes.
 
     Raises
     ------
@@ -53,43 +63,73 @@ def track(
         raise InvalidArgument("targets", f"batch shape {shape}", "a path: shape (n, 4, 4) or (n, 3)")
     if options.working_mode == "any":
         raise InvalidArgument("options.working_mode", "'any'", "'keep' or None: a machine cannot change it on its way")
+    pace = pace_of(mechanism, sample_time, speed_limits)
     flat = flat_of(mechanism)
-    rows = new_rows(mechanism, flat, len(poses))
+    rows, wanted = new_rows(mechanism, flat, len(poses)), Wanted(poses, options.hold, options.rotation_length)
     if flat is None:
         found = follow_by_closure(mechanism, poses, start_coordinates(mechanism, seed, ()), options, rows, on_progress)
-        handle_invalid(poses, rows, options)
-        return Solution(mechanism, rows, shape, partial(np.asarray, found))
-    seeds = seeds_of(mechanism, flat, seed, ())
-    settings = settings_of(mechanism, options, seeded=True, chained=True)
-    _follow(flat, poses, seeds, settings, rows, on_progress)
+        joints: Callable[[], Any] = partial(np.asarray, found)
+    else:
+        _follow(mechanism, flat, poses, seed, options, rows, on_progress)
+        joints = partial(joints_near, mechanism, rows, None if seed is None else seed._rows, chained=True)
     handle_invalid(poses, rows, options)
-    _count_turns(flat, rows)
-    begin = None if seed is None else seed._rows
-    return Solution(mechanism, rows, shape, partial(joints_near, mechanism, rows, begin, chained=True))
+    if flat is not None:
+        _count_turns(flat, rows)
+    again = partial(_tracked, mechanism, options)
+    return Track(mechanism, rows, joints, wanted, again, pace)
+
+
+def _tracked(mechanism: Mechanism, options: Options, targets: P.Floats, seed: Solution) -> Track:
+    return track(mechanism, targets, seed, options)
 
 
 def _follow(
+    mechanism: Mechanism,
     flat: Flat,
     poses: P.Floats,
-    seeds: P.Seeds,
-    settings: P.Settings,
+    seed: Solution | None,
+    options: Options,
     rows: P.Rows,
     on_progress: Callable[[int, int], None] | None,
 ) -> None:
-    """Run the chained kernel, in pieces where progress is reported."""
+    """Run the chained kernel in pieces: where progress is reported, and where an answer is still to be drawn near.
+
+    After such an answer, the steps that follow it are made again from where it ends.
+    """
     from .kernels.solve import solve_by_iteration
 
-    piece = _STEPS_A_REPORT if on_progress is not None else max(len(poses), 1)
-    for start in range(0, len(poses), piece):
-        block = slice(start, start + piece)
+    settings = settings_of(mechanism, options, seeded=True, chained=True)
+    seeds, begin = seeds_of(mechanism, flat, seed, ()), partial(start_coordinates, mechanism, seed, ())
+    longest = _STEPS_A_REPORT if on_progress is not None else max(len(poses), 1)
+    done, piece = 0, longest
+    while done < len(poses):
+        block = slice(done, done + piece)
         own = P.Rows._make(array[block] for array in rows)
         solve_by_iteration(flat.plan, poses[block], seeds, settings, own)
-        answered = np.flatnonzero(own.status != P.INVALID)
-        if len(answered):
-            last = slice(answered[-1], answered[-1] + 1)
-            seeds = P.Seeds(own.poses[last], own.nodes[last], own.trunks[last])
+        piece = min(2 * piece, longest)
+        for row in _drawn_after(flat, settings, own)[:1]:
+            before = _last_answer(own, row)
+            start = begin if before is None else partial(coordinates_of, mechanism, before)
+            alone = P.Rows._make(array[row : row + 1] for array in own)
+            draw_near(mechanism, flat, poses[block][row : row + 1], start, settings, options, alone)
+            own, piece = P.Rows._make(array[: row + 1] for array in own), 1
+        last = _last_answer(own, len(own.status))
+        if last is not None:
+            seeds, begin = P.Seeds(last.poses, last.nodes, last.trunks), partial(coordinates_of, mechanism, last)
+        done += len(own.status)
         if on_progress is not None:
-            on_progress(min(start + piece, len(poses)), len(poses))
+            on_progress(done, len(poses))
+
+
+def _drawn_after(flat: Flat, settings: P.Settings, rows: P.Rows) -> list[int]:
+    """Rows whose projections the kernels leave to be drawn near."""
+    return np.flatnonzero(rows.status == P.PROJECTED).tolist() if leaves_projections(flat, settings) else []
+
+
+def _last_answer(rows: P.Rows, before: int) -> P.Rows | None:
+    """The last answer before a row, alone; None where there is none."""
+    answered = np.flatnonzero(rows.status[:before] != P.INVALID)
+    return P.Rows._make(array[answered[-1] : answered[-1] + 1] for array in rows) if len(answered) else None
 
 
 def _count_turns(flat: Flat, rows: P.Rows) -> None:

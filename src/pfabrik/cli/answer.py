@@ -1,15 +1,22 @@
-"""One answer for people: what became of it, the pose, the actuators; angles in degrees."""
+"""Answers for people: what became of a question, poses, actuators, all modes; angles in degrees."""
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from ..report import Floats, as_sentence, loop_gap, readouts, rpy_angles
+import click
+
+from ..errors import ContinuumOfSolutions
+from ..report import Floats, as_sentence, by_bound, exceeded, loop_gap, readouts, rpy_angles
+from .group import complain
 from .table import aligned
 
 if TYPE_CHECKING:
+    from ..mechanism import Mechanism
+    from ..modes import Modes
     from ..report import Readout
     from ..solution import Solution
 
@@ -48,6 +55,61 @@ def actuator_table(solution: Solution, asked: Floats | None) -> str:
 def in_units(shown: Sequence[Readout], values: Floats) -> list[str]:
     """Actuator coordinates (n_a,) [length or rad] in the units for people."""
     return [plain(float(readout.display(value)), 1e-9) for readout, value in zip(shown, values, strict=True)]
+
+
+def tell_modes(
+    find: Callable[[], Modes], kind: str, header: Sequence[str], cells: Callable[[Solution], list[str]], as_json: bool
+) -> int:
+    """Print all modes of a kind that are found; the exit code.
+
+    Parameters
+    ----------
+    header, cells : what a table of them shows of each.
+    """
+    try:
+        found = find()
+    except ContinuumOfSolutions as error:
+        complain(str(error))
+        return 1
+    if as_json:
+        click.echo(json.dumps(modes_as_object(found), allow_nan=False))
+    else:
+        click.echo(describe_modes(found, kind, header, cells))
+    return 0 if any(found) else 1
+
+
+def modes_as_object(found: Modes) -> dict[str, object]:
+    """Modes as plain numbers, lists and dicts."""
+    return {
+        "modes": [mode.to_dict() for mode in found],
+        "total": found.total,
+        "hits": list(found.hits),
+        "starts": found.starts,
+        "unseen": found.unseen,
+    }
+
+
+def describe_modes(found: Modes, kind: str, header: Sequence[str], cells: Callable[[Solution], list[str]]) -> str:
+    """How many modes, a table of them, and how sure it is that there are no others."""
+    searched = (
+        f"{found.starts} starts; another one would find a new mode with a probability of about {found.unseen:.2%}"
+    )
+    if not found:
+        return f"no {kind} mode found\n\n{searched}"
+    kept = sum(map(bool, found)) or "none"
+    count = f"{found.total} {kind} mode{'s' * (found.total > 1)}, "
+    count += f"of the {len(found)} nearest to home " if found.total > len(found) else ""
+    rows = [
+        [str(number), *cells(mode), str(hits), by_bound(exceeded(mode)) or "nothing"]
+        for number, (mode, hits) in enumerate(zip(found, found.hits, strict=True), 1)
+    ]
+    table = aligned(["mode", *header, "starts", "exceeds"], rows)
+    return "\n\n".join([f"{count}{kept} within all limits", table, searched])
+
+
+def pose_header(mechanism: Mechanism) -> list[str]:
+    """The columns of `pose_texts`."""
+    return [*(f"{name} [{mechanism.length_unit}]" for name in "xyz"), "roll [deg]", "pitch [deg]", "yaw [deg]"]
 
 
 def bound_text(bound: float) -> str:

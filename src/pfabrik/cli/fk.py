@@ -9,11 +9,7 @@ import click
 
 import pfabrik as pf
 
-from .group import complain
-from .table import aligned
-
 if TYPE_CHECKING:
-    from ..assembly import AssemblyModes
     from ..mechanism import Mechanism
     from ..report import Floats
     from ..solution import Solution
@@ -48,7 +44,7 @@ def fk(mech: str, values: tuple[float, ...], list_all: bool, as_json: bool) -> i
     mechanism = pf.load(mech)
     asked = coordinates(mechanism, values)
     if list_all:
-        return tell_modes(mechanism, asked, as_json)
+        return list_modes(mechanism, asked, as_json)
     solution = pf.solve_fk(mechanism, asked)
     click.echo(json.dumps(solution.to_dict(), allow_nan=False) if as_json else describe_fk(solution, asked))
     return 0 if solution else 1
@@ -74,48 +70,12 @@ def describe_fk(solution: Solution, asked: Floats) -> str:
     return describe(solution, asked)
 
 
-def tell_modes(mechanism: Mechanism, asked: Floats, as_json: bool) -> int:
-    """Print all assembly modes; the exit code."""
-    try:
-        found = pf.assembly_modes(mechanism, asked)
-    except pf.errors.ContinuumOfSolutions as error:
-        complain(str(error))
-        return 1
-    click.echo(json.dumps(as_object(found), allow_nan=False) if as_json else describe_modes(mechanism, found))
-    return 0 if any(found) else 1
+def list_modes(mechanism: Mechanism, asked: Floats, as_json: bool) -> int:
+    """Print all assembly modes, each with its pose; the exit code."""
+    from .answer import pose_header, pose_texts, tell_modes
 
-
-def as_object(found: AssemblyModes) -> dict[str, object]:
-    """Assembly modes as plain numbers, lists and dicts."""
-    return {
-        "modes": [mode.to_dict() for mode in found],
-        "hits": list(found.hits),
-        "starts": found.starts,
-        "unseen": found.unseen,
-    }
-
-
-def describe_modes(mechanism: Mechanism, found: AssemblyModes) -> str:
-    """How many modes, a table of them, and how sure it is that there are no others."""
-    searched = (
-        f"{found.starts} starts; another one would find a new mode with a probability of about {found.unseen:.2%}"
-    )
-    if not found:
-        return f"no assembly mode found\n\n{searched}"
-    kept = sum(map(bool, found))
-    count = f"{len(found)} assembly mode{'s' * (len(found) > 1)}, {kept or 'none'} within all limits"
-    return "\n\n".join([count, mode_table(mechanism, found), searched])
-
-
-def mode_table(mechanism: Mechanism, found: AssemblyModes) -> str:
-    """Every mode with its pose, how many starts led to it, and the limits it exceeds."""
-    from ..report import by_bound, exceeded
-    from .answer import pose_texts
-
-    header = ["mode", *(f"{name} [{mechanism.length_unit}]" for name in "xyz")]
-    header += ["roll [deg]", "pitch [deg]", "yaw [deg]", "starts", "exceeds"]
-    rows = []
-    for number, (mode, hits) in enumerate(zip(found, found.hits, strict=True), 1):
+    def cells(mode: Solution) -> list[str]:
         position, angles = pose_texts(mode)
-        rows.append([str(number), *position, *angles, str(hits), by_bound(exceeded(mode)) or "nothing"])
-    return aligned(header, rows)
+        return [*position, *angles]
+
+    return tell_modes(lambda: pf.assembly_modes(mechanism, asked), "assembly", pose_header(mechanism), cells, as_json)

@@ -11,6 +11,7 @@ import click
 
 import pfabrik as pf
 
+from ..decompose import closure_reason, engine_of
 from ..joint_types import KINDS
 from .table import aligned
 
@@ -25,19 +26,19 @@ if TYPE_CHECKING:
 def info(mech: str) -> int:
     """Show what a mechanism is made of.
 
-    Its joints, limits, actuators, mobility and task, and its sub-chains with the engine that each of them needs.
+    Its joints, limits, actuators, mobility and task, and its sub-chains with the engine that answers, and why.
     """
     mechanism = pf.load(mech)
-    click.echo(summary(mechanism) + "\n")
-    click.echo(joint_table(mechanism) + "\n")
-    click.echo(chain_table(pf.decompose(mechanism)))
+    tables = [summary(mechanism), joint_table(mechanism), chain_table(mechanism)]
+    click.echo("\n\n".join([*tables, *parallelogram_tables(mechanism)]))
     return 0
 
 
 def summary(mechanism: Mechanism) -> str:
     """Name, size, what is moved and by what."""
     kind = "joint" if mechanism.end_effector_is_joint else "body"
-    point = ", ".join(f"{value:.6g}" for value in mechanism.reference_point)
+    length = mechanism.characteristic_length
+    point = ", ".join(f"{clean(value, length):.6g}" for value in mechanism.reference_point)
     return "\n".join(
         [
             mechanism.name,
@@ -45,7 +46,7 @@ def summary(mechanism: Mechanism) -> str:
             f"task                   {' '.join(mechanism.task)}",
             f"actuators              {' '.join(mechanism.actuators)}",
             *freedom(pf.mobility(mechanism)),
-            f"characteristic length  {mechanism.characteristic_length:.6g} {mechanism.length_unit}",
+            f"characteristic length  {length:.6g} {mechanism.length_unit}",
         ]
     )
 
@@ -111,17 +112,40 @@ def ranges(joint: Joint) -> list[Sequence[float]]:
 
 def interval(pair: Sequence[float], unit: str, is_angle: bool) -> str:
     """``140 to 250 mm``."""
-    low, high = (math.degrees(bound) if is_angle else bound for bound in pair)
+    low, high = (math.degrees(bound) + 0.0 if is_angle else bound + 0.0 for bound in pair)
     return f"{low:.6g} to {high:.6g} {'deg' if is_angle else unit}"
 
 
 def vector(components: Iterable[float]) -> str:
-    """``(0, 0, 1)``."""
-    return f"({', '.join(f'{component:.4g}' for component in components)})"
+    """A direction: ``(0, 0, 1)``."""
+    return f"({', '.join(f'{clean(component):.4g}' for component in components)})"
 
 
-def chain_table(chains: Sequence[SubChain]) -> str:
-    """The distinct sub-chains in the field's notation, how often each occurs, and which engine solves it."""
-    counts = Counter((str(chain), chain.engine, chain.reason or "positions alone express it") for chain in chains)
-    rows = [(str(count), notation, engine, reason) for (notation, engine, reason), count in counts.items()]
+def clean(value: float, scale: float = 1.0) -> float:
+    """A number without what rounding has left of it, twelve digits below the scale; zero has no sign."""
+    return round(value / scale, 12) * scale + 0.0
+
+
+def chain_table(mechanism: Mechanism) -> str:
+    """The distinct sub-chains in the field's notation, how often each occurs, the engine that answers, and why."""
+    counts = Counter((str(chain), why(chain, mechanism)) for chain in pf.decompose(mechanism))
+    rows = [(str(count), notation, engine_of(mechanism), reason) for (notation, reason), count in counts.items()]
     return aligned(("count", "sub-chain", "engine", "why"), rows)
+
+
+def why(chain: SubChain, mechanism: Mechanism) -> str:
+    """Why an engine answers for a sub-chain: for its own sake, or the mechanism's."""
+    if chain.reason is not None:
+        return chain.reason
+    for_all = closure_reason(mechanism)
+    return "positions alone express it" + (f", but {for_all}" if for_all else "")
+
+
+def parallelogram_tables(mechanism: Mechanism) -> list[str]:
+    """The parallelograms in sub-chains: joints of their rods, lengths of these, how far apart; none where none are."""
+    unit, counts = mechanism.length_unit, Counter[tuple[str, ...]]()
+    for found in (each for chain in pf.decompose(mechanism) for each in chain.parallelograms):
+        rods = ["-".join(KINDS[mechanism.joint(name).type].letter for name in rod) for rod in found.rods]
+        counts[", ".join(rods), f"{found.length:.6g} {unit}", f"{found.width:.6g} {unit}"] += 1
+    rows = [(str(count), *cells) for cells, count in counts.items()]
+    return [aligned(("count", "parallelogram", "rods", "apart"), rows)] if rows else []

@@ -61,9 +61,9 @@ def least_cosine(half_angle: float) -> float:
     return NO_CONE if angle >= math.pi else math.cos(angle) - COSINE_ROUNDING
 
 
-def is_parallel(a: Array, b: Array) -> bool:
-    """Whether two unit vectors are parallel or opposite, to the tolerance that descriptions have."""
-    return float(np.linalg.norm(np.cross(a, b))) <= TOLERANCES.alignment
+def is_parallel(a: Array, b: Array, sine: float = TOLERANCES.alignment) -> bool:
+    """Whether two unit vectors are parallel or opposite, up to a sine; by default to the one that descriptions have."""
+    return float(np.linalg.norm(np.cross(a, b))) <= sine
 
 
 def home_values(mechanism: Mechanism) -> Array:

@@ -1,9 +1,10 @@
-"""Inverse kinematics by closed form: coerce, call the kernel of the topology, wrap."""
+"""Inverse kinematics by closed form: coerce, call the kernel of the topology or go from leg to leg, wrap."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,10 @@ from numpy.typing import NDArray
 from ..errors import InvalidArgument
 from ..mechanism import Mechanism
 from ..parallel import in_blocks
-from ..poses import as_floats, as_targets, what_is_wrong
-from .targets import INVALID, REACHED
-from .topologies import closed_form
+from ..poses import are_poses, as_floats, as_targets, what_is_wrong
+from .modes import Legs, solve_legs, start_of
+from .targets import INVALID, MISSED, REACHED, Statuses
+from .topologies import ClosedForm, closed_form
 
 Floats = NDArray[np.float64]
 ROWS_A_BLOCK = 4096
@@ -30,32 +32,49 @@ class Geometric:
     ----------
     reached : whether the geometry closes and every limit is kept, (...,); a plain bool for one target.
     actuators : actuated coordinates in the order of `mechanism.actuators`, (..., n_a) [length or rad]; NaN where not.
+    pose : poses of the end effector, T_base_platform, (..., 4, 4) [length]: the targets, with what the task leaves out
+        as it follows from the mechanism; NaN where not reached.
     shape : the batch axes, () for one target.
     """
 
     reached: Any
     actuators: Floats
     shape: tuple[int, ...]
+    _completed: Floats
 
     def __bool__(self) -> bool:
         return bool(np.all(self.reached))
 
+    @cached_property
+    def pose(self) -> Floats:
+        return np.where(np.asarray(self.reached)[..., None, None], self._completed.reshape(*self.shape, 4, 4), np.nan)
+
+
+class _Rows(NamedTuple):
+    """Answers to be filled: actuators (n, n_a), poses (n, 4, 4), statuses (n,)."""
+
+    actuators: Floats
+    poses: Floats
+    status: Statuses
+
 
 def solve_ik(mechanism: Mechanism, target: Any, *, seed: Any = None) -> Geometric:
-    """Actuator values that put the end effector on a target, by the closed form of the mechanism's topology.
+    """Actuator values that put the end effector on a target, by the closed form of the mechanism's topology or legs.
 
-    One answer a target: home's working mode, and of a redundant arm the coordinates nearest to the seed's.
+    One answer a target: in the working mode of home, or of the seed, where that closes and keeps every limit. Otherwise
+    each leg that does not takes its other branch; where this does not help either, the other pose that completes a
+    target which sets but a part of one. Of a redundant arm the coordinates stay next to the seed's (or home's).
 
     Parameters
     ----------
     target : pose (..., 4, 4) of the end effector in the base frame [length], position (..., 3) at home orientation, or
-        a SciPy RigidTransform; leading axes are a batch.
-    seed : an answer (anything with `actuators`), single or one for each target, next to whose redundant coordinates
-        the answer is to be; without redundancy it changes nothing. Default: home.
+        a SciPy RigidTransform; leading axes are a batch. Of a pose counts what the mechanism's task sets.
+    seed : an answer (anything with `actuators` and `pose`), single or one for each target. One without `pose` does not
+        tell its working mode, and serves redundant arms alone. Default: home.
 
     Raises
     ------
-    NoClosedForm : the mechanism's topology has none here.
+    NoClosedForm : neither the mechanism's topology nor its legs have one here.
     InvalidArgument : a target or seed of the wrong shape, or rows that are no poses.
     """
     if not isinstance(mechanism, Mechanism):
@@ -63,19 +82,52 @@ def solve_ik(mechanism: Mechanism, target: Any, *, seed: Any = None) -> Geometri
     form = closed_form(mechanism)
     targets, shape = as_targets(target)
     seeds = form.home if seed is None else _seeds(seed, shape, len(mechanism.actuators))
-    actuators = np.empty((len(targets), len(mechanism.actuators)))
-    status = np.empty(len(targets), np.int8)
-
-    def run(rows: slice) -> int:
-        own = seeds if len(seeds) == 1 else seeds[rows]
-        return form.kernel(form.plan, targets[rows], own, seed is None, actuators[rows], status[rows])
-
-    if sum(in_blocks(run, len(targets), ROWS_A_BLOCK)):
-        bad = np.flatnonzero(status == INVALID)
+    places = None if form.legs is None else _seed_poses(seed, shape)
+    rows = _Rows(np.empty((len(targets), len(mechanism.actuators))), targets.copy(), np.empty(len(targets), np.int8))
+    if mechanism.end_effector_is_joint:
+        rows.poses[:, :3, :3] = np.eye(3)
+    if form.kernel is not None and places is None:
+        _by_kernel(form, targets, seeds, seed is None, rows)
+    else:
+        rows.status[:] = np.where(are_poses(targets), MISSED, INVALID)
+    if (rows.status == INVALID).any():
+        bad = np.flatnonzero(rows.status == INVALID)
         found = what_is_wrong(targets[bad[0]])
         raise InvalidArgument("target", found, "finite poses whose rotation is one", rows=[int(i) for i in bad[:5]])
-    reached = (status == REACHED).reshape(shape)
-    return Geometric(reached if shape else bool(reached), actuators.reshape(*shape, len(mechanism.actuators)), shape)
+    if form.legs is not None:
+        _by_legs(form.legs, targets, seeds, places, rows)
+    reached = (rows.status == REACHED).reshape(shape)
+    actuators = rows.actuators.reshape(*shape, len(mechanism.actuators))
+    return Geometric(reached if shape else bool(reached), actuators, shape, rows.poses)
+
+
+def _by_kernel(form: ClosedForm, targets: Floats, seeds: Floats, at_home: bool, rows: _Rows) -> None:
+    """Answer all rows by compiled code."""
+
+    def run(block: slice) -> int:
+        own = seeds if len(seeds) == 1 else seeds[block]
+        return int(form.kernel(form.plan, targets[block], own, at_home, rows.actuators[block], rows.status[block]))
+
+    in_blocks(run, len(targets), ROWS_A_BLOCK)
+
+
+def _by_legs(legs: Legs, targets: Floats, seeds: Floats, places: Floats | None, rows: _Rows) -> None:
+    """Answer leg by leg what is not reached yet."""
+    left = np.flatnonzero(rows.status == MISSED)
+    own = seeds[left] if len(seeds) > 1 else seeds
+    sides, first = start_of(legs, own, None if places is None else places[left] if len(places) > 1 else places)
+
+    def run(block: slice) -> None:
+        which = left[block]
+        reached, rows.actuators[which], rows.poses[which] = solve_legs(
+            legs,
+            targets[which],
+            sides if len(sides) == 1 else sides[block],
+            first if len(first) == 1 else first[block],
+        )
+        rows.status[which] = np.where(reached, REACHED, MISSED)
+
+    in_blocks(run, len(left), ROWS_A_BLOCK)
 
 
 def _seeds(seed: Any, shape: tuple[int, ...], n_actuators: int) -> Floats:
@@ -93,3 +145,18 @@ def _seeds(seed: Any, shape: tuple[int, ...], n_actuators: int) -> Floats:
             "seed", "actuators that are not finite", "reached answers", rows=[int(i) for i in bad[:5]]
         )
     return values
+
+
+def _seed_poses(seed: Any, shape: tuple[int, ...]) -> Floats | None:
+    """The poses of a seed, (1 or n, 4, 4); None of one that has none. InvalidArgument where they do not fit."""
+    if not hasattr(seed, "pose"):
+        return None
+    expected = f"poses, single or of batch shape {shape}"
+    poses = as_floats("seed", seed.pose, expected)
+    if poses.shape not in ((4, 4), (*shape, 4, 4)):
+        raise InvalidArgument("seed", f"poses of shape {poses.shape}", expected)
+    poses = poses.reshape(-1, 4, 4)
+    bad = np.flatnonzero(~are_poses(poses))
+    if len(bad):
+        raise InvalidArgument("seed", "what is no pose", "reached answers", rows=[int(i) for i in bad[:5]])
+    return poses

@@ -1,4 +1,4 @@
-"""The registry: which topologies have a closed form here, and what solves each."""
+"""The registry: which topologies have compiled code of their own, which legs any other may consist of."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from ..decompose import SubChain, decompose
 from ..errors import NoClosedForm
 from ..mechanism import Mechanism
 from .arms import plan_arms, solve_arms
+from .drives import DRIVES
 from .dyads import plan_dyads, solve_dyads
 from .facts import Array, Unsuitable, home_values, require
+from .modes import Legs, legs_of
 from .struts import plan_struts, solve_struts
 from .targets import Statuses
 
@@ -24,7 +26,7 @@ Kernel = Callable[[Any, Array, Array, bool, Array, Statuses], int]
 
 @dataclass(frozen=True)
 class Topology:
-    """Mechanisms with a closed form.
+    """Mechanisms with compiled code of their own.
 
     Attributes
     ----------
@@ -32,47 +34,71 @@ class Topology:
     end : what the chains end on, in words.
     plan : reads a mechanism with such chains; `Unsuitable` says what else it lacks.
     kernel : solves it.
+    one_branch : whether the legs have branches of which the kernel tries home's alone.
     """
 
     chain: str
     end: str
     plan: Callable[[Mechanism, Sequence[SubChain]], Any]
     kernel: Kernel
+    one_branch: bool = False
 
     def __str__(self) -> str:
         return f"{self.chain} to {self.end}"
 
 
 TOPOLOGIES = (
-    Topology("R*-R-R", "a joint, all axes parallel", plan_dyads, solve_dyads),
+    Topology("R*-R-R", "a joint, all axes parallel", plan_dyads, solve_dyads, one_branch=True),
     Topology("U-P*-S", "a body", plan_struts, solve_struts),
     Topology("R*-P*-[U-P*-S, U-P*-S]", "a body", plan_arms, solve_arms),
 )
+LEGS = " or ".join(f"'{drive.chain}'" for drive in DRIVES)
+KNOWN = (*map(str, TOPOLOGIES), f"legs that are {LEGS}")
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """A mechanism as its kernel takes it; `home` are its actuated coordinates at home, (1, n_a)."""
+    """A mechanism as its compiled code takes it, as its legs, or as both.
+
+    Attributes
+    ----------
+    plan, kernel : the compiled code and what it takes; None where the topology has none.
+    home : actuated coordinates at home, (1, n_a).
+    legs : tried where the compiled code finds nothing; None where it tries everything.
+    """
 
     plan: Any
-    kernel: Kernel
+    kernel: Any
     home: NDArray[np.float64]
+    legs: Legs | None
 
 
 @lru_cache(maxsize=64)
 def closed_form(mechanism: Mechanism) -> ClosedForm:
     """The closed form of a mechanism; `NoClosedForm` if its topology has none, or if one does not cover it."""
     chains = decompose(mechanism)
-    written = [str(chain) for chain in chains]
-    reason = "no such topology is known"
-    for topology in TOPOLOGIES:
-        if set(written) == {topology.chain}:
-            try:
-                _require_all_actuators(mechanism, chains)
-                return ClosedForm(topology.plan(mechanism, chains), topology.kernel, home_values(mechanism))
-            except Unsuitable as unsuitable:
-                reason = str(unsuitable)
-    raise NoClosedForm(mechanism.name, written, reason, [str(topology) for topology in TOPOLOGIES])
+    written = {str(chain) for chain in chains}
+    topology = next((each for each in TOPOLOGIES if written == {each.chain}), None)
+    reasons: list[str] = []
+    if topology is not None:
+        try:
+            require(mechanism.task == mechanism.whole_task, "its task leaves out a part of the pose")
+            _require_all_actuators(mechanism, chains)
+            plan = topology.plan(mechanism, chains)
+            legs = legs_of(mechanism) if topology.one_branch else None
+            return ClosedForm(plan, topology.kernel, home_values(mechanism), legs)
+        except Unsuitable as unsuitable:
+            reasons.append(str(unsuitable))
+    try:
+        return ClosedForm(None, None, home_values(mechanism), legs_of(mechanism))
+    except Unsuitable as unsuitable:
+        reasons.append(str(unsuitable))
+    raise no_closed_form(mechanism, "; ".join(dict.fromkeys(reasons)))
+
+
+def no_closed_form(mechanism: Mechanism, reason: str) -> NoClosedForm:
+    """What to raise of a mechanism that lacks something."""
+    return NoClosedForm(mechanism.name, [str(chain) for chain in decompose(mechanism)], reason, KNOWN)
 
 
 def _require_all_actuators(mechanism: Mechanism, chains: Sequence[SubChain]) -> None:

@@ -10,7 +10,7 @@ from ._jit import allocator, inlined, routine
 from .exact import branch_mode
 from .frames import move_carriers, orthonormalise
 from .measure import read_coordinate
-from .plan import LENGTH, POINT_END, REACHED, Configuration, Floats, Plan, Rows, Seeds, Work
+from .plan import HOLD_NOTHING, LENGTH, POINT_END, REACHED, Configuration, Floats, Plan, Rows, Seeds, Work
 from .search import place_ends
 from .vectors import copy_row, copy_table, put, vec
 
@@ -163,6 +163,7 @@ def write_reached(i: int, gap: float, excess: float, rows: Rows) -> None:
     rows.status[i] = REACHED
     rows.counters[i, 0] = 1
     rows.counters[i, 1] = 0
+    rows.counters[i, 2] = HOLD_NOTHING
     rows.measures[i, 0] = 0.0
     rows.measures[i, 1] = 0.0
     rows.measures[i, 2] = gap

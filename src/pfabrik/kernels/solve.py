@@ -16,6 +16,7 @@ from .plan import (
     HOME_X,
     INVALID,
     LENGTH,
+    ON_STRUTS,
     PENDING,
     POINT_END,
     PROJECTED,
@@ -43,6 +44,7 @@ from .rows import (
 )
 from .search import place_ends, reach_pose
 from .settle import TRANSLATES, TURNS, settle
+from .struts import Descent, find_nearest, new_descent
 from .vectors import copy_row, copy_table
 
 
@@ -162,15 +164,23 @@ def solve_row(
     safe: Configuration,
     now: Configuration,
     work: Work,
+    search: Descent,
     settings: Settings,
     rows: Rows,
 ) -> None:
-    """One target by every means: reach it, or project it, or walk back to where it was feasible."""
+    """One target by every means: reach it, or project it, or walk back to where it was feasible.
+
+    With no rounds to spend, one that is not reached stays pending.
+    """
     copy_table(wanted, now.pose)
     reached, iterations = reach_pose(plan, now, work, settings)
     rounds = 0
+    rows.counters[i, 2] = HOLD_NOTHING
     if reached and settings.exact == 0:
         reached = close_loops(plan, now, work, settings)
+    if not reached and settings.max_rounds == 0:
+        rows.status[i] = PENDING
+        return
     if not reached:
         # the chains are bent toward the target by now; a projection that keeps what is held starts from there
         copy_table(now.nodes, work.seed_nodes)
@@ -185,6 +195,9 @@ def solve_row(
             reached, more, more_rounds = project_target(plan, hold, now, work, staying)
             iterations += more
             rounds += more_rounds
+            if settings.nearest == 1 and plan.scalars[ON_STRUTS] == 1.0:
+                reached = find_nearest(plan, now, safe, wanted, hold, settings, search)
+            rows.counters[i, 2] = hold
             if reached or hold == HOLD_NOTHING or plan.scalars[POINT_END] == 1.0:
                 break
             hold = HOLD_NOTHING
@@ -208,6 +221,8 @@ def keep_mode(settings: Settings) -> Settings:
         settings.exact,
         0,
         settings.hold,
+        settings.nearest,
+        settings.rotation_length,
         settings.chained,
     )
 
@@ -243,7 +258,7 @@ def solve_by_iteration(plan: Plan, targets: Floats, seeds: Seeds, settings: Sett
     Returns how many rows it answered.
     """
     now, safe, home = new_configuration(plan), new_configuration(plan), new_configuration(plan)
-    work = new_work(plan)
+    work, search = new_work(plan), new_descent(plan)
     first_modes = np.ones(plan.branches.shape[0])
     home_modes(plan, home, first_modes)
     identity_pose(home.pose)
@@ -265,6 +280,6 @@ def solve_by_iteration(plan: Plan, targets: Floats, seeds: Seeds, settings: Sett
         gap, excess = measure_all(plan, now)
         feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack
         copy_configuration(plan, now if feasible else home, safe)
-        solve_row(plan, i, targets, wanted, safe, now, work, settings, rows)
+        solve_row(plan, i, targets, wanted, safe, now, work, search, settings, rows)
         answered += 1
     return answered

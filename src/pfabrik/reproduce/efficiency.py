@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from .. import geometric
 from ..flatten import Flat, flat_of
 from ..geometric.topologies import closed_form
-from ..ik import settings_of, solve_ik
+from ..ik import solve_ik
 from ..kernels.plan import Rows, Seeds
 from ..mechanism import Mechanism
 from ..options import Options
 from ..poses import pose
+from ..reaching import settings_of
 from ..rows import new_rows
 from ..solution import Solution, Status
 from .checking import Feasibility, feasibility

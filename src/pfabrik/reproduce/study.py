@@ -96,7 +96,7 @@ class Extent:
 
 
 FULL = Extent(steps=361, targets=1000, repeats=31, searches=1000, grid=241)
-QUICK = Extent(steps=73, targets=100, repeats=5, searches=8, grid=121)
+QUICK = Extent(steps=73, targets=100, repeats=5, searches=8, grid=61)
 
 
 @lru_cache(maxsize=1)

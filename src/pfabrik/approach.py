@@ -1,0 +1,96 @@
+"""The nearest feasible configuration, exactly: a local search on joint coordinates, and what holds it back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closure import Closing, Closure
+from .kernels.loops import Closed
+from .nearest import MARGIN
+from .parallel import in_blocks
+from .tolerances import TOLERANCES
+
+if TYPE_CHECKING:
+    from .kernels.aims import Aim
+
+Floats = NDArray[np.float64]
+
+MOST_STEPS = 200
+"""Steps of a search, including those that are taken back; most need a dozen."""
+
+
+def approached(
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+) -> Closing:
+    """Feasible configurations nearest to targets, (n, 4, 4): local minima of the distance, from given coordinates.
+
+    Parameters
+    ----------
+    coordinates : where to start, (n, columns): closed within all limits, or not far from it.
+    platform : what counts of the distance from the targets: weights of the squares of position [L] and rotation [rad];
+        LOCKED for what is to be as the target has it.
+    framed : of the rotation, only the direction of the platform's z axis counts.
+
+    Returns
+    -------
+    Closing : judge by `is_feasible`. Gaps and excesses are those of the whole, the same for every group.
+    """
+    from .kernels.approach import approach
+
+    closed = _closed(closure, coordinates)
+    aim = _aim(closure, targets, platform, framed)
+
+    def run(block: slice) -> None:
+        own = Closed._make(array[block] for array in closed)
+        approach(closure.loops, closure.layout(frozenset()), aim._replace(targets=aim.targets[block]), own)
+
+    in_blocks(run, len(coordinates), rows_a_block=16)
+    closed.poses[:, :3, 3] *= closure.mechanism.characteristic_length
+    return Closing(closed.coordinates / closure.scale, *closed[1:])
+
+
+def weighed_limits(
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+) -> Floats:
+    """How hard every limit holds configurations back from their targets: multipliers, (n, 2 columns + cones).
+
+    First the low and high bounds of the coordinates in turn, then the cones: by how much of L the target comes nearer,
+    per unit [L or rad] by which a limit gives way; 0 for limits that do not matter.
+    """
+    from .kernels.approach import weigh_limits
+
+    closed = _closed(closure, coordinates)
+    aim = _aim(closure, targets, platform, framed)
+    weights = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
+
+    def run(block: slice) -> None:
+        own = Closed._make(array[block] for array in closed)
+        layout = closure.layout(frozenset())
+        weigh_limits(closure.loops, layout, aim._replace(targets=aim.targets[block]), own, weights[block])
+
+    in_blocks(run, len(coordinates), rows_a_block=16)
+    return weights
+
+
+def _aim(closure: Closure, targets: Floats, platform: Sequence[float], framed: bool) -> Aim:
+    from .kernels.aims import Aim
+
+    wanted = targets.copy()
+    wanted[:, :3, 3] /= closure.mechanism.characteristic_length
+    return Aim(wanted, np.array(platform, dtype=float), int(framed), MARGIN, TOLERANCES.active, MOST_STEPS)
+
+
+def _closed(closure: Closure, coordinates: Floats) -> Closed:
+    n, groups = len(coordinates), len(closure.loops.groups) - 1
+    return Closed(
+        coordinates=coordinates * closure.scale,
+        poses=np.zeros((n, 4, 4)) + np.eye(4),
+        gaps=np.zeros((n, groups)),
+        excesses=np.zeros((n, groups)),
+        misses=np.zeros((n, groups)),
+        iterations=np.zeros(n, np.int64),
+    )

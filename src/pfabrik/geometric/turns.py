@@ -1,0 +1,109 @@
+"""Rotations in stacks, one a row: made from angles, read as angles, and found so that a direction comes out right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..tolerances import TOLERANCES
+from .facts import Array
+
+
+class Placed(NamedTuple):
+    """Where a body is: x = turn x_home + shift, both in base coordinates [length]."""
+
+    turn: Array  # (n, 3, 3)
+    shift: Array  # (n, 3)
+
+    def point(self, home: Array) -> Array:
+        """Where a point (3,) of the body is, (n, 3)."""
+        return np.asarray(self.turn @ home + self.shift)
+
+
+def at_home(n: int) -> Placed:
+    """A body that has not moved, in n rows."""
+    return Placed(np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)))
+
+
+def anchored(turn: Array, home: Array, present: Array) -> Placed:
+    """The body that is turned so, and whose point `home` (3,) is at `present` (n, 3)."""
+    return Placed(turn, present - turn @ home)
+
+
+def turns_about(axis: Array, angles: Array) -> Array:
+    """Rotations (n, 3, 3) about one unit axis (3,) by angles (n,) [rad]."""
+    sines, cosines = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
+    return np.asarray(cosines * np.eye(3) + sines * _skew(axis) + (1.0 - cosines) * np.outer(axis, axis))
+
+
+def _skew(axis: Array) -> Array:
+    """The matrix (3, 3) that multiplies as the cross product with an axis (3,) does."""
+    x, y, z = axis
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def angle_about(axis: Array, start: Array, end: Array) -> Array:
+    """Angles (n,) [rad] about an axis (3,) by which directions (n, 3) or (3,) come as near to others as they can."""
+    cosines = (start * end).sum(axis=-1) - (start @ axis) * (end @ axis)
+    return np.asarray(np.arctan2((start @ _skew(axis).T * end).sum(axis=-1), cosines))
+
+
+def angle_of(turns: Array, axis: Array) -> Array:
+    """Angles (n,) [rad] of rotations (n, 3, 3) about an axis (3,) that they leave where it is."""
+    skew = turns - np.swapaxes(turns, 1, 2)
+    sines = 0.5 * np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1) @ axis
+    return np.asarray(np.arctan2(sines, 0.5 * (np.trace(turns, axis1=1, axis2=2) - 1.0)))
+
+
+def either_angle(x: Array, y: Array, part: Array, square: Array, side: Array | float) -> Array:
+    """One of the two solutions (n,) [rad] of x cos + y sin = part; the nearest angle where there is none.
+
+    Parameters
+    ----------
+    square : x^2 + y^2 - part^2, which is told more exactly by who asks; to any common positive scale of `part` and
+        its root.
+    side : +1 for the solution to the left of the direction (x, y), -1 for the other.
+    """
+    return np.arctan2(y, x) + side * np.arctan2(np.sqrt(np.maximum(square, 0.0)), part)
+
+
+def aimed(axes: Sequence[Array], before: Array, home: Array, line: Array, other: bool = False) -> list[Array]:
+    """Rotations (n, 3, 3) of the bodies behind one or two hinges, one a hinge, that point a direction as asked.
+
+    One hinge has one solution. Two hinges have two, with the second turned to either side of where the direction is
+    square to both axes: taken is the one that home is on, or the `other`. Where there is none, the direction comes as
+    near as the hinges let it. Degenerate: a line along the first axis, about which any angle is a solution: 0 is taken.
+
+    Parameters
+    ----------
+    axes : unit axes (3,) at home.
+    before : rotations (n, 3, 3) of the body that the first hinge is on.
+    home, line : the direction at home, (3,), and the one asked for, (n, 3); of any length.
+    """
+    inside = np.einsum("nji,nj->ni", before, line)
+    if len(axes) == 1:
+        return [before @ turns_about(axes[0], angle_about(axes[0], home, inside))]
+    first, second = axes
+    inside = inside / np.maximum(np.linalg.norm(inside, axis=1), np.finfo(float).tiny)[:, None]
+    home = home / np.linalg.norm(home)
+    x, y = first @ (home - second * (second @ home)), first @ np.cross(second, home)
+    part = inside @ first - (first @ second) * (second @ home)
+    side = np.copysign(1.0, y if other else -y)
+    bends = either_angle(x, y, part, x * x + y * y - part * part, side)
+    bent = turns_about(second, bends)
+    outer = before @ turns_about(first, angle_about(first, bent @ home, inside))
+    return [outer, outer @ bent]
+
+
+def shortest_turn(start: Array, end: Array) -> Array:
+    """The shortest rotations (n, 3, 3) that take a unit vector (3,) to others (n, 3); any half turn to its opposite."""
+    middle = start + end
+    opposite = np.linalg.norm(middle, axis=1) <= TOLERANCES.rank
+    across = np.cross(start, np.eye(3)[np.abs(start).argmin()])
+    middle = np.where(opposite[:, None], across, middle)
+    middle = middle / np.linalg.norm(middle, axis=1)[:, None]
+    half_turn = 2.0 * middle[:, :, None] * middle[:, None, :] - np.eye(3)
+    about_start = 2.0 * np.outer(start, start) - np.eye(3)  # before a half turn about the middle, the shortest turn
+    return np.asarray(np.where(opposite[:, None, None], half_turn, half_turn @ about_start))

@@ -1,0 +1,48 @@
+"""How far a configuration is from each of its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InvalidArgument
+from .limits import coned, ranged
+from .mechanism import Mechanism
+from .solution import Solution
+
+Floats = NDArray[np.float64]
+
+
+def margins(mechanism: Mechanism, solution: Solution) -> Mapping[tuple[str, str], Any]:
+    """(joint, bound) -> how far every limit is from being met, (...,), for every limit of the mechanism.
+
+    Bounds are "min", "max" and "cone", as in `ActiveLimit`. A margin is a share of the room there is: of half the
+    range, or of the cone's half angle. It is 1 in the middle of a range or on the axis of a cone, 0 on the limit, and
+    negative beyond it; of the two ranges of a universal or cylindrical joint the nearer bound counts. A bound without
+    an opposite one is counted in units of L, the characteristic length, or in radians. NaN for INVALID rows.
+
+    Raises
+    ------
+    InvalidArgument : an answer of another mechanism.
+    """
+    if not isinstance(solution, Solution) or solution.mechanism != mechanism:
+        raise InvalidArgument("solution", repr(solution), f"an answer of '{mechanism.name}'")
+    found: dict[tuple[str, str], Floats] = {}
+    for joint in mechanism.joints:
+        for values, (low, high), unit in ranged(mechanism, joint, solution._coordinates):
+            room = 0.5 * (high - low) if np.isfinite(high - low) else unit
+            for bound, off in (("min", values - low), ("max", high - values)):
+                if np.isfinite(low if bound == "min" else high):
+                    margin = off / room if room > 0.0 else np.where(off == 0.0, 0.0, np.copysign(np.inf, off))
+                    found[joint.name, bound] = np.minimum(margin, found.get((joint.name, bound), np.inf))
+    for joint, angles, half_angle in coned(mechanism, solution._coordinates):
+        found[joint.name, "cone"] = (half_angle - angles) / half_angle
+    return MappingProxyType({key: _shaped(margin, solution.shape) for key, margin in found.items()})
+
+
+def _shaped(array: Floats, shape: tuple[int, ...]) -> Any:
+    return array.reshape(shape) if shape else array.item()

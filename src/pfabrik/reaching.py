@@ -1,0 +1,106 @@
+"""The reaching engine: rows of targets answered by its kernels, and their projections drawn near."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closure import closure_of
+from .completion import coordinates_of
+from .flatten import Flat
+from .kernels import plan as P
+from .mechanism import Mechanism
+from .options import Options
+from .parallel import run_in_blocks
+from .projection import SAME, project, ways_of
+from .task import task_of
+from .tolerances import TOLERANCES
+
+Floats = NDArray[np.float64]
+
+_HOLDS = {None: P.HOLD_NOTHING, "orientation": P.HOLD_ORIENTATION, "position": P.HOLD_POSITION}
+
+
+@lru_cache(maxsize=256)
+def settings_of(mechanism: Mechanism, options: Options, seeded: bool, chained: bool = False) -> P.Settings:
+    """Options as the kernels take them."""
+    length = mechanism.characteristic_length
+    mode = options.working_mode or ("keep" if seeded or chained else "any")
+    return P.Settings(
+        tolerance=float(options.tolerance or TOLERANCES.position * length),
+        rotation_tolerance=float(options.rotation_tolerance),
+        slack=0.1 * TOLERANCES.limit * length,
+        max_iterations=int(options.max_iterations),
+        max_rounds=int(options.max_rounds),
+        exact=int(options.exact),
+        any_mode=int(mode == "any"),
+        hold=_HOLDS[options.hold],
+        nearest=int(options.projection == "nearest" and options.exact),
+        rotation_length=float(options.rotation_length or mechanism.rotation_length),
+        chained=int(chained),
+    )
+
+
+def solve_rows(flat: Flat, targets: NDArray[np.float64], seeds: P.Seeds, settings: P.Settings, rows: P.Rows) -> None:
+    """Answer independent rows: directly where closed forms reach, by iteration where not."""
+    from .kernels.solve import solve_by_iteration, solve_directly
+
+    if len(targets) == 1:
+        if solve_directly(flat.plan, targets, seeds, settings, rows):
+            solve_by_iteration(flat.plan, targets, seeds, settings, rows)
+        return
+    if run_in_blocks(solve_directly, flat.plan, targets, seeds, settings, rows, rows_a_block=4096):
+        run_in_blocks(solve_by_iteration, flat.plan, targets, seeds, settings, rows, rows_a_block=64)
+
+
+def leaves_projections(flat: Flat, settings: P.Settings) -> bool:
+    """Whether the kernels leave projections to be drawn near: only platforms on struts they bring there themselves."""
+    return settings.nearest == 1 and flat.plan.scalars[P.ON_STRUTS] == 0.0
+
+
+def draw_near(
+    mechanism: Mechanism,
+    flat: Flat,
+    targets: Floats,
+    start: Callable[[], Floats],
+    settings: P.Settings,
+    options: Options,
+    rows: P.Rows,
+) -> None:
+    """Bring projected rows to the nearest feasible poses, where the kernels have not done so.
+
+    The closure engine looks for them, from where the projection ended and from where it started. An answer counts if
+    the reaching engine reaches it too, from where the projection ended, and so in its working mode.
+
+    Parameters
+    ----------
+    start : gives the joint coordinates (n, columns) or (1, columns) that the rows started from.
+    """
+    away = np.flatnonzero(rows.status == P.PROJECTED)
+    if not leaves_projections(flat, settings) or not len(away):
+        return
+    wanted, projected = targets[away], P.Rows._make(array[away] for array in rows)
+    begin = start()
+    starts = [coordinates_of(mechanism, projected), begin[away] if len(begin) > 1 else begin.repeat(len(away), axis=0)]
+    ways = ways_of(mechanism, options.hold, options.rotation_length)
+    found = project(closure_of(mechanism), wanted, starts, ways, corners=settings.any_mode == 1)
+    reached = P.Rows._make(array.copy() for array in projected)
+    seeds = P.Seeds(projected.poses, projected.nodes, projected.trunks)
+    solve_rows(flat, found.closing.poses, seeds, settings._replace(chained=0), reached)
+    near = np.isfinite(found.distances) & (reached.status == P.REACHED)
+    for way in ways:  # what fell back to a way tried later is farther, however near
+        ours, theirs = projected.counters[:, 2] == way.hold, found.holds == way.hold
+        distances = way.distances(closure_of(mechanism), projected.poses, wanted)
+        near &= ~(ours & theirs & (found.distances > (1.0 - SAME) * distances))
+        near &= ~(ours & ~theirs & (way is ways[0]))
+    task = task_of(mechanism)
+    reached.status[:] = P.PROJECTED
+    reached.counters[:] = projected.counters
+    reached.counters[:, 0] += found.closing.iterations
+    reached.counters[:, 2] = found.holds
+    reached.measures[:, 0], reached.measures[:, 1] = task.errors(reached.poses, wanted)
+    for array, own in zip(rows, reached, strict=True):
+        array[away[near]] = own[near]

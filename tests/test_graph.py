@@ -1,0 +1,73 @@
+"""The graph of bodies and joints: what lies in series between two bodies, by looking at every single way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from pfabrik import Joint
+from pfabrik.graph import Edge, components, is_tree, stages
+
+START, GOAL = "start", "goal"
+BODIES = (START, "a", "b", "c", "d", GOAL)
+
+
+def random_edges(random: np.random.Generator) -> list[Edge]:
+    """Four to ten joints between any two of six bodies, some side by side; one way at least leads to the goal."""
+    while True:
+        pairs = [random.choice(BODIES, 2, replace=False) for _ in range(random.integers(4, 11))]
+        edges = edges_of(*((str(one), str(other)) for one, other in pairs))
+        if any(ways(edges)):
+            return edges
+
+
+def edges_of(*pairs: tuple[str, str]) -> list[Edge]:
+    return [Edge(Joint(f"j{k}", "spherical", pair, at=(0, 0, 0)), pair) for k, pair in enumerate(pairs)]
+
+
+def ways(edges: list[Edge], passed: tuple[str, ...] = (START,)) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """All ways to the goal that pass no body twice: the bodies, and the joints between them."""
+    if passed[-1] == GOAL:
+        yield passed, ()
+        return
+    for edge in edges:
+        if passed[-1] in edge.bodies and edge.other(passed[-1]) not in passed:
+            for bodies, joints in ways(edges, (*passed, edge.other(passed[-1]))):
+                yield bodies, (edge.joint.name, *joints)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_stages_are_what_every_way_passes_in_that_order(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    for _ in range(20):
+        edges = random_edges(random)
+        all_ways = list(ways(edges))
+        common = set.intersection(*(set(bodies) for bodies, _ in all_ways))
+        in_turn = [body for body in all_ways[0][0] if body in common]
+        found = stages(edges, START, GOAL)
+        assert [(stage.inward, stage.outward) for stage in found] == list(pairwise(in_turn))
+        for stage in found:
+            passed = set()
+            for bodies, joints in all_ways:
+                passed |= set(joints[bodies.index(stage.inward) : bodies.index(stage.outward)])
+            assert [edge.joint.name for edge in stage.edges] == [e.joint.name for e in edges if e.joint.name in passed]
+
+
+def test_what_hangs_on_a_way_without_leading_anywhere_is_left_out() -> None:
+    edges = edges_of((START, "a"), ("a", "b"), ("b", "c"), ("c", "a"), ("a", GOAL), (GOAL, "d"))
+    assert [[edge.joint.name for edge in stage.edges] for stage in stages(edges, START, GOAL)] == [["j0"], ["j4"]]
+
+
+def test_groups_keep_the_order_of_the_description() -> None:
+    edges = edges_of((START, "a"), (START, "b"), ("b", GOAL), ("c", GOAL), ("a", "c"))
+    groups = [[edge.joint.name for edge in group] for group in components(edges, START, GOAL)]
+    assert groups == [["j0", "j3", "j4"], ["j1", "j2"]]
+
+
+def test_a_tree_has_one_joint_to_the_base_and_no_loop_before_the_end() -> None:
+    assert is_tree(edges_of((START, "a"), ("a", GOAL), ("a", GOAL)), START, GOAL)
+    assert not is_tree(edges_of((START, "a"), (START, "a"), ("a", GOAL)), START, GOAL)
+    assert not is_tree(edges_of((START, "a"), ("a", "b"), ("b", "c"), ("c", "a"), ("a", GOAL)), START, GOAL)

@@ -1,0 +1,87 @@
+"""`pfabrik info`: numbers without dust, parallelograms, and the engine that really answers."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from click.testing import CliRunner
+
+import pfabrik as pf
+from machines import MACHINES
+from pfabrik.cli import main
+from pfabrik.cli.info import chain_table, clean, vector
+from pfabrik.decompose import beyond_positions, closure_reason, engine_of
+from pfabrik.flatten import flat_of
+
+
+def printed(name: str) -> str:
+    result = CliRunner().invoke(main, ["info", name])
+    assert result.exit_code == 0
+    return result.stdout
+
+
+@pytest.mark.parametrize("name", pf.catalog())
+def test_no_number_is_dust_or_a_negative_zero(name: str) -> None:
+    assert re.findall(r"\d\.?\d*e-\d+|(?<![\d.])-0(?![\d.])", printed(name)) == []
+
+
+def test_directions_are_cleaned_of_rounding_and_nothing_else() -> None:
+    assert vector((1.665e-16, 1.0, -0.0)) == "(0, 1, 0)"
+    assert vector((-3e-13, 4e-12, 1e-6)) == "(0, 4e-12, 1e-06)"
+
+
+def test_lengths_are_cleaned_relative_to_the_machine() -> None:
+    assert (clean(1e-10, 300.0), clean(-1e-10, 300.0)) == (0.0, 0.0)
+    assert clean(1e-10, 0.1) == pytest.approx(1e-10)
+    assert str(clean(-0.0)) == "0.0"
+
+
+@pytest.mark.parametrize("name", pf.catalog())
+def test_the_engine_shown_is_the_one_that_answers(name: str) -> None:
+    mechanism = pf.load(name)
+    expected = "closure" if flat_of(mechanism) is None else "reaching"
+    assert engine_of(mechanism) == expected
+    lines = chain_table(mechanism).splitlines()[1:]
+    assert {re.split(r" {2,}", line.strip())[2] for line in lines} == {expected}
+    if mechanism.task != mechanism.whole_task:
+        assert expected == "closure"
+
+
+def test_a_chain_that_positions_express_says_for_whose_sake_it_is_not_reached() -> None:
+    assert "3  R-P*-S     closure  positions alone express it, but the task leaves some of the pose free" in printed(
+        "rps"
+    )
+    whole = MACHINES["tripod_rps"]()
+    assert chain_table(whole).endswith("3  R-P*-S     reaching  positions alone express it")
+    pivoted = pf.Mechanism(
+        "struts and a pivot",
+        [*pf.load("stewart").joints, pf.Joint("pivot", "universal", ("base", "platform"), at=(0, 0, 195))],
+        "platform",
+        (0, 0, 195),
+    )
+    assert (
+        "6  U-P*-S     closure  positions alone express it, but some sub-chain needs more than positions"
+        in chain_table(pivoted)
+    )
+
+
+def test_a_motor_in_no_sub_chain_is_why_the_closure_engine_answers() -> None:
+    stewart = pf.load("stewart")
+    bearings = [
+        pf.Joint(name, "revolute", ("platform", "tool"), at=(0, 0, z), axis=(0, 0, 1), actuated=name == "spindle")
+        for name, z in (("bearing", 180), ("spindle", 195))
+    ]
+    mechanism = pf.Mechanism("with a spindle", [*stewart.joints, *bearings], "platform", (0, 0, 195))
+    assert beyond_positions(mechanism) == ("actuated joint spindle is in no sub-chain",)
+    assert closure_reason(mechanism) == "actuated joint spindle is in no sub-chain"
+    assert "express it, but actuated joint spindle is in no sub-chain" in chain_table(mechanism)
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [("orthoglide", "3  R-R, R-R       310.583 mm  60 mm"), ("delta", "3  S-U, S-U       232 mm  50 mm")],
+)
+def test_parallelograms_are_shown_with_their_rods(name: str, line: str) -> None:
+    assert printed(name).splitlines()[-1].strip() == line
+    assert "parallelogram" not in printed("stewart")

@@ -1,0 +1,371 @@
+"""Projections are the nearest feasible poses: an optimiser that knows nothing of the solver finds none nearer."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from checking import worst_excess, worst_gap
+from nearest_oracles import Problem, drawn_targets, nearest
+from pfabrik import Mechanism, Options, Solution, Status
+
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+FEASIBLE = 1e-9
+"""What loops may be open, and limits exceeded, as every answer promises [L or rad]."""
+SAME = 1e-6
+"""Share of the distance by which an answer may be farther than the best: answers stay 1e-10 inside their limits, and
+one limit may hold back by more than it gives way."""
+CASES = [
+    ("five_bar", None),
+    ("stewart", "orientation"),
+    ("stewart", None),
+    ("nrpm", "orientation"),
+    ("nrpm", None),
+    ("servo_hexapod", "orientation"),
+    ("servo_hexapod", None),
+    ("delta", None),
+]
+"""Machines, and what is to be held; a 5-bar's tip and a delta's platform have no orientation to give up."""
+QUICK = ("five_bar", "stewart")
+NAMES = tuple(dict.fromkeys(name for name, _ in CASES))
+
+
+def projections(name: str, hold: str | None, n: int, seed: int = 0) -> tuple[Mechanism, np.ndarray, Solution]:
+    """A machine, `n` targets that it does not reach, (n, 4, 4), and its answers."""
+    mechanism, rng = pf.load(name), np.random.default_rng(seed)
+    targets = np.concatenate([drawn_targets(mechanism, rng, 10) for _ in range(1 + n // 2)])
+    answers = pf.solve_ik(mechanism, targets, options=Options(hold=hold))
+    away = np.flatnonzero(answers.status == Status.PROJECTED)[:n]
+    assert len(away) == n
+    return mechanism, targets[away], answers[away]
+
+
+def few(name: str) -> int:
+    """As many targets as two seconds allow."""
+    if INTERPRETED:
+        return 2 if name in QUICK else 1
+    return 10 if name in QUICK else 4
+
+
+def distances(mechanism: Mechanism, answers: Solution, rotation_length: float | None = None) -> np.ndarray:
+    """How far answers are from their targets, as projections count it, (n,) [length]."""
+    lever = rotation_length or mechanism.rotation_length
+    return np.hypot(answers.position_error, lever * np.asarray(answers.rotation_error))
+
+
+def check_feasible(mechanism: Mechanism, targets: np.ndarray, answers: Solution) -> None:
+    """Closed, within all limits, and finite: measured from the description alone, and by the closure engine."""
+    assert np.isin(answers.status, (Status.REACHED, Status.PROJECTED)).all()
+    assert all(np.isfinite(array).all() for array in (answers.pose, answers.actuators, *answers.joints.values()))
+    assert worst_gap(mechanism, answers).max() <= FEASIBLE
+    assert worst_excess(mechanism, answers).max() <= FEASIBLE
+    assert pf.closure_residual(mechanism, answers).max() <= FEASIBLE * mechanism.characteristic_length
+    problems = [Problem(mechanism, target, None, answer) for target, answer in zip(targets, answers, strict=True)]
+    assert max(problem.excess(problem.answer) for problem in problems) <= FEASIBLE
+
+
+# --- feasibility -----------------------------------------------------------------------------------------------------
+
+
+def check_anywhere(name: str, hold: str | None, n: int) -> None:
+    mechanism, targets, answers = projections(name, hold, n)
+    check_feasible(mechanism, targets, answers)
+    targets[:, :3, 3] *= 1e6
+    answers = pf.solve_ik(mechanism, targets, options=Options(hold=hold))
+    assert (answers.status == Status.PROJECTED).all()
+    check_feasible(mechanism, targets, answers)
+
+
+@pytest.mark.parametrize(("name", "hold"), CASES)
+def test_limits_are_kept_and_loops_closed_however_far_the_target(name: str, hold: str | None) -> None:
+    check_anywhere(name, hold, few(name))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "hold"), CASES)
+def test_limits_are_kept_and_loops_closed_however_far_any_target(name: str, hold: str | None) -> None:
+    check_anywhere(name, hold, 300)
+
+
+# --- nearness --------------------------------------------------------------------------------------------------------
+
+
+def gains(mechanism: Mechanism, targets: np.ndarray, answers: Solution, starts: int) -> np.ndarray:
+    """By what share of their distances the nearest poses found are nearer than answers that hold as much, (n,)."""
+    found = []
+    for target, answer in zip(targets, answers, strict=True):
+        problem = Problem(mechanism, target, answer.held, answer)
+        best = nearest(problem, starts)
+        assert best is not None, "not even the search that starts from the answer ends at a feasible pose"
+        found.append(best.gain / (problem.distance * problem.model.length))
+    return np.array(found)
+
+
+@pytest.mark.parametrize(("name", "hold"), CASES)
+def test_no_feasible_pose_is_nearer(name: str, hold: str | None) -> None:
+    assert gains(*projections(name, hold, few(name)), starts=1).max() <= SAME
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "hold"), CASES)
+def test_hardly_any_feasible_pose_is_nearer_and_none_by_much(name: str, hold: str | None) -> None:
+    farther = gains(*projections(name, hold, 60, seed=1), starts=6)
+    assert (farther <= SAME).mean() >= 0.99
+    assert farther.max() <= 0.01
+
+
+def turned_targets(mechanism: Mechanism, n: int, move: float, turn: float) -> np.ndarray:
+    """Targets (n, 4, 4) about home, moved by about `move` [L] and turned by about `turn` [rad]."""
+    rng, targets = np.random.default_rng(2), np.tile(mechanism.home_pose, (n, 1, 1))
+    targets[:, :3, 3] += move * mechanism.characteristic_length * rng.normal(size=(n, 3))
+    targets[:, :3, :3] = Rotation.from_rotvec(turn * rng.normal(size=(n, 3))).as_matrix()
+    return targets
+
+
+@pytest.mark.parametrize("name", ["stewart", pytest.param("nrpm", marks=pytest.mark.slow)])
+def test_no_feasible_pose_at_the_same_place_is_turned_less(name: str) -> None:
+    mechanism = pf.load(name)
+    targets = turned_targets(mechanism, few(name), 0.05, 1.0)
+    answers = pf.solve_ik(mechanism, targets, options=Options(hold="position"))
+    held = answers.held == "position"
+    assert held.any()
+    assert answers.position_error[held].max() <= FEASIBLE * mechanism.characteristic_length
+    away = np.flatnonzero(answers.status == Status.PROJECTED)
+    assert gains(mechanism, targets[away], answers[away], starts=1).max() <= SAME
+
+
+@pytest.mark.parametrize("share", [0.1, 10.0])
+def test_what_a_rotation_counts_is_for_the_caller_to_say(share: float) -> None:
+    """The less it counts, the more the platform turns toward a far target."""
+    mechanism, targets, answers = projections("stewart", None, few("stewart"))
+    length = share * mechanism.rotation_length
+    ours = pf.solve_ik(mechanism, targets, options=Options(hold=None, rotation_length=length))
+    for target, answer in zip(targets, ours, strict=True):
+        problem = Problem(mechanism, target, None, answer, rotation_length=length)
+        best = nearest(problem, 1)
+        assert best is not None
+        assert best.gain <= SAME * problem.distance * mechanism.characteristic_length
+    more = np.greater(ours.rotation_error, answers.rotation_error)
+    assert (more if share < 1.0 else ~more).all()
+
+
+@pytest.mark.parametrize(("name", "hold"), CASES)
+def test_the_centroid_is_never_nearer(name: str, hold: str | None) -> None:
+    mechanism, targets, answers = projections(name, hold, few(name))
+    centred = pf.solve_ik(mechanism, targets, options=Options(hold=hold, projection="centroid"))
+    check_feasible(mechanism, targets, centred)
+    alike = np.equal(centred.held, answers.held)
+    ours, theirs = distances(mechanism, answers)[alike], distances(mechanism, centred)[alike]
+    assert (ours <= theirs * (1.0 + SAME)).all()
+
+
+@pytest.mark.parametrize("name", ["five_bar", "delta"])
+def test_what_has_no_orientation_has_none_to_hold(name: str) -> None:
+    mechanism, targets, answers = projections(name, None, 2)
+    for hold in ("orientation", "position"):
+        held = pf.solve_ik(mechanism, targets, options=Options(hold=hold))
+        np.testing.assert_allclose(held.pose, answers.pose, atol=FEASIBLE * mechanism.characteristic_length)
+        assert list(held.held) == [None] * len(targets)
+
+
+# --- special targets -------------------------------------------------------------------------------------------------
+
+
+def special_targets(mechanism: Mechanism) -> np.ndarray:
+    """The centre of the base, home turned by half a turn and by a quarter, and places 1e6 L and 1e12 L away."""
+    half_turns = [pf.pose(mechanism.reference_point, rotvec=np.pi * axis) for axis in np.eye(3)]
+    quarter = pf.pose(mechanism.reference_point, rotvec=(0, 0, np.pi / 2))
+    rng = np.random.default_rng(3)
+    away = [*np.eye(3), *-np.eye(3), *rng.normal(size=(2, 3))]
+    far = [pf.pose(mechanism.characteristic_length * size * each) for each in away for size in (1e6, 1e12)]
+    targets = np.array([pf.pose((0, 0, 0)), *half_turns, quarter, *far])
+    return targets[:: 4 if INTERPRETED else 1]
+
+
+@pytest.mark.parametrize(("name", "hold"), CASES)
+def test_special_targets_have_feasible_answers(name: str, hold: str | None) -> None:
+    mechanism = pf.load(name)
+    targets = special_targets(mechanism)
+    check_feasible(mechanism, targets, pf.solve_ik(mechanism, targets, options=Options(hold=hold)))
+
+
+@pytest.mark.parametrize(("name", "hold"), [("five_bar", None), ("stewart", "orientation"), ("stewart", None)])
+def test_no_feasible_pose_is_nearer_to_a_special_target(name: str, hold: str | None) -> None:
+    """Far away a share of the distance says little: the answer is as far out as the machine goes."""
+    mechanism = pf.load(name)
+    targets = special_targets(mechanism)
+    answers = pf.solve_ik(mechanism, targets, options=Options(hold=hold))
+    for target, answer in zip(targets, answers, strict=True):
+        if answer.status == Status.REACHED:
+            continue
+        best = nearest(Problem(mechanism, target, answer.held, answer))
+        assert best is not None
+        assert best.gain <= SAME * mechanism.characteristic_length
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_beside_the_border_answers_stay_at_the_border(name: str) -> None:
+    """A ten-millionth of L outside it, that is how far they are; as much inside it they are reached, unless it is thin."""
+    mechanism, targets, answers = projections(name, "orientation", few(name))
+    outward = (targets - answers.pose)[:, :3, 3]
+    if mechanism.end_effector_is_joint:
+        normal = np.array(mechanism.joint(mechanism.end_effector).axis)
+        outward -= (outward @ normal)[:, None] * normal
+    far = np.linalg.norm(outward, axis=1)
+    rows = (far > FEASIBLE) & (answers.rotation_error <= FEASIBLE)
+    step = 1e-7 * mechanism.characteristic_length
+    for side in (step, -step):
+        beside = targets[rows]
+        beside[:, :3, 3] = answers.pose[rows, :3, 3] + side * outward[rows] / far[rows, None]
+        found = pf.solve_ik(mechanism, beside)
+        check_feasible(mechanism, beside, found)
+        np.testing.assert_array_less(found.position_error, 1.01 * step)
+        if side > 0.0:
+            np.testing.assert_allclose(found.position_error, step, rtol=0.01)
+        for target, answer in zip(beside, found, strict=True):
+            if answer.status == Status.PROJECTED:
+                best = nearest(Problem(mechanism, target, "orientation", answer), 1)
+                assert best is not None
+                assert best.gain <= FEASIBLE * mechanism.characteristic_length
+
+
+def test_an_answer_at_a_singular_pose_is_the_nearest() -> None:
+    """Without limits, both arms of a 5-bar stretch toward a target above it: their tip is where two circles meet."""
+    mechanism = pf.load("five_bar").without_limits()
+    shoulder, elbow = (np.array(mechanism.joint(joint).at) for joint in ("p1", "p2"))
+    reach = np.linalg.norm(elbow - shoulder) + np.linalg.norm(mechanism.reference_point - elbow)
+    height = np.sqrt(reach**2 - shoulder[1] ** 2)
+    for above in (1e-3, 1.0, 1e3):
+        answer = pf.solve_ik(mechanism, (0.0, 0.0, height + above * mechanism.characteristic_length))
+        assert answer.status == Status.PROJECTED
+        np.testing.assert_allclose(answer.position_error, above * mechanism.characteristic_length, rtol=SAME)
+
+
+# --- what is held ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("hold", ["orientation", "position"])
+@pytest.mark.parametrize(
+    "name",
+    ["stewart", pytest.param("nrpm", marks=pytest.mark.slow), pytest.param("servo_hexapod", marks=pytest.mark.slow)],
+)
+def test_what_is_held_is_given_up_only_where_no_pose_has_it(name: str, hold: str) -> None:
+    mechanism = pf.load(name)
+    sizes = (0.3, 0.5) if hold == "orientation" else (0.3, 0.3)
+    targets = turned_targets(mechanism, 6 if INTERPRETED else 20, *sizes)
+    answers = pf.solve_ik(mechanism, targets, options=Options(hold=hold))
+    away = np.flatnonzero(answers.status == Status.PROJECTED)
+    kept = np.equal(answers.held[away], hold)
+    assert 0 < kept.sum() < len(kept)
+    error = (
+        answers.rotation_error if hold == "orientation" else answers.position_error / mechanism.characteristic_length
+    )
+    assert np.array_equal(error[away] <= FEASIBLE, kept)
+    for row in away[~kept].tolist():
+        assert nearest(Problem(mechanism, targets[row], hold, answers[row])) is None
+
+
+# --- what holds answers back -----------------------------------------------------------------------------------------
+
+GIVEN_WAY = 1e-5
+"""By how much a limit gives way in these tests [L or rad]."""
+CURVATURE = 0.02
+"""How far gains may be from proportional: what a limit holds changes as it gives way."""
+INEXACT = 1e-3
+"""What multipliers may be off by [L per L or rad]: an answer is as near as one can tell before they have settled."""
+
+
+def moved(mechanism: Mechanism, name: str, bound: str, share: float) -> tuple[Mechanism, float]:
+    """A machine one of whose limits is wider by `share` [L or rad], narrower where negative; in its unit, by how much."""
+    joint = mechanism.joint(name)
+    if bound == "cone":
+        return mechanism.with_limits({name: replace(joint.cone, half_angle=joint.cone.half_angle + share)}), share
+    amount = share * (mechanism.characteristic_length if joint.type == "prismatic" else 1.0)
+    low, high = joint.range
+    return mechanism.with_limits({name: (low - amount, high) if bound == "min" else (low, high + amount)}), amount
+
+
+def limits_of(mechanism: Mechanism) -> list[tuple[str, str]]:
+    """Joint and bound of every limit."""
+    ranged = [(joint.name, bound) for joint in mechanism.joints if joint.range is not None for bound in ("min", "max")]
+    return ranged + [(joint.name, "cone") for joint in mechanism.joints if joint.cone is not None]
+
+
+def check_multipliers(name: str, hold: str | None, n: int, seed: int) -> None:
+    """Relaxing a limit gains no more than its multiplier says, tightening it costs no less; unnamed limits do nothing.
+
+    Where the limits that are met are independent, gain and cost are the same, and so the multiplier is both. Where they
+    are not, such as the cones of a parallelogram's two rods, a limit that gives way alone gains less.
+    """
+    mechanism, targets, answers = projections(name, hold, n, seed)
+    lengths, shares = distances(mechanism, answers), []
+    for target, answer, distance in zip(targets, answers, lengths, strict=True):
+        for limit in answer.active_limits:
+            gain, cost = (
+                abs(
+                    distance - distance_with(mechanism, limit.joint, limit.bound, side * GIVEN_WAY, target, answer.held)
+                )
+                for side in (1.0, -1.0)
+            )
+            unit = moved(mechanism, limit.joint, limit.bound, GIVEN_WAY)[1]
+            expected, inexact = limit.multiplier * unit, INEXACT * GIVEN_WAY * mechanism.characteristic_length
+            assert gain <= expected * (1.0 + CURVATURE) + inexact
+            assert cost >= expected * (1.0 - CURVATURE) - inexact
+            shares.append(gain >= expected * (1.0 - CURVATURE) - inexact)
+        for limit in unnamed(mechanism, answer):
+            closer = distance - distance_with(mechanism, *limit, GIVEN_WAY, target, answer.held)
+            assert closer <= INEXACT * GIVEN_WAY * mechanism.characteristic_length
+    assert not shares or np.mean(shares) >= 0.5
+
+
+def distance_with(
+    mechanism: Mechanism, name: str, bound: str, share: float, target: np.ndarray, hold: str | None
+) -> float:
+    """Distance from a target to the answer with a limit moved [length]."""
+    other, _ = moved(mechanism, name, bound, share)
+    return float(distances(other, pf.solve_ik(other, target, options=Options(hold=hold))))
+
+
+def unnamed(mechanism: Mechanism, answer: Solution) -> list[tuple[str, str]]:
+    """Three limits that are not said to hold the answer back: those with the least room."""
+    named = {(limit.joint, limit.bound) for limit in answer.active_limits}
+    room = {limit: room_of(mechanism, answer, *limit) for limit in limits_of(mechanism) if limit not in named}
+    return sorted(room, key=room.__getitem__)[:3]
+
+
+def room_of(mechanism: Mechanism, answer: Solution, name: str, bound: str) -> float:
+    """How far a coordinate is from its bound, as a share of its range; cones come last."""
+    if bound == "cone":
+        return 1.0
+    (low, high), value = mechanism.joint(name).range, float(answer.joints[name])
+    return (value - low if bound == "min" else high - value) / (high - low)
+
+
+@pytest.mark.parametrize(("name", "hold"), CASES)
+def test_answers_come_nearer_as_their_limits_give_way(name: str, hold: str | None) -> None:
+    check_multipliers(name, hold, 1 if INTERPRETED else 3, seed=4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "hold"), CASES)
+def test_answers_come_nearer_as_any_of_their_limits_give_way(name: str, hold: str | None) -> None:
+    check_multipliers(name, hold, 25, seed=5)
+
+
+def test_the_hardest_limit_is_named_first_in_any_unit() -> None:
+    """A multiplier of an angle grows with the unit of length; which limit is the hardest does not."""
+    mechanism, _, answers = projections("nrpm", "orientation", 3)
+    for answer in answers:
+        scale = [
+            1.0
+            if limit.bound == "cone" or mechanism.joint(limit.joint).type == "revolute"
+            else mechanism.characteristic_length
+            for limit in answer.active_limits
+        ]
+        hardness = [limit.multiplier * size for limit, size in zip(answer.active_limits, scale, strict=True)]
+        assert hardness == sorted(hardness, reverse=True)
