@@ -325,16 +325,17 @@ class Problem:
 
     def descend(self, begin: Array) -> Array | None:
         """Where a search from a start ends, if that is feasible."""
-        x, best = begin, np.inf
+        x, nearer, beyond = begin, -np.inf, np.inf
         for _ in range(RESTARTS):
             x = _Descent(self, x).end()
-            if not np.isfinite(x).all():
-                return None
-            distance = -self.gain(x)
-            if self.excess(x) <= CLOSED and abs(best - distance) <= 1e-10 * self.distance_of(x):
+            excess = self.excess(x)
+            if not excess <= max(CLOSED, 0.5 * beyond):
+                return None  # stuck where no step brings the loops together
+            gain, beyond = self.gain(x), excess
+            if excess <= CLOSED and abs(gain - nearer) <= 1e-10 * self.distance_of(x):
                 return x
-            best = distance
-        return x if self.excess(x) <= CLOSED else None
+            nearer = gain
+        return x if beyond <= CLOSED else None
 
 
 class _Descent:

@@ -39,18 +39,9 @@ def approached(
     -------
     Closing : judge by `is_feasible`. Gaps and excesses are those of the whole, the same for every group.
     """
-    from .kernels.approach import approach
-
-    closed = _closed(closure, coordinates)
-    aim = _aim(closure, targets, platform, framed)
-
-    def run(block: slice) -> None:
-        own = Closed._make(array[block] for array in closed)
-        approach(closure.loops, closure.layout(frozenset()), aim._replace(targets=aim.targets[block]), own)
-
-    in_blocks(run, len(coordinates), rows_a_block=16)
-    closed.poses[:, :3, 3] *= closure.mechanism.characteristic_length
-    return Closing(closed.coordinates / closure.scale, *closed[1:])
+    found = _run(closure, coordinates, _aim(closure, targets, platform, framed, MOST_STEPS))[0]
+    found.poses[:, :3, 3] *= closure.mechanism.characteristic_length
+    return Closing(found.coordinates / closure.scale, *found[1:])
 
 
 def weighed_limits(
@@ -61,27 +52,30 @@ def weighed_limits(
     First the low and high bounds of the coordinates in turn, then the cones: by how much of L the target comes nearer,
     per unit [L or rad] by which a limit gives way; 0 for limits that do not matter.
     """
-    from .kernels.approach import weigh_limits
+    return _run(closure, coordinates, _aim(closure, targets, platform, framed, 0))[1]
 
-    closed = _closed(closure, coordinates)
-    aim = _aim(closure, targets, platform, framed)
+
+def _run(closure: Closure, coordinates: Floats, aim: Aim) -> tuple[Closed, Floats]:
+    """The kernel over all rows, on all cores: where they ended, or what holds them where they are."""
+    from .kernels.approach import approach
+
+    closed, layout = _closed(closure, coordinates), closure.layout(frozenset())
     weights = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
 
     def run(block: slice) -> None:
         own = Closed._make(array[block] for array in closed)
-        layout = closure.layout(frozenset())
-        weigh_limits(closure.loops, layout, aim._replace(targets=aim.targets[block]), own, weights[block])
+        approach(closure.loops, layout, aim._replace(targets=aim.targets[block]), own, weights[block])
 
     in_blocks(run, len(coordinates), rows_a_block=16)
-    return weights
+    return closed, weights
 
 
-def _aim(closure: Closure, targets: Floats, platform: Sequence[float], framed: bool) -> Aim:
+def _aim(closure: Closure, targets: Floats, platform: Sequence[float], framed: bool, steps: int) -> Aim:
     from .kernels.aims import Aim
 
     wanted = targets.copy()
     wanted[:, :3, 3] /= closure.mechanism.characteristic_length
-    return Aim(wanted, np.array(platform, dtype=float), int(framed), MARGIN, TOLERANCES.active, MOST_STEPS)
+    return Aim(wanted, np.array(platform, dtype=float), int(framed), MARGIN, TOLERANCES.active, steps)
 
 
 def _closed(closure: Closure, coordinates: Floats) -> Closed:

@@ -32,7 +32,7 @@ STRIDES = 8
 STRIDE = 0.25
 """How far one step goes where the working mode is to be kept: a longer one may leap over a singularity [L or rad]."""
 
-SIGHT = 1e8
+SIGHT = 1e6
 """How far off targets are looked for [L]: farther ones in the same direction have the same nearest pose."""
 
 STRANGE = 0.1

@@ -31,7 +31,7 @@ FAR_CORNER, TURNED_CORNER = 0.5, 0.5
 """Where corners are looked for: so far from home [L], and turned so far [rad]."""
 
 
-CORNERS, CHANCES = 6, 64
+CORNERS, CHANCES = 4, 64
 """How many of them searches start from, and how many random configurations are closed to find some."""
 
 

@@ -203,8 +203,9 @@ class Solution:
         """The limits that hold projected rows back from the poses that were asked for."""
         found: dict[int, tuple[ActiveLimit, ...]] = {}
         closure, task = closure_of(self.mechanism), task_of(self.mechanism)
-        for way in ways_of(self.mechanism, wanted.hold, wanted.rotation_length):
-            rows = projected[self._rows.counters[projected, 2] == way.hold]
+        holds, ways = self._rows.counters[projected, 2], ways_of(self.mechanism, wanted.hold, wanted.rotation_length)
+        for way in ways:
+            rows = projected[holds == way.hold]
             q = self._coordinates[rows]
             weights = weighed_limits(closure, q, wanted.targets[rows], platform=way.weights, framed=task.is_framed)
             found.update(zip(rows.tolist(), holding_limits(self.mechanism, q, weights), strict=True))

@@ -195,26 +195,6 @@ def descend(
     return steps
 
 
-@kernel
-def approach(loops: Loops, layout: Layout, want: Aim, closed: Closed) -> None:
-    """Bring every row, from a configuration that is closed within its limits or nearly so, as near as it comes."""
-    rows = 6 * len(loops.paths)  # of all paths but the first, and six that may be held
-    best, trial = new_state(loops), new_state(loops)
-    first, second, desk = new_view(loops, rows), new_view(loops, rows), new_desk(loops, layout, rows)
-    p = new_programme(len(loops.lo), len(first.slope.h))
-    for row in range(len(closed.coordinates)):
-        load_row(loops, layout, False, row, closed, best)
-        closed.iterations[row] = 0
-        if restore(loops, row, want, best, desk, first, p):
-            closed.iterations[row] = descend(loops, row, want, best, trial, desk, first, second, p)
-        look(loops, row, want, best, desk, first)
-        store_row(loops, row, best, closed)
-        for group in range(closed.gaps.shape[1]):  # the loops are looked at as a whole
-            closed.gaps[row, group] = first.slope.scalars[GAP]
-            closed.excesses[row, group] = max(first.slope.scalars[EXCESS] - want.margin, 0.0)
-            closed.misses[row, group] = 0.0
-
-
 @routine
 def balance(slope: Slope, near: float, p: Programme, pulls: Floats) -> int:
     """The multipliers, into `p.x`, with which limits that are met hold the slope of the objective; how many are met.
@@ -245,17 +225,30 @@ def balance(slope: Slope, near: float, p: Programme, pulls: Floats) -> int:
 
 
 @kernel
-def weigh_limits(loops: Loops, layout: Layout, want: Aim, closed: Closed, weights: Floats) -> None:
-    """How hard every limit holds each row back from its target, (n, 2 columns + cones); 0 for those that do not.
+def approach(loops: Loops, layout: Layout, want: Aim, closed: Closed, weights: Floats) -> None:
+    """Bring every row, from a configuration that is closed within its limits or nearly so, as near as it comes.
 
-    The weight is the multiplier of the limit: how much nearer the target comes, per unit by which the limit gives way.
+    With no steps to take, tell instead how hard every limit holds each row back where it is, (n, 2 columns + cones):
+    the multiplier of the limit, by how much nearer the target comes per unit by which it gives way; else 0.
     """
-    rows = 6 * len(loops.paths)
-    state, view, desk = new_state(loops), new_view(loops, rows), new_desk(loops, layout, rows)
-    k = len(view.slope.h)
+    rows = 6 * len(loops.paths)  # of all paths but the first, and six that may be held
+    best, trial = new_state(loops), new_state(loops)
+    first, second, desk = new_view(loops, rows), new_view(loops, rows), new_desk(loops, layout, rows)
+    k = len(first.slope.h)
     p, pulls = new_programme(k, k), np.zeros((k, len(loops.lo)))
     for row in range(len(closed.coordinates)):
-        load_row(loops, layout, False, row, closed, state)
-        scale_aim(loops, row, want, state, desk, view)
-        for c in range(balance(view.slope, want.near, p, pulls)):
-            weights[row, view.slope.which[c]] = p.x[c]
+        load_row(loops, layout, False, row, closed, best)
+        closed.iterations[row] = 0
+        if want.max_iterations == 0:
+            scale_aim(loops, row, want, best, desk, first)
+            for c in range(balance(first.slope, want.near, p, pulls)):
+                weights[row, first.slope.which[c]] = p.x[c]
+            continue
+        if restore(loops, row, want, best, desk, first, p):
+            closed.iterations[row] = descend(loops, row, want, best, trial, desk, first, second, p)
+        look(loops, row, want, best, desk, first)
+        store_row(loops, row, best, closed)
+        for group in range(closed.gaps.shape[1]):  # the loops are looked at as a whole
+            closed.gaps[row, group] = first.slope.scalars[GAP]
+            closed.excesses[row, group] = max(first.slope.scalars[EXCESS] - want.margin, 0.0)
+            closed.misses[row, group] = 0.0

@@ -16,8 +16,9 @@ from .vectors import copy_row, copy_table, put, vec
 
 # Largest deviation of R^T R from I in a target, and below which it is machine noise.
 NOT_A_ROTATION, ROUNDED = 1e-6, 1e-15
-# Targets farther than this many L are solved for as if they lay there, in the same direction: no square overflows.
-HORIZON = 1e9
+# Targets farther than this many L are solved for as if they lay there, in the same direction: the square of their
+# distance would not feel where the platform goes.
+HORIZON = 1e6
 
 
 @allocator

@@ -197,7 +197,7 @@ def solve_row(
             rounds += more_rounds
             if settings.nearest == 1 and plan.scalars[ON_STRUTS] == 1.0:
                 reached = find_nearest(plan, now, safe, wanted, hold, settings, search)
-            rows.counters[i, 2] = hold
+            rows.counters[i, 2] = HOLD_NOTHING if plan.scalars[POINT_END] == 1.0 else hold
             if reached or hold == HOLD_NOTHING or plan.scalars[POINT_END] == 1.0:
                 break
             hold = HOLD_NOTHING

@@ -152,34 +152,29 @@ def lay_out(loops: Loops, held: int, desk: Desk) -> int:
 
 @routine
 def eliminate(rows: int, n: int, desk: Desk, view: View) -> None:
-    """Gauss-Jordan elimination with complete pivoting: the free motions and what closes the loops."""
-    A, rank = desk.A, 0
-    width = n + 1 + rows
+    """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what closes the loops."""
+    A, rank, width = desk.A, 0, n + 1 + rows
     for j in range(n):
         view.shift[j] = 0.0
         desk.row[j] = 0.0  # 1 for pivot columns
-    for r in range(rows):
-        best, pivot_row, pivot = DEPENDENT, -1, -1
-        for i in range(r, rows):
-            for j in range(n):
-                if abs(A[i, j]) > best and desk.row[j] == 0.0:
-                    best, pivot_row, pivot = abs(A[i, j]), i, j
-        if pivot < 0:
-            break
-        if pivot_row != r:
-            for j in range(width):
-                A[r, j], A[pivot_row, j] = A[pivot_row, j], A[r, j]
-        factor = 1.0 / A[r, pivot]
+    for row in range(rows):
+        largest, pivot = DEPENDENT, -1
+        for j in range(n):
+            if abs(A[row, j]) > largest and desk.row[j] == 0.0:
+                largest, pivot = abs(A[row, j]), j
+        if pivot < 0:  # it follows from those before
+            continue
+        factor = 1.0 / A[row, pivot]
         for j in range(width):
-            A[r, j] *= factor
+            A[row, j], A[rank, j] = A[rank, j], factor * A[row, j]
         for i in range(rows):
             share = A[i, pivot]
-            if i != r and share != 0.0:
+            if i != rank and share != 0.0:
                 for j in range(width):
-                    A[i, j] -= share * A[r, j]
+                    A[i, j] -= share * A[rank, j]
                 A[i, pivot] = 0.0
         desk.row[pivot] = 1.0
-        view.pivots[r] = pivot
+        view.pivots[rank] = pivot
         rank += 1
     motions = 0
     for j in range(n):

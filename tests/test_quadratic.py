@@ -1,0 +1,69 @@
+"""Quadratic programmes: a solution is told by the conditions of Karush, Kuhn and Tucker, whatever found it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pfabrik.kernels._jit import kernel
+from pfabrik.kernels.quadratic import factorise, new_programme, solve_programme
+
+
+@kernel
+def solve(
+    H: np.ndarray, g: np.ndarray, G: np.ndarray, h: np.ndarray, x: np.ndarray, multipliers: np.ndarray
+) -> tuple[bool, bool]:
+    """Whether H is positive, and whether there is a solution, which goes to `x` and `multipliers`."""
+    n, k = len(g), len(h)
+    p = new_programme(n, k)
+    p.H[:], p.g[:], p.G[:], p.h[:] = H, g, G, h
+    if not factorise(p.H, n, 0.0, p.factor):
+        return False, False
+    found = solve_programme(p, n, k)
+    x[:], multipliers[:] = p.x, p.multipliers
+    return True, found
+
+
+def solved(H: np.ndarray, g: np.ndarray, G: np.ndarray, h: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
+    x, multipliers = np.full(len(g), np.nan), np.full(len(h), np.nan)
+    positive, found = solve(H, g, G, h, x, multipliers)
+    assert positive
+    return found, x, multipliers
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_solutions_balance_the_objective_with_limits_that_are_met(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for _ in range(10):
+        n, k = rng.integers(1, 9), rng.integers(0, 30)
+        A = rng.normal(size=(n, n))
+        H, g = A @ A.T + 0.01 * np.eye(n), 10.0 * rng.normal(size=n)
+        G, h = rng.normal(size=(k, n)), -rng.uniform(0.0, 1.0, k) * (rng.random(k) < 0.9)
+        if k > 5:  # limits that ask the same, and one that follows from two others
+            G[1], h[1], G[5], h[5] = G[0], h[0], G[3] + G[4], h[3] + h[4]
+        found, x, multipliers = solved(H, g, G, h)
+        assert found  # zero keeps all limits
+        over = G @ x + h
+        assert np.abs(H @ x + g + G.T @ multipliers).max() <= 1e-8
+        assert over.max(initial=0.0) <= 1e-8
+        assert multipliers.min(initial=0.0) >= 0.0
+        assert np.abs(multipliers * over).max(initial=0.0) <= 1e-7
+
+
+def test_a_free_minimum_within_all_limits_needs_no_multiplier() -> None:
+    found, x, multipliers = solved(2.0 * np.eye(2), np.array([-2.0, 4.0]), np.array([[1.0, 0.0]]), np.array([-1.5]))
+    assert found
+    np.testing.assert_allclose(x, [1.0, -2.0], atol=1e-15)
+    assert multipliers.tolist() == [0.0]
+
+
+def test_limits_that_contradict_each_other_are_found_out() -> None:
+    G = np.array([[1.0, 0.0], [-1.0, 0.0]])
+    assert not solved(np.eye(2), np.zeros(2), G, np.array([1.0, 1.0]))[0]  # x <= -1 and x >= 1
+    assert solved(np.eye(2), np.zeros(2), G, np.array([1.0, -1.0]))[0]  # x <= -1 and x >= -1
+
+
+def test_a_matrix_that_is_not_positive_is_refused() -> None:
+    x, multipliers = np.zeros(2), np.zeros(0)
+    none = np.zeros((0, 2)), np.zeros(0)
+    assert solve(np.diag([1.0, -1.0]), np.zeros(2), *none, x, multipliers)[0] is False
