@@ -26,16 +26,20 @@ class Options:
     tolerance : E, how close the end effector must come to be REACHED [length]; None is 1e-9 of the mechanism's
         characteristic length.
     rotation_tolerance : the same for the orientation [rad].
-    max_iterations : K, forward and backward passes a chain may take for one target.
-    max_rounds : how often a projection may revise its target before the exact step closes the loops; more brings the
-        answer no nearer.
+    max_iterations : K, forward and backward passes a chain may take for one target; of the reaching engine alone.
+    max_rounds : how often a projection may revise its target before exact steps take over, which more would bring to
+        the same answer; likewise.
     working_mode : "keep" stays in the seed's working mode (home's without a seed), "any" may change it to reach; None
         keeps it if there is a seed.
     hold : what a projection keeps: "orientation" (the paper's choice) or "position" if any feasible pose has it, None
-        nothing.
-    projection : how the projected pose is chosen; "centroid" is the paper's.
+        nothing. `Solution.held` tells what was kept.
+    projection : which feasible pose answers a target that is not reached: the "nearest" that local searches from
+        several starts find; or the "centroid" of where the chains end, which is the paper's, where the reaching engine
+        answers.
+    rotation_length : how a rotation counts beside a distance: by the angle times this [length per rad], in
+        sqrt(distance^2 + (rotation_length angle)^2). None is `Mechanism.rotation_length`.
     exact : closed forms and exact steps where they apply; False for the paper's passes alone, which end within
-        `tolerance` and then only close the loops.
+        `tolerance` and then only close the loops, in the reaching engine.
     actuator_tolerance : how close actuated coordinates must come to the asked values to be REACHED [L or rad]. Readings
         of more encoders than the mechanism has freedoms never agree better than they are exact.
     on_invalid : what a row of a batch that is no pose does: "raise", or "mark" the row INVALID.
@@ -59,9 +63,9 @@ class Options:
                 raise InvalidArgument(f"options.{name}", repr(getattr(self, name)), f"one of {choices}")
         if not isinstance(self.exact, bool):
             raise InvalidArgument("options.exact", repr(self.exact), "True or False")
-        for name in ("tolerance", "rotation_tolerance", "actuator_tolerance"):
+        for name in ("tolerance", "rotation_tolerance", "rotation_length", "actuator_tolerance"):
             value = getattr(self, name)
-            optional = name == "tolerance" and value is None
+            optional = name in ("tolerance", "rotation_length") and value is None
             if not optional and not (_is_a(Real, value) and 0.0 < value < float("inf")):
                 raise InvalidArgument(f"options.{name}", repr(value), "a positive number")
         for name in ("max_iterations", "max_rounds"):
@@ -72,7 +76,7 @@ class Options:
     @classmethod
     def paper(cls) -> Options:
         """The paper's K = 100 and E = 1e-2 [length], by passes alone."""
-        return cls(tolerance=1e-2, max_iterations=100, max_rounds=1000, exact=False)
+        return cls(tolerance=1e-2, max_iterations=100, max_rounds=1000, exact=False, projection="centroid")
 
 
 def _is_a(kind: type, value: object) -> bool:

@@ -47,6 +47,9 @@ from .settle import TRANSLATES, TURNS, settle
 from .struts import Descent, find_nearest, new_descent
 from .vectors import copy_row, copy_table
 
+# Rounds of projection that bring a descent near enough to start: more lead it to the same pose.
+ROUNDS_BEFORE_DESCENT = 2
+
 
 @kernel
 def solve_directly(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, rows: Rows) -> int:
@@ -185,7 +188,7 @@ def solve_row(
         # the chains are bent toward the target by now; a projection that keeps what is held starts from there
         copy_table(now.nodes, work.seed_nodes)
         copy_row(now.trunks, work.seed_trunks)
-        staying = keep_mode(settings)
+        staying = for_projection(plan, settings)
         hold = settings.hold
         for _hold in range(2):
             copy_table(wanted, now.pose)
@@ -210,14 +213,15 @@ def solve_row(
 
 
 @routine
-def keep_mode(settings: Settings) -> Settings:
-    """The same settings, staying in the working mode."""
+def for_projection(plan: Plan, settings: Settings) -> Settings:
+    """The same settings, staying in the working mode, with fewer rounds where a descent follows."""
+    descends = settings.nearest == 1 and plan.scalars[ON_STRUTS] == 1.0
     return Settings(
         settings.tolerance,
         settings.rotation_tolerance,
         settings.slack,
         settings.max_iterations,
-        settings.max_rounds,
+        min(settings.max_rounds, ROUNDS_BEFORE_DESCENT) if descends else settings.max_rounds,
         settings.exact,
         0,
         settings.hold,
