@@ -24,7 +24,6 @@ LEAVES = ("cli", "view", "reproduce")
 FILES = {path.relative_to(PACKAGE).as_posix(): path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".toml")}
 MAY_NAME_MACHINES = {
     "catalog/": "the machines themselves",
-    "templates/": "files to start from, called what people call such machines",
     "reproduce/paper.toml": "the machines of the paper's experiments, with what it printed of them",
     "geometric/": "closed forms, which speak of the machines that are known for theirs",
 }

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from ..errors import UnknownName
+from .errors import UnknownName
 
+_FOLDER = files(__package__) / "catalog" / "templates"
 _SUFFIX = ".toml"
 
 
 def templates() -> tuple[str, ...]:
     """Names of the starting files, sorted."""
-    names = (entry.name for entry in files(__name__).iterdir())
+    names = (entry.name for entry in _FOLDER.iterdir())
     return tuple(sorted(name.removesuffix(_SUFFIX) for name in names if name.endswith(_SUFFIX)))
 
 
@@ -20,7 +21,7 @@ def template(name: str) -> str:
     known = {each.lower(): each for each in templates()}
     if name.lower() not in known:
         raise UnknownName("template", name, templates())
-    return (files(__name__) / f"{known[name.lower()]}{_SUFFIX}").read_text(encoding="utf-8")
+    return (_FOLDER / f"{known[name.lower()]}{_SUFFIX}").read_text(encoding="utf-8")
 
 
 def title(name: str) -> str:
