@@ -68,7 +68,8 @@ MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
 STARTS = 5
-"""Starts of a search where arms carry the struts: a pose that one start misses is found by another."""
+"""Starts of a search where arms carry the struts: a pose that one start misses is found by another. Without arms one or
+two find the nearest pose but for one target in 200."""
 
 SPREAD = (0.38196601, 0.61803399, 0.75487767, 0.56984029)
 """Irrational shares, by whose multiples starts are spread over the ranges of the arms' joints."""
@@ -430,8 +431,10 @@ def find_nearest(
 ) -> bool:
     """The nearest feasible pose that has what is held, into `now`; False where none is found.
 
-    From where the projection ended, and where arms carry the struts, or that finds nothing, from other starts too.
+    From where the projection ended; with the orientation held, from where all was feasible too; and where arms carry
+    the struts, or nothing is found yet, from other starts.
     """
+    enough = 2 if hold == HOLD_ORIENTATION else 1
     weight = (settings.rotation_length / plan.scalars[LENGTH]) ** 2
     n = number_motions(plan, hold, search)
     for slope in (search.first, search.second):
@@ -442,7 +445,7 @@ def find_nearest(
             slope.metric[a, a] = 1.0
     found, least = False, math.inf
     for start in range(STARTS):
-        if found and plan.trunk_joints.shape[0] == 0:
+        if found and start >= enough and plan.trunk_joints.shape[0] == 0:
             break
         begin(plan, start, now, safe, wanted, hold, search)
         if descend(plan, wanted, weight, search):
