@@ -163,6 +163,137 @@ def test_a_projection_names_its_distance_and_the_limits_that_hold_it(run: Callab
     assert all(limit.joint in first_line for limit in solution.active_limits)
 
 
+def test_the_limits_that_hold_an_answer_back_are_named_the_hardest_first(run: Callable[..., Result]) -> None:
+    target = pf.pose([0, 150, 120], rpy=np.radians([8, -5, 0]))
+    answer = pf.solve_ik(pf.load("stewart"), target)
+    first_line = run("ik", "stewart", "--position", 0, 150, 120, "--rpy", 8, -5, 0).stdout.splitlines()[0]
+    named = re.findall(r"\b[ABC][LR][123]\b", first_line)
+    hardness = {limit.joint: limit.multiplier for limit in answer.active_limits}
+    assert set(named) == set(hardness) and len(named) >= 2
+    phrases = [re.findall(r"\b[ABC][LR][123]\b", phrase) for phrase in first_line.split("; ")[1:]]
+    hardest = [max(hardness[joint] for joint in phrase) for phrase in phrases]
+    assert hardest == sorted(hardest, reverse=True)
+
+
+def test_limits_that_hold_alike_are_named_as_the_description_lists_them(run: Callable[..., Result]) -> None:
+    """Rounding decides which of six struts holds hardest right above the base; it does not decide what is printed."""
+    first_line = run("ik", "stewart", *BEYOND_REACH).stdout.splitlines()[0]
+    assert first_line.endswith("; struts BL1, BL2, BL3, BR1, BR2, BR3 at their maximum 280 mm")
+
+
+def test_what_was_to_be_held_and_is_not_is_said(run: Callable[..., Result]) -> None:
+    line = ["ik", "stewart", "--rpy", 70, 0, 0]
+    fell_back, free, turned = (
+        run(*line, "--hold", hold).stdout.splitlines()[0] for hold in ("orientation", "none", "position")
+    )
+    said = "no position was found that suits the orientation: both give way"
+    assert said in fell_back and " mm and " in fell_back.split(";")[0]
+    assert fell_back.replace(f"{said}; ", "") == free
+    assert "give way" not in turned and " mm" not in turned.split(";")[0]
+    assert run("ik", "five_bar", "--position", 0, 0, 300).stdout.count("give way") == 0
+
+
+@pytest.mark.parametrize(
+    ("position", "why"),
+    [
+        ((0, 0, 400), "the links are stretched out or folded"),
+        ((30, 10, 180), "the mechanism has no freedom that way"),
+        ((30, 0, 400), "the links are stretched out or folded, and the mechanism has no freedom that way"),
+    ],
+)
+def test_where_no_limit_holds_it_back_it_is_said_what_does(
+    run: Callable[..., Result], tmp_path: Path, position: tuple[float, ...], why: str
+) -> None:
+    pf.save(pf.load("five_bar").without_limits(), tmp_path / "free.toml")
+    first_line = run("ik", "free.toml", "--position", *position).stdout.splitlines()[0]
+    assert first_line.endswith(f"mm from the target; no limit is active: {why}")
+
+
+def test_the_nearest_pose_is_no_farther_than_the_centroid(run: Callable[..., Result]) -> None:
+    line = ["ik", "stewart", "--position", 60, 30, 260, "--json"]
+    nearest, centroid = (json.loads(run(*line, "--projection", way).stdout) for way in ("nearest", "centroid"))
+    assert nearest == json.loads(run(*line).stdout)
+    assert nearest["position_error"] < centroid["position_error"]
+    assert centroid["rotation_error"] <= 1e-9
+
+
+def test_margins_are_listed_the_nearest_limit_first(run: Callable[..., Result]) -> None:
+    result = run("ik", "stewart", *BEYOND_REACH, "--margins")
+    table = result.stdout.split("\n\n")[-1].splitlines()
+    assert table[0].split() == ["joint", "bound", "margin"]
+    rows = [(joint, bound, float(margin)) for joint, bound, margin in map(str.split, table[1:])]
+    assert [margin for *_, margin in rows] == sorted(margin for *_, margin in rows)
+    assert {(joint, bound) for joint, bound, margin in rows if margin == 0.0} == {
+        (f"B{side}{leg}", "max") for side in "LR" for leg in (1, 2, 3)
+    }
+    listed = json.loads(run("ik", "stewart", *BEYOND_REACH, "--margins", "--json").stdout)["margins"]
+    assert [limit["joint"] for limit in listed[6:]] == [joint for joint, *_ in rows[6:]]
+    assert [limit["margin"] for limit in listed] == pytest.approx([margin for *_, margin in rows], rel=1e-5, abs=1e-7)
+    assert len(rows) == 24  # of six strokes, both ends, and twelve cones
+
+
+def test_a_machine_without_limits_has_no_margins(run: Callable[..., Result], tmp_path: Path) -> None:
+    pf.save(pf.load("five_bar").without_limits(), tmp_path / "free.toml")
+    result = run("ik", "free.toml", "--position", 0, 10, 180, "--margins")
+    assert (result.exit_code, result.stdout.splitlines()[-1]) == (0, "no limits")
+
+
+# Reach
+
+
+def test_reach_tells_the_distances_that_the_library_does(run: Callable[..., Result]) -> None:
+    machine = pf.load("stewart")
+    result = run("reach", "stewart")
+    header, *rows = [line.split() for line in result.stdout.splitlines()]
+    assert (result.exit_code, header) == (0, ["x", "y", "z", "reach", "[mm]"])
+    axes = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+    assert [[float(cell) for cell in row[:3]] for row in rows] == axes
+    expected = pf.reach(machine, machine.home_pose, axes)
+    assert [float(row[3]) for row in rows] == pytest.approx(expected, rel=1e-5)
+
+
+def test_reach_starts_where_it_is_told(run: Callable[..., Result]) -> None:
+    line = [
+        "reach",
+        "stewart",
+        "--from",
+        10,
+        0,
+        200,
+        "--rpy",
+        0,
+        5,
+        0,
+        "--direction",
+        0,
+        -1,
+        -1,
+        "--direction",
+        1,
+        0,
+        0,
+    ]
+    answer = json.loads(run(*line, "--json").stdout)
+    origin, rays = pf.pose([10, 0, 200], rpy=np.radians([0, 5, 0])), [[0, -1, -1], [1, 0, 0]]
+    assert answer["reach"] == pf.reach(pf.load("stewart"), origin, rays).tolist()
+    assert (answer["from"], answer["directions"]) == (origin.tolist(), rays)
+
+
+def test_reach_without_end_is_unlimited(run: Callable[..., Result], tmp_path: Path) -> None:
+    pf.save(pf.load("stewart").without_limits(), tmp_path / "free.toml")
+    assert run("reach", "free.toml", "--direction", 0, 0, 1).stdout.splitlines()[1].split() == [
+        "0",
+        "0",
+        "1",
+        "unlimited",
+    ]
+    assert json.loads(run("reach", "free.toml", "--direction", 0, 0, 1, "--json").stdout)["reach"] == [None]
+
+
+def test_no_freedom_is_a_reach_of_0(run: Callable[..., Result]) -> None:
+    assert run("reach", "five_bar", "--direction", 1, 0, 0).stdout.splitlines()[1].split()[3] == "0"
+
+
 def test_json_is_one_object_that_says_what_the_solution_says(run: Callable[..., Result]) -> None:
     result = run("ik", "stewart", *WITHIN_REACH, "--rpy", 0, 5, 0, "--json")
     solution = pf.solve_ik(pf.load("stewart"), pf.pose([10, 0, 190], rpy=[0, math.radians(5), 0]))
@@ -430,6 +561,18 @@ def test_the_page_of_the_command_line_shows_what_ik_all_prints(run: Callable[...
         assert found == told, line
 
 
+def test_the_page_of_the_command_line_shows_what_is_out_of_reach(run: Callable[..., Result]) -> None:
+    shown = re.findall(
+        r"^```\n\$ pfabrik ((?:ik|reach) (?:(?!--all)[^\n])*)\n(.*?)^```$",
+        CLI_PAGE.read_text("utf-8"),
+        re.DOTALL | re.MULTILINE,
+    )
+    assert [line.split()[0] for line, _ in shown] == ["ik", "reach"]
+    for line, expected in shown:
+        found, told = (without_chance(text) for text in (run(*shlex.split(line)).stdout, expected))
+        assert found == told, line
+
+
 @pytest.mark.slow
 def test_the_page_of_the_command_line_shows_what_fk_prints(run: Callable[..., Result]) -> None:
     shown = re.findall(
@@ -559,6 +702,87 @@ def test_track_writes_angles_in_radians(run: Callable[..., Result], tmp_path: Pa
     assert [float(row[f"actuator_{name}_rad"]) for name in ("p1", "p5")] == answer.actuators[0].tolist()
 
 
+def quick_path(folder: Path) -> Path:
+    """Two places 10 apart: the struts of a Stewart platform differ there by what Pythagoras says."""
+    path = folder / "path.csv"
+    path.write_text("x,y,z\n0,0,195\n0,0,205\n0,0,205\n")
+    return path
+
+
+def test_track_names_the_actuators_that_are_too_fast(run: Callable[..., Result], tmp_path: Path) -> None:
+    path = quick_path(tmp_path)
+    foot, head = np.array([100, 20]), np.array([40, 40])
+    lengths = [math.hypot(*(head - foot), height) for height in (195, 205)]
+    fastest = (lengths[1] - lengths[0]) / 0.5
+    line = ["track", "stewart", path, "-o", "answers.csv", "--sample-time", 0.5]
+    for speeds, named in (
+        ([f"{1.001 * fastest}"], []),
+        ([f"BL2={0.999 * fastest}"], ["BL2"]),
+        ([f"{0.999 * fastest}", f"BL2={1.001 * fastest}"], ["BL1", "BL3", "BR1", "BR2", "BR3"]),
+        ([f"BL2={1.001 * fastest}", f"{0.999 * fastest}"], ["BL1", "BL3", "BR1", "BR2", "BR3"]),
+    ):
+        result = run(*line, *(word for speed in speeds for word in ("--speed", speed)))
+        rows = rows_of(tmp_path / "answers.csv")
+        assert [row["too_fast"] for row in rows] == ["", "; ".join(named), ""]
+        assert result.exit_code == (1 if named else 0)
+        assert result.stdout.strip().split("; ") == [
+            "3 reached",
+            *(f"{name} too fast: {fastest:.3g} mm/s (target 2)" for name in named),
+        ]
+
+
+def test_speeds_of_angles_are_in_degrees(run: Callable[..., Result], tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n0,0,175\n0,10,180\n")
+    p1, p5 = np.degrees(pf.solve_ik(pf.load("five_bar"), (0, 10, 180)).actuators)  # from home, where both are 0
+    line = ["track", "five_bar", "path.csv", "-o", "answers.csv", "--sample-time", 1]
+    between = 0.5 * (abs(p1) + abs(p5))
+    name, fastest = ("p1", abs(p1)) if abs(p1) > abs(p5) else ("p5", abs(p5))
+    result = run(*line, "--speed", between)
+    assert result.stdout == f"2 reached; {name} too fast: {fastest:.3g} deg/s (target 2)\n"
+    assert run(*line, "--speed", f"{name}={1.001 * fastest}").exit_code == 0
+
+
+@pytest.mark.slow
+def test_track_tells_where_answers_leap(run: Callable[..., Result], tmp_path: Path) -> None:
+    """A two-link arm, whose hole of radius 1 a target crosses along a diameter."""
+    joints = [
+        pf.Joint("j1", "revolute", ("base", "upper"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True),
+        pf.Joint("j2", "revolute", ("upper", "lower"), at=(3, 0, 0), axis=(0, 0, -1), actuated=True),
+        pf.Joint("tip", "revolute", ("lower", "tool"), at=(3, 2, 0), axis=(0, 0, 1)),
+    ]
+    pf.save(pf.Mechanism("two-link arm", joints, "tip"), tmp_path / "arm.toml")
+    x = [3, 2, 1.5, 1.1, 0.75, 0.5, 0.25, -0.25, -0.5, -0.75]
+    (tmp_path / "path.csv").write_text("x,y,z\n" + "".join(f"{each},0,0\n" for each in x))
+    result = run("track", "arm.toml", "path.csv", "-o", "answers.csv")
+    assert [row["jump"] for row in rows_of(tmp_path / "answers.csv")] == ["0"] * 7 + ["1"] + ["0"] * 2
+    assert "; 1 jump (target 8)" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("speed", "told"),
+    [
+        (["--speed", "10"], "--speed says nothing without --sample-time"),
+        (["--sample-time", "1", "--speed", "p2=10"], "no actuator 'p2' (known: p1, p5)"),
+        (["--sample-time", "1", "--speed", "p1="], "found ''; expected a positive number"),
+        (["--sample-time", "1", "--speed", "fast"], "found 'fast'; expected a positive number"),
+        (["--sample-time", "1", "--speed", "0"], "found '0'; expected a positive number"),
+        (["--sample-time", "1", "--speed", "p1=-3"], "found '-3'; expected a positive number"),
+        (["--sample-time", "1", "--speed", "p1=nan"], "found 'nan'; expected a positive number"),
+        (["--sample-time", "0"], "sample_time"),
+        (["--sample-time", "inf"], "sample_time"),
+        (["--sample-time", "soon"], "--sample-time"),
+    ],
+)
+def test_wrong_speeds_are_told_in_a_line(
+    run: Callable[..., Result], tmp_path: Path, speed: list[str], told: str
+) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n0,10,200\n")
+    result = run("track", "five_bar", "path.csv", "-o", "answers.csv", *speed)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert told in result.stderr and result.stderr.count("\n") == 1
+    assert os.listdir(tmp_path) == ["path.csv"]
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -652,6 +876,12 @@ def test_an_output_that_is_a_link_or_a_device_stays_one(run: Callable[..., Resul
         (["ik", "stewart", "--position", "0", "0", "-inf"], "finite"),
         (["ik", "stewart", *WITHIN_REACH, "--rpy", "0", "nan", "0"], "finite"),
         (["ik", "stewart", *WITHIN_REACH, "--hold", "both"], "orientation"),
+        (["ik", "stewart", *WITHIN_REACH, "--projection", "best"], "centroid"),
+        (["ik", "stewart", *WITHIN_REACH, "--all", "--margins"], "--margins is of one answer"),
+        (["reach", "stewart", "--from", "0", "0", "900"], "origin: found a pose that is PROJECTED"),
+        (["reach", "stewart", "--direction", "0", "0", "0"], "directions"),
+        (["reach", "stewart", "--direction", "0", "nan", "0"], "directions"),
+        (["reach", "agile_eye"], "task"),
         (["fk"], "MECH"),
         (["fk", "stewrt", "1"], "did you mean 'stewart'"),
         (["fk", "nowhere/machine.toml", "1"], "machine.toml"),

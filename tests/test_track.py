@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import pickle
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ import checking
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik import Joint, Mechanism, Options, Status
-from pfabrik.errors import InvalidArgument
+from pfabrik.errors import InvalidArgument, UnknownName
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 STEPS = 60 if INTERPRETED else 360
@@ -218,3 +220,159 @@ def test_a_path_may_be_empty() -> None:
     empty = pf.track(machine, np.empty((0, 3)))
     assert len(empty) == 0
     assert empty.actuators.shape == (0, 6)
+
+
+NEAREST = 1e-6
+"""Share of the distance by which projections may be farther than the nearest, as in the tests of projections. Where
+many places are nearly as near, that leaves some of them."""
+
+
+# --- leaps -----------------------------------------------------------------------------------------------------------
+
+
+def past_the_hole(offset: float, targets: int = 21) -> np.ndarray:
+    """A line of targets in the hole of the two-link arm, of radius 3 - 2, that passes its centre at a distance."""
+    x = np.linspace(-0.5, 0.5, targets)
+    return np.stack([x, 0 * x + offset, 0 * x], axis=1)
+
+
+def test_an_answer_leaps_where_its_target_passes_the_centre_of_a_hole() -> None:
+    """There every point of the rim is as near; on the line before and behind it, only one is the nearest."""
+    machine, path = arm(None), past_the_hole(0.0)
+    followed = pf.track(machine, path, seed=pf.solve_ik(machine, (-2.0, 0.0, 0.0)))
+    assert (followed.status == Status.PROJECTED).all()
+    np.testing.assert_allclose(followed.position_error, 1.0 - np.abs(path[:, 0]), rtol=NEAREST)
+    np.testing.assert_allclose(followed.pose[:10, 0, 3], -1.0, atol=1e-4)
+    np.testing.assert_allclose(followed.pose[11:, 0, 3], 1.0, atol=1e-4)
+    assert set(np.flatnonzero(followed.jumps)) <= {10, 11}
+    assert followed.jumps.any()
+
+
+def test_an_answer_that_swings_round_beside_the_centre_does_not_leap() -> None:
+    """At a fifth of a step from the centre the arm makes most of half a turn in two steps, and yet it moves."""
+    machine, path = arm(None), past_the_hole(0.01)
+    followed = pf.track(machine, path, seed=pf.solve_ik(machine, (-2.0, 0.0, 0.0)))
+    np.testing.assert_allclose(followed.position_error, 1.0 - np.linalg.norm(path, axis=1), rtol=NEAREST)
+    assert not followed.jumps.any()
+
+
+def waiting_at(shoulder: float, path: np.ndarray) -> np.ndarray:
+    """Where the tip of the two-link arm is nearest to targets (n, 3) with its shoulder at an angle, (n, 3)."""
+    elbow = 3.0 * np.array([np.cos(shoulder), np.sin(shoulder), 0.0])
+    return elbow + 2.0 * (path - elbow) / np.linalg.norm(path - elbow, axis=1)[:, None]
+
+
+def test_an_answer_at_a_limit_leaps_once_when_the_other_side_has_become_nearer() -> None:
+    """A target circles where the shoulder cannot go. The tip waits at the shoulder's limit, on the forearm's circle
+    there, and then on that at its other limit: not before that is nearer, nor after the target is half a turn ahead.
+    """
+    machine, home = arm((-2.0, 2.0)), np.arctan2(2.0, 3.0)
+    angle = np.linspace(home + 1.5, home + 2 * np.pi - 1.5, 60)
+    path = 3.0 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    followed = pf.track(machine, path, seed=pf.solve_ik(machine, path[0]))
+    away = np.flatnonzero(followed.status == Status.PROJECTED)
+    (leap,) = np.flatnonzero(followed.jumps)
+    here, there = waiting_at(2.0, path), waiting_at(-2.0, path)
+    to_here, to_there = (np.linalg.norm(path - tips, axis=1) for tips in (here, there))
+    for rows, distances, limit in ((away[away < leap], to_here, 2.0), (away[away >= leap], to_there, -2.0)):
+        np.testing.assert_allclose(followed.position_error[rows], distances[rows], rtol=NEAREST)
+        np.testing.assert_allclose(followed.actuators[rows, 0], limit, atol=1e-6)
+    assert to_there[leap] < to_here[leap]
+    assert np.cross(here, path)[leap - 1, 2] > 0.0
+
+
+@pytest.mark.parametrize("name", ["five_bar", "stewart"])
+def test_a_smooth_path_out_of_reach_and_back_has_no_leaps(name: str) -> None:
+    followed = pf.track(pf.load(name), circle(*CIRCLES[name]))
+    assert (followed.status == Status.PROJECTED).any()
+    assert not followed.jumps.any()
+
+
+@pytest.mark.parametrize("steps", [0, 1])
+def test_a_path_without_steps_has_no_leaps(steps: int) -> None:
+    followed = pf.track(arm(None), past_the_hole(0.0)[:steps], sample_time=0.1)
+    assert followed.jumps.shape == (steps,) and not followed.jumps.any()
+    assert followed.speeds is not None and followed.speeds.shape == (steps, 2)
+    assert followed.too_fast == [()] * steps
+
+
+# --- speeds ----------------------------------------------------------------------------------------------------------
+
+PACE = 0.25
+"""How far the shoulder of the arm below turns in a step [rad]."""
+
+
+def turning(steps: int = 9) -> np.ndarray:
+    """A path on which the shoulder of the two-link arm turns evenly, and its elbow rests."""
+    angle = PACE * np.arange(steps)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([3 * c - 2 * s, 3 * s + 2 * c, 0 * c], axis=1)
+
+
+def test_speeds_are_steps_by_the_time_they_take() -> None:
+    followed = pf.track(arm(None), turning(), sample_time=0.5)
+    expected = np.tile([PACE / 0.5, 0.0], (9, 1))
+    expected[0] = 0.0
+    np.testing.assert_allclose(followed.speeds, expected, rtol=0, atol=1e-7)
+    assert followed.too_fast == [()] * 9
+
+
+@pytest.mark.parametrize("limits", [lambda limit: limit, lambda limit: {"j1": limit}], ids=["all", "by name"])
+@pytest.mark.parametrize(("share", "named"), [(1.001, ()), (0.999, ("j1",))])
+def test_an_actuator_above_its_speed_limit_is_named(limits: Any, share: float, named: tuple[str, ...]) -> None:
+    followed = pf.track(arm(None), turning(), sample_time=0.5, speed_limits=limits(share * PACE / 0.5))
+    assert followed.too_fast == [(), *[named] * 8]
+
+
+def test_an_actuator_that_is_not_named_may_be_as_fast_as_it_likes() -> None:
+    assert pf.track(arm(None), turning(), sample_time=0.5, speed_limits={"j2": 1e-3}).too_fast == [()] * 9
+
+
+def test_without_a_sample_time_nothing_is_said_of_speeds() -> None:
+    followed = pf.track(arm(None), turning())
+    assert followed.speeds is None and followed.too_fast is None
+
+
+def test_speeds_do_not_reach_over_rows_that_are_no_poses() -> None:
+    path = turning()
+    path[4] = np.nan
+    options = Options(on_invalid="mark")
+    followed = pf.track(arm(None), path, options=options, sample_time=0.5, speed_limits=0.1)
+    assert followed.too_fast == [(), *[("j1",)] * 3, (), (), *[("j1",)] * 3]
+    assert not followed.jumps.any()
+
+
+def test_a_track_survives_pickling() -> None:
+    machine, path = arm(None), past_the_hole(0.0)
+    seed = pf.solve_ik(machine, (-2.0, 0.0, 0.0))
+    followed = pf.track(machine, path, seed=seed, sample_time=0.1, speed_limits=1.0)
+    again = pickle.loads(pickle.dumps(followed))
+    np.testing.assert_array_equal(again.jumps, followed.jumps)
+    np.testing.assert_array_equal(again.speeds, followed.speeds)
+    np.testing.assert_array_equal(again.pose, followed.pose)
+    assert again.too_fast == followed.too_fast
+    assert again.active_limits == followed.active_limits
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"sample_time": 0.0}, "sample_time"),
+        ({"sample_time": -1.0}, "sample_time"),
+        ({"sample_time": np.inf}, "sample_time"),
+        ({"sample_time": "1"}, "sample_time"),
+        ({"sample_time": True}, "sample_time"),
+        ({"speed_limits": 1.0}, "sample_time"),
+        ({"sample_time": 0.1, "speed_limits": 0.0}, "speed_limits"),
+        ({"sample_time": 0.1, "speed_limits": [1.0, 2.0]}, "speed_limits"),
+        ({"sample_time": 0.1, "speed_limits": {"j1": np.nan}}, "speed_limits\\['j1'\\]"),
+    ],
+)
+def test_wrong_times_and_speeds_are_refused(wrong: dict[str, Any], named: str) -> None:
+    with pytest.raises(InvalidArgument, match=named):
+        pf.track(arm(None), turning(), **wrong)
+
+
+def test_a_speed_limit_of_an_unknown_actuator_is_refused() -> None:
+    with pytest.raises(UnknownName, match="j3"):
+        pf.track(arm(None), turning(), sample_time=0.1, speed_limits={"j3": 1.0})

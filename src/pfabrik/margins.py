@@ -13,6 +13,7 @@ from .errors import InvalidArgument
 from .limits import coned, ranged
 from .mechanism import Mechanism
 from .solution import Solution
+from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]
 
@@ -22,8 +23,8 @@ def margins(mechanism: Mechanism, solution: Solution) -> Mapping[tuple[str, str]
 
     Bounds are "min", "max" and "cone", as in `ActiveLimit`. A margin is a share of the room there is: of half the
     range, or of the cone's half angle. It is 1 in the middle of a range or on the axis of a cone, 0 on the limit, and
-    negative beyond it; of the two ranges of a universal or cylindrical joint the nearer bound counts. A bound without
-    an opposite one is counted in units of L, the characteristic length, or in radians. NaN for INVALID rows.
+    negative beyond it; of the two ranges of a universal or cylindrical joint the nearer bound counts. In a range whose
+    two bounds are the same there is no room: 0 on it, infinite off it. NaN for INVALID rows.
 
     Raises
     ------
@@ -34,14 +35,19 @@ def margins(mechanism: Mechanism, solution: Solution) -> Mapping[tuple[str, str]
     found: dict[tuple[str, str], Floats] = {}
     for joint in mechanism.joints:
         for values, (low, high), unit in ranged(mechanism, joint, solution._coordinates):
-            room = 0.5 * (high - low) if np.isfinite(high - low) else unit
             for bound, off in (("min", values - low), ("max", high - values)):
-                if np.isfinite(low if bound == "min" else high):
-                    margin = off / room if room > 0.0 else np.where(off == 0.0, 0.0, np.copysign(np.inf, off))
-                    found[joint.name, bound] = np.minimum(margin, found.get((joint.name, bound), np.inf))
+                margin = _share(off, 0.5 * (high - low), TOLERANCES.limit * unit)
+                found[joint.name, bound] = np.minimum(margin, found.get((joint.name, bound), np.inf))
     for joint, angles, half_angle in coned(mechanism, solution._coordinates):
         found[joint.name, "cone"] = (half_angle - angles) / half_angle
     return MappingProxyType({key: _shaped(margin, solution.shape) for key, margin in found.items()})
+
+
+def _share(off: Floats, room: float, tolerance: float) -> Floats:
+    """Distances from a bound (n,) as shares of the room there is."""
+    if room > 0.0:
+        return off / room
+    return np.where(np.abs(off) <= tolerance, 0.0 * off, np.copysign(np.inf, off))
 
 
 def _shaped(array: Floats, shape: tuple[int, ...]) -> Any:

@@ -26,8 +26,9 @@ Floats = NDArray[np.float64]
 STEP = 1.0 / 32.0
 """How far one look ahead goes at first [L]: what is narrower may be stepped over."""
 
-NEARBY, HORIZON = 4.0, 1e3
-"""How far looks are so short, beyond which each goes twice as far as the one before, and beyond which none goes [L]."""
+NEARBY, LONGEST, HORIZON = 4.0, 64.0, 1e3
+"""How far looks are so short, beyond which each goes twice as far as the one before; how far one goes at most, as an
+engine that takes limited steps can follow; and beyond which none goes [L]."""
 
 
 def reach(
@@ -69,10 +70,12 @@ def reach(
     near, step = np.zeros(len(rays)), np.full(len(rays), STEP * length)
     moving = np.arange(len(rays))
     while len(moving):  # ahead, until something stops each ray
-        stopped = ~search.go_on(moving, near[moving] + step[moving])
-        near[moving[~stopped]] += step[moving[~stopped]]
-        step[near > NEARBY * length] *= 2.0
-        moving = moving[~stopped]
+        ahead = near[moving] + step[moving]
+        reached = search.go_on(moving, ahead)
+        moving = moving[reached]
+        near[moving] = ahead[reached]
+        distant = moving[near[moving] > NEARBY * length]
+        step[distant] = np.minimum(2.0 * step[distant], LONGEST * length)
         near[near > HORIZON * length] = np.inf
         moving = moving[np.isfinite(near[moving])]
     bounded = np.flatnonzero(np.isfinite(near))
@@ -81,7 +84,7 @@ def reach(
         middle = 0.5 * (near[bounded] + far[bounded])
         reached = search.go_on(bounded, middle)
         near[bounded[reached]], far[bounded[~reached]] = middle[reached], middle[~reached]
-        bounded = bounded[(far - near)[bounded] > TOLERANCES.position * length]
+        bounded = bounded[far[bounded] - near[bounded] > TOLERANCES.position * length]
     return near.reshape(shape) if shape else near.item()
 
 

@@ -19,6 +19,14 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+ALIKE = 0.999
+"""Share of a multiplier above which another counts as the same: they are known to about one in ten thousand."""
+
+STRETCHED = 1e-3
+"""Measure of singularity [L and rad] below which links count as stretched out or folded: it goes with the square root
+of a length, and what a search for the nearest pose leaves of a length is up to a millionth.
+"""
+
 
 @dataclass(frozen=True)
 class Readout:
@@ -87,7 +95,8 @@ def rpy_angles(pose: Floats) -> Floats:
 def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
     """What became of one target, or of the actuator values asked for, in one sentence.
 
-    For instance ``projected: 12.3 mm from the target; strut B3 at its maximum 250 mm; joint C1's cone at 45 deg``.
+    For instance ``projected: 12.3 mm from the target; strut B3 at its maximum 250 mm; joint C1's cone at 45 deg``: how
+    far, what was to be held and is not, and the limits that hold it back, the hardest first.
 
     Parameters
     ----------
@@ -100,11 +109,60 @@ def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
         why = reasons(solution) or ["no limit is active: no configuration with these values was found"]
         return "; ".join([f"projected: {actuator_distance(solution, asked)} from the values asked for", *why])
     if status == "projected":
-        why = reasons(solution) or ["no limit is active: the links themselves do not reach"]
-        return "; ".join([f"projected: {distance(solution)} from the target", *why])
+        why = reasons(solution) or [f"no limit is active: {why_without_limits(solution)}"]
+        return "; ".join([f"projected: {distance(solution)} from the target", *given_up(solution), *why])
     if status == "exceeded":
         return f"exceeded: assembled, but beyond limits: {by_bound(exceeded(solution))}"
     return f"{status}: no feasible configuration found; {what_is_wrong(solution)}"
+
+
+def given_up(solution: Solution) -> list[str]:
+    """What a projected answer was to hold of its target and does not: one phrase, or none."""
+    from .kernels.plan import HOLD_NOTHING
+    from .projection import ways_of
+
+    wanted = solution._wanted
+    if wanted is None or solution.held is not None:
+        return []
+    first, *_ = ways_of(solution.mechanism, wanted.hold, wanted.rotation_length)
+    if first.hold == HOLD_NOTHING:
+        return []
+    other = "position" if wanted.hold == "orientation" else "orientation"
+    return [f"no {other} was found that suits the {wanted.hold}: both give way"]
+
+
+def why_without_limits(solution: Solution) -> str:
+    """What keeps an answer that no limit holds back from its target, as far as first order tells."""
+    from .differential import singularity
+
+    inside, outside = missed(solution)
+    found = []
+    measured = singularity(solution.mechanism, solution)
+    if inside and min(measured.serial, measured.passive) < STRETCHED:
+        found.append("the links are stretched out or folded")
+    if outside:
+        found.append("the mechanism has no freedom that way")
+    return ", and ".join(found) or "nothing nearer was found"
+
+
+def missed(solution: Solution) -> tuple[bool, bool]:
+    """Whether what is missed lies along motions of the end effector (at home and here), and whether across them.
+
+    Of a rotation that is missed, only the first is said.
+    """
+    from .differential import forward_jacobian
+    from .ik import solve_ik
+
+    mechanism, wanted = solution.mechanism, solution._wanted
+    if wanted is None or solution.rotation_error > TOLERANCES.rotation:
+        return True, False
+    axes = [axis in mechanism.task for axis in "xyz"]
+    offset = (wanted.targets[0] - solution.pose)[:3, 3][axes]
+    answers = (solve_ik(mechanism, mechanism.home_pose), solution)
+    motions = np.hstack([forward_jacobian(mechanism, answer)[:3][axes] for answer in answers])
+    along = motions @ np.linalg.lstsq(motions, offset, rcond=TOLERANCES.alignment)[0]
+    least = TOLERANCES.alignment * float(np.linalg.norm(offset))
+    return bool(np.linalg.norm(along) > least), bool(np.linalg.norm(offset - along) > least)
 
 
 def what_is_wrong(solution: Solution) -> str:
@@ -139,11 +197,29 @@ def loop_gap(solution: Solution) -> str:
 
 
 def reasons(solution: Solution) -> list[str]:
-    """What holds a projected answer back, one phrase for the limits of a kind that have the same value."""
+    """What holds a projected answer back, the hardest first, one phrase for those of a kind and value."""
     names: dict[tuple[str, str], list[str]] = {}
-    for limit in solution.active_limits:
+    for limit in hardest_first(solution.active_limits, solution.mechanism):
         names.setdefault(in_words(limit, solution.mechanism), []).append(limit.joint)
     return [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
+
+
+def hardest_first(limits: Sequence[ActiveLimit], mechanism: Mechanism) -> list[ActiveLimit]:
+    """Limits in their order; those that hold alike, as symmetry makes them, as the description lists their joints."""
+    places = {joint.name: place for place, joint in enumerate(mechanism.joints)}
+    alike: list[list[ActiveLimit]] = []
+    for limit in limits:
+        if alike and limit.multiplier and hardness(limit, mechanism) > ALIKE * hardness(alike[-1][0], mechanism):
+            alike[-1].append(limit)
+        else:
+            alike.append([limit])
+    return [limit for group in alike for limit in sorted(group, key=lambda limit: places[limit.joint])]
+
+
+def hardness(limit: ActiveLimit, mechanism: Mechanism) -> float:
+    """How hard a limit holds, in any unit: its multiplier, per L where it is one of an angle."""
+    held = limit.multiplier or 0.0
+    return held if is_length(limit, mechanism.joint(limit.joint)) else held / mechanism.characteristic_length
 
 
 def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:

@@ -249,6 +249,7 @@ class Solution:
         )
         plain: dict[str, Any] = {"status": _plain_status(self.status)}
         plain |= {name: _plain(getattr(self, name)) for name in names}
+        plain["held"] = _plain(self.held)
         plain["joints"] = {name: _plain(value) for name, value in self.joints.items()}
         plain["points"] = {name: _plain(point) for name, point in self.points.items()}
         limits = [self.active_limits] if self.shape == () else self.active_limits

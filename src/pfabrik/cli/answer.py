@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+import pfabrik as pf
+
 from ..errors import ContinuumOfSolutions
 from ..report import Floats, as_sentence, by_bound, exceeded, loop_gap, readouts, rpy_angles
+from ..tolerances import TOLERANCES
 from .group import complain
 from .table import aligned
 
@@ -55,6 +58,18 @@ def actuator_table(solution: Solution, asked: Floats | None) -> str:
 def in_units(shown: Sequence[Readout], values: Floats) -> list[str]:
     """Actuator coordinates (n_a,) [length or rad] in the units for people."""
     return [plain(float(readout.display(value)), 1e-9) for readout, value in zip(shown, values, strict=True)]
+
+
+def margins_of(solution: Solution) -> list[tuple[str, str, float]]:
+    """Joint, bound and margin of every limit, nearest first."""
+    found = pf.margins(solution.mechanism, solution)
+    return sorted(((joint, bound, margin) for (joint, bound), margin in found.items()), key=lambda limit: limit[2])
+
+
+def margins_table(solution: Solution) -> str:
+    """The same as a table."""
+    rows = [(joint, bound, plain(margin, TOLERANCES.active)) for joint, bound, margin in margins_of(solution)]
+    return aligned(["joint", "bound", "margin"], rows) if rows else "no limits"
 
 
 def tell_modes(

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ..reproduce.study import Case
     from ..solution import Solution
+    from ..tracked import Track
 
 QUICK_STEPS = 36
 
@@ -33,7 +34,7 @@ class Run:
 
     key: str
     targets: NDArray[np.float64]
-    solution: Solution
+    solution: Track
     seconds: float
 
 
@@ -46,8 +47,8 @@ def demo(out: Path, steps: int, quick: bool) -> int:
 
     Three mechanisms track the circles of the P-FABRIK paper; pictures and CSV files go to a folder.
 
-    The upper arc of each circle is out of reach: there the answer is the feasible pose that the mechanism can take
-    near the target, and every limit is still kept.
+    The upper arc of each circle is out of reach: there the answer is the feasible pose that is nearest
+    to the target, and every limit is still kept.
     """
     from ..reproduce.study import cases
 

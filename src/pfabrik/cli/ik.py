@@ -10,8 +10,8 @@ import click
 
 import pfabrik as pf
 
-from .answer import describe, in_units, pose_header, pose_texts, tell_modes
-from .hold import hold_option, options_holding
+from .answer import describe, in_units, margins_of, margins_table, pose_header, pose_texts, tell_modes
+from .projecting import note_unused, options_projecting, projecting
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
@@ -25,26 +25,47 @@ Triple = tuple[float, float, float]
 @click.argument("mech")
 @click.option("--position", type=float, nargs=3, metavar="X Y Z", help="Of the reference point. Default: at home.")
 @click.option("--rpy", type=float, nargs=3, metavar="R P Y", help="Roll, pitch, yaw [deg] from home. Default: 0 0 0.")
-@hold_option
+@projecting
+@click.option("--margins", "with_margins", is_flag=True, help="List how far off every limit is, nearest first.")
 @click.option("--all", "list_all", is_flag=True, help="List every working mode, limits kept or not.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
-def ik(mech: str, position: Triple | None, rpy: Triple | None, hold: str, list_all: bool, as_json: bool) -> int:
+def ik(
+    mech: str,
+    position: Triple | None,
+    rpy: Triple | None,
+    hold: str,
+    projection: str,
+    with_margins: bool,
+    list_all: bool,
+    as_json: bool,
+) -> int:
     """Solve for one target.
 
-    A target out of reach gets a feasible answer near it, with the limits that hold it back.
+    A target out of reach gets the feasible answer nearest to it, with the limits that hold it back, the hardest first.
+
+    A margin is a share of the room there is: 1 in the middle of a range, 0 on the limit.
 
     With --all only what reaches the target is listed, and the exit code is 0 if some mode keeps all limits.
     """
+    if list_all and with_margins:
+        raise click.UsageError("--margins is of one answer: it does not go with --all")
     if position is None and rpy is None:
         raise click.UsageError("no target: give --position, --rpy or both")
     mechanism = pf.load(mech)
     note_ignored(mechanism, position, rpy)
     target = pf.pose(position or mechanism.reference_point, rpy=[math.radians(angle) for angle in rpy or (0, 0, 0)])
     if list_all:
-        note_hold()
+        note_unused("--all")
         return list_modes(mechanism, target, as_json)
-    solution = pf.solve_ik(mechanism, target, options=options_holding(hold))
-    click.echo(json.dumps(solution.to_dict(), allow_nan=False) if as_json else describe(solution))
+    solution = pf.solve_ik(mechanism, target, options=options_projecting(hold, projection))
+    if as_json:
+        answer = solution.to_dict()
+        if with_margins:
+            names = ("joint", "bound", "margin")
+            answer["margins"] = [dict(zip(names, limit, strict=True)) for limit in margins_of(solution)]
+        click.echo(json.dumps(answer, allow_nan=False))
+    else:
+        click.echo("\n\n".join([describe(solution), *[margins_table(solution)] * with_margins]))
     return 0 if solution else 1
 
 
@@ -54,13 +75,6 @@ def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | No
     left_out = {"--position": position and not task & set("xyz"), "--rpy": rpy and not task & {"rotation", "tilt"}}
     for option in (name for name, ignored in left_out.items() if ignored):
         click.echo(f"pfabrik: note: {option} has no effect: the task is {' '.join(mechanism.task)}", err=True)
-
-
-def note_hold() -> None:
-    """Say so when `--hold` is given where nothing is projected."""
-    source = click.get_current_context().get_parameter_source("hold")
-    if source is click.core.ParameterSource.COMMANDLINE:
-        click.echo("pfabrik: note: --hold has no effect with --all: nothing is projected", err=True)
 
 
 def list_modes(mechanism: Mechanism, target: Floats, as_json: bool) -> int:

@@ -18,7 +18,7 @@ from ..errors import near_miss
 from ..report import readouts, rpy_angles, short_names
 
 if TYPE_CHECKING:
-    from ..solution import Solution
+    from ..tracked import Track
 
 Floats = NDArray[np.float64]
 POSITION = ("x", "y", "z")
@@ -100,24 +100,26 @@ def is_finite(cell: str) -> bool:
         return False
 
 
-def write_track(handle: TextIO, targets: Floats, solution: Solution) -> None:
-    """One row for each target: target, achieved pose, status, actuators, errors, active limits; angles in radians."""
+def write_track(handle: TextIO, targets: Floats, followed: Track) -> None:
+    """One row for each target: target, achieved pose, status, actuators, errors, active limits, and what is swift.
+
+    Angles are in radians. `jump` is 1 where the answer leaps away from the one before it; `too_fast` names actuators.
+    """
     writer = csv.writer(handle, lineterminator="\n")
-    names = [f"actuator_{readout.name}{'_rad' if readout.is_angle else ''}" for readout in readouts(solution.mechanism)]
+    names = [f"actuator_{readout.name}{'_rad' if readout.is_angle else ''}" for readout in readouts(followed.mechanism)]
     pose_names = [*POSITION, *(f"{name}_rad" for name in ANGLES)]
-    targets_names = [f"target_{name}" for name in pose_names]
-    writer.writerow(
-        [*targets_names, *pose_names, "status", *names, "position_error", "rotation_error_rad", "active_limits"]
+    ends = ["position_error", "rotation_error_rad", "active_limits", "jump", "too_fast"]
+    writer.writerow([*(f"target_{name}" for name in pose_names), *pose_names, "status", *names, *ends])
+    too_fast = followed.too_fast or [()] * len(followed)
+    words = zip(
+        map(short_names, followed.active_limits), map(int, followed.jumps), map("; ".join, too_fast), strict=True
     )
-    errors = np.stack([solution.position_error, solution.rotation_error], axis=-1)
-    numbers = zip(coordinates(targets), coordinates(solution.pose), solution.actuators, errors, strict=True)
-    for status, limits, (target, pose, actuators, error) in zip(
-        solution.status, solution.active_limits, numbers, strict=True
+    errors = np.stack([followed.position_error, followed.rotation_error], axis=-1)
+    numbers = (coordinates(targets), coordinates(followed.pose), followed.actuators, errors)
+    for status, (target, pose, actuators, error), ending in zip(
+        followed.status, zip(*map(np.ndarray.tolist, numbers), strict=True), words, strict=True
     ):
-        name = pf.Status(int(status)).name
-        writer.writerow(
-            [*target.tolist(), *pose.tolist(), name, *actuators.tolist(), *error.tolist(), short_names(limits)]
-        )
+        writer.writerow([*target, *pose, pf.Status(int(status)).name, *actuators, *error, *ending])
 
 
 def coordinates(poses: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,48 +10,129 @@ import click
 
 import pfabrik as pf
 
-from .hold import hold_option, options_holding
+from ..errors import near_miss
 from .progress import progress
+from .projecting import options_projecting, projecting
 from .whole import whole_file
 
 if TYPE_CHECKING:
+    from ..mechanism import Mechanism
     from ..solution import Solution
+    from ..tracked import Track
+
+ROWS_NAMED = 5
 
 
 @click.command()
 @click.argument("mech")
 @click.argument("path", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="CSV file to write.")
-@hold_option
-def track(mech: str, path: Path, output: Path, hold: str) -> int:
+@projecting
+@click.option("--sample-time", type=float, metavar="S", help="Time from one target to the next [s].")
+@click.option(
+    "--speed",
+    "speeds",
+    multiple=True,
+    metavar="[NAME=]VALUE",
+    help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated.",
+)
+def track(
+    mech: str,
+    path: Path,
+    output: Path,
+    hold: str,
+    projection: str,
+    sample_time: float | None,
+    speeds: tuple[str, ...],
+) -> int:
     """Follow a path of targets.
 
     Reads the targets from a CSV file and writes the answers to another. Each answer starts from the one before.
 
     PATH has a header line and the columns x, y, z and, optionally, roll, pitch, yaw [deg]. In the output all angles
     are in radians.
+
+    The exit code is 1 also where an actuator would have to be faster than --speed allows.
     """
     from .pathfile import read_targets, write_track
 
     mechanism = pf.load(mech)
+    limits = speed_limits(mechanism, speeds)
+    if limits and sample_time is None:
+        raise click.UsageError("--speed says nothing without --sample-time")
     targets = read_targets(path)
+    options = options_projecting(hold, projection)
     with whole_file(output) as handle:
         with progress(f"tracking {len(targets)} targets") as on_progress:
-            solution = pf.track(mechanism, targets, options=options_holding(hold), on_progress=on_progress)
-        write_track(handle, targets, solution)
-    click.echo(summary(solution))
-    return 0 if solution else 1
+            followed = pf.track(
+                mechanism,
+                targets,
+                options=options,
+                on_progress=on_progress,
+                sample_time=sample_time,
+                speed_limits=limits or None,
+            )
+        write_track(handle, targets, followed)
+    click.echo(summary(followed))
+    return 0 if followed and not any(followed.too_fast or ()) else 1
 
 
-def summary(solution: Solution) -> str:
+def speed_limits(mechanism: Mechanism, given: Sequence[str]) -> dict[str, float]:
+    """Speeds by name [rad/s or length/s], from words as of ``--speed``; what is said of one counts before all."""
+    from ..report import readouts
+
+    shown = {readout.name: readout for readout in readouts(mechanism)}
+    said: dict[str, float] = {}
+    for word in sorted(given, key=lambda word: "=" in word):
+        name, _, value = word.rpartition("=")
+        if "=" in word and name not in shown:
+            hint = near_miss(name, tuple(shown)) or f" (known: {', '.join(shown)})"
+            raise click.UsageError(f"--speed {word}: no actuator '{name}'{hint}")
+        said |= dict.fromkeys([name] if "=" in word else shown, positive(word, value))
+    return {name: shown[name].coordinate(value) for name, value in said.items()}
+
+
+def positive(word: str, value: str) -> float:
+    """A speed as a positive number."""
+    from .pathfile import is_finite
+
+    if not is_finite(value) or float(value) <= 0.0:
+        raise click.UsageError(f"--speed {word}: found '{value}'; expected a positive number")
+    return float(value)
+
+
+def summary(followed: Track) -> str:
     """What became of the targets, in one line."""
-    counts = count_statuses(solution)
-    told = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name == "reached")
-    if not counts["projected"]:
-        return told
-    return (
-        f"{told}; farthest from its target {float(solution.position_error.max()):.3g} {solution.mechanism.length_unit}"
-    )
+    counts = count_statuses(followed)
+    told = [", ".join(f"{count} {name}" for name, count in counts.items() if count or name == "reached")]
+    if counts["projected"]:
+        unit = followed.mechanism.length_unit
+        told.append(f"farthest from its target {float(followed.position_error.max()):.3g} {unit}")
+    jumps = [row for row, leaps in enumerate(followed.jumps.tolist(), 1) if leaps]
+    if jumps:
+        told.append(f"{len(jumps)} jump{'s' * (len(jumps) > 1)} ({targets_named(jumps)})")
+    return "; ".join([*told, *hasty(followed)])
+
+
+def hasty(followed: Track) -> list[str]:
+    """The actuators that would have to be too fast, how fast, and where: one phrase each."""
+    from ..report import readouts
+
+    too_fast, speeds, phrases = followed.too_fast, followed.speeds, []
+    if too_fast is None or speeds is None:
+        return []
+    for column, readout in enumerate(readouts(followed.mechanism)):
+        rows = [row for row, names in enumerate(too_fast, 1) if readout.name in names]
+        if rows:
+            fastest = float(readout.display(speeds[:, column]).max())
+            phrases.append(f"{readout.name} too fast: {fastest:.3g} {readout.unit}/s ({targets_named(rows)})")
+    return phrases
+
+
+def targets_named(rows: Sequence[int]) -> str:
+    """Numbers of targets, counted from 1: the first of them."""
+    more = f", and {len(rows) - ROWS_NAMED} more" if len(rows) > ROWS_NAMED else ""
+    return f"target{'s' * (len(rows) > 1)} {', '.join(map(str, rows[:ROWS_NAMED]))}{more}"
 
 
 def count_statuses(solution: Solution) -> dict[str, int]:
