@@ -223,3 +223,14 @@ def test_limits_are_active_up_to_the_stated_distance(
     found = Solution(moved, answer._rows, ()).active_limits
     hits = [(hit.bound, hit.limit) for hit in found if hit.joint == joint.name]
     assert hits == ([(bound, pytest.approx(expected))] if named else [])
+
+
+def test_what_a_caller_does_to_targets_afterwards_changes_no_answer(stewart: Mechanism) -> None:
+    target = stewart.home_pose.copy()
+    target[2, 3] += 1000
+    expected = pf.solve_ik(stewart, target).active_limits
+    answer, path = pf.solve_ik(stewart, target), np.repeat(target[None], 3, axis=0)
+    followed = pf.track(stewart, path)
+    target[:], path[:] = np.eye(4), np.eye(4)
+    assert answer.active_limits == expected
+    assert [limit.joint for limit in followed.active_limits[0]] == [limit.joint for limit in expected]

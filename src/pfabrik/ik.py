@@ -17,7 +17,7 @@ from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
 from .poses import as_targets, what_is_wrong
-from .reaching import draw_near, settings_of, solve_rows
+from .reaching import draw_near, leaves_projections, settings_of, solve_rows
 from .rows import new_rows
 from .solution import Solution, Wanted
 
@@ -60,11 +60,16 @@ def solve_ik(
         seeds = seeds_of(mechanism, flat, seed, shape)
         settings = settings_of(mechanism, options, seeded=seed is not None)
         solve_rows(flat, targets, seeds, settings, rows)
-        draw_near(mechanism, flat, targets, partial(start_coordinates, mechanism, seed, shape), settings, options, rows)
+        if leaves_projections(flat, settings):
+            start_from = partial(start_coordinates, mechanism, seed, shape)
+            draw_near(mechanism, flat, targets, start_from, settings, options, rows)
         if seed is not None:
             joints = partial(joints_near, mechanism, rows, seed._rows)
     handle_invalid(targets, rows, options)
-    return Solution(mechanism, rows, shape, joints, Wanted(targets, options.hold, options.rotation_length))
+    if not (rows.status[0] == P.PROJECTED if len(targets) == 1 else P.PROJECTED in rows.status):
+        return Solution(mechanism, rows, shape, joints)
+    wanted = Wanted(targets.copy(), options.hold, options.rotation_length)  # a caller may write to the targets
+    return Solution(mechanism, rows, shape, joints, wanted)
 
 
 def start_coordinates(mechanism: Mechanism, seed: Solution | None, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -70,7 +70,7 @@ def draw_near(
     options: Options,
     rows: P.Rows,
 ) -> None:
-    """Bring projected rows to the nearest feasible poses, where the kernels have not done so.
+    """Bring projected rows to the nearest feasible poses, where the kernels leave that to be done.
 
     The closure engine looks for them, from where the projection ended and from where it started. An answer counts if
     the reaching engine reaches it too, from where the projection ended, and so in its working mode.
@@ -80,7 +80,7 @@ def draw_near(
     start : gives the joint coordinates (n, columns) or (1, columns) that the rows started from.
     """
     away = np.flatnonzero(rows.status == P.PROJECTED)
-    if not leaves_projections(flat, settings) or not len(away):
+    if not len(away):
         return
     wanted, projected = targets[away], P.Rows._make(array[away] for array in rows)
     begin = start()

@@ -65,7 +65,7 @@ def track(
         raise InvalidArgument("options.working_mode", "'any'", "'keep' or None: a machine cannot change it on its way")
     pace = pace_of(mechanism, sample_time, speed_limits)
     flat = flat_of(mechanism)
-    rows, wanted = new_rows(mechanism, flat, len(poses)), Wanted(poses, options.hold, options.rotation_length)
+    rows, wanted = new_rows(mechanism, flat, len(poses)), Wanted(poses.copy(), options.hold, options.rotation_length)
     if flat is None:
         found = follow_by_closure(mechanism, poses, start_coordinates(mechanism, seed, ()), options, rows, on_progress)
         joints: Callable[[], Any] = partial(np.asarray, found)
