@@ -1,4 +1,4 @@
-"""How many rounds of projection pay: distance to targets out of reach, and time, by `Options.max_rounds`.
+"""How many rounds of the paper's projection pay: distance to targets out of reach, and time, by `Options.max_rounds`.
 
 python benchmarks/rounds.py
 """
@@ -26,7 +26,7 @@ def main() -> None:
     print("hold         max_rounds  mean distance  99 %    mean rotation [rad]  us a target")
     for hold in ("orientation", None):
         for rounds in ROUNDS:
-            options = pf.Options(hold=hold, max_rounds=rounds)
+            options = pf.Options(hold=hold, projection="centroid", max_rounds=rounds)
             with one_core():
                 (seconds,) = best_times(3, lambda options=options: pf.solve_ik(mechanism, far, options=options))
             solution = pf.solve_ik(mechanism, far, options=options)

@@ -190,3 +190,83 @@ def similar_hexagons() -> Mechanism:
     home[:3, :3] = Rotation.from_rotvec([0.2, -0.1, 0.3]).as_matrix()
     home[:3, 3] = 3.0, -2.0, 150.0
     return gough(100.0 * corners, 60.0 * corners, home, "similar hexagons")
+
+
+# --- more actuators than freedoms ------------------------------------------------------------------------------------
+
+STROKE, RAIL, SWING = (160.0, 300.0), 150.0, np.radians(80.0)
+
+
+def seven_struts() -> Mechanism:
+    """A 7-UPS: six lengths fix the platform, up to its assembly mode, and the seventh must agree."""
+    home = np.eye(4)
+    home[2, 3] = 200.0
+    return gough(*_struts(), home, "7-UPS").with_limits({f"B{i}": STROKE for i in range(1, 8)})
+
+
+def four_rails() -> Mechanism:
+    """A planar 4-PRR: rods from carriages on the sides of a square to a platform within; three of them would do."""
+    joints = []
+    for i, (angle, a, c) in enumerate(zip(_QUARTERS, *_rods(), strict=True), 1):
+        along = (-np.sin(angle), np.cos(angle), 0.0)
+        rail, rod = (-RAIL, RAIL), (-SWING, SWING)
+        joints += [
+            Joint(f"A{i}", "prismatic", ("base", f"carriage{i}"), axis=along, range=rail, actuated=True),
+            Joint(f"B{i}", "revolute", (f"carriage{i}", f"rod{i}"), at=a, axis=(0, 0, 1), range=rod),
+            Joint(f"C{i}", "revolute", (f"rod{i}", "platform"), at=c, axis=(0, 0, 1)),
+        ]
+    return Mechanism("planar 4-PRR", joints, "platform", (0, 0, 0), task=("x", "y", "rotation"))
+
+
+def seven_struts_readings(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+    """Random poses (n, 4, 4) of `seven_struts`, turned by up to 2 rad about any axis, and their lengths (n, 7)."""
+    feet, tops = _struts()
+    turns = rng.normal(size=(400 * n, 3))
+    turns *= (rng.uniform(0.0, 2.0, len(turns)) / np.linalg.norm(turns, axis=1))[:, None]
+    poses = np.tile(np.eye(4), (len(turns), 1, 1))
+    poses[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
+    poses[:, :3, 3] = rng.uniform([-150, -150, 80], [150, 150, 320], (len(turns), 3))
+    lengths = np.linalg.norm(tops @ poses[:, :3, :3].swapaxes(1, 2) + poses[:, None, :3, 3] - feet, axis=2)
+    return _first(n, poses, lengths, ((lengths >= STROKE[0]) & (lengths <= STROKE[1])).all(axis=1))
+
+
+def four_rails_readings(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+    """Random poses (n, 4, 4) of `four_rails` in any of its working modes, and where its carriages are (n, 4)."""
+    feet, tops = _rods()
+    along = np.stack([-np.sin(_QUARTERS), np.cos(_QUARTERS), 0.0 * _QUARTERS], axis=1)
+    turns, modes = rng.uniform(-np.pi, np.pi, 400 * n), rng.choice([-1.0, 1.0], (400 * n, 4))
+    poses = np.tile(np.eye(4), (len(turns), 1, 1))
+    poses[:, :3, :3] = Rotation.from_rotvec(turns[:, None] * [0, 0, 1]).as_matrix()
+    poses[:, :2, 3] = rng.uniform(-80, 80, (len(turns), 2))
+    lines = tops @ poses[:, :3, :3].swapaxes(1, 2) + poses[:, None, :3, 3] - feet
+    middle = (lines * along).sum(axis=2)
+    square = ((tops - feet) ** 2).sum(axis=1) - (lines**2).sum(axis=2) + middle**2
+    values = middle + modes * np.sqrt(np.maximum(square, 0.0))
+    rods = lines - values[:, :, None] * along
+    sine, cosine = np.cross(tops - feet, rods)[:, :, 2], ((tops - feet) * rods).sum(axis=2)
+    kept = (square >= 0.0) & (np.abs(values) <= RAIL) & (np.abs(np.arctan2(sine, cosine)) <= SWING)
+    return _first(n, poses, values, kept.all(axis=1))
+
+
+def _struts() -> tuple[Array, Array]:
+    """Both ends of the struts of `seven_struts`, (7, 3) each, in the base's and in the platform's coordinates."""
+    return _on_circle(150.0, [10, 60, 110, 130, 230, 250, 350]), _on_circle(80.0, [50, 60, 75, 170, 190, 290, 310])
+
+
+_QUARTERS = np.radians([0.0, 90.0, 180.0, 270.0])
+
+
+def _rods() -> tuple[Array, Array]:
+    """Where the rods of `four_rails` begin and end at home, (4, 3) each."""
+    return _on_circle(190.0, np.degrees(_QUARTERS) - 40.0), _on_circle(60.0, np.degrees(_QUARTERS))
+
+
+def _on_circle(radius: float, degrees: Any) -> Array:
+    angles = np.radians(degrees)
+    return radius * np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
+
+
+def _first(n: int, poses: Array, values: Array, kept: NDArray[np.bool_]) -> tuple[Array, Array]:
+    rows = np.flatnonzero(kept)[:n]
+    assert len(rows) == n
+    return poses[rows], values[rows]

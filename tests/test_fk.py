@@ -489,6 +489,31 @@ def test_twelve_values_that_agree_give_the_pose() -> None:
     assert is_same_pose(mechanism, answer.pose, targets).mean() >= 0.99
 
 
+@pytest.mark.parametrize("name", ["seven_struts", "four_rails"])
+def test_more_readings_than_freedoms_that_agree_are_reached_from_home(name: str) -> None:
+    """Of poses far from home too, where Newton's method alone strays."""
+    mechanism, readings = getattr(fk_machines, name)(), getattr(fk_machines, f"{name}_readings")
+    poses, values = readings(np.random.default_rng(1), 10 if INTERPRETED else 100)
+    answer = pf.solve_fk(mechanism, values)
+    assert (answer.status == Status.REACHED).all()
+    assert_feasible(mechanism, values, answer)
+    assert_same_pose(mechanism, answer.pose, poses)
+
+
+@pytest.mark.parametrize("name", ["seven_struts", "four_rails"])
+def test_more_readings_than_freedoms_that_nearly_agree_are_answered_as_nearly(name: str) -> None:
+    """The nearest feasible values are no farther than the exact readings that the noise was added to."""
+    mechanism, readings = getattr(fk_machines, name)(), getattr(fk_machines, f"{name}_readings")
+    rng = np.random.default_rng(2)
+    _, exact = readings(rng, 5 if INTERPRETED else 30)
+    asked = exact + rng.normal(0.0, 1e-3, exact.shape) * mechanism.characteristic_length
+    answer = pf.solve_fk(mechanism, asked)
+    assert_feasible(mechanism, asked, answer)
+    assert (answer.status == Status.PROJECTED).all()
+    errors = [np.linalg.norm(deviation(mechanism, values, asked), axis=1) for values in (answer.actuators, exact)]
+    assert (errors[0] <= errors[1] + 1e-9).all()
+
+
 def test_an_arm_of_a_redundant_machine_is_not_turned_beyond_its_range() -> None:
     mechanism = machine("nrpm")
     asked = home_values(mechanism)

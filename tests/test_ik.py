@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import numpy as np
 import pytest
@@ -322,3 +323,11 @@ def test_a_mechanism_that_positions_cannot_express_is_solved_by_the_closure_engi
     assert answer.status is pf.Status.REACHED
     expected = [np.linalg.norm(np.subtract((50 * c, 50 * s, 162), (80 * c, 80 * s, 0))) for c, s in directions]
     np.testing.assert_allclose(answer.actuators, expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("projection", ["nearest", "centroid"])
+def test_a_joint_end_effector_has_no_orientation_to_hold(projection: Any) -> None:
+    answer = pf.solve_ik(pf.load("five_bar"), (0, 60, 300), options=pf.Options(projection=projection))
+    assert answer.status is pf.Status.PROJECTED
+    assert answer.held is None
+    assert isinstance(answer.active_limits, tuple)

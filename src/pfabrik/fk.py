@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import chain
 from typing import Any
 
@@ -33,6 +34,9 @@ STRIDES = 8
 
 STARTS = 48
 """Random starts where nothing else assembles and no seed says in which mode to stay."""
+
+SAME = 1e-3
+"""Share by which distances or gaps may differ and still count as the same: those of mirror images are."""
 
 NEAR = 1e-6
 """Actuators this near to the asked values need no search from elsewhere for nearer ones [L or rad]."""
@@ -120,8 +124,8 @@ def _assemble(mechanism: Mechanism, coordinates: Floats, poses: Floats, values: 
     """Close the loops at the asked values, or as near to them as can be."""
     closure = closure_of(mechanism)
     best = _locked(closure, coordinates, poses, values)
-    if not is_feasible(best).all() and not _over_determined(mechanism):
-        attempts = [_led, _reached]
+    if not is_feasible(best).all():
+        attempts = [] if _over_determined(mechanism) else [_led, _reached]
         for attempt in attempts if seeded else [*attempts, _scattered]:
             rest = np.flatnonzero(~is_feasible(best))
             if len(rest):
@@ -165,16 +169,23 @@ def _reached(closure: Closure, coordinates: Floats, poses: Floats, values: Float
 
 
 def _scattered(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
-    """Random starts; of each row's feasible answers the platform nearest to where it started."""
+    """Random starts; of each row's answers the best: the least open, of equals the nearest to where the row started."""
     best = _locked(closure, coordinates, poses, values)
-    from_start = np.where(is_feasible(best), _distances(closure, best.poses, poses), np.inf)
+    off, from_start = _off(best), _distances(closure, best.poses, poses)
     for start in same_random_starts(closure, STARTS, len(values)):
         tried = _locked(closure, *start, values)
-        distance = np.where(is_feasible(tried), _distances(closure, tried.poses, poses), np.inf)
-        better = np.flatnonzero(distance < from_start)
-        from_start[better] = distance[better]
+        tried_off, distance = _off(tried), _distances(closure, tried.poses, poses)
+        equal = np.abs(tried_off - off) <= SAME * off
+        better = np.flatnonzero(np.where(equal, distance < from_start, tried_off < off))
+        off[better], from_start[better] = tried_off[better], distance[better]
         _take(best, better, tried, better)
     return best
+
+
+def _off(closing: Closing) -> Floats:
+    """What keeps rows from being feasible, (n,) [L or rad]; the least tolerance where nothing does."""
+    least = min(TOLERANCES.position, TOLERANCES.limit)
+    return np.maximum(np.maximum(closing.gap, closing.excess), least)
 
 
 def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:
@@ -185,9 +196,9 @@ def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:
 
 
 def _improve(best: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
-    """Take over the rows that are feasible, or are closed where none were."""
-    tried_ok, closed = is_feasible(tried), tried.gap <= TOLERANCES.position
-    better = np.flatnonzero(tried_ok | (closed & (best.gap[rest] > TOLERANCES.position)))
+    """Take over the rows that are feasible, or are less open."""
+    is_open = best.gap[rest] > TOLERANCES.position
+    better = np.flatnonzero(is_feasible(tried) | (is_open & (tried.gap < best.gap[rest])))
     _take(best, rest[better], tried, better)
 
 
@@ -207,12 +218,13 @@ def _project(
     ended = best.coordinates[rest], best.poses[rest]
     found = close(closure, *start, max_iterations=0)
     distance = np.full(len(rest), np.inf)
-    others = () if seeded else same_random_starts(closure, PROJECTIONS, len(rest))
+    others = () if seeded else _newton_ends(closure, values)
     for coordinates, poses in chain([ended, start], others):
         waiting = np.flatnonzero(distance > NEAR)
-        if len(waiting):
-            tried = _nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting])
-            _take_nearer(closure, found, distance, waiting, tried, values)
+        if not len(waiting):
+            break
+        tried = _nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting])
+        _take_nearer(closure, found, distance, waiting, tried, values)
     waiting = np.flatnonzero(np.isinf(distance))
     if len(waiting):
         asked = _within_sight(closure, start[0][waiting], values[waiting])
@@ -222,12 +234,19 @@ def _project(
     _take(best, rest[feasible], found, feasible)
 
 
+def _newton_ends(closure: Closure, values: Floats) -> Iterator[tuple[Floats, Floats]]:
+    """Where Newton's method leads from random starts: nearer, in fewer steps, than the search that follows."""
+    for start in same_random_starts(closure, PROJECTIONS, len(values)):
+        ended = _locked(closure, *start, values)
+        yield ended.coordinates, ended.poses
+
+
 def _take_nearer(
     closure: Closure, found: Closing, distance: Floats, rows: NDArray[np.intp], tried: Closing, values: Floats
 ) -> None:
-    """Take over the rows that are feasible with actuators nearer to the values, and how near they are."""
+    """Take over the rows that are feasible with actuators clearly nearer to the values, and how near they are."""
     errors = np.linalg.norm(_actuator_errors(closure, tried.coordinates, values[rows]), axis=1)
-    better = np.flatnonzero(is_feasible(tried) & (errors < distance[rows]))
+    better = np.flatnonzero(is_feasible(tried) & (errors < (1.0 - SAME) * distance[rows]))
     distance[rows[better]] = errors[better]
     _take(found, rows[better], tried, better)
 

@@ -1,4 +1,6 @@
-"""The feasible pose nearest to a target, by a general optimiser: what a projection is measured against."""
+"""The feasible pose nearest to a target, by exact projection and by a general optimiser: what the paper's projection
+is measured against.
+"""
 
 from __future__ import annotations
 
@@ -26,24 +28,39 @@ SPREAD = 0.3
 
 
 class Comparison(NamedTuple):
-    """One projected step: its distance to the target, and that of the nearest feasible pose found [length]."""
+    """One projected step, and how far from its target poses of the target's orientation are [length].
+
+    Attributes
+    ----------
+    distance : of the answer.
+    exact : of the answer by exact projection; NaN if it gives up the orientation.
+    searched : of the nearest feasible pose that the optimiser finds; NaN if it finds none.
+    """
 
     step: int
     distance: float
-    nearest: float
+    exact: float
+    searched: float
+
+    @property
+    def nearest(self) -> float:
+        """Distance of the nearest feasible pose found in either way."""
+        return float(np.fmin(self.exact, self.searched))
 
 
-def compare(targets: Floats, solution: Solution, searches: int, tick: Tick) -> list[Comparison]:
-    """Projected answers next to the nearest feasible poses of the same orientation.
+def compare(targets: Floats, solution: Solution, exact: Solution, searches: int, tick: Tick) -> list[Comparison]:
+    """Projected answers, and those by exact projection, next to the nearest feasible poses of the same orientation.
 
     Left out are answers that gave up the target's orientation.
     """
     held = (np.asarray(solution.status) == Status.PROJECTED) & (solution.rotation_error <= TOLERANCES.rotation)
     steps = np.flatnonzero(held)
     steps = steps[np.unique(np.linspace(0, len(steps) - 1, min(searches, len(steps))).astype(int))]
+    nearest = np.where(exact.rotation_error <= TOLERANCES.rotation, exact.position_error, np.nan)
     model, found = model_of(solution.mechanism), []
     for step, x in zip(steps.tolist(), model.variables(solution[steps]), strict=True):
-        found.append(Comparison(step, float(solution.position_error[step]), nearest_distance(model, targets[step], x)))
+        searched = nearest_distance(model, targets[step], x)
+        found.append(Comparison(step, float(solution.position_error[step]), float(nearest[step]), searched))
         tick()
     return found
 

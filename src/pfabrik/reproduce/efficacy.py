@@ -13,12 +13,9 @@ from ..options import Options
 from ..solution import Solution, Status
 from ..track import track
 from .checking import Feasibility, feasibility
-from .study import Case, Extent, Tick
+from .study import SETTINGS, Case, Extent, Tick
 
 Floats = NDArray[np.float64]
-
-SETTINGS = {"paper": Options.paper(), "default": Options()}
-"""The paper's E and passes alone; and what the library does unless told otherwise."""
 
 
 @dataclass(frozen=True)

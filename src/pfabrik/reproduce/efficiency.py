@@ -21,9 +21,9 @@ from ..reaching import settings_of
 from ..rows import new_rows
 from ..solution import Solution, Status
 from .checking import Feasibility, feasibility
-from .efficacy import SETTINGS, rms
+from .efficacy import rms
 from .one_by_one import closed_form_one_by_one, p_fabrik_one_by_one
-from .study import Case, Extent, Tick
+from .study import CENTROID, SETTINGS, Case, Extent, Tick
 from .timing import median_times, one_core
 
 Floats = NDArray[np.float64]
@@ -160,7 +160,7 @@ def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str
     for start in ("cold", "warm"):
         calls["geometric", "", start, "single"] = _single_closed(mechanism, targets, start == "warm")
     many = np.tile(targets, (COPIES, 1, 1))
-    calls["P-FABRIK", "default", "cold", "batch"] = lambda: solve_ik(mechanism, many)
+    calls["P-FABRIK", "default", "cold", "batch"] = lambda: solve_ik(mechanism, many, options=CENTROID)
     calls["geometric", "", "cold", "batch"] = lambda: geometric.solve_ik(mechanism, many)
     with one_core():
         seconds = median_times(calls, repeats)

@@ -16,7 +16,7 @@ from ..solution import Solution, Status
 from ..track import track
 from .checking import Feasibility, feasibility
 from .closest import Comparison, compare
-from .study import Case, Circle, Extent, Tick
+from .study import CENTROID, NEAREST, Case, Circle, Extent, Tick
 from .timing import clock, one_core
 
 Floats = NDArray[np.float64]
@@ -57,8 +57,8 @@ class Robustness:
 
     Attributes
     ----------
-    solution : what `track` answered.
-    feasibility : of its steps.
+    solution : what `track` answered, projected as the paper does.
+    feasibility, exact_feasibility : of its steps, and of the same targets projected exactly.
     jumps : by kind of actuator ("lengths", "angles"), then by part of the path: "inside", "outside", "edge" (between
         a step that is reached and one that is not).
     compared : projected steps next to the nearest feasible pose.
@@ -69,6 +69,7 @@ class Robustness:
     targets: Floats
     solution: Solution
     feasibility: Feasibility
+    exact_feasibility: Feasibility
     jumps: dict[str, dict[str, Jump]]
     compared: list[Comparison]
     workspace: Workspace
@@ -83,19 +84,26 @@ class Robustness:
         """Distance to the target over that of the nearest feasible pose."""
         return np.array([pair.distance / pair.nearest for pair in self.compared])
 
+    @property
+    def exact_ratios(self) -> Floats:
+        """The same for the exact projection, over the distance of the nearest pose that the optimiser finds."""
+        return np.array([pair.exact / pair.searched for pair in self.compared])
+
 
 def run(case: Case, extent: Extent, tick: Tick) -> Robustness:
     """Follow the circle that leaves the workspace."""
     mechanism = case.mechanism
     targets = case.leaving.poses(extent.steps)
-    solution = track(mechanism, targets)
-    finer = track(mechanism, case.leaving.poses(2 * extent.steps - 1))
-    compared = compare(targets, solution, extent.searches, tick)
+    solution = track(mechanism, targets, options=CENTROID)
+    finer = track(mechanism, case.leaving.poses(2 * extent.steps - 1), options=CENTROID)
+    exact = solve_ik(mechanism, targets, options=NEAREST)
+    compared = compare(targets, solution, exact, extent.searches, tick)
     return Robustness(
         case=case,
         targets=targets,
         solution=solution,
         feasibility=feasibility(solution),
+        exact_feasibility=feasibility(exact),
         jumps=jumps(solution, finer),
         compared=compared,
         workspace=workspace(mechanism, case.leaving, extent.grid),
@@ -140,7 +148,7 @@ def workspace(mechanism: Mechanism, circle: Circle, grid: int) -> Workspace:
     points = np.stack([np.full((grid, grid), x), *np.meshgrid(y, z)], axis=-1).reshape(-1, 3)
     reached = np.array(geometric.solve_ik(mechanism, points).reached)
     missed = np.flatnonzero(~reached)
-    reached[missed] = solve_ik(mechanism, points[missed]).status == Status.REACHED
+    reached[missed] = solve_ik(mechanism, points[missed], options=CENTROID).status == Status.REACHED
     return Workspace(y, z, reached.reshape(grid, grid))
 
 
@@ -152,7 +160,7 @@ def step_times(mechanism: Mechanism, targets: Floats, solution: Solution, repeat
         for row in taken:
             for i, seed in enumerate(seeds):
                 start = clock()
-                track(mechanism, targets[i : i + 1], seed=seed)
+                track(mechanism, targets[i : i + 1], seed=seed, options=CENTROID)
                 row[i] = clock() - start
     return np.asarray(np.median(taken, axis=0))
 
@@ -168,13 +176,18 @@ def summary(found: Robustness) -> dict[str, Any]:
         "largest_distance": float(found.solution.position_error.max()),
         "orientation_given_up": int((found.solution.rotation_error > 1e-9).sum()),
         "compared": len(found.compared),
-        "ratio_median": float(np.median(found.ratios)),
-        "ratio_worst": float(found.ratios.max()),
-        "ratio_least": float(found.ratios.min()),
+        **ratio_cells("ratio", found.ratios),
+        **ratio_cells("exact_ratio", found.exact_ratios),
         "iterations_inside": float(np.mean(found.solution.iterations[~found.projected])),
         "iterations_outside": float(np.mean(found.solution.iterations[found.projected])),
         "length": mechanism.characteristic_length,
     }
+
+
+def ratio_cells(name: str, ratios: Floats) -> dict[str, float]:
+    """The least, the median, that of 95 in 100, and the worst."""
+    places = {"least": 0.0, "median": 0.5, "95": 0.95, "worst": 1.0}
+    return {f"{name}_{what}": float(np.quantile(ratios, share)) for what, share in places.items()}
 
 
 def jump_rows(found: Robustness) -> list[dict[str, Any]]:
@@ -189,7 +202,7 @@ def jump_rows(found: Robustness) -> list[dict[str, Any]]:
 def steps(found: Robustness) -> list[dict[str, Any]]:
     """One row for each step."""
     solution = found.solution
-    nearest = {pair.step: pair.nearest for pair in found.compared}
+    compared = {pair.step: pair for pair in found.compared}
     return [
         {
             "step": i,
@@ -198,7 +211,8 @@ def steps(found: Robustness) -> list[dict[str, Any]]:
             "status": Status(int(solution.status[i])).name,
             "position_error": solution.position_error[i],
             "rotation_error": solution.rotation_error[i],
-            "nearest_feasible": nearest.get(i, ""),
+            "exact_projection": compared[i].exact if i in compared else "",
+            "nearest_by_search": compared[i].searched if i in compared else "",
             "iterations": solution.iterations[i],
             "rounds": solution.rounds[i],
             "residual": solution.residual[i],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any
@@ -14,10 +14,20 @@ from numpy.typing import NDArray
 
 from ..files import load
 from ..mechanism import Mechanism
+from ..options import Options
 from ..poses import pose
 
 Floats = NDArray[np.float64]
 Tick = Callable[[], None]
+
+CENTROID = Options(projection="centroid")
+"""What the library does unless told otherwise, but for the projection, which is the paper's."""
+
+NEAREST = Options(projection="nearest")
+"""The exact projection, which the paper's is compared with."""
+
+SETTINGS = {"paper": replace(Options.paper(), projection="centroid"), "default": CENTROID}
+"""The paper's E and passes alone; and closed forms and exact steps. Both project as the paper does."""
 
 
 @dataclass(frozen=True)
