@@ -44,6 +44,7 @@ from .loops import Ints
 from .measure import cone_step
 from .plan import (
     CARRIER_CONE,
+    HOLD_NOTHING,
     HOLD_ORIENTATION,
     HOLD_POSITION,
     LENGTH,
@@ -67,9 +68,15 @@ MARGIN = 1e-10
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
-STARTS = 5
-"""Starts of a search where arms carry the struts: a pose that one start misses is found by another. Without arms one or
-two find the nearest pose but for one target in 200."""
+STARTS, ENOUGH = 5, 3
+"""Starts of a search where arms carry the struts, or nothing is found yet, and where struts stand on the base: a pose
+that one start misses is found by another."""
+
+FAR = 1.0
+"""Distance from which a target may have another nearest pose than the first found, if no arms move [L]."""
+
+TWIST = 0.5
+"""How far the platform is turned for other starts [rad]: hexapods have further nearest poses that are twisted."""
 
 SPREAD = (0.38196601, 0.61803399, 0.75487767, 0.56984029)
 """Irrational shares, by whose multiples starts are spread over the ranges of the arms' joints."""
@@ -400,9 +407,11 @@ def descend(plan: Plan, wanted: Floats, weight: float, search: Descent) -> bool:
 def begin(
     plan: Plan, start: int, now: Configuration, safe: Configuration, wanted: Floats, hold: int, search: Descent
 ) -> None:
-    """Put a start into `best`: where a projection ended, where all was feasible, or there with other arms."""
+    """Put a start into `best`: where a projection ended, or where all was feasible, turned there, with other arms."""
     best = search.best
     copy_configuration(plan, now if start == 0 else safe, best)
+    if start > 0 and hold == HOLD_NOTHING:
+        turn_about_struts(plan, best, TWIST if start % 2 == 1 else -TWIST)
     for i in range(3):
         if hold == HOLD_POSITION:
             best.pose[i, 3] = wanted[i, 3]
@@ -420,6 +429,18 @@ def begin(
 
 
 @routine
+def turn_about_struts(plan: Plan, now: Configuration, angle: float) -> None:
+    """Turn the platform about the mean direction of its struts."""
+    axis = (0.0, 0.0, 0.0)
+    for b in range(plan.branches.shape[0]):
+        branch = plan.branches[b]
+        axis = add(axis, sub(vec(now.nodes[branch["last"]]), vec(now.nodes[branch["first"]])))
+    size = norm(axis)
+    if size > 0.0:
+        turn_pose_by_vector(now.pose, scale(angle / size, axis))
+
+
+@routine
 def find_nearest(
     plan: Plan,
     now: Configuration,
@@ -431,10 +452,9 @@ def find_nearest(
 ) -> bool:
     """The nearest feasible pose that has what is held, into `now`; False where none is found.
 
-    From where the projection ended; with the orientation held, from where all was feasible too; and where arms carry
-    the struts, or nothing is found yet, from other starts.
+    From where the projection ended, and from where all was feasible; where arms carry the struts, or nothing is found
+    yet, from other starts too.
     """
-    enough = 2 if hold == HOLD_ORIENTATION else 1
     weight = (settings.rotation_length / plan.scalars[LENGTH]) ** 2
     n = number_motions(plan, hold, search)
     for slope in (search.first, search.second):
@@ -445,7 +465,7 @@ def find_nearest(
             slope.metric[a, a] = 1.0
     found, least = False, math.inf
     for start in range(STARTS):
-        if found and start >= enough and plan.trunk_joints.shape[0] == 0:
+        if found and plan.trunk_joints.shape[0] == 0 and (start >= ENOUGH or least < 0.5 * FAR * FAR):
             break
         begin(plan, start, now, safe, wanted, hold, search)
         if descend(plan, wanted, weight, search):
