@@ -38,7 +38,7 @@ SIGHT = 1e6
 STRANGE = 0.1
 """How far what a task leaves out may be from where it was before its way is looked at [L or rad]."""
 
-STARTS = 40
+STARTS = 80
 """Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
 
 STEPS = 30

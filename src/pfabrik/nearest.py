@@ -81,6 +81,10 @@ def nearest(
     )
 
 
+CLOSED = 0.3 * TOLERANCES.position
+"""Gap of a path that counts as closed [L or rad]: loops, which lead along two paths, may add their gaps up."""
+
+
 def is_feasible(closing: Closing) -> NDArray[np.bool_]:
     """Which rows are closed within every limit, (n,)."""
-    return np.asarray((closing.gap <= TOLERANCES.position) & (closing.excess <= TOLERANCES.limit))
+    return np.asarray((closing.gap <= CLOSED) & (closing.excess <= TOLERANCES.limit))

@@ -21,9 +21,9 @@ LONGEST_STEP = 0.3
 REACH = 1.0
 """Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
 
-CLOSED, NEARLY_CLOSED = 1e-13, 3e-10
+CLOSED, NEARLY_CLOSED = 1e-13, 1e-10
 """Gaps and excesses of a feasible configuration, and of one that nothing makes more so [rad or L]: loops that are
-overconstrained close no better than their description is exact. The second is a third of what is promised."""
+overconstrained close no better than their description is exact. The second is a tenth of what is promised."""
 
 FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
