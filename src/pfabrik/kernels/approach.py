@@ -12,11 +12,12 @@ import numpy as np
 
 from ._jit import kernel, routine
 from .aims import Aim, look_at_aim
-from .close import State, copy_state, load_row, new_state, store_row
 from .descent import (
     CLOSED,
+    DONE,
     EXCESS,
     GAP,
+    LARGEST,
     LIMITS,
     LONGEST_STEP,
     MOTIONS,
@@ -24,23 +25,21 @@ from .descent import (
     PROBE,
     RANK,
     RESTORING,
-    STEEPEST,
+    STEPS,
     VALUE,
     Slope,
+    begin_descent,
     is_closed,
-    is_last,
-    leads_down,
-    less_damping,
+    judge_step,
     longest,
-    more_damping,
-    note_multipliers,
-    propose,
+    plan_step,
     way_back,
 )
 from .loops import BALL, Closed, Floats, Layout, Loops
 from .quadratic import Programme, apply_inverse, factorise, new_programme, solve_programme
 from .spin import turn_ball
 from .views import Desk, View, add_cone, add_force, cone_excess, look, new_desk, new_view, walk_all
+from .walks import State, copy_state, load_row, new_state, store_row
 
 SHARING = 1e-10
 """Weight of the sum of their squares against the balance of multipliers: far below what a limit's gradient counts."""
@@ -163,36 +162,22 @@ def descend(
     p: Programme,
 ) -> int:
     """From a feasible configuration down to the nearest; how many steps it took."""
-    view, other, curve = first, second, desk.curve
-    for c in range(len(curve.multipliers)):
-        curve.multipliers[c] = 0.0
+    view, other, curve, pace = first, second, desk.curve, desk.pace
     scale_aim(loops, row, want, best, desk, view)
-    damping = longest(view.slope.g, view.slope.counts[MOTIONS]) / LONGEST_STEP
-    steps, done, before = 0, False, math.inf
-    while not done:
-        largest = feel_curvature(loops, row, want, best, trial, desk, view)
+    begin_descent(view.slope, curve, pace)
+    while pace.counts[DONE] == 0:
+        pace.scalars[LARGEST] = feel_curvature(loops, row, want, best, trial, desk, view)
         led_down = False
-        while not led_down and not done:
-            steps += 1
-            promise, damping = propose(view.slope, curve, damping, largest, p)
-            done = promise <= 0.0 or damping > STEEPEST * largest or steps > want.max_iterations
-            if done:
-                continue
-            note_multipliers(view.slope, p, curve)
-            copy_state(best, trial)
-            promise *= take(loops, view, p.x, trial, desk, False)
-            feasible = restore(loops, row, want, trial, desk, other, p)
-            led_down = feasible and leads_down(view.slope, other.slope, promise)
-            done = is_last(view.slope, promise, before)
-            before = promise
-            if led_down:
-                gain = view.slope.scalars[VALUE] - other.slope.scalars[VALUE]
-                copy_state(trial, best)
-                view, other = other, view
-                damping = less_damping(damping, gain, promise, largest)
-            else:
-                damping = more_damping(damping, largest)
-    return steps
+        while not led_down and pace.counts[DONE] == 0:
+            if plan_step(view.slope, curve, pace, want.max_iterations, p):
+                copy_state(best, trial)
+                share = take(loops, view, p.x, trial, desk, False)
+                feasible = restore(loops, row, want, trial, desk, other, p)
+                led_down = judge_step(view.slope, other.slope, feasible, share, pace)
+                if led_down:
+                    copy_state(trial, best)
+                    view, other = other, view
+    return int(pace.counts[STEPS])
 
 
 @routine

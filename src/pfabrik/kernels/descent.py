@@ -7,6 +7,7 @@ shortens steps where the model is poor, and vanishes where it is good (Nocedal a
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +46,10 @@ ENOUGH, GOOD = 1e-4, 0.5
 STEEPEST = 1e8
 """Damping, in units of curvature, that ends a search: no step however short leads down."""
 
+# Scalars and counts of a pace.
+DAMPING, LARGEST, PROMISE, BEFORE = 0, 1, 2, 3
+STEPS, DONE = 0, 1
+
 # Scalars of a slope: the objective, the largest gap of a loop, the largest excess. Counts: unknowns, limits, rank.
 VALUE, GAP, EXCESS = 0, 1, 2
 MOTIONS, LIMITS, RANK = 0, 1, 2
@@ -61,6 +66,13 @@ class Slope(NamedTuple):
     which: Ints  # (k,): its number
     scalars: Floats  # (3,)
     counts: Ints  # (3,)
+
+
+class Pace(NamedTuple):
+    """How a search goes on."""
+
+    scalars: Floats  # (4,): damping, the largest curvature, what the last step promised, and the one before
+    counts: Ints  # (2,): steps taken, and 1 where none is worth taking any more
 
 
 class Curve(NamedTuple):
@@ -88,6 +100,11 @@ def new_slope(n: int, k: int) -> Slope:
 @allocator
 def new_curve(n: int, k: int) -> Curve:
     return Curve(np.zeros((n, n)), np.zeros(k))
+
+
+@allocator
+def new_pace() -> Pace:
+    return Pace(np.zeros(4), np.zeros(2, np.int64))
 
 
 @routine
@@ -183,14 +200,40 @@ def note_multipliers(slope: Slope, p: Programme, curve: Curve) -> None:
 
 
 @routine
-def less_damping(damping: float, gain: float, promise: float, largest: float) -> float:
-    """Damping after a step that led down."""
-    if gain > GOOD * promise:
-        damping *= 0.1
-    return damping if damping > 1e-8 * largest else 0.0
+def begin_descent(slope: Slope, curve: Curve, pace: Pace) -> None:
+    """Start at a feasible configuration."""
+    for c in range(len(curve.multipliers)):
+        curve.multipliers[c] = 0.0
+    pace.scalars[DAMPING] = longest(slope.g, slope.counts[MOTIONS]) / LONGEST_STEP
+    pace.scalars[PROMISE] = math.inf
+    pace.counts[STEPS] = pace.counts[DONE] = 0
 
 
 @routine
-def more_damping(damping: float, largest: float) -> float:
-    """Damping after a step that did not."""
-    return max(4.0 * damping, 1e-3 * largest)
+def plan_step(slope: Slope, curve: Curve, pace: Pace, most_steps: int, p: Programme) -> bool:
+    """The next step to try, into `p.x`; False where none is worth trying."""
+    pace.counts[STEPS] += 1
+    pace.scalars[BEFORE] = pace.scalars[PROMISE]
+    promise, damping = propose(slope, curve, pace.scalars[DAMPING], pace.scalars[LARGEST], p)
+    pace.scalars[PROMISE], pace.scalars[DAMPING] = promise, damping
+    if promise <= 0.0 or damping > STEEPEST * pace.scalars[LARGEST] or pace.counts[STEPS] > most_steps:
+        pace.counts[DONE] = 1
+        return False
+    note_multipliers(slope, p, curve)
+    return True
+
+
+@routine
+def judge_step(slope: Slope, other: Slope, feasible: bool, share: float, pace: Pace) -> bool:
+    """Whether a share of the step planned led from one slope down to another; damping follows how well it did."""
+    promise = pace.scalars[PROMISE] = share * pace.scalars[PROMISE]
+    led_down = feasible and leads_down(slope, other, promise)
+    if is_last(slope, promise, pace.scalars[BEFORE]):
+        pace.counts[DONE] = 1
+    damping, largest = pace.scalars[DAMPING], pace.scalars[LARGEST]
+    if not led_down:
+        pace.scalars[DAMPING] = max(4.0 * damping, 1e-3 * largest)
+    elif slope.scalars[VALUE] - other.scalars[VALUE] > GOOD * promise:
+        damping *= 0.1
+        pace.scalars[DAMPING] = damping if damping > 1e-8 * largest else 0.0
+    return led_down

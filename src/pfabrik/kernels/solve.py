@@ -44,7 +44,8 @@ from .rows import (
 )
 from .search import place_ends, reach_pose
 from .settle import TRANSLATES, TURNS, settle
-from .struts import Descent, find_nearest, new_descent
+from .strut_views import Descent, new_descent
+from .struts import find_nearest
 from .vectors import copy_row, copy_table
 
 # Rounds of projection that bring a descent near enough to start: more lead it to the same pose.

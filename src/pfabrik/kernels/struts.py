@@ -1,76 +1,25 @@
-"""The nearest feasible pose of a platform on struts: a descent on its pose, and on arms that carry struts.
-
-Struts close by themselves, whatever the pose: lengths and cones are functions of it, with gradients that can be written
-down. So there are as many unknowns as freedoms, and a search takes microseconds. Lengths are in units of L.
-"""
+"""The nearest feasible pose of a platform on struts: descents on its pose, and on arms that carry struts."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-
-from ._jit import allocator, routine
-from .descent import (
-    CLOSED,
-    EXCESS,
-    GAP,
-    LIMITS,
-    LONGEST_STEP,
-    MOTIONS,
-    NEARLY_CLOSED,
-    PROBE,
-    REACH,
-    RESTORING,
-    STEEPEST,
-    VALUE,
-    Curve,
-    Slope,
-    is_closed,
-    is_last,
-    leads_down,
-    less_damping,
-    longest,
-    more_damping,
-    new_curve,
-    new_slope,
-    note_multipliers,
-    propose,
-    way_back,
-)
-from .frames import move_carriers, rotation_between, turn_pose_by_vector
-from .loops import Ints
-from .measure import cone_step
-from .plan import (
-    CARRIER_CONE,
-    HOLD_NOTHING,
-    HOLD_ORIENTATION,
-    HOLD_POSITION,
-    LENGTH,
-    ON_STRUTS,
-    TURN,
-    Configuration,
-    Floats,
-    Plan,
-    Settings,
-)
+from ._jit import routine
+from .descent import DONE, LARGEST, MOTIONS, begin_descent, judge_step, plan_step
+from .frames import turn_pose_by_vector
+from .plan import HOLD_ORIENTATION, HOLD_POSITION, LENGTH, Configuration, Floats, Plan, Settings
 from .project import copy_configuration
-from .quadratic import Programme, new_programme
-from .reach import point_rate
-from .restrict import cone_axis
-from .rows import new_configuration
-from .vectors import Vec, add, cross, dot, move, norm, scale, sub, vec
-
-MARGIN = 1e-10
-"""How far inside their limits answers are put [L or rad]: a tenth of the excess that counts as none."""
+from .strut_views import Descent, feel_curvature, move_all, number_motions, objective, restore, step_to, take, unit_of
+from .vectors import add, cross, norm, scale, sub, vec
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
-STARTS, ENOUGH = 5, 3
-"""Starts of a search where arms carry the struts, or nothing is found yet, and where struts stand on the base: a pose
-that one start misses is found by another."""
+STARTS, HITS = 12, 4
+"""Most starts of a search where arms carry the struts, and how often they find the best pose before it is believed."""
+
+TRIES = 5
+"""Most starts where struts stand on the base: as long as nothing is found, and for far targets."""
 
 FAR = 1.0
 """Distance from which a target may have another nearest pose than the first found, if no arms move [L]."""
@@ -78,328 +27,39 @@ FAR = 1.0
 TWIST = 0.5
 """How far the platform is turned for other starts [rad]: hexapods have further nearest poses that are twisted."""
 
+ASIDE, TURN_ASIDE = 0.4, 2.0 * math.pi / 3.0
+"""How far to the side of the nearest pose so far others are looked for [L], and by what angle from one side to the
+next [rad]."""
+
 SPREAD = (0.38196601, 0.61803399, 0.75487767, 0.56984029)
 """Irrational shares, by whose multiples starts are spread over the ranges of the arms' joints."""
 
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
 
-LEAST_SINE = 1e-9
-"""Sine of an angle below which the way to change it has no direction."""
-
-
-class Descent(NamedTuple):
-    """Room for one search."""
-
-    nearest: Configuration
-    best: Configuration
-    trial: Configuration
-    first: Slope
-    second: Slope
-    curve: Curve
-    p: Programme
-    columns: Ints  # (6 + trunk joints,): unknown of each motion, or -1 for one that is held
-    row: Floats  # (6 + trunk joints,): a gradient in all motions
-    here: Floats
-    there: Floats
-    unit: Floats  # (1,): what the objective is multiplied by, so that its gradient is of order one
-
-
-@allocator
-def new_descent(plan: Plan) -> Descent:
-    """Room for one search; next to none for a machine that does not stand on struts."""
-    n = 6 + plan.trunk_joints.shape[0]
-    k = 2 * plan.branches.shape[0] + plan.cones.shape[0] + 2 * plan.trunk_joints.shape[0]
-    if plan.scalars[ON_STRUTS] == 0.0:
-        n, k = 0, 0
-    return Descent(
-        new_configuration(plan),
-        new_configuration(plan),
-        new_configuration(plan),
-        new_slope(n, k),
-        new_slope(n, k),
-        new_curve(n, k),
-        new_programme(n, k),
-        np.zeros(n, np.int64),
-        np.zeros(n),
-        np.zeros(n),
-        np.zeros(n),
-        np.ones(1),
-    )
-
-
-@routine
-def unit_of(plan: Plan, j: int) -> float:
-    """What one step of a trunk joint's unknown is in its own unit [rad or length]."""
-    return 1.0 if plan.trunk_joints[j]["kind"] == TURN else float(plan.scalars[LENGTH])
-
-
-@routine
-def number_motions(plan: Plan, hold: int, search: Descent) -> int:
-    """Number the unknowns: what is not held of the platform's motions, then the trunk joints; how many."""
-    n = 0
-    for i in range(search.columns.shape[0]):
-        held = (i < 3 and hold == HOLD_POSITION) or (3 <= i < 6 and hold == HOLD_ORIENTATION)
-        search.columns[i] = -1 if held else n
-        n += 0 if held else 1
-    return n
-
-
-@routine
-def step_to(plan: Plan, now: Configuration, wanted: Floats) -> tuple[Vec, Vec]:
-    """How the platform differs from where it is wanted: position [L], rotation [rad]."""
-    L = plan.scalars[LENGTH]
-    off = (
-        (now.pose[0, 3] - wanted[0, 3]) / L,
-        (now.pose[1, 3] - wanted[1, 3]) / L,
-        (now.pose[2, 3] - wanted[2, 3]) / L,
-    )
-    return off, rotation_between(wanted, now.pose)
-
-
-@routine
-def objective(plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, out: Floats) -> float:
-    """Half the square of the distance, rotations squared counting `weight`; its gradient in all motions."""
-    unit = search.unit[0]
-    off, turned = step_to(plan, now, wanted)
-    for i in range(3):
-        out[i] = unit * off[i]
-        out[3 + i] = unit * weight * turned[i]
-    for i in range(6, out.shape[0]):
-        out[i] = 0.0
-    return 0.5 * unit * (dot(off, off) + weight * dot(turned, turned))
-
-
-@routine
-def add_line(
-    plan: Plan, b: int, now: Configuration, g: Vec, on_carrier: Vec, on_platform: Vec, factor: float, out: Floats
-) -> None:
-    """Add to `out` a gradient in the line from foot to head [1/L], and in rotations of what carries its two ends."""
-    branch, L = plan.branches[b], plan.scalars[LENGTH]
-    foot, head = vec(now.nodes[branch["first"]]), vec(now.nodes[branch["last"]])
-    arm = scale(1.0 / L, sub(head, (now.pose[0, 3], now.pose[1, 3], now.pose[2, 3])))
-    moment = add(cross(arm, g), on_platform)
-    for i in range(3):
-        out[i] += factor * g[i]
-        out[3 + i] += factor * moment[i]
-    if branch["carrier"] == 0:
-        return
-    span = plan.trunks[branch["carrier"] - 1]
-    for j in range(span["first"], span["last"]):
-        rate = dot(g, point_rate(plan, now, j, foot))
-        if plan.trunk_joints[j]["kind"] == TURN:
-            rate = rate / L - dot(on_carrier, vec(now.screws[j, 1]))
-        out[6 + j] -= factor * rate
-
-
-@routine
-def cone_excess(plan: Plan, b: int, c: int, now: Configuration) -> tuple[float, Vec, Vec, Vec]:
-    """Excess over a cone [rad], its gradient in the line from foot to head, and in turns of carrier and platform."""
-    branch, cone = plan.branches[b], plan.cones[c]
-    zero = (0.0, 0.0, 0.0)
-    axis = cone_axis(cone, now.carriers[branch["carrier"]], now.pose, zero, now.nodes)
-    d = scale(1.0 / plan.scalars[LENGTH], cone_step(cone, now.nodes))
-    size = norm(d)
-    u = scale(1.0 / size, d)
-    across, cosine = cross(axis, u), dot(axis, u)
-    sine = norm(across)
-    excess = math.atan2(sine, cosine) - cone["half_angle"] + MARGIN
-    if sine < LEAST_SINE:
-        return excess, zero, zero, zero
-    g = scale(-1.0 / (size * sine), sub(axis, scale(cosine, u)))
-    moment = scale(-1.0 / sine, across)  # the axis turned toward the line makes the angle less
-    if cone["kind"] == CARRIER_CONE:
-        return excess, g, moment, zero
-    return excess, scale(-1.0, g), zero, moment
-
-
-@routine
-def strut_excess(plan: Plan, b: int, now: Configuration, side: int) -> tuple[float, Vec]:
-    """Excess of a strut over its shortest (side 0) or longest length [L], and its gradient in the line."""
-    branch, L = plan.branches[b], plan.scalars[LENGTH]
-    node = plan.nodes[branch["last"]]
-    d = sub(vec(now.nodes[branch["last"]]), vec(now.nodes[branch["first"]]))
-    length = norm(d)
-    if side == 0:
-        return (node["lo"] - length) / L + MARGIN, scale(-1.0 / length, d)
-    return (length - node["hi"]) / L + MARGIN, scale(1.0 / length, d)
-
-
-@routine
-def trunk_excess(plan: Plan, j: int, now: Configuration, side: int) -> float:
-    """Excess of a trunk joint over its lower (side 0) or upper bound [L or rad]."""
-    joint = plan.trunk_joints[j]
-    over = joint["lo"] - now.trunks[j] if side == 0 else now.trunks[j] - joint["hi"]
-    return float(over / unit_of(plan, j) + MARGIN)
-
-
-@routine
-def enter_limit(search: Descent, slope: Slope, k: int, h: float, number: int) -> int:
-    """Note a limit whose gradient in all motions is in `row`; the next free place."""
-    slope.h[k], slope.which[k] = h, number
-    slope.scalars[EXCESS] = max(slope.scalars[EXCESS], h)
-    for i in range(search.row.shape[0]):
-        if search.columns[i] >= 0:
-            slope.G[k, search.columns[i]] = search.row[i]
-        search.row[i] = 0.0
-    return k + 1
-
-
-@routine
-def look(plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, slope: Slope) -> None:
-    """Objective and limits at a pose, to first order."""
-    n, B, C = search.row.shape[0], plan.branches.shape[0], plan.cones.shape[0]
-    zero = (0.0, 0.0, 0.0)
-    slope.scalars[VALUE] = objective(plan, now, wanted, weight, search, search.row)
-    slope.scalars[GAP], slope.scalars[EXCESS] = 0.0, -math.inf
-    for i in range(n):
-        if search.columns[i] >= 0:
-            slope.g[search.columns[i]] = search.row[i]
-        search.row[i] = 0.0
-    k = 0
-    for b in range(B):
-        for side in range(2):
-            h, g = strut_excess(plan, b, now, side)
-            if h > -REACH:
-                add_line(plan, b, now, g, zero, zero, 1.0, search.row)
-                k = enter_limit(search, slope, k, h, 2 * b + side)
-        for c in range(plan.branches[b]["cone_first"], plan.branches[b]["cone_last"]):
-            h, g, on_carrier, on_platform = cone_excess(plan, b, c, now)
-            if h > -REACH:
-                add_line(plan, b, now, g, on_carrier, on_platform, 1.0, search.row)
-                k = enter_limit(search, slope, k, h, 2 * B + c)
-    for j in range(plan.trunk_joints.shape[0]):
-        for side in range(2):
-            h = trunk_excess(plan, j, now, side)
-            if h > -REACH:
-                search.row[6 + j] = -1.0 if side == 0 else 1.0
-                k = enter_limit(search, slope, k, h, 2 * B + C + 2 * j + side)
-    slope.counts[LIMITS] = k
-
-
-@routine
-def pull(plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, out: Floats) -> None:
-    """Gradient of the Lagrangian in all motions, but for ranges of trunk joints, which have no curvature."""
-    multipliers, B = search.curve.multipliers, plan.branches.shape[0]
-    zero = (0.0, 0.0, 0.0)
-    objective(plan, now, wanted, weight, search, out)
-    for b in range(B):
-        for side in range(2):
-            if multipliers[2 * b + side] > 0.0:
-                _, g = strut_excess(plan, b, now, side)
-                add_line(plan, b, now, g, zero, zero, multipliers[2 * b + side], out)
-        for c in range(plan.branches[b]["cone_first"], plan.branches[b]["cone_last"]):
-            if multipliers[2 * B + c] > 0.0:
-                _, g, on_carrier, on_platform = cone_excess(plan, b, c, now)
-                add_line(plan, b, now, g, on_carrier, on_platform, multipliers[2 * B + c], out)
-
-
-@routine
-def feel_curvature(plan: Plan, wanted: Floats, weight: float, search: Descent, slope: Slope) -> float:
-    """Curvature of the objective and of the active limits, by differences of gradients; the largest on its diagonal."""
-    n, H, columns = search.row.shape[0], search.curve.H, search.columns
-    pull(plan, search.best, wanted, weight, search, search.here)
-    largest = 0.0
-    for i in range(n):
-        if columns[i] < 0:
-            continue
-        copy_configuration(plan, search.best, search.trial)
-        search.row[i] = PROBE
-        move_all(plan, search.row, 1.0, search.trial)
-        search.row[i] = 0.0
-        pull(plan, search.trial, wanted, weight, search, search.there)
-        for j in range(n):
-            if columns[j] >= 0:
-                H[columns[j], columns[i]] = (search.there[j] - search.here[j]) / PROBE
-        largest = max(largest, abs(H[columns[i], columns[i]]))
-    for a in range(slope.counts[MOTIONS]):
-        for b in range(a):
-            H[a, b] = H[b, a] = 0.5 * (H[a, b] + H[b, a])
-    return largest
-
-
-@routine
-def move_all(plan: Plan, step: Floats, share: float, now: Configuration) -> None:
-    """Take a share of a step of all motions; the struts follow."""
-    for i in range(3):
-        now.pose[i, 3] += share * step[i] * plan.scalars[LENGTH]
-    turn_pose_by_vector(now.pose, (share * step[3], share * step[4], share * step[5]))
-    for j in range(plan.trunk_joints.shape[0]):
-        now.trunks[j] += share * step[6 + j] * unit_of(plan, j)
-    if plan.trunk_joints.shape[0] > 0:
-        move_carriers(plan, now)
-    for b in range(plan.branches.shape[0]):
-        branch = plan.branches[b]
-        foot = move(now.carriers[branch["carrier"]], vec(plan.nodes[branch["first"]]["home"]))
-        head = move(now.pose, vec(branch["end"]))
-        for i in range(3):
-            now.nodes[branch["first"], i] = foot[i]
-            now.nodes[branch["last"], i] = head[i]
-
-
-@routine
-def take(plan: Plan, search: Descent, x: Floats, now: Configuration) -> float:
-    """Take a step of the unknowns; the share of it that is not too long."""
-    n = search.row.shape[0]
-    for i in range(n):
-        search.row[i] = x[search.columns[i]] if search.columns[i] >= 0 else 0.0
-    share = LONGEST_STEP / max(longest(search.row, n), LONGEST_STEP)
-    move_all(plan, search.row, share, now)
-    for i in range(n):
-        search.row[i] = 0.0
-    return share
-
-
-@routine
-def restore(plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, slope: Slope) -> bool:
-    """Bring a pose within all limits, by the shortest way; it is looked at where it ends."""
-    for _step in range(RESTORING):
-        look(plan, now, wanted, weight, search, slope)
-        if is_closed(slope, CLOSED):
-            return True
-        if not way_back(slope, search.p):
-            return False
-        take(plan, search, search.p.x, now)
-    look(plan, now, wanted, weight, search, slope)
-    return is_closed(slope, NEARLY_CLOSED)
-
 
 @routine
 def descend(plan: Plan, wanted: Floats, weight: float, search: Descent) -> bool:
     """From `best`, a pose that has what is held, down to the nearest; False where it finds no feasible one."""
-    view, other, curve, p = search.first, search.second, search.curve, search.p
-    for c in range(curve.multipliers.shape[0]):
-        curve.multipliers[c] = 0.0
+    view, other, curve, pace, p = search.first, search.second, search.curve, search.pace, search.p
     search.unit[0] = 1.0
     value = objective(plan, search.best, wanted, weight, search, search.here)
     search.unit[0] = 1.0 / max(math.sqrt(2.0 * value), 1e-12)
     if not restore(plan, search.best, wanted, weight, search, view):
         return False
-    damping = longest(view.g, view.counts[MOTIONS]) / LONGEST_STEP
-    steps, done, before = 0, False, math.inf
-    while not done:
-        largest = feel_curvature(plan, wanted, weight, search, view)
+    begin_descent(view, curve, pace)
+    while pace.counts[DONE] == 0:
+        pace.scalars[LARGEST] = feel_curvature(plan, wanted, weight, search, view)
         led_down = False
-        while not led_down and not done:
-            steps += 1
-            promise, damping = propose(view, curve, damping, largest, p)
-            done = promise <= 0.0 or damping > STEEPEST * largest or steps > MOST_STEPS
-            if done:
-                continue
-            note_multipliers(view, p, curve)
-            copy_configuration(plan, search.best, search.trial)
-            promise *= take(plan, search, p.x, search.trial)
-            feasible = restore(plan, search.trial, wanted, weight, search, other)
-            led_down = feasible and leads_down(view, other, promise)
-            done = is_last(view, promise, before)
-            before = promise
-            if led_down:
-                gain = view.scalars[VALUE] - other.scalars[VALUE]
-                copy_configuration(plan, search.trial, search.best)
-                view, other = other, view
-                damping = less_damping(damping, gain, promise, largest)
-            else:
-                damping = more_damping(damping, largest)
+        while not led_down and pace.counts[DONE] == 0:
+            if plan_step(view, curve, pace, MOST_STEPS, p):
+                copy_configuration(plan, search.best, search.trial)
+                share = take(plan, search, p.x, search.trial)
+                feasible = restore(plan, search.trial, wanted, weight, search, other)
+                led_down = judge_step(view, other, feasible, share, pace)
+                if led_down:
+                    copy_configuration(plan, search.trial, search.best)
+                    view, other = other, view
     return True
 
 
@@ -407,10 +67,17 @@ def descend(plan: Plan, wanted: Floats, weight: float, search: Descent) -> bool:
 def begin(
     plan: Plan, start: int, now: Configuration, safe: Configuration, wanted: Floats, hold: int, search: Descent
 ) -> None:
-    """Put a start into `best`: where a projection ended, or where all was feasible, turned there, with other arms."""
-    best = search.best
-    copy_configuration(plan, now if start == 0 else safe, best)
-    if start > 0 and hold == HOLD_NOTHING:
+    """Put a start into `best`: where a projection ended, or where all was feasible, or beside the nearest pose so far.
+
+    Starts after the first are turned, if the orientation is free, and have other arms.
+    """
+    best, arms = search.best, plan.trunk_joints.shape[0] > 0
+    if start >= 2 and not arms:
+        copy_configuration(plan, search.nearest, best)
+        step_aside(plan, best, wanted, TURN_ASIDE * (start - 2))
+    else:
+        copy_configuration(plan, now if start == 0 else safe, best)
+    if start > 0 and hold != HOLD_ORIENTATION:
         turn_about_struts(plan, best, TWIST if start % 2 == 1 else -TWIST)
     for i in range(3):
         if hold == HOLD_POSITION:
@@ -426,6 +93,20 @@ def begin(
     for i in range(search.row.shape[0]):
         search.row[i] = 0.0
     move_all(plan, search.row, 0.0, best)
+
+
+@routine
+def step_aside(plan: Plan, now: Configuration, wanted: Floats, angle: float) -> None:
+    """Move the platform across the direction of its target, to a side given by an angle."""
+    off, _ = step_to(plan, now, wanted)
+    across = cross(off, (1.0, 0.0, 0.0) if abs(off[0]) <= max(abs(off[1]), abs(off[2])) else (0.0, 1.0, 0.0))
+    other = cross(off, across)
+    if norm(other) == 0.0:
+        return
+    one = scale(ASIDE * plan.scalars[LENGTH] * math.cos(angle) / norm(across), across)
+    two = scale(ASIDE * plan.scalars[LENGTH] * math.sin(angle) / norm(other), other)
+    for i in range(3):
+        now.pose[i, 3] += one[i] + two[i]
 
 
 @routine
@@ -463,17 +144,21 @@ def find_nearest(
             for b in range(a):
                 slope.metric[a, b] = 0.0
             slope.metric[a, a] = 1.0
-    found, least = False, math.inf
-    for start in range(STARTS):
-        if found and plan.trunk_joints.shape[0] == 0 and (start >= ENOUGH or least < 0.5 * FAR * FAR):
+    arms = plan.trunk_joints.shape[0] > 0
+    copy_configuration(plan, safe, search.nearest)
+    hits, least = 0, math.inf
+    for start in range(STARTS if arms else TRIES):
+        if (hits >= HITS) if arms else (hits > 0 and least < 0.5 * FAR * FAR):
             break
         begin(plan, start, now, safe, wanted, hold, search)
         if descend(plan, wanted, weight, search):
             search.unit[0] = 1.0
             value = objective(plan, search.best, wanted, weight, search, search.here)
             if value < (1.0 - SAME) * least:
-                found, least = True, value
+                hits, least = 1, value
                 copy_configuration(plan, search.best, search.nearest)
-    if found:
+            elif value <= (1.0 + SAME) * least:
+                hits += 1
+    if hits > 0:
         copy_configuration(plan, search.nearest, now)
-    return found
+    return hits > 0

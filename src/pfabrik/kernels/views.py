@@ -9,9 +9,23 @@ import numpy as np
 
 from ._jit import allocator, routine
 from .aims import Aim, Pull, look_at_aim
-from .close import Equations, State, compare_end, end_path, new_equations, pose_cone, walk_path
-from .descent import EXCESS, GAP, LIMITS, MOTIONS, RANK, REACH, VALUE, Curve, Slope, new_curve, new_slope
+from .descent import (
+    EXCESS,
+    GAP,
+    LIMITS,
+    MOTIONS,
+    RANK,
+    REACH,
+    VALUE,
+    Curve,
+    Pace,
+    Slope,
+    new_curve,
+    new_pace,
+    new_slope,
+)
 from .loops import BALL, Floats, Ints, Layout, Loops
+from .walks import Equations, State, compare_end, end_path, new_equations, pose_cone, walk_path
 
 DEPENDENT = 1e-6
 """What is left of an equation that follows from the others: descriptions are typed with as many digits."""
@@ -33,6 +47,7 @@ class Desk(NamedTuple):
     eq: Equations
     aim: Pull
     curve: Curve
+    pace: Pace
     gaps: Floats  # (paths, 6): between the ends of each path and of the first
     A: Floats  # (rows, columns + 1 + rows)
     row: Floats  # (columns,)
@@ -62,6 +77,7 @@ def new_desk(loops: Loops, layout: Layout, rows: int) -> Desk:
         new_equations(loops, layout),
         Pull(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
         new_curve(n, 2 * n + len(loops.cone_angles)),
+        new_pace(),
         np.zeros((paths, 6)),
         np.zeros((rows, n + 1 + rows)),
         np.zeros(n),
