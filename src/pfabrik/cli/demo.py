@@ -68,7 +68,7 @@ def follow(case: Case, steps: int) -> Run:
     """Track one circle, and time it without the compilation of the kernels."""
     mechanism = case.mechanism
     targets = case.leaving.poses(steps)
-    pf.track(mechanism, targets[:2])
+    pf.track(mechanism, targets[:: max(1, steps // 12)])  # inside and outside, for each has kernels of its own
     with progress(f"{mechanism.name}: {steps} steps") as on_progress:
         start = time.perf_counter()
         solution = pf.track(mechanism, targets, on_progress=on_progress)
