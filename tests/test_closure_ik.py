@@ -353,6 +353,26 @@ def test_a_target_however_far_is_approached_like_one_that_is_far(distance: float
 
 
 @compiled
+@pytest.mark.parametrize("distance", [1e1, 1e2, 1e3, 1e4])
+def test_slides_without_ranges_reach_however_far(distance: float) -> None:
+    mechanism = Mechanism.from_legs(
+        "U-P*-U",
+        base=[(2, 0, 0)],
+        platform=[(1, 0, 2)],
+        copies={"count": 3, "axis": (0, 0, 1)},
+        reference_point=(0, 0, 2),
+        task=("x", "y", "z"),
+        A={"axes": [(0, 1, 0), (2, 0, 1)]},
+        C={"axes": [(2, 0, 1), (0, 1, 0)]},
+    )
+    directions = np.random.default_rng(0).normal(size=(20, 3))
+    directions[:, 2] = np.abs(directions[:, 2])
+    targets = mechanism.home_pose[:3, 3] + distance * directions
+    answers = pf.solve_ik(mechanism, targets)
+    assert (answers.status == Status.REACHED).all()
+    assert pf.closure_residual(mechanism, answers).max() <= 1e-9 * distance
+
+
 def test_universal_and_revolute_joints_may_turn_further_than_half_way() -> None:
     wide = {"range": ((-4, 4), (-0.1, 3.5))}
     joints = [

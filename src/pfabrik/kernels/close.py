@@ -21,7 +21,7 @@ from .equations import (
     out_of_frame,
     turn_equations,
 )
-from .loops import BALL, LOCKED, Closed, Floats, Layout, Loops, Wishes
+from .loops import BALL, LOCKED, SLIDE, Closed, Floats, Layout, Loops, Wishes
 from .spin import exponential, turn_ball
 from .walks import Equations, State, copy_state, load_row, new_equations, new_state, store_row
 
@@ -122,13 +122,19 @@ def solve(layout: Layout, damping: float, eq: Equations) -> None:
 
 @inlined
 def move(loops: Loops, layout: Layout, eq: Equations, state: State) -> float:
-    """Take the step, shortened where it turns too far; its largest part."""
+    """Take the step, shortened where it turns too far, or slides farther than the largest gap; its largest part."""
+    gap = 1.0
+    for group in range(len(layout.sizes)):
+        gap = max(gap, eq.gaps[group] / LONGEST_STEP)
     longest = 0.0
     for i in range(6):
-        longest = max(longest, abs(eq.twist[i]))
-    for group in range(len(layout.sizes)):
-        for s in range(layout.sizes[group]):
-            longest = max(longest, abs(eq.Y[group, s, 6]))
+        longest = max(longest, abs(eq.twist[i]) / (gap if i < 3 else 1.0))
+    for k in range(len(loops.kinds)):
+        j = loops.columns[k]
+        for i in range(3 if loops.kinds[k] == BALL else 1):
+            if layout.slots[j + i] >= 0:
+                part = abs(eq.Y[loops.group_of[j], layout.slots[j + i], 6])
+                longest = max(longest, part / (gap if loops.kinds[k] == SLIDE else 1.0))
     scale = min(1.0, LONGEST_STEP / longest) if longest > 0.0 else 1.0
     for k in range(len(loops.kinds)):
         j = loops.columns[k]
@@ -209,7 +215,7 @@ def close(loops: Loops, layout: Layout, wishes: Wishes, closed: Closed) -> None:
                     copy_state(best, trial)
             elif turn == RETURN:
                 turn = TRY
-            damping = LEAST_DAMPING if plunging else max(LEAST_DAMPING, DAMPING * factor * cost)
+            damping = LEAST_DAMPING if plunging else max(LEAST_DAMPING, DAMPING * factor * min(cost, 1.0))
             if turn == TRY and (iterations == wishes.max_iterations or not damping < MOST_DAMPING):
                 turn = MEASURE
             if turn == TRY:
