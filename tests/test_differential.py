@@ -6,7 +6,6 @@ import dataclasses
 import warnings
 from collections.abc import Callable
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from machines import MACHINES, planar, ring
-from pfabrik import Joint, Mechanism
+from pfabrik import Joint, Mechanism, Solution
 from pfabrik.differential import (
     KINDS,
     Mobility,
@@ -28,6 +27,7 @@ from pfabrik.differential import (
 )
 from pfabrik.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units
 from pfabrik.errors import InvalidArgument
+from pfabrik.rows import new_rows
 from pfabrik.tolerances import TOLERANCES
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -213,9 +213,9 @@ def closed(name: str) -> tuple[Mechanism, np.ndarray]:
     return machine, q
 
 
-def answer(machine: Mechanism, q: np.ndarray, shape: tuple[int, ...]) -> SimpleNamespace:
-    """What is read of a Solution."""
-    return SimpleNamespace(mechanism=machine, _coordinates=q, shape=shape)
+def answer(machine: Mechanism, q: np.ndarray, shape: tuple[int, ...]) -> Solution:
+    """Joint coordinates as an answer, with nothing measured of them."""
+    return Solution(machine, new_rows(machine, None, len(q)), shape, joints_from=lambda: q)
 
 
 def home(machine: Mechanism) -> np.ndarray:
@@ -372,7 +372,7 @@ class TestJacobians:
 
     def test_a_solution_of_another_machine_is_refused(self):
         machine, q = closed("stewart")
-        with pytest.raises(InvalidArgument, match=r"solution: found a solution of '6-UPS"):
+        with pytest.raises(InvalidArgument, match=r"solution: found an answer of another '6-UPS"):
             forward_jacobian(pf.load("five_bar"), answer(machine, q, (2,)))
 
 

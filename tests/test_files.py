@@ -373,12 +373,13 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
     centres = draw(st.lists(vectors, min_size=5, max_size=5, unique=True))
     half_angle = draw(st.one_of(st.just(math.pi), st.floats(3, math.pi)))
     axis, links = draw(directions), list(pairwise(bodies))
+    toward_next = tuple(np.copysign(axis, np.subtract(centres[4], centres[3])))
     joints = [
         Joint(labels[0], "revolute", links[0], centres[0], axis=axis, actuated=True, home=turn, range=around),
         Joint(labels[1], "cylindrical", links[1], centres[1], axis=axis, home=(turn, shift), range=(around, across)),
         Joint(labels[2], "universal", links[2], centres[2], axes=(np.eye(3)[np.abs(axis).argmin()], axis),
               home=(turn, turn), range=(around, around)),
-        Joint(labels[3], "spherical", links[3], centres[3], cone=Cone(axis, half_angle, bodies[3])),
+        Joint(labels[3], "spherical", links[3], centres[3], cone=Cone(toward_next, half_angle, bodies[3])),
         Joint(labels[4], "fixed", links[4], centres[4]),
         Joint(labels[5], "prismatic", (bodies[0], bodies[5]), axis=axis, home=shift, range=across, actuated=True),
     ]  # fmt: skip

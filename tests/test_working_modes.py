@@ -17,6 +17,7 @@ import fk_oracles
 import joint_checking
 import machines
 import pfabrik as pf
+from pfabrik import Status, geometric
 from pfabrik.errors import ContinuumOfSolutions, InvalidArgument, PfabrikError
 
 Z = (0.0, 0.0, 1.0)
@@ -386,11 +387,20 @@ def test_modes_merge_and_vanish_where_an_arm_is_stretched() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("position", [(0, 0, 9000), (0, 1e12, 1e12), (0, 1e200, -1e200)])
-@pytest.mark.parametrize("name", ["stewart", "five_bar", "rps", "serial_arm"])
-def test_what_is_out_of_reach_has_no_modes(name: str, position: tuple) -> None:
+@pytest.mark.parametrize("name", ["five_bar", "serial_arm"])
+def test_what_no_arm_is_long_enough_for_has_no_modes(name: str, position: tuple) -> None:
     modes = pf.working_modes(pf.load(name), position)
     assert (len(modes), modes.total, list(modes), modes.hits) == (0, 0, [], ())
     assert 0.0 < modes.unseen < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("away", [9e3, 1e5, 1e7])
+@pytest.mark.parametrize("name", ["stewart", "rps"])
+def test_a_strut_has_a_mode_however_far_and_exceeds_its_stroke(name: str, away: float) -> None:
+    modes = pf.working_modes(pf.load(name), (0, 0, away))
+    assert len(modes) == len(geometric.working_modes(pf.load(name), (0, 0, away)).actuators) > 0
+    assert all(mode.status == Status.EXCEEDED for mode in modes)
 
 
 # --- what the list says ----------------------------------------------------------------------------------------------

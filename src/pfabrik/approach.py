@@ -16,8 +16,12 @@ from .tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from .kernels.aims import Aim
+    from .mechanism import Mechanism
 
 Floats = NDArray[np.float64]
+
+SIGHT = 1e6
+"""How far off targets are looked for [L]: farther ones in the same direction have the same nearest pose."""
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
@@ -52,7 +56,15 @@ def weighed_limits(
     First the low and high bounds of the coordinates in turn, then the cones: by how much of L the target comes nearer,
     per unit [L or rad] by which a limit gives way; 0 for limits that do not matter.
     """
-    return _run(closure, coordinates, _aim(closure, targets, platform, framed, 0))[1]
+    return _run(closure, coordinates, _aim(closure, within_sight(closure.mechanism, targets), platform, framed, 0))[1]
+
+
+def within_sight(mechanism: Mechanism, targets: Floats) -> Floats:
+    """Targets (n, 4, 4), those so far from home that no search could tell them from others there brought nearer."""
+    home, far = mechanism.home_pose[:3, 3], SIGHT * mechanism.characteristic_length
+    near, offset = targets.copy(), targets[:, :3, 3] - home
+    near[:, :3, 3] = home + offset * np.minimum(1.0, far / np.maximum(np.abs(offset).max(axis=1), far))[:, None]
+    return near
 
 
 def _run(closure: Closure, coordinates: Floats, aim: Aim) -> tuple[Closed, Floats]:

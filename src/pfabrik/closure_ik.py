@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from .approach import within_sight
 from .assemblies import differences, follows_task, has_parasitic_motion
 from .closure import HELD, Closing, Closure, close, closure_of
 from .completion import actuators_of
@@ -20,7 +21,7 @@ from .paths import end_body
 from .poses import are_poses, between, made_exact
 from .projection import project, ways_of
 from .starts import random_coordinates
-from .task import Weights, norms, task_of
+from .task import Weights, task_of
 from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]
@@ -31,9 +32,6 @@ STRIDES = 8
 
 STRIDE = 0.25
 """How far one step goes where the working mode is to be kept: a longer one may leap over a singularity [L or rad]."""
-
-SIGHT = 1e6
-"""How far off targets are looked for [L]: farther ones in the same direction have the same nearest pose."""
 
 STRANGE = 0.1
 """How far what a task leaves out may be from where it was before its way is looked at [L or rad]."""
@@ -115,7 +113,7 @@ def _answer(
     if len(away):
         stays = keep_mode or follows_task(mechanism)
         starts = [start[away]] if stays else [start[away], found.coordinates[away]]
-        sought = _within_sight(closure, wanted[away], begin[away])
+        sought = within_sight(mechanism, wanted[away])
         answers = project(
             closure, sought, starts, ways_of(mechanism, options.hold, options.rotation_length), corners=not keep_mode
         )
@@ -241,15 +239,6 @@ def _take_better(found: Closing, rest: NDArray[np.intp], tried: Closing) -> None
     better = np.flatnonzero(is_feasible(tried) | (_off(tried).max(axis=1) < _off(found)[rest].max(axis=1)))
     for array, own in zip(found, tried, strict=True):
         array[rest[better]] = own[better]
-
-
-def _within_sight(closure: Closure, targets: Floats, begin: Floats) -> Floats:
-    """Targets no further from where the platform is than a search can tell from others in the same direction."""
-    offset = (targets - begin)[:, :3, 3]
-    far = SIGHT * closure.mechanism.characteristic_length
-    near = targets.copy()
-    near[:, :3, 3] = begin[:, :3, 3] + offset * np.minimum(1.0, far / np.maximum(norms(offset), far))[:, None]
-    return near
 
 
 def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:

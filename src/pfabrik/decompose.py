@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 from .forms import BranchForm, NotExpressible, TrunkForm
 from .graph import TIP, Edge, Stage, components, graph_of, is_tree, leads, stages
 from .joint_types import KINDS
-from .mechanism import Joint, Mechanism
+from .mechanism import Joint, Mechanism, checked_mechanism
 from .parallelograms import Parallelogram, parallelogram_of
 from .positions import express_branch, express_trunk
 
@@ -168,7 +168,7 @@ def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
 
     Source: the paper's TDS; DESIGN of restrictions on positions in `pfabrik.positions`.
     """
-    graph = graph_of(mechanism)
+    graph = graph_of(checked_mechanism(mechanism))
     groups = components(graph.edges, graph.base, graph.end)
     on_base = (group for group in groups if any(graph.base in edge.bodies for edge in group))
     return tuple(_sub_chain(mechanism, group, graph.base, graph.end) for group in on_base)

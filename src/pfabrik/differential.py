@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .displacements import columns, end_effector_pose, gaps, loop_errors, rate_units, screws, stepped
-from .errors import InvalidArgument
 from .freedom import (
     body_twist,
     column_joints,
@@ -30,8 +29,8 @@ from .freedom import (
     orthonormal_rates,
     spanning_tree,
 )
-from .mechanism import Mechanism
-from .solution import Solution
+from .mechanism import Mechanism, checked_mechanism
+from .solution import Solution, checked_solution
 from .tolerances import TOLERANCES
 
 __all__ = ["Mobility", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]
@@ -112,7 +111,7 @@ def mobility(mechanism: Mechanism) -> Mobility:
 
     Overconstrained mechanisms count right: the loops are closed exactly before conditions are compared.
     """
-    return _generic(mechanism).mobility
+    return _generic(checked_mechanism(mechanism)).mobility
 
 
 def forward_jacobian(mechanism: Mechanism, solution: Solution) -> Floats:
@@ -157,11 +156,8 @@ def singularity(mechanism: Mechanism, solution: Solution) -> Singularity:
 
 
 def _coordinates(mechanism: Mechanism, solution: Solution) -> Floats:
-    """The solution's joint coordinates as deviations from home, (n, c), if they can be this mechanism's."""
-    q: Floats = solution._coordinates
-    if q.shape[-1] != len(column_joints(mechanism)):
-        raise InvalidArgument("solution", f"a solution of '{solution.mechanism.name}'", f"one of '{mechanism.name}'")
-    return q
+    """The solution's joint coordinates as deviations from home, (n, c), if it is one of this mechanism."""
+    return checked_solution(solution, mechanism)._coordinates
 
 
 def _shaped(solution: Solution, rows: Floats) -> Any:

@@ -4,8 +4,22 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
+from copyreg import __newobj__  # type: ignore[attr-defined]  # what pickles call to make an object without its __init__
 from dataclasses import dataclass
 from typing import Any
+
+__all__ = [
+    "ContinuumOfSolutions",
+    "ContinuumOfWorkingModes",
+    "Fault",
+    "InvalidArgument",
+    "InvalidMechanism",
+    "MobilityWarning",
+    "NoClosedForm",
+    "PfabrikError",
+    "UnknownName",
+    "UnsupportedMechanism",
+]
 
 
 def near_miss(name: str, known: Iterable[str]) -> str:
@@ -17,9 +31,16 @@ def near_miss(name: str, known: Iterable[str]) -> str:
 class PfabrikError(Exception):
     """Root of every error this library raises on purpose."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For copies and other processes: the text and the attributes as they are, not put together again."""
+        return __newobj__, (type(self), *self.args), self.__dict__
+
 
 class MobilityWarning(UserWarning):
-    """The actuators of a mechanism do not hold its end effector: locked, they leave it freedoms at home."""
+    """A sound description that may not be what is meant, by how the mechanism can move at home.
+
+    Its actuators, locked, leave the end effector freedoms; or its loops hold the end effector, or all but lock.
+    """
 
 
 @dataclass(frozen=True)
@@ -80,12 +101,9 @@ class NoClosedForm(PfabrikError, ValueError):
             f"expected only {', or only '.join(self.topologies)}"
         )
 
-    def __reduce__(self) -> tuple[type, tuple[str, tuple[str, ...], str, tuple[str, ...]]]:
-        return type(self), (self.mechanism, self.sub_chains, self.reason, self.topologies)
-
 
 class ContinuumOfSolutions(PfabrikError, ValueError):
-    """With its actuators locked the end effector still moves: there are no single solutions to list.
+    """The mechanism still moves with what was given: there are no single solutions to list.
 
     Attributes
     ----------
@@ -93,16 +111,19 @@ class ContinuumOfSolutions(PfabrikError, ValueError):
     freedoms : how many independent motions are left.
     """
 
-    def __init__(self, mechanism: str, freedoms: int) -> None:
+    def __init__(
+        self,
+        mechanism: str,
+        freedoms: int,
+        given: str = "its actuators locked at these values",
+        moving: str = "the end effector",
+    ) -> None:
         self.mechanism = mechanism
         self.freedoms = freedoms
         super().__init__(
-            f"'{mechanism}' still moves with its actuators locked at these values ({freedoms} freedom"
-            f"{'s' if freedoms > 1 else ''} of the end effector): a continuum of solutions, none of which stands alone"
+            f"'{mechanism}' still moves with {given} ({freedoms} freedom{'s' if freedoms > 1 else ''} of {moving}): "
+            "a continuum of solutions, none of which stands alone"
         )
-
-    def __reduce__(self) -> tuple[type, tuple[str, int]]:
-        return type(self), (self.mechanism, self.freedoms)
 
 
 class ContinuumOfWorkingModes(ContinuumOfSolutions):
@@ -116,18 +137,9 @@ class ContinuumOfWorkingModes(ContinuumOfSolutions):
     """
 
     def __init__(self, mechanism: str, freedoms: int, moving: Iterable[str]) -> None:
-        self.mechanism = mechanism
-        self.freedoms = freedoms
         self.moving = tuple(moving)
-        PfabrikError.__init__(
-            self,
-            f"'{mechanism}' still moves with its end effector on the target ({freedoms} freedom"
-            f"{'s' if freedoms > 1 else ''} of the actuators {', '.join(self.moving)}): a continuum of solutions, none "
-            "of which stands alone",
-        )
-
-    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
-        return type(self), (self.mechanism, self.freedoms, self.moving)
+        names = f"the actuators {', '.join(self.moving)}"
+        super().__init__(mechanism, freedoms, "its end effector on the target", names)
 
 
 class InvalidArgument(PfabrikError, ValueError):

@@ -8,6 +8,7 @@ import shutil
 import tomllib
 import warnings
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,7 +21,7 @@ from .form_faults import direction_faults, joint_faults, shown
 from .leg_joints import LegJoint, at_legs, count_joints, placed_joints
 from .leg_tables import read_leg
 from .legs import Leg
-from .mechanism import Cone, Joint, Mechanism
+from .mechanism import Cone, Joint, Mechanism, checked_mechanism
 from .schema import MOST_JOINTS, HeadTable, JointTable, read_table
 from .units import in_radians
 from .writing import dumps
@@ -83,6 +84,7 @@ def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
 
     The file is replaced as a whole or not at all. Copies and shorthands of a file it came from are not kept.
     """
+    checked_mechanism(mechanism)
     target = Path(path).resolve()
     draft = target.with_name(f".{secrets.token_hex(8)}.tmp")
     try:
@@ -90,8 +92,13 @@ def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
         if target.exists():
             shutil.copymode(target, draft)
         os.replace(draft, target)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from error  # the name that the caller knows
     finally:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):
+            draft.unlink()
 
 
 def _text(path: Path) -> str:

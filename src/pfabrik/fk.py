@@ -18,7 +18,7 @@ from .flatten import flat_of
 from .ik import checked, seed_rows
 from .kernels import plan as P
 from .locked import reached_with_locked_legs
-from .mechanism import Mechanism
+from .mechanism import Mechanism, checked_mechanism
 from .nearest import is_feasible, nearest
 from .options import Options
 from .poses import as_floats
@@ -97,7 +97,7 @@ def answered(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solut
 
 def as_values(mechanism: Mechanism, actuators: Any) -> tuple[Floats, tuple[int, ...]]:
     """Actuated values (n, n_a), and the batch shape they came in."""
-    n = len(mechanism.actuators)
+    n = len(checked_mechanism(mechanism).actuators)
     expected = f"shape (..., {n}): {', '.join(mechanism.actuators)}"
     array = as_floats("actuators", actuators, expected)
     if array.shape[-1:] != (n,):

@@ -14,7 +14,7 @@ from .completion import coordinates_of
 from .errors import InvalidArgument
 from .flatten import Flat, flat_of
 from .kernels import plan as P
-from .mechanism import Mechanism
+from .mechanism import Mechanism, checked_mechanism
 from .options import Options
 from .poses import as_targets, what_is_wrong
 from .reaching import draw_near, leaves_projections, settings_of, solve_rows
@@ -88,8 +88,7 @@ def joints_near(mechanism: Mechanism, rows: P.Rows, seed: P.Rows | None, chained
 
 def checked(mechanism: Mechanism, options: Options | None) -> Options:
     """The options to use; InvalidArgument where a mechanism or options are something else."""
-    if not isinstance(mechanism, Mechanism):
-        raise InvalidArgument("mechanism", type(mechanism).__name__, "a Mechanism, as `load` returns")
+    checked_mechanism(mechanism)
     if not isinstance(options, Options | None):
         raise InvalidArgument("options", type(options).__name__, "Options, or None")
     return options or DEFAULT

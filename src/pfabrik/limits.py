@@ -26,6 +26,8 @@ class ActiveLimit:
     ----------
     joint, bound : which limit of which joint.
     value, limit : the coordinate (or the angle at the cone) and its bound [length or rad].
+    coordinate : which coordinate of the joint, as in `home_coordinate`: 0, or 1 for the second of a universal or
+        cylindrical joint.
     multiplier : by how much the answer to a target comes nearer to it, at most, per unit by which the limit gives way
         [length per length or rad]; rotations count as lengths by `Options.rotation_length`. By just so much where the
         limits that hold are independent; those that act as one (two rods side by side) share what they hold, and
@@ -37,19 +39,24 @@ class ActiveLimit:
     value: float
     limit: float
     multiplier: float | None = None
+    coordinate: int = 0
+
+
+ALIKE = 0.999
+"""Share of a multiplier above which another counts as the same: they are known to about one in ten thousand."""
 
 
 def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[ActiveLimit, ...]]:
     """The limits that each row of joint coordinates (n, columns), deviations from home, lies on; ranges first."""
     found: list[list[ActiveLimit]] = [[] for _ in coordinates]
     for joint in mechanism.joints:
-        for values, bounds, scale in ranged(mechanism, joint, coordinates):
+        for place, (values, bounds, scale) in enumerate(ranged(mechanism, joint, coordinates)):
             near = TOLERANCES.active * scale
             low, high = values - bounds[0] <= near, bounds[1] - values <= near
             for row in np.flatnonzero(low):
-                found[row].append(ActiveLimit(joint.name, "min", float(values[row]), bounds[0]))
+                found[row].append(ActiveLimit(joint.name, "min", float(values[row]), bounds[0], None, place))
             for row in np.flatnonzero(high & ~low):
-                found[row].append(ActiveLimit(joint.name, "max", float(values[row]), bounds[1]))
+                found[row].append(ActiveLimit(joint.name, "max", float(values[row]), bounds[1], None, place))
     for joint, angles, half_angle in coned(mechanism, coordinates):
         for row in np.flatnonzero(half_angle - angles <= TOLERANCES.active):
             found[row].append(ActiveLimit(joint.name, "cone", float(angles[row]), half_angle))
@@ -59,6 +66,8 @@ def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[Activ
 def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Floats) -> list[tuple[ActiveLimit, ...]]:
     """The limits that hold each row of joint coordinates (n, columns) back, the hardest first.
 
+    Those that hold alike, as symmetry makes them, come as the description lists them.
+
     Parameters
     ----------
     multipliers : (n, 2 columns + cones), as of `weighed_limits`.
@@ -66,31 +75,43 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
     found: list[list[ActiveLimit]] = [[] for _ in coordinates]
     bounded, n = _bounds(mechanism), coordinates.shape[1]
     angles = list(coned(mechanism, coordinates))
-    hardest_first = np.argsort(-multipliers, axis=1, kind="stable")
-    for row, place in ((row, int(place)) for row, places in enumerate(hardest_first) for place in places):
-        if multipliers[row, place] <= TOLERANCES.holding:
-            continue
+    for row, place in ((row, place) for row, own in enumerate(multipliers) for place in _hardest_first(own)):
+        which = 0
         if place < 2 * n:
-            name, home, bounds, unit = bounded[place // 2]
+            name, which, home, bounds, unit = bounded[place // 2]
             value, limit = float(coordinates[row, place // 2]) + home, bounds[place % 2]
             bound: Literal["min", "max", "cone"] = "max" if place % 2 else "min"
         else:
             joint, values, limit = angles[place - 2 * n]
             name, value, bound, unit = joint.name, float(values[row]), "cone", mechanism.characteristic_length
-        found[row].append(ActiveLimit(name, bound, value, limit, float(multipliers[row, place]) * unit))
+        found[row].append(ActiveLimit(name, bound, value, limit, float(multipliers[row, place]) * unit, which))
     return [tuple(each) for each in found]
 
 
-def _bounds(mechanism: Mechanism) -> list[tuple[str, float, tuple[float, float], float]]:
-    """Of every coordinate: its joint, its value at home, its bounds, and L if it is an angle, else 1."""
+def _hardest_first(multipliers: Floats) -> list[int]:
+    """Places of the multipliers (k,) that hold, in falling order, but for those that are alike."""
+    alike: list[list[int]] = []
+    for place in np.argsort(-multipliers, kind="stable").tolist():
+        if multipliers[place] <= TOLERANCES.holding:
+            break
+        if alike and multipliers[place] > ALIKE * multipliers[alike[-1][0]]:
+            alike[-1].append(place)
+        else:
+            alike.append([place])
+    return [place for group in alike for place in sorted(group)]
+
+
+def _bounds(mechanism: Mechanism) -> list[tuple[str, int, float, tuple[float, float], float]]:
+    """Of every coordinate: its joint, its place there, its value at home, its bounds; and L for an angle, else 1."""
     found = []
     for joint in mechanism.joints:
         kinds = KINDS[joint.type].coordinates
         least = 0.0 if joint.along is not None else -np.inf  # a distance is not negative
         bounds = [(least, np.inf)] * len(kinds) if joint.range is None else np.reshape(joint.range, (-1, 2)).tolist()
-        for kind, home, (low, high) in zip(kinds, np.ravel(mechanism.home_coordinate(joint.name)), bounds, strict=True):
+        homes = np.ravel(mechanism.home_coordinate(joint.name)).tolist()
+        for place, (kind, home, (low, high)) in enumerate(zip(kinds, homes, bounds, strict=True)):
             unit = 1.0 if kind == "length" else mechanism.characteristic_length
-            found.append((joint.name, float(home), (max(low, least), high), unit))
+            found.append((joint.name, place, home, (max(low, least), high), unit))
     return found
 
 

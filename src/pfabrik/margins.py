@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InvalidArgument
 from .limits import coned, ranged
 from .mechanism import Mechanism
-from .solution import Solution
+from .solution import Solution, checked_solution
 from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]
@@ -28,10 +27,9 @@ def margins(mechanism: Mechanism, solution: Solution) -> Mapping[tuple[str, str]
 
     Raises
     ------
-    InvalidArgument : an answer of another mechanism.
+    InvalidArgument : what is no mechanism, or no answer of it; its limits may be others.
     """
-    if not isinstance(solution, Solution) or solution.mechanism != mechanism:
-        raise InvalidArgument("solution", repr(solution), f"an answer of '{mechanism.name}'")
+    checked_solution(solution, mechanism)
     found: dict[tuple[str, str], Floats] = {}
     for joint in mechanism.joints:
         for values, (low, high), unit in ranged(mechanism, joint, solution._coordinates):

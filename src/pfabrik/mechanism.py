@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .coercion import items, numbers, text, texts, unit_vector
 from .enclosing import enclosing_radius
-from .errors import InvalidMechanism, MobilityWarning, UnknownName
+from .errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
 from .faults import find_faults, in_order, merged
 from .form_faults import joint_faults
 from .freedom import end_effector_freedom, inexactness
@@ -24,7 +24,7 @@ from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import at_legs, legs_name, placed_joints
 from .legs import Leg, as_legs
 
-__all__ = ["JOINT_TYPES", "Cone", "Joint", "JointType", "Limit", "Mechanism", "Range", "Vector"]
+__all__ = ["JOINT_TYPES", "Cone", "Joint", "JointType", "Limit", "Mechanism", "Range", "Vector", "checked_mechanism"]
 
 MOST_JOINTS_FOR_FREEDOM = 200
 """Most joints for which construction counts freedoms: the cost grows with the cube, and reaches a second here."""
@@ -290,6 +290,13 @@ class Mechanism:
         set_fields(copy, **(self.__getstate__() | {"joints": tuple(joints)}))
         copy._check()
         return copy
+
+
+def checked_mechanism(mechanism: Any) -> Mechanism:
+    """What was passed as a mechanism; InvalidArgument where it is none."""
+    if not isinstance(mechanism, Mechanism):
+        raise InvalidArgument("mechanism", type(mechanism).__name__, "a Mechanism, as `load` returns")
+    return mechanism
 
 
 _TEXT_FIELDS = ("name", "end_effector", "base", "length_unit", "angle_unit")

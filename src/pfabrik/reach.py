@@ -12,7 +12,7 @@ from .errors import InvalidArgument
 from .flatten import flat_of
 from .ik import solve_ik
 from .kernels import plan as P
-from .mechanism import Mechanism
+from .mechanism import Mechanism, checked_mechanism
 from .options import Options
 from .poses import as_floats, as_targets
 from .reaching import settings_of, solve_rows
@@ -43,7 +43,7 @@ def reach(
     Parameters
     ----------
     origin : pose (4, 4) or position (3,) to start from, in the base frame [length]; must be reachable.
-    directions : (..., 3), of any length but zero, in the base frame.
+    directions : (..., 3), of any length but zero, in the base frame, along axes that the task has.
     seed : an answer that tells the working mode; default home.
 
     Returns
@@ -53,16 +53,16 @@ def reach(
 
     Raises
     ------
-    InvalidArgument : an origin that is no pose or is not reached, directions that are none, or a mechanism whose task
-        has no position.
+    InvalidArgument : an origin that is no pose or is not reached, directions that are none or that leave the task, or a
+        mechanism whose task has no position.
     """
-    length = mechanism.characteristic_length
-    rays, shape = _as_directions(directions)
+    if not any(task_of(checked_mechanism(mechanism)).axes):
+        raise InvalidArgument("mechanism", f"task {' '.join(mechanism.task)}", "one whose task has a position")
+    rays, shape = _as_directions(mechanism, directions)
     poses, single = as_targets(origin)
     if single != ():
         raise InvalidArgument("origin", f"batch shape {single}", "one pose")
-    if not any(task_of(mechanism).axes):
-        raise InvalidArgument("mechanism", f"task {' '.join(mechanism.task)}", "one whose task has a position")
+    length = mechanism.characteristic_length
     start = solve_ik(mechanism, poses[0], seed=seed, options=options)
     if not start:
         raise InvalidArgument("origin", f"a pose that is {start.status.name}", "a pose that can be reached")
@@ -88,18 +88,25 @@ def reach(
     return near.reshape(shape) if shape else near.item()
 
 
-def _as_directions(directions: Any) -> tuple[Floats, tuple[int, ...]]:
+def _as_directions(mechanism: Mechanism, directions: Any) -> tuple[Floats, tuple[int, ...]]:
     """Unit vectors (n, 3), and the batch shape they came in."""
     expected = "finite directions of shape (..., 3) that are not zero"
     array = as_floats("directions", directions, expected)
     if array.ndim == 0 or array.shape[-1] != 3:
         raise InvalidArgument("directions", f"shape {array.shape}", expected)
     rays = array.reshape(-1, 3)
-    sizes = np.linalg.norm(rays, axis=1)
+    sizes = np.abs(rays).max(axis=1, initial=0.0)  # however long, no square of them is too large to be represented
     bad = np.flatnonzero(~(np.isfinite(sizes) & (sizes > 0.0)))
     if len(bad):
         raise InvalidArgument("directions", f"{rays[bad[0]].tolist()}", expected, rows=bad[:5].tolist())
-    return rays / sizes[:, None], array.shape[:-1]
+    rays = rays / sizes[:, None]
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    free = [place for place, counts in enumerate(task_of(mechanism).axes) if not counts]
+    bad = np.flatnonzero(np.abs(rays[:, free]).max(axis=1, initial=0.0) > TOLERANCES.alignment)
+    if len(bad):
+        expected = f"directions within the task, {' '.join(mechanism.task)}: what it leaves out follows by itself"
+        raise InvalidArgument("directions", f"{rays[bad[0]].tolist()}", expected, rows=bad[:5].tolist())
+    return rays, array.shape[:-1]
 
 
 class _Rays:

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from .approach import within_sight
 from .closure import closure_of
 from .completion import coordinates_of
 from .flatten import Flat
@@ -86,14 +87,15 @@ def draw_near(
     begin = start()
     starts = [coordinates_of(mechanism, projected), begin[away] if len(begin) > 1 else begin.repeat(len(away), axis=0)]
     ways = ways_of(mechanism, options.hold, options.rotation_length)
-    found = project(closure_of(mechanism), wanted, starts, ways, corners=settings.any_mode == 1)
+    sought = within_sight(mechanism, wanted)
+    found = project(closure_of(mechanism), sought, starts, ways, corners=settings.any_mode == 1)
     reached = P.Rows._make(array.copy() for array in projected)
     seeds = P.Seeds(projected.poses, projected.nodes, projected.trunks)
     solve_rows(flat, found.closing.poses, seeds, settings._replace(chained=0), reached)
     near = np.isfinite(found.distances) & (reached.status == P.REACHED)
     for way in ways:  # what fell back to a way tried later is farther, however near
         ours, theirs = projected.counters[:, 2] == way.hold, found.holds == way.hold
-        distances = way.distances(closure_of(mechanism), projected.poses, wanted)
+        distances = way.distances(closure_of(mechanism), projected.poses, sought)
         near &= ~(ours & theirs & (found.distances > (1.0 - SAME) * distances))
         near &= ~(ours & ~theirs & (way is ways[0]))
     task = task_of(mechanism)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .joint_types import KINDS
 from .tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
     from .solution import Solution
 
 Floats = NDArray[np.float64]
-
-ALIKE = 0.999
-"""Share of a multiplier above which another counts as the same: they are known to about one in ten thousand."""
 
 STRETCHED = 1e-3
 """Measure of singularity [L and rad] below which links count as stretched out or folded: it goes with the square root
@@ -199,27 +197,10 @@ def loop_gap(solution: Solution) -> str:
 def reasons(solution: Solution) -> list[str]:
     """What holds a projected answer back, the hardest first, one phrase for those of a kind and value."""
     names: dict[tuple[str, str], list[str]] = {}
-    for limit in hardest_first(solution.active_limits, solution.mechanism):
-        names.setdefault(in_words(limit, solution.mechanism), []).append(limit.joint)
+    for limit in solution.active_limits:
+        is_plain = solution.mechanism.joint(limit.joint).type != "universal"  # length or angle: the bound's unit tells
+        names.setdefault(in_words(limit, solution.mechanism), []).append(limit.joint if is_plain else name_of(limit))
     return [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
-
-
-def hardest_first(limits: Sequence[ActiveLimit], mechanism: Mechanism) -> list[ActiveLimit]:
-    """Limits in their order; those that hold alike, as symmetry makes them, as the description lists their joints."""
-    places = {joint.name: place for place, joint in enumerate(mechanism.joints)}
-    alike: list[list[ActiveLimit]] = []
-    for limit in limits:
-        if alike and limit.multiplier and hardness(limit, mechanism) > ALIKE * hardness(alike[-1][0], mechanism):
-            alike[-1].append(limit)
-        else:
-            alike.append([limit])
-    return [limit for group in alike for limit in sorted(group, key=lambda limit: places[limit.joint])]
-
-
-def hardness(limit: ActiveLimit, mechanism: Mechanism) -> float:
-    """How hard a limit holds, in any unit: its multiplier, per L where it is one of an angle."""
-    held = limit.multiplier or 0.0
-    return held if is_length(limit, mechanism.joint(limit.joint)) else held / mechanism.characteristic_length
 
 
 def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
@@ -235,10 +216,13 @@ def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
 
 
 def is_length(limit: ActiveLimit, joint: Joint) -> bool:
-    """Whether a limit is one of a length; a cylindrical joint limits its angle first, then its length."""
-    if joint.type == "cylindrical" and joint.range is not None:
-        return limit.limit not in np.reshape(joint.range, (2, 2))[0]
-    return joint.type == "prismatic"
+    """Whether a limit is one of a length."""
+    return limit.bound != "cone" and KINDS[joint.type].coordinates[limit.coordinate] == "length"
+
+
+def name_of(limit: ActiveLimit) -> str:
+    """The joint, and where it is not its first, which of its coordinates."""
+    return f"{limit.joint} (second coordinate)" if limit.coordinate else limit.joint
 
 
 def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
@@ -253,7 +237,7 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
 
 def short_names(limits: Iterable[ActiveLimit]) -> str:
     """Active limits in a cell of a table: ``B3 max; C1 cone``."""
-    return "; ".join(f"{limit.joint} {limit.bound}" for limit in limits)
+    return "; ".join(f"{name_of(limit)} {limit.bound}" for limit in limits)
 
 
 def exceeded(solution: Solution) -> list[ActiveLimit]:
@@ -272,5 +256,5 @@ def by_bound(limits: Iterable[ActiveLimit]) -> str:
     """Limits in a few words: ``max of B1, B2; cone of C1``."""
     names: dict[str, dict[str, None]] = {}
     for limit in limits:
-        names.setdefault(limit.bound, {})[limit.joint] = None
+        names.setdefault(limit.bound, {})[name_of(limit)] = None
     return "; ".join(f"{bound} of {', '.join(joints)}" for bound, joints in names.items())

@@ -8,9 +8,8 @@ import numpy as np
 
 from .completion import joint_values
 from .displacements import end_effector_pose, gaps
-from .errors import InvalidArgument
 from .mechanism import Mechanism
-from .solution import Solution
+from .solution import Solution, checked_solution
 from .task import Task
 
 
@@ -23,14 +22,9 @@ def closure_residual(mechanism: Mechanism, solution: Solution) -> Any:
 
     Raises
     ------
-    InvalidArgument : an answer of another mechanism.
+    InvalidArgument : what is no mechanism, or no answer of it; its limits may be others.
     """
-    if not isinstance(solution, Solution):
-        raise InvalidArgument("solution", type(solution).__name__, "a Solution")
-    if solution.mechanism != mechanism and solution.mechanism.without_limits() != mechanism.without_limits():
-        raise InvalidArgument(
-            "solution", f"an answer of another '{solution.mechanism.name}'", f"one of '{mechanism.name}'"
-        )
+    checked_solution(solution, mechanism)
     length, rows, q = mechanism.characteristic_length, solution._rows, solution._coordinates
     known = np.isfinite(q).all(axis=1)
     found = np.full(len(q), np.nan)

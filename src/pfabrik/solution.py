@@ -15,10 +15,11 @@ from .approach import weighed_limits
 from .closure import closure_of
 from .completion import coordinates_of, joint_values
 from .displacements import centres
+from .errors import InvalidArgument
 from .flatten import flat_of
 from .kernels import plan as P
 from .limits import ActiveLimit, active_limits, holding_limits
-from .mechanism import Mechanism
+from .mechanism import Mechanism, checked_mechanism
 from .points import joint_points
 from .projection import ways_of
 from .task import task_of
@@ -261,6 +262,16 @@ class Solution:
         counts = {status.name: int((self._rows.status == status).sum()) for status in Status}
         found = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
         return f"<Solution of '{self.mechanism.name}': {found or 'empty'}>"
+
+
+def checked_solution(solution: Any, mechanism: Mechanism) -> Solution:
+    """What was passed as an answer of a mechanism, its limits perhaps others; InvalidArgument where it is none."""
+    if not isinstance(solution, Solution):
+        raise InvalidArgument("solution", type(solution).__name__, "a Solution, as `solve_ik` returns")
+    own = solution.mechanism
+    if own != checked_mechanism(mechanism) and own.without_limits() != mechanism.without_limits():
+        raise InvalidArgument("solution", f"an answer of another '{own.name}'", f"one of '{mechanism.name}'")
+    return solution
 
 
 def _plain_status(status: Any) -> Any:

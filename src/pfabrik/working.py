@@ -15,7 +15,7 @@ from .completion import actuators_of, positions_of
 from .errors import InvalidArgument
 from .flatten import flat_of
 from .kernels import plan as P
-from .mechanism import Mechanism
+from .mechanism import Mechanism, checked_mechanism
 from .modes import BATCH, Modes
 from .nearest import is_feasible
 from .poses import are_poses, as_targets, made_exact, what_is_wrong
@@ -87,8 +87,7 @@ def working_modes(mechanism: Mechanism, target: Any, *, most_starts: int = 40_00
 
 def _as_pose(mechanism: Mechanism, target: Any) -> Floats:
     """The one target as an exact pose (4, 4)."""
-    if not isinstance(mechanism, Mechanism):
-        raise InvalidArgument("mechanism", type(mechanism).__name__, "a Mechanism, as `load` returns")
+    checked_mechanism(mechanism)
     targets, shape = as_targets(target)
     if shape != ():
         raise InvalidArgument("target", f"batch shape {shape}", "one target: a pose (4, 4) or a position (3,)")

@@ -26,6 +26,7 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
     cls=CommandGroup,
     subcommands=("catalog", "new", "info", "check", "ik", "fk", "track", "reach", "demo", "reproduce"),
     invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=print_version, help="Show the version."

@@ -31,6 +31,8 @@ def new(kind: str | None, output: Path | None, force: bool, list_all: bool) -> i
     if output is None:
         click.echo(text, nl=False)
         return 0
+    if output.is_dir():
+        raise click.ClickException(f"{output}: is a folder; expected the name of a file")
     if output.exists() and not force:
         raise click.ClickException(f"{output}: exists already; --force replaces it")
     with whole_file(output) as handle:

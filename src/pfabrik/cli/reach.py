@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 Triple = tuple[float, float, float]
 
-AXES: tuple[Triple, ...] = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
+AXES: dict[str, tuple[Triple, Triple]] = {
+    "x": ((1, 0, 0), (-1, 0, 0)),
+    "y": ((0, 1, 0), (0, -1, 0)),
+    "z": ((0, 0, 1), (0, 0, -1)),
+}
 
 
 @click.command()
@@ -32,7 +36,7 @@ AXES: tuple[Triple, ...] = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0,
     nargs=3,
     multiple=True,
     metavar="X Y Z",
-    help="Where to, of any length. May be repeated. Default: along each axis, both ways.",
+    help="Where to, of any length. May be repeated. Default: along each axis of the task, both ways.",
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 def reach(mech: str, position: Triple | None, rpy: Triple | None, directions: tuple[Triple, ...], as_json: bool) -> int:
@@ -43,7 +47,7 @@ def reach(mech: str, position: Triple | None, rpy: Triple | None, directions: tu
     """
     mechanism = pf.load(mech)
     origin = pf.pose(position or mechanism.reference_point, rpy=[math.radians(angle) for angle in rpy or (0, 0, 0)])
-    rays = directions or AXES
+    rays = directions or tuple(way for axis in AXES if axis in mechanism.task for way in AXES[axis])
     distances = pf.reach(mechanism, origin, rays)
     click.echo(as_object(origin, rays, distances) if as_json else describe(mechanism, rays, distances))
     return 0

@@ -26,7 +26,7 @@ ROWS_NAMED = 5
 @click.command()
 @click.argument("mech")
 @click.argument("path", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="CSV file to write.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="CSV file to write, or replace.")
 @projecting
 @click.option("--sample-time", type=float, metavar="S", help="Time from one target to the next [s].")
 @click.option(
@@ -61,6 +61,8 @@ def track(
     if limits and sample_time is None:
         raise click.UsageError("--speed says nothing without --sample-time")
     targets = read_targets(path)
+    if output.exists() and output.samefile(path):
+        raise click.UsageError(f"-o {output}: found the path of targets itself; expected another file")
     options = options_projecting(hold, projection)
     with whole_file(output) as handle:
         with progress(f"tracking {len(targets)} targets") as on_progress:

@@ -40,14 +40,22 @@ def open_new(part: Path, path: Path) -> TextIO:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
+def new_folder(path: Path) -> tempfile.TemporaryDirectory[str]:
+    """An empty folder beside `path`; a failure speaks of `path`, the name that the user knows."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
     """A folder to fill; its files move into `path` only when the block ends without an error."""
     path = path.resolve()
-    path.parent.mkdir(parents=True, exist_ok=True)
     if path.exists() and not path.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(path))
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as part:
+    with new_folder(path) as part:
         yield Path(part)
         path.mkdir(exist_ok=True)
         for item in sorted(Path(part).iterdir()):

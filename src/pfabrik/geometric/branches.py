@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..decompose import decompose
 from ..errors import InvalidArgument
-from ..mechanism import Mechanism
+from ..mechanism import Mechanism, checked_mechanism
 from ..poses import are_poses, as_targets, what_is_wrong
 from ..tolerances import TOLERANCES
 from .facts import Array, Unsuitable
@@ -72,8 +72,7 @@ def working_modes(mechanism: Mechanism, target: Any) -> WorkingModes:
     NoClosedForm : its legs have none here, or a continuum of branches (redundant arms).
     InvalidArgument : no target, or more than one.
     """
-    if not isinstance(mechanism, Mechanism):
-        raise InvalidArgument("mechanism", type(mechanism).__name__, "a Mechanism, as `load` returns")
+    checked_mechanism(mechanism)
     try:
         plan = legs_of(mechanism)
     except Unsuitable as unsuitable:

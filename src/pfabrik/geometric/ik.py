@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidArgument
-from ..mechanism import Mechanism
+from ..mechanism import Mechanism, checked_mechanism
 from ..parallel import in_blocks
 from ..poses import are_poses, as_floats, as_targets, what_is_wrong
 from .modes import Legs, solve_legs, start_of
@@ -77,8 +77,7 @@ def solve_ik(mechanism: Mechanism, target: Any, *, seed: Any = None) -> Geometri
     NoClosedForm : neither the mechanism's topology nor its legs have one here.
     InvalidArgument : a target or seed of the wrong shape, or rows that are no poses.
     """
-    if not isinstance(mechanism, Mechanism):
-        raise InvalidArgument("mechanism", type(mechanism).__name__, "a Mechanism, as `load` returns")
+    checked_mechanism(mechanism)
     form = closed_form(mechanism)
     targets, shape = as_targets(target)
     seeds = form.home if seed is None else _seeds(seed, shape, len(mechanism.actuators))

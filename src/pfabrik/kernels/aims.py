@@ -8,6 +8,10 @@ from typing import NamedTuple
 from ._jit import routine
 from .loops import LOCKED, Floats
 from .spin import difference
+from .vectors import Vec, cross, dot, norm, scale
+
+ALIGNED = 1e-9
+"""Sine below which two directions have no axis across them."""
 
 
 class Aim(NamedTuple):
@@ -66,7 +70,19 @@ def hold(pull: Pull, held: int, component: int, error: float) -> int:
 
 @routine
 def hold_tilt(target: Floats, X: Floats, pull: Pull, held: int) -> int:
-    """The z axis keeps the target's direction: it has no part along the target's x and y axes."""
+    """The z axis keeps the target's direction: it has no part along the target's x and y axes.
+
+    Nor has the opposite one; what looks away is first to turn round, without swaying from the way there.
+    """
+    axis, angle = turn_of_tilt(target, X)
+    if angle > 0.5 * math.pi:
+        held = hold(pull, held, 3, angle)
+        held = hold(pull, held, 3, 0.0)
+        sway = cross(axis, (X[0, 2], X[1, 2], X[2, 2]))
+        for i in range(3):
+            pull.holds[held - 2, 3 + i] = -axis[i]
+            pull.holds[held - 1, 3 + i] = sway[i]
+        return held
     for k in range(2):
         off = 0.0
         for i in range(3):
@@ -81,14 +97,21 @@ def hold_tilt(target: Floats, X: Floats, pull: Pull, held: int) -> int:
 @routine
 def tilt(target: Floats, weight: float, X: Floats, force: Floats) -> float:
     """Half the weighted square of the angle between z axes, its gradient added to the force."""
-    cosine = X[0, 2] * target[0, 2] + X[1, 2] * target[1, 2] + X[2, 2] * target[2, 2]
-    x = X[1, 2] * target[2, 2] - X[2, 2] * target[1, 2]
-    y = X[2, 2] * target[0, 2] - X[0, 2] * target[2, 2]
-    z = X[0, 2] * target[1, 2] - X[1, 2] * target[0, 2]
-    sine = math.sqrt(x * x + y * y + z * z)
-    angle = math.atan2(sine, cosine)
-    factor = weight * (angle / sine if sine > 1e-9 else 1.0)
-    force[3] -= factor * x
-    force[4] -= factor * y
-    force[5] -= factor * z
+    axis, angle = turn_of_tilt(target, X)
+    for i in range(3):
+        force[3 + i] -= weight * angle * axis[i]
     return 0.5 * weight * angle * angle
+
+
+@routine
+def turn_of_tilt(target: Floats, X: Floats) -> tuple[Vec, float]:
+    """The shortest turn of the z axis to the target's: about which axis, and how far; half a turn about any."""
+    here, there = (X[0, 2], X[1, 2], X[2, 2]), (target[0, 2], target[1, 2], target[2, 2])
+    axis = cross(here, there)
+    sine, cosine = norm(axis), dot(here, there)
+    angle = math.atan2(sine, cosine)
+    if sine > ALIGNED:
+        return scale(1.0 / sine, axis), angle
+    if cosine > 0.0:  # the axis is of no length, but neither is the turn
+        return scale(1.0 / max(angle, ALIGNED), axis), angle
+    return (X[0, 0], X[1, 0], X[2, 0]), angle

@@ -30,6 +30,9 @@ from .walks import Equations, State, compare_end, end_path, new_equations, pose_
 DEPENDENT = 1e-6
 """What is left of an equation that follows from the others: descriptions are typed with as many digits."""
 
+SHARED = 0.01
+"""By what entries of unknowns that paths have in common count less as pivots: they couple the paths' equations."""
+
 
 class View(NamedTuple):
     """What a configuration looks like to first order: its unknowns are the motions that the loops leave free."""
@@ -55,7 +58,8 @@ class Desk(NamedTuple):
     balance: Floats  # (rows,): multipliers of the loops and of what is held
     here: Floats  # (columns,)
     there: Floats  # (columns,)
-    used: Ints  # (columns,): 1 for those on a path
+    used: Ints  # (columns,): how often paths pass each
+    filled: Ints  # (columns + 1 + rows,): where a row of A is not zero: legs have few unknowns in common
 
 
 @allocator
@@ -72,7 +76,7 @@ def new_desk(loops: Loops, layout: Layout, rows: int) -> Desk:
     n, paths = len(loops.lo), len(loops.paths) - 1
     used = np.zeros(n, np.int64)
     for r in range(len(loops.row_columns)):
-        used[loops.row_columns[r]] = 1
+        used[loops.row_columns[r]] += 2 if r < loops.visit_rows[loops.paths[1]] else 1  # the first is in all equations
     return Desk(
         new_equations(loops, layout),
         Pull(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
@@ -86,6 +90,7 @@ def new_desk(loops: Loops, layout: Layout, rows: int) -> Desk:
         np.zeros(n),
         np.zeros(n),
         used,
+        np.zeros(n + 1 + rows, np.int64),
     )
 
 
@@ -174,27 +179,33 @@ def eliminate(rows: int, n: int, desk: Desk, view: View) -> None:
         view.shift[j] = 0.0
         desk.row[j] = 0.0  # 1 for pivot columns
     for row in range(rows):
-        largest, pivot = DEPENDENT, -1
+        largest, pivot = 0.0, -1
         for j in range(n):
-            if abs(A[row, j]) > largest and desk.row[j] == 0.0:
-                largest, pivot = abs(A[row, j]), j
+            size = abs(A[row, j])
+            if size > DEPENDENT and desk.row[j] == 0.0:
+                size *= SHARED if desk.used[j] > 1 else 1.0
+                if size > largest:
+                    largest, pivot = size, j
         if pivot < 0:  # it follows from those before
             continue
-        factor = 1.0 / A[row, pivot]
+        factor, filled = 1.0 / A[row, pivot], 0
         for j in range(width):
             A[row, j], A[rank, j] = A[rank, j], factor * A[row, j]
+            if A[rank, j] != 0.0:
+                desk.filled[filled] = j
+                filled += 1
         for i in range(rows):
             share = A[i, pivot]
             if i != rank and share != 0.0:
-                for j in range(width):
-                    A[i, j] -= share * A[rank, j]
+                for k in range(filled):
+                    A[i, desk.filled[k]] -= share * A[rank, desk.filled[k]]
                 A[i, pivot] = 0.0
         desk.row[pivot] = 1.0
         view.pivots[rank] = pivot
         rank += 1
     motions = 0
     for j in range(n):
-        if desk.row[j] == 0.0 and desk.used[j] == 1:
+        if desk.row[j] == 0.0 and desk.used[j] > 0:
             for i in range(n):
                 view.basis[i, motions] = 0.0
             view.basis[j, motions] = 1.0
@@ -216,7 +227,7 @@ def look_at_limits(loops: Loops, margin: float, state: State, desk: Desk, view: 
     for j in range(n):
         for side in range(2):
             h = loops.lo[j] + margin - state.q[j] if side == 0 else state.q[j] - loops.hi[j] + margin
-            if h > -REACH and desk.used[j] == 1:
+            if h > -REACH and desk.used[j] > 0:
                 for a in range(slope.counts[MOTIONS]):
                     slope.G[k, a] = -view.basis[j, a] if side == 0 else view.basis[j, a]
                 slope.drift[k] = -view.shift[j] if side == 0 else view.shift[j]
@@ -225,7 +236,7 @@ def look_at_limits(loops: Loops, margin: float, state: State, desk: Desk, view: 
                 k += 1
     for cone in range(len(loops.cone_angles)):
         h = cone_excess(loops, cone, margin, state, desk)
-        if h > -REACH and desk.used[loops.columns[loops.cone_units[cone, 0]]] == 1:
+        if h > -REACH and desk.used[loops.columns[loops.cone_units[cone, 0]]] > 0:
             for j in range(n):
                 desk.row[j] = 0.0
             add_cone(loops, cone, 1.0, desk, desk.row)

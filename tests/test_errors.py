@@ -1,0 +1,44 @@
+"""Errors: they reach another process as they are, and say who still moves."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import pytest
+
+from pfabrik import errors
+from pfabrik.errors import Fault
+
+FAULT = Fault("joint[0].at", "nothing", "three numbers")
+PUBLIC = [
+    errors.PfabrikError("anything"),
+    errors.InvalidMechanism([FAULT, FAULT], "my.toml"),
+    errors.UnsupportedMechanism("m", ["one", "two"]),
+    errors.NoClosedForm("m", ["R-S"], "no driven joint", ["U-P*-S", "R*-U-S"]),
+    errors.ContinuumOfSolutions("m", 2),
+    errors.ContinuumOfWorkingModes("m", 1, ["j4", "j6"]),
+    errors.InvalidArgument("target", "a text", "numbers", rows=[3, 5]),
+    errors.UnknownName("joint", "p", ["p1", "p5"]),
+    errors.MobilityWarning("the loops all but lock"),
+]
+
+
+def test_every_public_error_is_tried_below() -> None:
+    classes = {name for name in errors.__all__ if issubclass(getattr(errors, name), Exception)}
+    assert {type(error).__name__ for error in PUBLIC} == classes
+
+
+@pytest.mark.parametrize("error", PUBLIC, ids=lambda error: type(error).__name__)
+def test_an_error_reaches_another_process_as_it_is(error: Exception) -> None:
+    for again in (pickle.loads(pickle.dumps(error)), copy.copy(error)):
+        assert type(again) is type(error)
+        assert str(again) == str(error)
+        assert vars(again) == vars(error)
+
+
+def test_a_continuum_says_what_is_given_and_what_still_moves() -> None:
+    locked = "still moves with its actuators locked at these values (2 freedoms of the end effector)"
+    assert locked in str(errors.ContinuumOfSolutions("m", 2))
+    placed = "still moves with its end effector on the target (1 freedom of the actuators j4, j6)"
+    assert placed in str(errors.ContinuumOfWorkingModes("m", 1, ["j4", "j6"]))
