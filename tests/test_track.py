@@ -288,6 +288,50 @@ def test_a_smooth_path_out_of_reach_and_back_has_no_leaps(name: str) -> None:
     assert not followed.jumps.any()
 
 
+def rail_and_crank() -> tuple[Mechanism, np.ndarray]:
+    """A 5-bar with a crank and a rail, and a way on which the rail's end stop and the stretched crank hold it."""
+    arms = [
+        Joint("A0", "revolute", ("base", "crank"), (-25.4, 0, 0), axis=(0, 0, 1), actuated=True, range=(-0.96, 0.62)),
+        Joint("B0", "revolute", ("crank", "rod"), (-79.5, 66.6, 0), axis=(0, 0, 1)),
+        Joint("A1", "prismatic", ("base", "slider"), axis=(0, 1, 0), actuated=True, range=(-30, 30)),
+        Joint("B1", "revolute", ("slider", "bar"), (69.2, 70.1, 0), axis=(0, 0, 1), range=(-0.94, 0.47)),
+        Joint("T", "revolute", ("rod", "bar"), (-0.2, 139.4, 0), axis=(0, 0, 1)),
+    ]
+    return Mechanism("5-bar", arms, "T", task=("x", "y")), np.array((0.42, 0.91, 0.0))
+
+
+def three_rrc() -> tuple[Mechanism, np.ndarray]:
+    """A translating machine whose legs each bend in a plane of their own, and a way on which two are stretched out."""
+    places = [
+        ((37.7, -85.4, 57.0), (12.7, -18.8, 50.6), (-12.3, 0.6, -3.0)),
+        ((62.9, 51.8, -115.7), (67.6, 26.8, -22.3), (2.9, 1.8, 1.6)),
+        ((-80.9, 51.3, 45.3), (-8.2, 53.1, 20.3), (0.9, -8.7, -4.7)),
+    ]
+    joints = []
+    for leg, (a, b, c) in enumerate(places):
+        along = {"axis": np.eye(3)[leg]}
+        joints += [
+            Joint(f"A{leg}", "revolute", ("base", f"{leg}.1"), a, actuated=True, **along),
+            Joint(f"B{leg}", "revolute", (f"{leg}.1", f"{leg}.2"), b, **along),
+            Joint(f"C{leg}", "cylindrical", (f"{leg}.2", "table"), c, range=((-1.5, 1.5), (-60, 60)), **along),
+        ]
+    return Mechanism("3-RRC", joints, "table", (0, 0, 0), task=("x", "y", "z")), np.array((0.56, -0.51, 0.65))
+
+
+@pytest.mark.parametrize("machine_and_way", [rail_and_crank, three_rrc])
+def test_links_that_were_stretched_out_beyond_reach_bend_back_the_way_they_did(machine_and_way: Any) -> None:
+    machine, way = machine_and_way()
+    share = np.linspace(0, 1.2, 13 if INTERPRETED else 31)
+    share = np.concatenate([share, share[-2::-1]])
+    home = machine.home_pose[:3, 3]
+    followed = pf.track(machine, home + share[:, None] * machine.characteristic_length * way)
+    assert pf.singularity(machine, followed).serial.min() < 1e-3  # links are stretched out on the way
+    assert followed.status[-1] == Status.REACHED
+    np.testing.assert_allclose(followed.actuators[-1], followed.actuators[0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(followed.pose, followed.pose[::-1], rtol=0, atol=1e-5 * machine.characteristic_length)
+    assert checking.worst_excess(machine, followed).max() <= 1e-9
+
+
 @pytest.mark.parametrize("steps", [0, 1])
 def test_a_path_without_steps_has_no_leaps(steps: int) -> None:
     followed = pf.track(arm(None), past_the_hole(0.0)[:steps], sample_time=0.1)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from .closure import Closing, Closure, close, closure_of
 from .closure_ik import platform_poses
 from .completion import set_actuators
-from .differential import stepped_freely
 from .errors import ContinuumOfSolutions, InvalidArgument
 from .fk import answered, as_values
 from .mechanism import Mechanism
 from .modes import ALONG, BATCH, LEAST_STARTS, STEPS, Modes, Sightings
+from .motions import stepped_freely
 from .starts import random_starts
 from .tolerances import TOLERANCES
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .approach import within_sight
 from .assemblies import differences, follows_task, has_parasitic_motion
+from .bends import Bends
 from .closure import HELD, Closing, Closure, close, closure_of
 from .completion import actuators_of
 from .displacements import displacements
@@ -77,10 +78,20 @@ def follow_by_closure(
 ) -> Floats:
     """Answer a path from joint coordinates (1, columns): each target from the answer before it, in its working mode."""
     known, coordinates = _prepare(targets, start, rows)
+    closure, bends, alone = closure_of(mechanism), Bends(mechanism, options), np.ones(1, bool)
     for i in range(len(targets)):
         if known[i]:
-            only = np.arange(len(targets)) == i
-            start = coordinates[only] = _answer(closure_of(mechanism), targets, only, start, options, True, rows)
+            target, row = targets[i : i + 1], P.Rows._make(array[i : i + 1] for array in rows)
+            found = _answer(closure, target, alone, start, options, True, row)
+            if bends.before is not None:
+                other_row = P.Rows._make(array.copy() for array in row)
+                other = _answer(closure, target, alone, bends.before, options, True, other_row)
+                if bends.prefer(target, row, other_row):
+                    found = other
+                    for array, own in zip(row, other_row, strict=True):
+                        array[:] = own
+            bends.note(int(row.status[0]), start, found)
+            start = coordinates[i : i + 1] = found
         if on_progress is not None:
             on_progress(i + 1, len(targets))
     return coordinates

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .joint_types import KINDS
+from .motions import are_stretched
 from .tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -19,11 +20,6 @@ if TYPE_CHECKING:
     from .solution import Solution
 
 Floats = NDArray[np.float64]
-
-STRETCHED = 1e-3
-"""Measure of singularity [L and rad] below which links count as stretched out or folded: it goes with the square root
-of a length, and what a search for the nearest pose leaves of a length is up to a millionth.
-"""
 
 
 @dataclass(frozen=True)
@@ -131,12 +127,9 @@ def given_up(solution: Solution) -> list[str]:
 
 def why_without_limits(solution: Solution) -> str:
     """What keeps an answer that no limit holds back from its target, as far as first order tells."""
-    from .differential import singularity
-
     inside, outside = missed(solution)
     found = []
-    measured = singularity(solution.mechanism, solution)
-    if inside and min(measured.serial, measured.passive) < STRETCHED:
+    if inside and are_stretched(solution.mechanism, solution._coordinates).any():
         found.append("the links are stretched out or folded")
     if outside:
         found.append("the mechanism has no freedom that way")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
-from .closure_ik import follow_by_closure
-from .completion import coordinates_of
+from .bends import Bends
+from .closure_ik import follow_by_closure, platform_poses
+from .completion import coordinates_of, positions_of
 from .errors import InvalidArgument
 from .flatten import Flat, flat_of
 from .ik import checked, handle_invalid, joints_near, seeds_of, start_coordinates
@@ -37,6 +38,8 @@ def track(
     speed_limits: float | Mapping[str, float] | None = None,
 ) -> Track:
     """Follow a path: warm-started from step to step, in the working mode it starts in.
+
+    Links that are stretched out where a target is beyond reach bend back the way they did.
 
     Parameters
     ----------
@@ -99,7 +102,9 @@ def _follow(
     from .kernels.solve import solve_by_iteration
 
     settings = settings_of(mechanism, options, seeded=True, chained=True)
-    seeds, begin = seeds_of(mechanism, flat, seed, ()), partial(start_coordinates, mechanism, seed, ())
+    seeds = seeds_of(mechanism, flat, seed, ())
+    begin: Callable[[], P.Floats] = partial(start_coordinates, mechanism, seed, ())
+    bends = Bends(mechanism, options)
     longest = _STEPS_A_REPORT if on_progress is not None else max(len(poses), 1)
     done, piece = 0, longest
     while done < len(poses):
@@ -109,16 +114,40 @@ def _follow(
         piece = min(2 * piece, longest)
         for row in _drawn_after(flat, settings, own)[:1]:
             before = _last_answer(own, row)
-            start = begin if before is None else partial(coordinates_of, mechanism, before)
+            begin = begin if before is None else cache(partial(coordinates_of, mechanism, before))
             alone = P.Rows._make(array[row : row + 1] for array in own)
-            draw_near(mechanism, flat, poses[block][row : row + 1], start, settings, options, alone)
+            draw_near(mechanism, flat, poses[block][row : row + 1], begin, settings, options, alone)
             own, piece = P.Rows._make(array[: row + 1] for array in own), 1
+        if bends.before is not None:
+            other = _answered(mechanism, flat, poses[block], bends.before, settings, options)
+            if bends.prefer(poses[block], own, other):
+                for array, better in zip(own, other, strict=True):
+                    array[:] = better
         last = _last_answer(own, len(own.status))
         if last is not None:
-            seeds, begin = P.Seeds(last.poses, last.nodes, last.trunks), partial(coordinates_of, mechanism, last)
+            seeds, after = P.Seeds(last.poses, last.nodes, last.trunks), cache(partial(coordinates_of, mechanism, last))
+            if bends.before is not None or (last.status[0] == P.PROJECTED and leaves_projections(flat, settings)):
+                bends.note(last.status[0], begin(), after())
+                piece = 1 if bends.before is not None else piece
+            begin = after
         done += len(own.status)
         if on_progress is not None:
             on_progress(done, len(poses))
+
+
+def _answered(
+    mechanism: Mechanism, flat: Flat, pose: P.Floats, start: P.Floats, settings: P.Settings, options: Options
+) -> P.Rows:
+    """One target (1, 4, 4) answered from joint coordinates (1, columns)."""
+    from .kernels.solve import solve_by_iteration
+
+    begin, found = new_rows(mechanism, flat, 1), new_rows(mechanism, flat, 1)
+    begin.poses[:] = platform_poses(mechanism, start)
+    positions_of(mechanism, flat, start, begin)
+    solve_by_iteration(flat.plan, pose, P.Seeds(begin.poses, begin.nodes, begin.trunks), settings, found)
+    if _drawn_after(flat, settings, found):
+        draw_near(mechanism, flat, pose, lambda: start, settings, options, found)
+    return found
 
 
 def _drawn_after(flat: Flat, settings: P.Settings, rows: P.Rows) -> list[int]:
