@@ -14,9 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pfabrik.cones import cone_line
+from pfabrik.differential import mobility
 from pfabrik.enclosing import enclosing_radius
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
-from pfabrik.freedom import end_effector_freedom, instantaneous_mobility, universal_axes
+from pfabrik.freedom import end_effector_freedom, universal_axes
 from pfabrik.joint_types import JOINT_TYPES, KINDS
 from pfabrik.mechanism import Cone, Joint, Mechanism
 from pfabrik.tolerances import TOLERANCES
@@ -186,7 +187,7 @@ class TestLimits:
 class TestFreedom:
     def test_hexapod_has_six_freedoms_and_none_when_locked(self):
         machine = stewart()
-        assert instantaneous_mobility(machine) == 6
+        assert mobility(machine).mobility == 6
         assert end_effector_freedom(machine, frozenset()) == 6
         assert end_effector_freedom(machine, frozenset(machine.actuators)) == 0
         assert end_effector_freedom(machine, frozenset(machine.actuators[1:])) == 1
@@ -196,17 +197,17 @@ class TestFreedom:
             dataclasses.replace(joint, type="spherical") if joint.type == "universal" else joint for joint in hexapod()
         ]
         machine = Mechanism("6-SPS", joints, "platform", (0, 0, 150))
-        assert instantaneous_mobility(machine) == 12
+        assert mobility(machine).mobility == 12
         assert end_effector_freedom(machine, frozenset()) == 6
 
     def test_five_bar_moves_in_its_plane(self):
         machine = Mechanism("5", five_bar(), "tip")
-        assert instantaneous_mobility(machine) == 2
+        assert mobility(machine).mobility == 2
         assert end_effector_freedom(machine, frozenset()) == 2
 
     def test_slider_crank_has_one_freedom(self):
         machine = Mechanism("s", slider(), "block", (3, 0, 0))
-        assert instantaneous_mobility(machine) == end_effector_freedom(machine, frozenset()) == 1
+        assert mobility(machine).mobility == end_effector_freedom(machine, frozenset()) == 1
 
     def test_cylindrical_and_fixed_joints_count_two_and_none(self):
         joints = [
@@ -216,7 +217,7 @@ class TestFreedom:
         ]
         with pytest.warns(MobilityWarning, match="1 actuators leave the end effector 2 freedoms"):
             machine = Mechanism("c", joints, "tool", (3, 0, 0))
-        assert instantaneous_mobility(machine) == 3
+        assert mobility(machine).mobility == 3
 
     def test_fewer_actuators_than_freedoms_warn_with_the_numbers(self):
         with pytest.warns(MobilityWarning, match="1 actuators leave the end effector 1 freedom at home"):
@@ -239,7 +240,7 @@ class TestFreedom:
     @settings(max_examples=20, deadline=None)
     def test_freedoms_do_not_depend_on_the_unit(self, scale):
         joints = [dataclasses.replace(joint, at=[scale * x for x in joint.at]) for joint in five_bar()]
-        assert instantaneous_mobility(Mechanism("5", joints, "tip")) == 2
+        assert mobility(Mechanism("5", joints, "tip")).mobility == 2
 
     def test_universal_joint_without_axes_keeps_its_link_from_spinning(self):
         machine = stewart()

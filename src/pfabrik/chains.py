@@ -48,7 +48,8 @@ def chain_faults(place: str, chain: Any) -> Iterator[Fault]:
         return
     hint = ""
     if isinstance(chain, str) and _LOOSE.fullmatch(chain):
-        meant = "-".join(re.findall(_JOINT, chain.upper()))
+        behind = re.sub(r"(^|[^A-Z])\*([A-Z])", r"\1\2*", chain.upper())  # a star before its joint
+        meant = "-".join(re.findall(_JOINT, behind))
         hint = f"; did you mean '{meant}'?" if read_chain(meant) else ""
     expected = f"joints from the base outward, such as 'U-P*-S': {' '.join(_TYPES)}, '*' behind the actuated ones"
     yield Fault(place, f"{shown(chain)}{hint}", expected)

@@ -166,7 +166,7 @@ def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
     the bodies that all its ways pass: where several ways leave a body, they are branches if they end at the end
     effector, else a loop of its own. Each sub-chain says which engine could serve it, and why.
 
-    Source: the paper's TDS; DESIGN of restrictions on positions in `pfabrik.positions`.
+    Source: the paper's TDS. Which chains positions can express: `pfabrik.positions`.
     """
     graph = graph_of(checked_mechanism(mechanism))
     groups = components(graph.edges, graph.base, graph.end)

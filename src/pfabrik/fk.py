@@ -81,7 +81,7 @@ def solve_fk(
     values, shape = as_values(mechanism, actuators)
     known = np.asarray(np.isfinite(values).all(axis=1))
     if options.on_invalid == "raise" and not known.all():
-        bad = np.flatnonzero(~known)[:5].tolist()
+        bad = np.flatnonzero(~known)[:5].tolist() if shape else ()
         raise InvalidArgument("actuators", "a value that is not finite", "finite values", rows=bad)
     coordinates, poses = _starts(mechanism, seed, shape, len(values))
     asked = np.clip(values[known], -HORIZON, HORIZON)

@@ -102,12 +102,6 @@ def loop_conditions(loops: NDArray[np.float64], screws: NDArray[np.float64]) -> 
     return conditions.reshape(*screws.shape[:-2], 6 * len(loops), screws.shape[-2])
 
 
-def instantaneous_mobility(mechanism: Mechanism) -> int:
-    """Number of independent motions of the whole mechanism at home, passive ones included (a strut's own spin)."""
-    _, closure = _home_motion(mechanism, frozenset())
-    return int(_null_space(closure).shape[1])
-
-
 def end_effector_freedom(mechanism: Mechanism, locked: frozenset[str]) -> int:
     """Number of independent motions of the end effector at home, with some joints locked.
 

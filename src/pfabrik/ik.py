@@ -65,7 +65,7 @@ def solve_ik(
             draw_near(mechanism, flat, targets, start_from, settings, options, rows)
         if seed is not None:
             joints = partial(joints_near, mechanism, rows, seed._rows)
-    handle_invalid(targets, rows, options)
+    handle_invalid(targets, shape, rows, options)
     if not (rows.status[0] == P.PROJECTED if len(targets) == 1 else P.PROJECTED in rows.status):
         return Solution(mechanism, rows, shape, joints)
     wanted = Wanted(targets.copy(), options.hold, options.rotation_length)  # a caller may write to the targets
@@ -115,16 +115,16 @@ def seed_rows(mechanism: Mechanism, seed: Solution, shape: tuple[int, ...]) -> P
     return seed._rows
 
 
-def handle_invalid(targets: NDArray[np.float64], rows: P.Rows, options: Options) -> None:
-    """Raise for rows that are no poses, naming the first; or leave them marked, their numbers NaN."""
+def handle_invalid(targets: NDArray[np.float64], shape: tuple[int, ...], rows: P.Rows, options: Options) -> None:
+    """Raise for rows that are no poses, naming the first of a batch; or leave them marked, their numbers NaN."""
     if len(targets) == 1 and rows.status[0] != P.INVALID:
         return
     bad = np.flatnonzero(rows.status == P.INVALID)
     if not len(bad):
         return
     if options.on_invalid == "raise":
-        found = what_is_wrong(targets[bad[0]])
-        raise InvalidArgument("target", found, "finite poses whose rotation is one", rows=[int(i) for i in bad[:5]])
+        found, first = what_is_wrong(targets[bad[0]]), bad[:5].tolist() if shape else ()
+        raise InvalidArgument("target", found, "finite poses whose rotation is one", rows=first)
     for array in (rows.poses, rows.nodes, rows.trunks, rows.actuators, rows.measures):
         array[bad] = np.nan
     rows.counters[bad] = 0

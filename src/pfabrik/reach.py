@@ -94,19 +94,23 @@ def _as_directions(mechanism: Mechanism, directions: Any) -> tuple[Floats, tuple
     array = as_floats("directions", directions, expected)
     if array.ndim == 0 or array.shape[-1] != 3:
         raise InvalidArgument("directions", f"shape {array.shape}", expected)
-    rays = array.reshape(-1, 3)
+    rays, shape = array.reshape(-1, 3), array.shape[:-1]
     sizes = np.abs(rays).max(axis=1, initial=0.0)  # however long, no square of them is too large to be represented
     bad = np.flatnonzero(~(np.isfinite(sizes) & (sizes > 0.0)))
     if len(bad):
-        raise InvalidArgument("directions", f"{rays[bad[0]].tolist()}", expected, rows=bad[:5].tolist())
+        raise InvalidArgument(
+            "directions", f"{rays[bad[0]].tolist()}", expected, rows=bad[:5].tolist() if shape else ()
+        )
     rays = rays / sizes[:, None]
     rays /= np.linalg.norm(rays, axis=1)[:, None]
     free = [place for place, counts in enumerate(task_of(mechanism).axes) if not counts]
     bad = np.flatnonzero(np.abs(rays[:, free]).max(axis=1, initial=0.0) > TOLERANCES.alignment)
     if len(bad):
         expected = f"directions within the task, {' '.join(mechanism.task)}: what it leaves out follows by itself"
-        raise InvalidArgument("directions", f"{rays[bad[0]].tolist()}", expected, rows=bad[:5].tolist())
-    return rays, array.shape[:-1]
+        raise InvalidArgument(
+            "directions", f"{rays[bad[0]].tolist()}", expected, rows=bad[:5].tolist() if shape else ()
+        )
+    return rays, shape
 
 
 class _Rays:

@@ -75,7 +75,7 @@ def track(
     else:
         _follow(mechanism, flat, poses, seed, options, rows, on_progress)
         joints = partial(joints_near, mechanism, rows, None if seed is None else seed._rows, chained=True)
-    handle_invalid(poses, rows, options)
+    handle_invalid(poses, shape, rows, options)
     if flat is not None:
         _count_turns(flat, rows)
     again = partial(_tracked, mechanism, options)

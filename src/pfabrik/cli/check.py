@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import click
+import numpy as np
 
 import pfabrik as pf
+
+from ..motions import generic_of
+
+if TYPE_CHECKING:
+    from ..mechanism import Joint, Mechanism
+
+COUNTS = {"x": 1, "y": 1, "z": 1, "tilt": 2, "rotation": 3}
+"""Freedoms that each part of a task asks for."""
+
+FULL_TURN = 2.0 * math.pi
 
 
 @click.command()
@@ -12,12 +27,38 @@ import pfabrik as pf
 def check(mech: str) -> int:
     """Check a mechanism file.
 
-    Says "ok", or names every fault, one a line.
+    Says "ok", or names every fault, one a line. What is sound but may not be what was meant is noted on stderr.
     """
     mechanism = pf.load(mech)
     chains = pf.decompose(mechanism)
+    for note in notes(mechanism):
+        click.echo(f"pfabrik: note: {note}", err=True)
     click.echo(
         f"ok: {mechanism.name}: {len(mechanism.joints)} joints, {len(mechanism.actuators)} actuated, "
         f"{len(chains)} sub-chains, task {' '.join(mechanism.task)}"
     )
     return 0
+
+
+def notes(mechanism: Mechanism) -> Iterator[str]:
+    """What a description says that its author may not have meant."""
+    asked, there = sum(COUNTS[part] for part in mechanism.task), pf.mobility(mechanism).platform
+    if asked > there < generic_of(mechanism).directions.shape[1]:  # not always the same ones, as in a plane
+        yield (
+            f"the task {' '.join(mechanism.task)} asks for {asked} freedoms, and the end effector has {there}, from "
+            "which the others follow: hardly any target can be reached; `task` says which count"
+        )
+    widths = [width for joint in mechanism.joints for width in angular_widths(joint)]
+    if widths and mechanism.angle_unit == "rad" and max(widths) > 4 * FULL_TURN:
+        yield f"a range of {max(widths):.4g} rad is {max(widths) / FULL_TURN:.3g} turns; were degrees meant?"
+    if widths and mechanism.angle_unit == "deg" and max(widths) < math.radians(FULL_TURN):
+        yield f"no range of an angle is wider than {math.degrees(max(widths)):.3g} degrees; were radians meant?"
+
+
+def angular_widths(joint: Joint) -> Iterator[float]:
+    """How wide each range of an angle is, and a cone from side to side [rad]."""
+    if joint.cone is not None:
+        yield 2.0 * joint.cone.half_angle
+    if joint.range is not None and joint.type in ("revolute", "universal", "cylindrical"):
+        ranges = np.reshape(joint.range, (-1, 2))[: 1 if joint.type == "cylindrical" else None]
+        yield from (ranges[:, 1] - ranges[:, 0]).tolist()

@@ -11,6 +11,7 @@ import click
 import pfabrik as pf
 
 from .answer import describe, in_units, margins_of, margins_table, pose_header, pose_texts, tell_modes
+from .finite import FINITE
 from .projecting import note_unused, options_projecting, projecting
 
 if TYPE_CHECKING:
@@ -23,8 +24,8 @@ Triple = tuple[float, float, float]
 
 @click.command()
 @click.argument("mech")
-@click.option("--position", type=float, nargs=3, metavar="X Y Z", help="Of the reference point. Default: at home.")
-@click.option("--rpy", type=float, nargs=3, metavar="R P Y", help="Roll, pitch, yaw [deg] from home. Default: 0 0 0.")
+@click.option("--position", type=FINITE, nargs=3, metavar="X Y Z", help="Of the reference point. Default: at home.")
+@click.option("--rpy", type=FINITE, nargs=3, metavar="R P Y", help="Roll, pitch, yaw [deg] from home. Default: 0 0 0.")
 @projecting
 @click.option("--margins", "with_margins", is_flag=True, help="List how far off every limit is, nearest first.")
 @click.option("--all", "list_all", is_flag=True, help="List every working mode, limits kept or not.")
@@ -71,10 +72,18 @@ def ik(
 
 def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | None) -> None:
     """Say so when the task leaves out what the user gave."""
-    task = set(mechanism.task)
-    left_out = {"--position": position and not task & set("xyz"), "--rpy": rpy and not task & {"rotation", "tilt"}}
-    for option in (name for name, ignored in left_out.items() if ignored):
-        click.echo(f"pfabrik: note: {option} has no effect: the task is {' '.join(mechanism.task)}", err=True)
+    task, left_out = set(mechanism.task), []
+    if position and not task & set("xyz"):
+        left_out.append("--position")
+    elif position:
+        off = zip("xyz", position, mechanism.reference_point, strict=True)
+        left_out += [f"{axis} of --position" for axis, asked, home in off if axis not in task and asked != home]
+    if rpy and not task & {"rotation", "tilt"}:
+        left_out.append("--rpy")
+    elif rpy and "tilt" in task and any(rpy) and not any(rpy[:2]):
+        left_out.append("the yaw of --rpy")
+    for given in left_out:
+        click.echo(f"pfabrik: note: {given} has no effect: the task is {' '.join(mechanism.task)}", err=True)
 
 
 def list_modes(mechanism: Mechanism, target: Floats, as_json: bool) -> int:

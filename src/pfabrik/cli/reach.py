@@ -10,6 +10,7 @@ import click
 
 import pfabrik as pf
 
+from .finite import FINITE
 from .table import aligned
 
 if TYPE_CHECKING:
@@ -27,12 +28,12 @@ AXES: dict[str, tuple[Triple, Triple]] = {
 
 @click.command()
 @click.argument("mech")
-@click.option("--from", "position", type=float, nargs=3, metavar="X Y Z", help="Where to start. Default: at home.")
-@click.option("--rpy", type=float, nargs=3, metavar="R P Y", help="Roll, pitch, yaw [deg] from home. Default: 0 0 0.")
+@click.option("--from", "position", type=FINITE, nargs=3, metavar="X Y Z", help="Where to start. Default: at home.")
+@click.option("--rpy", type=FINITE, nargs=3, metavar="R P Y", help="Roll, pitch, yaw [deg] from home. Default: 0 0 0.")
 @click.option(
     "--direction",
     "directions",
-    type=float,
+    type=FINITE,
     nargs=3,
     multiple=True,
     metavar="X Y Z",

@@ -58,7 +58,7 @@ class _KernelCache(_Cache):  # type: ignore[misc]  # a class only at run time
         overload = super().load_overload(signature, target_context)
         if overload is None and not self._announced.is_set():
             self._announced.set()
-            sys.stderr.write("pfabrik: compiling the kernels, once per version (under a minute) ...\n")
+            sys.stderr.write("pfabrik: compiling the kernels, once per version ...\n")
             sys.stderr.flush()
         return overload
 
