@@ -234,3 +234,9 @@ def test_what_a_caller_does_to_targets_afterwards_changes_no_answer(stewart: Mec
     target[:], path[:] = np.eye(4), np.eye(4)
     assert answer.active_limits == expected
     assert [limit.joint for limit in followed.active_limits[0]] == [limit.joint for limit in expected]
+
+
+def test_a_status_is_written_by_its_name() -> None:
+    assert str(Status.PROJECTED) == f"{Status.PROJECTED}" == "PROJECTED"
+    assert f"{Status.REACHED:>9}" == "  REACHED"
+    assert Status.PROJECTED == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 from typing import Any
@@ -384,6 +385,17 @@ def test_speeds_do_not_reach_over_rows_that_are_no_poses() -> None:
     followed = pf.track(arm(None), path, options=options, sample_time=0.5, speed_limits=0.1)
     assert followed.too_fast == [(), *[("j1",)] * 3, (), (), *[("j1",)] * 3]
     assert not followed.jumps.any()
+
+
+def test_a_track_tells_its_fields_as_plain_numbers() -> None:
+    followed = pf.track(pf.load("stewart"), [(0, 0, 195), (0, 0, 196)], sample_time=0.1, speed_limits={"BL1": 1.0})
+    plain = json.loads(json.dumps(followed.to_dict()))
+    assert plain["jumps"] == [False, False]
+    np.testing.assert_allclose(plain["speeds"], followed.speeds)
+    assert plain["too_fast"] == [[], ["BL1"]]
+    assert plain["status"] == ["REACHED", "REACHED"]
+    assert repr(followed) == "<Track of '6-UPS Stewart platform': 2 REACHED>"
+    assert pf.track(pf.load("stewart"), [(0, 0, 195)]).to_dict()["speeds"] is None
 
 
 def test_a_track_survives_pickling() -> None:

@@ -542,3 +542,13 @@ def test_a_branch_that_cannot_reach_is_kept_where_it_is_to_be(name: str, mode: s
     assert answer.status is pf.Status.PROJECTED
     # a limit of one actuator by 0.02 beyond: what keeps it on the same branch is near
     assert apart(answer, pf.working_modes(mechanism.without_limits(), target)[0]) <= 0.2
+
+
+@pytest.mark.parametrize("wrong", [-1, 2.5, True, "many", None])
+def test_counts_that_are_none_are_refused(wrong: object) -> None:
+    machine = pf.load("five_bar")
+    for name in ("most", "most_starts"):
+        with pytest.raises(InvalidArgument, match=f"{name}: found .* expected a whole number, at least"):
+            pf.working_modes(machine, (0, 0, 180), **{name: wrong})
+    with pytest.raises(InvalidArgument, match="most_starts: found"):
+        pf.assembly_modes(machine, (0, 0), most_starts=wrong)

@@ -116,6 +116,10 @@ def __getattr__(name: str) -> Any:
     return value
 
 
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES, *_MODULES})
+
+
 class _Package(ModuleType):
     """Keeps a function from being hidden by the module of the same name when that module is imported."""
 

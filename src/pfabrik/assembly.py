@@ -14,7 +14,7 @@ from .completion import set_actuators
 from .errors import ContinuumOfSolutions, InvalidArgument
 from .fk import answered, as_values
 from .mechanism import Mechanism
-from .modes import ALONG, BATCH, LEAST_STARTS, STEPS, Modes, Sightings
+from .modes import ALONG, BATCH, LEAST_STARTS, STEPS, Modes, Sightings, as_count
 from .motions import stepped_freely
 from .starts import random_starts
 from .tolerances import TOLERANCES
@@ -50,6 +50,7 @@ def assembly_modes(mechanism: Mechanism, actuators: Any, *, most_starts: int = 4
     if shape != () or not np.isfinite(values).all():
         found = f"batch shape {shape}" if shape else "a value that is not finite"
         raise InvalidArgument("actuators", found, f"one set of {len(mechanism.actuators)} finite values")
+    most_starts = as_count("most_starts", most_starts, 1)
     search = _Search(closure_of(mechanism), values)
     while search.starts < most_starts and not search.is_done:
         search.go_on(BATCH)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import overload
+from numbers import Integral
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import InvalidArgument
+from .form_faults import shown
 from .solution import Solution
 from .tolerances import TOLERANCES
 
@@ -29,6 +32,13 @@ STEPS = 80
 ALONG = 1e-3
 """How far a solution is moved to see whether it is one of a continuum [L or rad]: far enough to tell one from a double
 root, not so far as to meet another solution."""
+
+
+def as_count(name: str, value: Any, least: int) -> int:
+    """A whole number of things, checked."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+        raise InvalidArgument(name, shown(value), f"a whole number, at least {least}")
+    return int(value)
 
 
 @dataclass(frozen=True)

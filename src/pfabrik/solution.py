@@ -43,6 +43,12 @@ class Status(IntEnum):
     FAILED = P.FAILED
     INVALID = P.INVALID
 
+    def __str__(self) -> str:
+        return self.name
+
+    def __format__(self, spec: str) -> str:
+        return format(self.name, spec)
+
 
 class Wanted(NamedTuple):
     """Poses that were asked for, (n, 4, 4), and how the distance from them counts; see `Options`."""
@@ -249,10 +255,10 @@ class Solution:
             "rounds",
         )
         plain: dict[str, Any] = {"status": _plain_status(self.status)}
-        plain |= {name: _plain(getattr(self, name)) for name in names}
-        plain["held"] = _plain(self.held)
-        plain["joints"] = {name: _plain(value) for name, value in self.joints.items()}
-        plain["points"] = {name: _plain(point) for name, point in self.points.items()}
+        plain |= {name: as_plain(getattr(self, name)) for name in names}
+        plain["held"] = as_plain(self.held)
+        plain["joints"] = {name: as_plain(value) for name, value in self.joints.items()}
+        plain["points"] = {name: as_plain(point) for name, point in self.points.items()}
         limits = [self.active_limits] if self.shape == () else self.active_limits
         listed = [[vars(limit) for limit in row] for row in limits]
         plain["active_limits"] = listed[0] if self.shape == () else listed
@@ -261,7 +267,7 @@ class Solution:
     def __repr__(self) -> str:
         counts = {status.name: int((self._rows.status == status).sum()) for status in Status}
         found = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-        return f"<Solution of '{self.mechanism.name}': {found or 'empty'}>"
+        return f"<{type(self).__name__} of '{self.mechanism.name}': {found or 'empty'}>"
 
 
 def checked_solution(solution: Any, mechanism: Mechanism) -> Solution:
@@ -282,7 +288,8 @@ def _plain_status(status: Any) -> Any:
     )
 
 
-def _plain(value: Any) -> Any:
+def as_plain(value: Any) -> Any:
+    """An array as numbers and lists; what is not finite becomes None."""
     array = np.asarray(value)
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         return np.where(np.isfinite(array), array.astype(object), np.array(None)).tolist()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .errors import InvalidArgument, UnknownName
 from .mechanism import Mechanism
 from .poses import between
-from .solution import Solution
+from .solution import Solution, as_plain
 from .task import task_of
 from .tolerances import TOLERANCES
 
@@ -94,6 +94,14 @@ class Track(Solution):
         actuators = np.concatenate([self.actuators[row - 1 : row], divided.actuators, self.actuators[row : row + 1]])
         steps = np.maximum(_moves(self.mechanism, poses), _scaled(self.mechanism, actuators).max(axis=1, initial=0.0))
         return bool(steps.max() > LEAP * moved)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As that of a `Solution`, with the fields of a track."""
+        plain = super().to_dict()
+        plain["jumps"] = self.jumps.tolist()
+        plain["speeds"] = None if self.speeds is None else as_plain(self.speeds)
+        plain["too_fast"] = None if self.too_fast is None else [list(names) for names in self.too_fast]
+        return plain
 
     def _actuator_moves(self) -> Floats:
         return _scaled(self.mechanism, self.actuators)

@@ -16,7 +16,7 @@ from .errors import InvalidArgument
 from .flatten import flat_of
 from .kernels import plan as P
 from .mechanism import Mechanism, checked_mechanism
-from .modes import BATCH, Modes
+from .modes import BATCH, Modes, as_count
 from .nearest import is_feasible
 from .poses import are_poses, as_targets, made_exact, what_is_wrong
 from .rows import new_rows
@@ -77,6 +77,7 @@ def working_modes(mechanism: Mechanism, target: Any, *, most_starts: int = 40_00
     InvalidArgument : a batch of targets, or what is no pose.
     """
     pose = _as_pose(mechanism, target)
+    most_starts, most = as_count("most_starts", most_starts, 1), as_count("most", most, 0)
     search = BranchSearch(closure_of(mechanism), pose)
     while search.starts < most_starts and not search.is_done:
         search.go_on(BATCH)
