@@ -155,9 +155,10 @@ def test_home_is_the_first_of_its_working_modes_and_the_answer(name: str) -> Non
 @pytest.mark.parametrize("name", DRIVEN)
 def test_rods_keep_their_length_in_every_working_mode(name: str) -> None:
     mechanism = pf.load(name)
-    for target in some_targets(mechanism, 8):
-        modes = pf.geometric.working_modes(mechanism, target)
-        assert not len(modes) or misfits(mechanism, name, modes.poses, modes.actuators).max() < TOLERANCES.position
+    found = [pf.geometric.working_modes(mechanism, target) for target in some_targets(mechanism, 8)]
+    assert any(map(len, found))
+    for modes in filter(len, found):
+        assert misfits(mechanism, name, modes.poses, modes.actuators).max() < TOLERANCES.position
     wanted = some_targets(mechanism)
     answer = pf.geometric.solve_ik(mechanism, wanted)
     fits = misfits(mechanism, name, answer.pose[answer.reached], answer.actuators[answer.reached])
@@ -345,7 +346,7 @@ def test_leg_by_leg_is_the_same_as_compiled(name: str) -> None:
     compiled = pf.geometric.solve_ik(mechanism, wanted)
     np.testing.assert_array_equal(reached, compiled.reached)
     np.testing.assert_allclose(actuators, compiled.actuators, rtol=0, atol=1e-9)
-    assert 0 < reached.sum() < len(wanted) or name == "five_bar"
+    assert reached.any()
 
 
 # --- branches --------------------------------------------------------------------------------------------------------
