@@ -7,8 +7,7 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES
-from pfabrik.closure import HELD, close, closure_of
-from pfabrik.closure_ik import platform_poses
+from pfabrik.closure import HELD, close, closure_of, platform_poses
 from pfabrik.completion import actuators_of, set_actuators
 from pfabrik.displacements import columns, displacements, gaps, stepped
 from pfabrik.limits import active_limits

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closure import Closing, Closure, close, closure_of
-from .closure_ik import platform_poses
+from .closure import Closing, Closure, close, closure_of, platform_poses
 from .completion import set_actuators
 from .errors import ContinuumOfSolutions, InvalidArgument
 from .fk import answered, as_values

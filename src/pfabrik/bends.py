@@ -30,9 +30,8 @@ class Bends:
     before : joint coordinates (1, columns) of the last answer whose links were bent; None while that is the last one.
     """
 
-    def __init__(self, mechanism: Mechanism, options: Options) -> None:
+    def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._ways = ways_of(mechanism, options.hold, options.rotation_length)
         self.before: Floats | None = None
 
     def note(self, status: int, start: Floats, found: Floats) -> None:
@@ -42,18 +41,27 @@ class Bends:
         is_stretched = bool(are_stretched(self._mechanism, found)[0])
         self.before = (start if self.before is None else self.before) if is_stretched else None
 
-    def prefer(self, target: Floats, found: P.Rows, other: P.Rows) -> bool:
-        """Whether of two answers to one target (1, 4, 4), the one found from `before` is better, or bent as before."""
-        if other.status[0] != found.status[0]:
-            return bool(other.status[0] < found.status[0])
-        closure = closure_of(self._mechanism)
-        if differences(closure, other.poses, found.poses)[0] <= SAME_POSE:
-            return True
-        if found.status[0] != P.PROJECTED:
-            return False
-        ranks = [[way.hold for way in self._ways].index(rows.counters[0, 2]) for rows in (found, other)]
-        if ranks[0] != ranks[1]:
-            return ranks[1] < ranks[0]
-        way = self._ways[ranks[0]]
-        ours, theirs = (way.distances(closure, rows.poses, target)[0] for rows in (found, other))
-        return bool(theirs < (1.0 - SAME) * ours)
+
+def is_better(mechanism: Mechanism, options: Options, target: Floats, other: P.Rows, found: P.Rows) -> bool:
+    """Whether of two answers to one target (1, 4, 4), the other is better than the one found: reached, or nearer."""
+    if other.status[0] != found.status[0]:
+        return bool(other.status[0] < found.status[0])
+    if found.status[0] != P.PROJECTED:
+        return False
+    ways = ways_of(mechanism, options.hold, options.rotation_length)
+    ranks = [[way.hold for way in ways].index(rows.counters[0, 2]) for rows in (other, found)]
+    if ranks[0] != ranks[1]:
+        return ranks[0] < ranks[1]
+    theirs, ours = (ways[ranks[0]].distances(closure_of(mechanism), rows.poses, target)[0] for rows in (other, found))
+    return bool(theirs < (1.0 - SAME) * ours)
+
+
+def is_at_same_pose(mechanism: Mechanism, other: P.Rows, found: P.Rows) -> bool:
+    """Whether two answers, one row each, differ in how links are bent at most."""
+    return bool(differences(closure_of(mechanism), other.poses, found.poses)[0] <= SAME_POSE)
+
+
+def take_over(other: P.Rows, found: P.Rows) -> None:
+    """Put one answer in the place of another."""
+    for array, own in zip(found, other, strict=True):
+        array[:] = own

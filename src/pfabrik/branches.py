@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .closure import HELD, Closing, Closure, close
-from .closure_ik import platform_poses
+from .closure import HELD, Closing, Closure, close, platform_poses
 from .completion import actuators_of
 from .displacements import columns
 from .errors import ContinuumOfWorkingModes

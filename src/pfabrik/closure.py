@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .displacements import columns
+from .displacements import columns, displacements
 from .joint_types import KINDS
 from .kernels import loops as K
 from .loops import loops_of
 from .mechanism import Mechanism
 from .parallel import in_blocks
+from .paths import end_body
 
 Floats = NDArray[np.float64]
 
@@ -88,6 +89,11 @@ def _layout(mechanism: Mechanism, locked: frozenset[str]) -> K.Layout:
         slots[j] = sizes[group]
         sizes[group] += 1
     return K.Layout(slots, sizes)
+
+
+def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
+    """Poses (n, 4, 4) of the end effector, or of the body that carries it where it is a joint."""
+    return np.asarray(displacements(mechanism, coordinates)[end_body(mechanism)] @ mechanism.home_pose)
 
 
 class Closing(NamedTuple):

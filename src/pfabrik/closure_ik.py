@@ -9,16 +9,14 @@ from numpy.typing import NDArray
 
 from .approach import within_sight
 from .assemblies import differences, follows_task, has_parasitic_motion
-from .bends import Bends
-from .closure import HELD, Closing, Closure, close, closure_of
+from .bends import Bends, is_at_same_pose, is_better, take_over
+from .closure import HELD, Closing, Closure, close, closure_of, platform_poses
 from .completion import actuators_of
-from .displacements import displacements
 from .kernels import plan as P
 from .limits import within_turns
 from .mechanism import Mechanism
 from .nearest import MARGIN, is_feasible
 from .options import Options
-from .paths import end_body
 from .poses import are_poses, between, made_exact
 from .projection import project, ways_of
 from .starts import random_coordinates
@@ -42,11 +40,6 @@ STARTS = 80
 
 STEPS = 30
 """Steps each of them may take: those that arrive need fewer."""
-
-
-def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
-    """Poses (n, 4, 4) of the end effector, or of the body that carries it where it is a joint."""
-    return np.asarray(displacements(mechanism, coordinates)[end_body(mechanism)] @ mechanism.home_pose)
 
 
 def answer_by_closure(
@@ -78,7 +71,7 @@ def follow_by_closure(
 ) -> Floats:
     """Answer a path from joint coordinates (1, columns): each target from the answer before it, in its working mode."""
     known, coordinates = _prepare(targets, start, rows)
-    closure, bends, alone = closure_of(mechanism), Bends(mechanism, options), np.ones(1, bool)
+    closure, bends, alone = closure_of(mechanism), Bends(mechanism), np.ones(1, bool)
     for i in range(len(targets)):
         if known[i]:
             target, row = targets[i : i + 1], P.Rows._make(array[i : i + 1] for array in rows)
@@ -86,10 +79,10 @@ def follow_by_closure(
             if bends.before is not None:
                 other_row = P.Rows._make(array.copy() for array in row)
                 other = _answer(closure, target, alone, bends.before, options, True, other_row)
-                if bends.prefer(target, row, other_row):
+                is_kept = is_at_same_pose(mechanism, other_row, row)  # of its two ways to bend, the one from before
+                if is_kept or is_better(mechanism, options, target, other_row, row):
                     found = other
-                    for array, own in zip(row, other_row, strict=True):
-                        array[:] = own
+                    take_over(other_row, row)
             bends.note(int(row.status[0]), start, found)
             start = coordinates[i : i + 1] = found
         if on_progress is not None:

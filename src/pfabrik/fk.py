@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closure import Closing, Closure, close, closure_of
-from .closure_ik import platform_poses
+from .closure import Closing, Closure, close, closure_of, platform_poses
 from .completion import actuators_of, coordinates_of, positions_of, set_actuators
 from .differential import mobility
 from .errors import InvalidArgument

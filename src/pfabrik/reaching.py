@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .approach import within_sight
-from .closure import closure_of
-from .completion import coordinates_of
+from .closure import closure_of, platform_poses
+from .completion import coordinates_of, positions_of
 from .flatten import Flat
 from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
 from .parallel import run_in_blocks
 from .projection import SAME, project, ways_of
+from .rows import new_rows
 from .task import task_of
 from .tolerances import TOLERANCES
 
@@ -106,3 +107,18 @@ def draw_near(
     reached.measures[:, 0], reached.measures[:, 1] = task.errors(reached.poses, wanted)
     for array, own in zip(rows, reached, strict=True):
         array[away[near]] = own[near]
+
+
+def answer_from(
+    mechanism: Mechanism, flat: Flat, target: Floats, start: Floats, settings: P.Settings, options: Options
+) -> P.Rows:
+    """One target (1, 4, 4) answered from joint coordinates (1, columns)."""
+    from .kernels.solve import solve_by_iteration
+
+    begin, found = new_rows(mechanism, flat, 1), new_rows(mechanism, flat, 1)
+    begin.poses[:] = platform_poses(mechanism, start)
+    positions_of(mechanism, flat, start, begin)
+    solve_by_iteration(flat.plan, target, P.Seeds(begin.poses, begin.nodes, begin.trunks), settings, found)
+    if leaves_projections(flat, settings):
+        draw_near(mechanism, flat, target, lambda: start, settings, options, found)
+    return found

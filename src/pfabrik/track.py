@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from .bends import Bends
-from .closure_ik import follow_by_closure, platform_poses
-from .completion import coordinates_of, positions_of
+from .bends import Bends, is_at_same_pose, is_better, take_over
+from .closure_ik import follow_by_closure
+from .completion import coordinates_of
 from .errors import InvalidArgument
 from .flatten import Flat, flat_of
 from .ik import checked, handle_invalid, joints_near, seeds_of, start_coordinates
@@ -18,7 +18,7 @@ from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
 from .poses import as_targets
-from .reaching import draw_near, leaves_projections, settings_of
+from .reaching import answer_from, draw_near, leaves_projections, settings_of
 from .rows import new_rows
 from .solution import Solution, Wanted
 from .tolerances import TOLERANCES
@@ -104,7 +104,7 @@ def _follow(
     settings = settings_of(mechanism, options, seeded=True, chained=True)
     seeds = seeds_of(mechanism, flat, seed, ())
     begin: Callable[[], P.Floats] = partial(start_coordinates, mechanism, seed, ())
-    bends = Bends(mechanism, options)
+    bends = Bends(mechanism)
     longest = _STEPS_A_REPORT if on_progress is not None else max(len(poses), 1)
     done, piece = 0, longest
     while done < len(poses):
@@ -119,10 +119,9 @@ def _follow(
             draw_near(mechanism, flat, poses[block][row : row + 1], begin, settings, options, alone)
             own, piece = P.Rows._make(array[: row + 1] for array in own), 1
         if bends.before is not None:
-            other = _answered(mechanism, flat, poses[block], bends.before, settings, options)
-            if bends.prefer(poses[block], own, other):
-                for array, better in zip(own, other, strict=True):
-                    array[:] = better
+            other = answer_from(mechanism, flat, poses[block], bends.before, settings, options)
+            if is_at_same_pose(mechanism, other, own) or is_better(mechanism, options, poses[block], other, own):
+                take_over(other, own)
         last = _last_answer(own, len(own.status))
         if last is not None:
             seeds, after = P.Seeds(last.poses, last.nodes, last.trunks), cache(partial(coordinates_of, mechanism, last))
@@ -133,21 +132,6 @@ def _follow(
         done += len(own.status)
         if on_progress is not None:
             on_progress(done, len(poses))
-
-
-def _answered(
-    mechanism: Mechanism, flat: Flat, pose: P.Floats, start: P.Floats, settings: P.Settings, options: Options
-) -> P.Rows:
-    """One target (1, 4, 4) answered from joint coordinates (1, columns)."""
-    from .kernels.solve import solve_by_iteration
-
-    begin, found = new_rows(mechanism, flat, 1), new_rows(mechanism, flat, 1)
-    begin.poses[:] = platform_poses(mechanism, start)
-    positions_of(mechanism, flat, start, begin)
-    solve_by_iteration(flat.plan, pose, P.Seeds(begin.poses, begin.nodes, begin.trunks), settings, found)
-    if _drawn_after(flat, settings, found):
-        draw_near(mechanism, flat, pose, lambda: start, settings, options, found)
-    return found
 
 
 def _drawn_after(flat: Flat, settings: P.Settings, rows: P.Rows) -> list[int]:
