@@ -31,8 +31,11 @@ FAR_CORNER, TURNED_CORNER = 0.5, 0.5
 """Where corners are looked for: so far from home [L], and turned so far [rad]."""
 
 
-CORNERS, CHANCES = 4, 64
+CORNERS, CHANCES = 8, 128
 """How many of them searches start from, and how many random configurations are closed to find some."""
+
+HITS = 5
+"""How many searches must end at the nearest configuration found before no other is looked for."""
 
 
 class Way(NamedTuple):
@@ -86,26 +89,37 @@ def project(
     )
     everywhere = [*starts, *(np.repeat(corner[None], n, axis=0) for corner in corners_of(closure.mechanism) if corners)]
     for way in ways:
-        waiting = np.flatnonzero(np.isinf(best.distances))
-        for start in everywhere if len(waiting) else ():
-            found = approached(closure, start[waiting], targets[waiting], platform=way.weights, framed=framed)
-            _take_nearer(closure, best, waiting, found, targets, way)
+        open_to_it, hits = np.isinf(best.distances), np.zeros(n, np.int64)
+        for start in everywhere:
+            waiting = np.flatnonzero(open_to_it & (hits < HITS))
+            if len(waiting):
+                found = approached(closure, start[waiting], targets[waiting], platform=way.weights, framed=framed)
+                hits[waiting] = _take_nearer(closure, best, waiting, found, targets, way, hits[waiting])
         lost = np.flatnonzero(np.isinf(best.distances))
         if len(lost) and LOCKED in way.weights:
             placed = _placed(closure, starts[0][lost], targets[lost], way)
-            _take_nearer(closure, best, lost, placed, targets, way)
+            _take_nearer(closure, best, lost, placed, targets, way, np.zeros(len(lost), np.int64))
     return best
 
 
 def _take_nearer(
-    closure: Closure, best: Projected, rows: NDArray[np.intp], found: Closing, targets: Floats, way: Way
-) -> None:
-    """Take over the rows that are feasible, and nearer than the best so far."""
+    closure: Closure,
+    best: Projected,
+    rows: NDArray[np.intp],
+    found: Closing,
+    targets: Floats,
+    way: Way,
+    hits: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Take over the rows that are feasible, and nearer than the best so far; how often each best was found by now."""
     distances = np.where(is_feasible(found), way.distances(closure, found.poses, targets[rows]), np.inf)
-    better = distances < (1.0 - SAME) * best.distances[rows]
+    least = best.distances[rows]
+    better = distances < (1.0 - SAME) * least
+    again = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)
     best.distances[rows[better]], best.holds[rows[better]] = distances[better], way.hold
     for array, own in zip(best.closing, found, strict=True):
         array[rows[better]] = own[better]
+    return np.where(better, 1, hits + again)
 
 
 def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Closing:
