@@ -82,16 +82,17 @@ class Track(Solution):
         moved = np.maximum(_moves(self.mechanism, self.pose), self._actuator_moves().max(axis=1, initial=0.0))
         asked = np.maximum(SUSPICIOUS * _moves(self.mechanism, self._targets), LEAST)
         for row in np.flatnonzero(moved > asked).tolist():
-            found[row] = self._leaps(row, moved[row])
+            # where links are stretched out, only one direction may tell which way they bend
+            found[row] = all(self._leaps(*ends, moved[row]) for ends in ((row - 1, row), (row, row - 1)))
         return found
 
-    def _leaps(self, row: int, moved: float) -> bool:
-        """Whether a step stays a leap where it is divided, or leads elsewhere."""
+    def _leaps(self, start: int, end: int, moved: float) -> bool:
+        """Whether a step from one row to the next, or back, stays a leap where it is divided, or leads elsewhere."""
         shares = np.arange(1, SUBSTEPS + 1)[:, None, None] / SUBSTEPS
-        ends = np.repeat(self._targets[row - 1 : row + 1], SUBSTEPS, axis=0)
-        divided = self._follow(between(ends[:SUBSTEPS], ends[SUBSTEPS:], shares), self[row - 1])
-        poses = np.concatenate([self.pose[row - 1 : row], divided.pose, self.pose[row : row + 1]])
-        actuators = np.concatenate([self.actuators[row - 1 : row], divided.actuators, self.actuators[row : row + 1]])
+        here, there = (np.repeat(self._targets[row : row + 1], SUBSTEPS, axis=0) for row in (start, end))
+        way = [self[start], self._follow(between(here, there, shares), self[start]), self[end]]
+        poses = np.concatenate([each.pose.reshape(-1, 4, 4) for each in way])
+        actuators = np.concatenate([each.actuators.reshape(-1, self.actuators.shape[1]) for each in way])
         steps = np.maximum(_moves(self.mechanism, poses), _scaled(self.mechanism, actuators).max(axis=1, initial=0.0))
         return bool(steps.max() > LEAP * moved)
 
