@@ -34,7 +34,7 @@ FAR_CORNER, TURNED_CORNER = 0.5, 0.5
 CORNERS, CHANCES = 8, 128
 """How many of them searches start from, and how many random configurations are closed to find some."""
 
-HITS = 5
+HITS = 7
 """How many searches must end at the nearest configuration found before no other is looked for."""
 
 
