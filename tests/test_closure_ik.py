@@ -373,6 +373,7 @@ def test_slides_without_ranges_reach_however_far(distance: float) -> None:
     assert pf.closure_residual(mechanism, answers).max() <= 1e-9 * distance
 
 
+@compiled
 def test_universal_and_revolute_joints_may_turn_further_than_half_way() -> None:
     wide = {"range": ((-4, 4), (-0.1, 3.5))}
     joints = [

@@ -239,4 +239,5 @@ def test_what_a_caller_does_to_targets_afterwards_changes_no_answer(stewart: Mec
 def test_a_status_is_written_by_its_name() -> None:
     assert str(Status.PROJECTED) == f"{Status.PROJECTED}" == "PROJECTED"
     assert f"{Status.REACHED:>9}" == "  REACHED"
+    assert f"{Status.PROJECTED:d}" == "1"
     assert Status.PROJECTED == 1

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import checking
 import pfabrik as pf
@@ -332,6 +333,57 @@ def test_links_that_were_stretched_out_beyond_reach_bend_back_the_way_they_did(m
     np.testing.assert_allclose(followed.actuators[-1], followed.actuators[0], rtol=0, atol=1e-9)
     np.testing.assert_allclose(followed.pose, followed.pose[::-1], rtol=0, atol=1e-5 * machine.characteristic_length)
     assert checking.worst_excess(machine, followed).max() <= 1e-9
+
+
+def out_and_back(steps: int) -> np.ndarray:
+    """Shares of a way, out and back the same way."""
+    share = np.linspace(0, 1, steps)
+    return np.concatenate([share, share[-2::-1]])[:, None]
+
+
+@pytest.mark.skipif(INTERPRETED, reason="long")
+def test_cranks_that_were_stretched_out_beyond_reach_bend_back_the_way_they_did() -> None:
+    machine = pf.load("servo_hexapod").without_limits()
+    draw = np.random.default_rng(2)
+    way, turn = draw.normal(size=3), 0.6 * draw.normal(size=3)
+    share = out_and_back(21)
+    targets = np.tile(machine.home_pose, (len(share), 1, 1))
+    targets[:, :3, 3] += 1.56 * machine.characteristic_length * share * way / np.linalg.norm(way)
+    targets[:, :3, :3] = Rotation.from_rotvec(share * turn).as_matrix()
+    followed = pf.track(machine, targets)
+    np.testing.assert_allclose(followed.position_error, followed.position_error[::-1], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(followed.actuators[-1], followed.actuators[0], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["delta", "orthoglide"])
+def test_a_platform_that_cannot_turn_does_not_turn_beyond_reach(name: str) -> None:
+    machine = pf.load(name).without_limits()
+    draw = np.random.default_rng(11)
+    for way in draw.normal(size=(1 if INTERPRETED else 10, 3)):
+        way *= 1.8 * machine.characteristic_length / np.linalg.norm(way)
+        followed = pf.track(machine, machine.home_pose[:3, 3] + out_and_back(13) * way)
+        turned = Rotation.from_matrix(followed.pose[:, :3, :3]).magnitude()
+        assert turned.max() <= 1e-5
+        assert (followed.status[[0, -1]] == Status.REACHED).all()
+
+
+@pytest.mark.parametrize("on_invalid", ["raise", "mark"])
+def test_a_row_that_is_no_pose_where_links_are_stretched_out_is_passed_over(on_invalid: str) -> None:
+    machine = pf.load("five_bar").without_limits()
+    path = np.linspace((0, 0, 220), (0, 0, 400), 12)
+    whole = pf.track(machine, path)
+    path[8] = np.nan
+    if on_invalid == "raise":
+        with pytest.raises(InvalidArgument, match="first bad rows: 8"):
+            pf.track(machine, path)
+        return
+    followed = pf.track(machine, path, options=Options(on_invalid="mark"))
+    assert pf.singularity(machine, whole).serial[7] < 1e-3
+    assert followed.status[8] == Status.INVALID
+    others = np.arange(12) != 8
+    np.testing.assert_allclose(
+        followed.pose[others], whole.pose[others], rtol=0, atol=1e-6 * machine.characteristic_length
+    )
 
 
 @pytest.mark.parametrize("steps", [0, 1])

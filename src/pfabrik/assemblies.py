@@ -53,6 +53,15 @@ def has_parasitic_motion(mechanism: Mechanism) -> bool:
     return bool((differences(closure, found.poses, wanted)[closed] > TOLERANCES.same_mode).any())
 
 
+def strays(mechanism: Mechanism, poses: Floats) -> NDArray[np.bool_]:
+    """Whether poses (n, 4, 4) are those of a platform that has turned over though its legs keep it as it is, (n,)."""
+    if not follows_task(mechanism) or has_parasitic_motion(mechanism):
+        return np.zeros(len(poses), bool)
+    home = np.repeat(mechanism.home_pose[None], len(poses), axis=0)
+    kept = task_of(mechanism).completed(poses, home)
+    return np.asarray(differences(closure_of(mechanism), poses, kept) > TOLERANCES.same_mode)
+
+
 def differences(closure: Closure, poses: Floats, others: Floats) -> Floats:
     """Largest difference of positions [L] and of entries of rotations, (n,)."""
     scale = np.ones((3, 4))

@@ -15,7 +15,7 @@ from .projection import SAME, ways_of
 
 Floats = NDArray[np.float64]
 
-SAME_POSE = 1e-6
+SAME_POSE = 1e-7
 """Largest difference of poses that are the same to a search for the nearest [L and entries of rotations]."""
 
 
@@ -30,8 +30,9 @@ class Bends:
     before : joint coordinates (1, columns) of the last answer whose links were bent; None while that is the last one.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, options: Options) -> None:
         self._mechanism = mechanism
+        self._ways = ways_of(mechanism, options.hold, options.rotation_length)
         self.before: Floats | None = None
 
     def note(self, status: int, start: Floats, found: Floats) -> None:
@@ -41,27 +42,31 @@ class Bends:
         is_stretched = bool(are_stretched(self._mechanism, found)[0])
         self.before = (start if self.before is None else self.before) if is_stretched else None
 
+    def settle(self, target: Floats, found: P.Rows, other: P.Rows) -> bool:
+        """Put an answer to a target (1, 4, 4) that was found from `before` in the place of the one found; whether so.
 
-def is_better(mechanism: Mechanism, options: Options, target: Floats, other: P.Rows, found: P.Rows) -> bool:
-    """Whether of two answers to one target (1, 4, 4), the other is better than the one found: reached, or nearer."""
-    if other.status[0] != found.status[0]:
-        return bool(other.status[0] < found.status[0])
-    if found.status[0] != P.PROJECTED:
-        return False
-    ways = ways_of(mechanism, options.hold, options.rotation_length)
-    ranks = [[way.hold for way in ways].index(rows.counters[0, 2]) for rows in (other, found)]
-    if ranks[0] != ranks[1]:
-        return ranks[0] < ranks[1]
-    theirs, ours = (ways[ranks[0]].distances(closure_of(mechanism), rows.poses, target)[0] for rows in (other, found))
-    return bool(theirs < (1.0 - SAME) * ours)
+        It is if it is reached or nearer, where the one found is not, or if it has the same pose, and so is bent as
+        links were.
+        """
+        is_taken = self._is_alike(found, other) or self._is_better(target, found, other)
+        if is_taken:
+            for array, own in zip(found, other, strict=True):
+                array[:] = own
+        return is_taken
 
+    def _is_alike(self, found: P.Rows, other: P.Rows) -> bool:
+        apart = differences(closure_of(self._mechanism), other.poses, found.poses)[0]
+        return bool(other.status[0] == found.status[0] and apart <= SAME_POSE)
 
-def is_at_same_pose(mechanism: Mechanism, other: P.Rows, found: P.Rows) -> bool:
-    """Whether two answers, one row each, differ in how links are bent at most."""
-    return bool(differences(closure_of(mechanism), other.poses, found.poses)[0] <= SAME_POSE)
-
-
-def take_over(other: P.Rows, found: P.Rows) -> None:
-    """Put one answer in the place of another."""
-    for array, own in zip(found, other, strict=True):
-        array[:] = own
+    def _is_better(self, target: Floats, found: P.Rows, other: P.Rows) -> bool:
+        if other.status[0] != found.status[0]:
+            return bool(other.status[0] < found.status[0])
+        if found.status[0] != P.PROJECTED:
+            return False
+        holds = [way.hold for way in self._ways]
+        ours, theirs = (holds.index(rows.counters[0, 2]) for rows in (found, other))
+        if ours != theirs:
+            return theirs < ours
+        closure, way = closure_of(self._mechanism), self._ways[ours]
+        here, there = (way.distances(closure, rows.poses, target)[0] for rows in (found, other))
+        return bool(there < (1.0 - SAME) * here)

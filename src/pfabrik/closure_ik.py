@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .approach import within_sight
 from .assemblies import differences, follows_task, has_parasitic_motion
-from .bends import Bends, is_at_same_pose, is_better, take_over
+from .bends import Bends
 from .closure import HELD, Closing, Closure, close, closure_of, platform_poses
 from .completion import actuators_of
 from .kernels import plan as P
@@ -18,7 +18,7 @@ from .mechanism import Mechanism
 from .nearest import MARGIN, is_feasible
 from .options import Options
 from .poses import are_poses, between, made_exact
-from .projection import project, ways_of
+from .projection import kept, project, ways_of
 from .starts import random_coordinates
 from .task import Weights, task_of
 from .tolerances import TOLERANCES
@@ -71,7 +71,7 @@ def follow_by_closure(
 ) -> Floats:
     """Answer a path from joint coordinates (1, columns): each target from the answer before it, in its working mode."""
     known, coordinates = _prepare(targets, start, rows)
-    closure, bends, alone = closure_of(mechanism), Bends(mechanism), np.ones(1, bool)
+    closure, bends, alone = closure_of(mechanism), Bends(mechanism, options), np.ones(1, bool)
     for i in range(len(targets)):
         if known[i]:
             target, row = targets[i : i + 1], P.Rows._make(array[i : i + 1] for array in rows)
@@ -79,10 +79,7 @@ def follow_by_closure(
             if bends.before is not None:
                 other_row = P.Rows._make(array.copy() for array in row)
                 other = _answer(closure, target, alone, bends.before, options, True, other_row)
-                is_kept = is_at_same_pose(mechanism, other_row, row)  # of its two ways to bend, the one from before
-                if is_kept or is_better(mechanism, options, target, other_row, row):
-                    found = other
-                    take_over(other_row, row)
+                found = other if bends.settle(target, row, other_row) else found
             bends.note(int(row.status[0]), start, found)
             start = coordinates[i : i + 1] = found
         if on_progress is not None:
@@ -121,7 +118,7 @@ def _answer(
         answers = project(
             closure, sought, starts, ways_of(mechanism, options.hold, options.rotation_length), corners=not keep_mode
         )
-        holds[away] = answers.holds
+        holds[away] = kept(mechanism, answers.holds, answers.closing.poses, wanted[away])
         for array, own in zip(found, answers.closing, strict=True):
             array[away] = own
     _fill(closure, found, wanted, which, options, rows)

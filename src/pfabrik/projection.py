@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .approach import approached
-from .assemblies import differences, follows_task, has_parasitic_motion
+from .assemblies import differences, follows_task, has_parasitic_motion, strays
 from .closure import Closing, Closure, close, closure_of
 from .displacements import displacements
 from .kernels import plan as P
@@ -36,6 +36,10 @@ CORNERS, CHANCES = 8, 128
 
 HITS = 7
 """How many searches must end at the nearest configuration found before no other is looked for."""
+
+
+HELD = 1e-6
+"""Most that an answer may miss of what it says it holds [L or rad]."""
 
 
 class Way(NamedTuple):
@@ -69,6 +73,14 @@ def ways_of(mechanism: Mechanism, hold: str | None, rotation_length: float | Non
     if hold == "orientation":
         return [Way(task.weights(1.0, LOCKED), P.HOLD_ORIENTATION), free]
     return [Way(task.weights(LOCKED, turning), P.HOLD_POSITION), free]
+
+
+def kept(mechanism: Mechanism, holds: NDArray[np.int64], poses: Floats, targets: Floats) -> NDArray[np.int64]:
+    """What poses (n, 4, 4) have of their targets, of what they were to hold: targets out of sight were not sought."""
+    position, rotation = task_of(mechanism).errors(poses, targets)
+    turned = (holds == P.HOLD_ORIENTATION) & (rotation > HELD)
+    moved = (holds == P.HOLD_POSITION) & (position > HELD * mechanism.characteristic_length)
+    return np.where(turned | moved, P.HOLD_NOTHING, holds)
 
 
 def project(
@@ -112,7 +124,8 @@ def _take_nearer(
     hits: NDArray[np.int64],
 ) -> NDArray[np.int64]:
     """Take over the rows that are feasible, and nearer than the best so far; how often each best was found by now."""
-    distances = np.where(is_feasible(found), way.distances(closure, found.poses, targets[rows]), np.inf)
+    counts = is_feasible(found) & ~strays(closure.mechanism, found.poses)
+    distances = np.where(counts, way.distances(closure, found.poses, targets[rows]), np.inf)
     least = best.distances[rows]
     better = distances < (1.0 - SAME) * least
     again = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)

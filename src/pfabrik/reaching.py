@@ -16,7 +16,7 @@ from .kernels import plan as P
 from .mechanism import Mechanism
 from .options import Options
 from .parallel import run_in_blocks
-from .projection import SAME, project, ways_of
+from .projection import SAME, kept, project, ways_of
 from .rows import new_rows
 from .task import task_of
 from .tolerances import TOLERANCES
@@ -103,7 +103,7 @@ def draw_near(
     reached.status[:] = P.PROJECTED
     reached.counters[:] = projected.counters
     reached.counters[:, 0] += found.closing.iterations
-    reached.counters[:, 2] = found.holds
+    reached.counters[:, 2] = kept(mechanism, found.holds, reached.poses, wanted)
     reached.measures[:, 0], reached.measures[:, 1] = task.errors(reached.poses, wanted)
     for array, own in zip(rows, reached, strict=True):
         array[away[near]] = own[near]

@@ -27,6 +27,10 @@ from .task import task_of
 Floats = NDArray[np.float64]
 
 
+NUMBERS = tuple("bdoxXneEfFgG%")
+"""Types of format specifications by which a status is written as the number it is."""
+
+
 class Status(IntEnum):
     """What became of a target; the worst of a batch is the largest.
 
@@ -47,7 +51,7 @@ class Status(IntEnum):
         return self.name
 
     def __format__(self, spec: str) -> str:
-        return format(self.name, spec)
+        return format(int(self) if spec[-1:] in NUMBERS else self.name, spec)
 
 
 class Wanted(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .bends import Bends, is_at_same_pose, is_better, take_over
+from .bends import Bends
 from .closure_ik import follow_by_closure
 from .completion import coordinates_of
 from .errors import InvalidArgument
@@ -104,31 +104,29 @@ def _follow(
     settings = settings_of(mechanism, options, seeded=True, chained=True)
     seeds = seeds_of(mechanism, flat, seed, ())
     begin: Callable[[], P.Floats] = partial(start_coordinates, mechanism, seed, ())
-    bends = Bends(mechanism)
+    bends = Bends(mechanism, options)
     longest = _STEPS_A_REPORT if on_progress is not None else max(len(poses), 1)
     done, piece = 0, longest
     while done < len(poses):
         block = slice(done, done + piece)
         own = P.Rows._make(array[block] for array in rows)
         solve_by_iteration(flat.plan, poses[block], seeds, settings, own)
-        piece = min(2 * piece, longest)
-        for row in _drawn_after(flat, settings, own)[:1]:
+        away = _drawn_after(flat, settings, own)[:1]
+        for row in away:
             before = _last_answer(own, row)
             begin = begin if before is None else cache(partial(coordinates_of, mechanism, before))
             alone = P.Rows._make(array[row : row + 1] for array in own)
             draw_near(mechanism, flat, poses[block][row : row + 1], begin, settings, options, alone)
-            own, piece = P.Rows._make(array[: row + 1] for array in own), 1
+            own = P.Rows._make(array[: row + 1] for array in own)
         if bends.before is not None:
-            other = answer_from(mechanism, flat, poses[block], bends.before, settings, options)
-            if is_at_same_pose(mechanism, other, own) or is_better(mechanism, options, poses[block], other, own):
-                take_over(other, own)
+            bends.settle(poses[block], own, answer_from(mechanism, flat, poses[block], bends.before, settings, options))
         last = _last_answer(own, len(own.status))
         if last is not None:
             seeds, after = P.Seeds(last.poses, last.nodes, last.trunks), cache(partial(coordinates_of, mechanism, last))
             if bends.before is not None or (last.status[0] == P.PROJECTED and leaves_projections(flat, settings)):
                 bends.note(last.status[0], begin(), after())
-                piece = 1 if bends.before is not None else piece
             begin = after
+        piece = 1 if away or bends.before is not None else min(2 * piece, longest)
         done += len(own.status)
         if on_progress is not None:
             on_progress(done, len(poses))

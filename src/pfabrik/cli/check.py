@@ -12,6 +12,8 @@ import numpy as np
 import pfabrik as pf
 
 from ..motions import generic_of
+from ..task import task_of
+from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from ..mechanism import Joint, Mechanism
@@ -43,7 +45,11 @@ def check(mech: str) -> int:
 def notes(mechanism: Mechanism) -> Iterator[str]:
     """What a description says that its author may not have meant."""
     asked, there = sum(COUNTS[part] for part in mechanism.task), pf.mobility(mechanism).platform
-    if asked > there < generic_of(mechanism).directions.shape[1]:  # not always the same ones, as in a plane
+    task = task_of(mechanism)
+    directions = generic_of(mechanism).directions
+    counts = [*task.axes, *[task.rotations > 0] * 3][: len(directions)]  # of a joint end effector, three
+    twists = directions[counts]
+    if asked > there < np.linalg.matrix_rank(twists, TOLERANCES.alignment):  # not always the same, as in a plane
         yield (
             f"the task {' '.join(mechanism.task)} asks for {asked} freedoms, and the end effector has {there}, from "
             "which the others follow: hardly any target can be reached; `task` says which count"

@@ -11,6 +11,7 @@ import click
 import pfabrik as pf
 
 from ..errors import near_miss
+from .finite import FINITE
 from .progress import progress
 from .projecting import options_projecting, projecting
 from .whole import whole_file
@@ -28,7 +29,7 @@ ROWS_NAMED = 5
 @click.argument("path", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="CSV file to write, or replace.")
 @projecting
-@click.option("--sample-time", type=float, metavar="S", help="Time from one target to the next [s].")
+@click.option("--sample-time", type=FINITE, metavar="S", help="Time from one target to the next [s].")
 @click.option(
     "--speed",
     "speeds",

@@ -72,7 +72,8 @@ def hold(pull: Pull, held: int, component: int, error: float) -> int:
 def hold_tilt(target: Floats, X: Floats, pull: Pull, held: int) -> int:
     """The z axis keeps the target's direction: it has no part along the target's x and y axes.
 
-    Nor has the opposite one; what looks away is first to turn round, without swaying from the way there.
+    The opposite direction has none either. So a z axis that is farther away than a right angle is asked to turn by the
+    shortest way, and not across it.
     """
     axis, angle = turn_of_tilt(target, X)
     if angle > 0.5 * math.pi:
@@ -112,6 +113,6 @@ def turn_of_tilt(target: Floats, X: Floats) -> tuple[Vec, float]:
     angle = math.atan2(sine, cosine)
     if sine > ALIGNED:
         return scale(1.0 / sine, axis), angle
-    if cosine > 0.0:  # the axis is of no length, but neither is the turn
-        return scale(1.0 / max(angle, ALIGNED), axis), angle
+    if cosine > 0.0:
+        return scale(1.0 / angle if angle > 0.0 else 0.0, axis), angle
     return (X[0, 0], X[1, 0], X[2, 0]), angle

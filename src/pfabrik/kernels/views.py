@@ -58,7 +58,7 @@ class Desk(NamedTuple):
     balance: Floats  # (rows,): multipliers of the loops and of what is held
     here: Floats  # (columns,)
     there: Floats  # (columns,)
-    used: Ints  # (columns,): how often paths pass each
+    used: Ints  # (columns,): how many paths pass each, the first counted twice: it is in the equations of all
     filled: Ints  # (columns + 1 + rows,): where a row of A is not zero: legs have few unknowns in common
 
 
