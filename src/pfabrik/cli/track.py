@@ -18,6 +18,7 @@ from .whole import whole_file
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
+    from ..report import Floats
     from ..solution import Solution
     from ..tracked import Track
 
@@ -64,6 +65,7 @@ def track(
     targets = read_targets(path)
     if output.exists() and output.samefile(path):
         raise click.UsageError(f"-o {output}: found the path of targets itself; expected another file")
+    note_ignored(mechanism, targets)
     options = options_projecting(hold, projection)
     with whole_file(output) as handle:
         with progress(f"tracking {len(targets)} targets") as on_progress:
@@ -78,6 +80,18 @@ def track(
         write_track(handle, targets, followed)
     click.echo(summary(followed))
     return 0 if followed and not any(followed.too_fast or ()) else 1
+
+
+def note_ignored(mechanism: Mechanism, targets: Floats) -> None:
+    """Say so when the task leaves out columns that are not as at home."""
+    task, home = set(mechanism.task), mechanism.home_pose
+    moved = (targets[:, :3, 3] != home[:3, 3]).any(axis=0)
+    columns = [axis for axis, moves in zip("xyz", moved, strict=True) if moves and axis not in task]
+    if not task & {"rotation", "tilt"} and (targets[:, :3, :3] != home[:3, :3]).any():
+        columns += ["roll", "pitch", "yaw"]
+    if columns:
+        left_out = f"{'columns' if len(columns) > 1 else 'column'} {', '.join(columns)} without effect"
+        click.echo(f"pfabrik: note: {left_out}: the task is {' '.join(mechanism.task)}", err=True)
 
 
 def speed_limits(mechanism: Mechanism, given: Sequence[str]) -> dict[str, float]:
