@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
-from copyreg import __newobj__  # type: ignore[attr-defined]  # what pickles call to make an object without its __init__
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +32,12 @@ class PfabrikError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For copies and other processes: the text and the attributes as they are, not put together again."""
-        return __newobj__, (type(self), *self.args), self.__dict__
+        return _as_it_was, (type(self), self.args), self.__dict__
+
+
+def _as_it_was(kind: type[PfabrikError], args: tuple[Any, ...]) -> PfabrikError:
+    """An error with these texts; its attributes follow."""
+    return kind.__new__(kind, *args)
 
 
 class MobilityWarning(UserWarning):

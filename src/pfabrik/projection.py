@@ -38,7 +38,7 @@ HITS = 7
 """How many searches must end at the nearest configuration found before no other is looked for."""
 
 
-HELD = 1e-6
+MISSED = 1e-6
 """Most that an answer may miss of what it says it holds [L or rad]."""
 
 
@@ -78,8 +78,8 @@ def ways_of(mechanism: Mechanism, hold: str | None, rotation_length: float | Non
 def kept(mechanism: Mechanism, holds: NDArray[np.int64], poses: Floats, targets: Floats) -> NDArray[np.int64]:
     """What poses (n, 4, 4) have of their targets, of what they were to hold: targets out of sight were not sought."""
     position, rotation = task_of(mechanism).errors(poses, targets)
-    turned = (holds == P.HOLD_ORIENTATION) & (rotation > HELD)
-    moved = (holds == P.HOLD_POSITION) & (position > HELD * mechanism.characteristic_length)
+    turned = (holds == P.HOLD_ORIENTATION) & (rotation > MISSED)
+    moved = (holds == P.HOLD_POSITION) & (position > MISSED * mechanism.characteristic_length)
     return np.where(turned | moved, P.HOLD_NOTHING, holds)
 
 

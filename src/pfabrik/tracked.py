@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .errors import InvalidArgument, UnknownName
 from .mechanism import Mechanism
 from .poses import between
-from .solution import Solution, as_plain
+from .solution import Solution, Status, as_plain
 from .task import task_of
 from .tolerances import TOLERANCES
 
@@ -83,7 +83,8 @@ class Track(Solution):
         asked = np.maximum(SUSPICIOUS * _moves(self.mechanism, self._targets), LEAST)
         for row in np.flatnonzero(moved > asked).tolist():
             # where links are stretched out, only one direction may tell which way they bend
-            found[row] = all(self._leaps(*ends, moved[row]) for ends in ((row - 1, row), (row, row - 1)))
+            ways = [ends for ends in ((row - 1, row), (row, row - 1)) if self.status[ends[0]] < Status.FAILED]
+            found[row] = all(self._leaps(*ends, moved[row]) for ends in ways)
         return found
 
     def _leaps(self, start: int, end: int, moved: float) -> bool:

@@ -12,7 +12,7 @@ import pfabrik as pf
 
 from .answer import describe, in_units, margins_of, margins_table, pose_header, pose_texts, tell_modes
 from .finite import FINITE
-from .projecting import note_unused, options_projecting, projecting
+from .projecting import note_left_out, note_unused, options_projecting, projecting
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
@@ -82,8 +82,7 @@ def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | No
         left_out.append("--rpy")
     elif rpy and "tilt" in task and any(rpy) and not any(rpy[:2]):
         left_out.append("the yaw of --rpy")
-    for given in left_out:
-        click.echo(f"pfabrik: note: {given} has no effect: the task is {' '.join(mechanism.task)}", err=True)
+    note_left_out(left_out, mechanism)
 
 
 def list_modes(mechanism: Mechanism, target: Floats, as_json: bool) -> int:

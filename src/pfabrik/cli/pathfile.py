@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -18,6 +18,8 @@ from ..errors import near_miss
 from ..report import readouts, rpy_angles, short_names
 
 if TYPE_CHECKING:
+    from _csv import Reader
+
     from ..tracked import Track
 
 Floats = NDArray[np.float64]
@@ -55,10 +57,10 @@ def read_targets(path: Path) -> Floats:
     return np.stack([pf.pose(xyz, rpy=angles) for xyz, angles in zip(positions, rpy, strict=True)])
 
 
-def numbered(reader: Iterable[Sequence[str]]) -> Iterator[tuple[int, list[str]]]:
+def numbered(reader: Reader) -> Iterator[tuple[int, list[str]]]:
     """Rows with the line they end on, cells without surrounding blanks."""
     for cells in reader:
-        yield reader.line_num, [cell.strip() for cell in cells]  # type: ignore[attr-defined]
+        yield reader.line_num, [cell.strip() for cell in cells]
 
 
 def refuse(path: Path, faults: Sequence[str]) -> None:

@@ -1,8 +1,8 @@
-"""The options ``--hold`` and ``--projection`` of the commands that solve."""
+"""What the commands that solve share: ``--hold``, ``--projection``, and notes of what has no effect."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 import click
@@ -10,6 +10,7 @@ import click
 import pfabrik as pf
 
 if TYPE_CHECKING:
+    from ..mechanism import Mechanism
     from ..options import Options
 
 Hold = Literal["orientation", "position"]
@@ -42,6 +43,12 @@ def projecting(command: Callable[..., Any]) -> Callable[..., Any]:
 def options_projecting(hold: str, projection: str) -> Options:
     """Solver options for the values of both."""
     return pf.Options(hold=HOLDS[hold], projection=cast(Projection, projection))
+
+
+def note_left_out(given: Iterable[str], mechanism: Mechanism) -> None:
+    """Say so when the task leaves out what was given."""
+    for each in given:
+        click.echo(f"pfabrik: note: {each} has no effect: the task is {' '.join(mechanism.task)}", err=True)
 
 
 def note_unused(because: str) -> None:

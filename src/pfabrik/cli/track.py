@@ -13,7 +13,7 @@ import pfabrik as pf
 from ..errors import near_miss
 from .finite import FINITE
 from .progress import progress
-from .projecting import options_projecting, projecting
+from .projecting import note_left_out, options_projecting, projecting
 from .whole import whole_file
 
 if TYPE_CHECKING:
@@ -89,9 +89,7 @@ def note_ignored(mechanism: Mechanism, targets: Floats) -> None:
     columns = [axis for axis, moves in zip("xyz", moved, strict=True) if moves and axis not in task]
     if not task & {"rotation", "tilt"} and (targets[:, :3, :3] != home[:3, :3]).any():
         columns += ["roll", "pitch", "yaw"]
-    if columns:
-        left_out = f"{'columns' if len(columns) > 1 else 'column'} {', '.join(columns)} without effect"
-        click.echo(f"pfabrik: note: {left_out}: the task is {' '.join(mechanism.task)}", err=True)
+    note_left_out((f"column {name}" for name in columns), mechanism)
 
 
 def speed_limits(mechanism: Mechanism, given: Sequence[str]) -> dict[str, float]:
