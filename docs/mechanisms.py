@@ -12,7 +12,7 @@ from PIL import Image
 
 import pfabrik as pf
 from pfabrik.catalog import catalog_file, description
-from pfabrik.decompose import closure_reason, engine_of
+from pfabrik.decomposition.decompose import closure_reason, engine_of
 from pfabrik.view.drawing import draw
 
 PAGE = Path(__file__).with_suffix(".md")

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from pfabrik.mechanism import Joint, Mechanism
-from pfabrik.solution import Solution
+from pfabrik.answers.solution import Solution
+from pfabrik.description.mechanism import Joint, Mechanism
 
 Array = NDArray[np.float64]
 

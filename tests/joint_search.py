@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from joint_checking import _cone_angle, motion
 from pfabrik import Mechanism
-from pfabrik.joint_types import KINDS
+from pfabrik.description.joint_types import KINDS
 
 Array = NDArray[np.float64]
 INSIDE = (

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from pfabrik.mechanism import Cone, Joint, Mechanism
+from pfabrik.description.mechanism import Cone, Joint, Mechanism
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

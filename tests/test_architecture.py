@@ -78,7 +78,11 @@ def test_closed_forms_share_only_the_decorator_with_the_kernels() -> None:
     names = {name for source in (PACKAGE / "geometric").glob("*.py") for name in imports(source)}
     shared = {name for name in names if "numba" in name or name.startswith("pfabrik.kernels")}
     assert shared == {f"pfabrik.kernels._jit.{decorator}" for decorator in ("kernel", "routine", "inlined")}
-    assert not {name for name in names if name.startswith(("pfabrik.flatten", "pfabrik.positions", "pfabrik.ik"))}
+    assert not {
+        name
+        for name in names
+        if name.startswith(("pfabrik.decomposition.plan", "pfabrik.decomposition.positions", "pfabrik.ik"))
+    }
 
 
 def test_the_contract_of_closed_forms_names_every_kernel() -> None:

@@ -17,8 +17,8 @@ import pfabrik as pf
 from fk_machines import PUBLISHED, moved_from_home
 from pfabrik import Mechanism, Solution, Status
 from pfabrik.catalog import catalog_file, description
+from pfabrik.description.home_mobility import universal_axes
 from pfabrik.errors import NoClosedForm
-from pfabrik.freedom import universal_axes
 
 Array = NDArray[np.float64]
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pfabrik.closure.close.close import HELD, close, closure_of, platform_poses
+from pfabrik.reaching.solve.completion import actuators_of, set_actuators
 
 import pfabrik as pf
 from machines import MACHINES
-from pfabrik.closure import HELD, close, closure_of, platform_poses
-from pfabrik.completion import actuators_of, set_actuators
-from pfabrik.displacements import columns, displacements, gaps, stepped
-from pfabrik.limits import active_limits
-from pfabrik.paths import end_body, independent_paths
+from pfabrik.answers.limits import active_limits
+from pfabrik.description.paths import end_body, independent_paths
+from pfabrik.motion.displacements import columns, displacements, gaps, stepped
 from pfabrik.tolerances import TOLERANCES
 
 CATALOGUE = ("five_bar", "nrpm", "stewart")

@@ -16,8 +16,10 @@ from numba.core.caching import NullCache
 
 import pfabrik as pf
 from machines import MACHINES
-from pfabrik.flatten import flatten
-from pfabrik.kernels import _jit, close, solve
+from pfabrik.decomposition.plan import flatten
+from pfabrik.kernels import _jit
+from pfabrik.kernels.closure import close
+from pfabrik.kernels.reaching import solve
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 TESTS = Path(__file__).parent

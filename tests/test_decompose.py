@@ -15,8 +15,8 @@ import pfabrik as pf
 from machines import MACHINES, planar, ring
 from pfabrik import Cone, Joint, Mechanism
 from pfabrik.cli import main
+from pfabrik.decomposition.plan import flatten
 from pfabrik.errors import UnsupportedMechanism
-from pfabrik.flatten import flatten
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

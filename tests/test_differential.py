@@ -9,16 +9,16 @@ from functools import cache
 
 import numpy as np
 import pytest
+from pfabrik.reaching.solve.rows import new_rows
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from machines import MACHINES, planar, ring
 from pfabrik import Joint, Mechanism, Solution
-from pfabrik.differential import Mobility, forward_jacobian, inverse_jacobian, mobility, singularity
-from pfabrik.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units
+from pfabrik.answers.differential import Mobility, forward_jacobian, inverse_jacobian, mobility, singularity
 from pfabrik.errors import InvalidArgument
-from pfabrik.motions import KINDS, forward_map, generic_of, inverse_map, measures
-from pfabrik.rows import new_rows
+from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units
+from pfabrik.motion.first_order import KINDS, forward_map, generic_of, inverse_map, measures
 from pfabrik.tolerances import TOLERANCES
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik import Joint, Mechanism
-from pfabrik.displacements import (
+from pfabrik.description.home_mobility import universal_axes
+from pfabrik.motion.displacements import (
     centres,
     columns,
     displacements,
@@ -23,7 +24,6 @@ from pfabrik.displacements import (
     screws,
     stepped,
 )
-from pfabrik.freedom import universal_axes
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

@@ -17,12 +17,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pfabrik.catalog import catalog, catalog_file
-from pfabrik.copies import cos_sin, rotated
+from pfabrik.description.copies import cos_sin, rotated
+from pfabrik.description.mechanism import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
 from pfabrik.files import LARGEST_FILE, MOST_DOTS, dumps, load, loads, save
-from pfabrik.mechanism import Cone, Joint, Mechanism
-from pfabrik.schema import MOST_COPIES, MOST_FAULTS, MOST_JOINTS
-from pfabrik.units import exact_degrees
+from pfabrik.files.schema import MOST_COPIES, MOST_FAULTS, MOST_JOINTS
+from pfabrik.files.units import exact_degrees
 
 HEAD = 'schema = 1\nname = "m"\nend_effector = "platform"\nreference_point = [0, 0, 3]\n'
 TRIPOD = (
@@ -444,5 +444,5 @@ class TestWriting:
 
 
 def test_descriptions_do_not_import_pydantic():
-    code = "import sys, pfabrik.mechanism, pfabrik.catalog; sys.exit('pydantic' in sys.modules)"
+    code = "import sys, pfabrik.description.mechanism, pfabrik.catalog; sys.exit('pydantic' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

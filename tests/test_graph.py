@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pfabrik import Joint
-from pfabrik.graph import Edge, components, is_tree, stages
+from pfabrik.description.graph import Edge, components, is_tree, stages
 
 START, GOAL = "start", "goal"
 BODIES = (START, "a", "b", "c", "d", GOAL)

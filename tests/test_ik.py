@@ -15,7 +15,7 @@ import oracles
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.errors import InvalidArgument
-from pfabrik.kernels import rows as kernels
+from pfabrik.kernels.reaching import rows as kernels
 from pfabrik.tolerances import TOLERANCES
 
 CATALOGUE = ("five_bar", "stewart", "nrpm")

@@ -11,8 +11,8 @@ import pfabrik as pf
 from machines import MACHINES
 from pfabrik.cli import main
 from pfabrik.cli.info import chain_table, clean, vector
-from pfabrik.decompose import beyond_positions, closure_reason, engine_of
-from pfabrik.flatten import flat_of
+from pfabrik.decomposition.decompose import beyond_positions, closure_reason, engine_of
+from pfabrik.decomposition.plan import flat_of
 
 
 def printed(name: str) -> str:

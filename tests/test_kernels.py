@@ -20,10 +20,12 @@ import checking
 import pfabrik as pf
 from machines import MACHINES, ring
 from pfabrik import Cone, Joint, Mechanism
-from pfabrik.flatten import Flat, flatten
-from pfabrik.kernels import exact, frames, linear, reach, restrict, rows, search, settle, vectors
-from pfabrik.kernels import plan as P
+from pfabrik.decomposition.plan import Flat, flatten
+from pfabrik.kernels import linear, vectors
 from pfabrik.kernels._jit import kernel
+from pfabrik.kernels.reaching import exact, frames, restrict, rows, search, settle
+from pfabrik.kernels.reaching import passes as reach
+from pfabrik.kernels.reaching import plan as P
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 import pfabrik as pf
 from pfabrik import Cone, Joint, Leg, Mechanism
-from pfabrik.chains import read_chain
+from pfabrik.description.chains import read_chain
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from pfabrik.files import dumps, loads
-from pfabrik.schema import MOST_FAULTS, MOST_JOINTS
+from pfabrik.files.schema import MOST_FAULTS, MOST_JOINTS
 
 PAGE = Path(__file__).parents[1] / "docs" / "describing-a-mechanism.md"
 HEAD = 'schema = 1\nname = "m"\nend_effector = "platform"\nreference_point = [0, 0, 195]\n'

@@ -13,13 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pfabrik.cones import cone_line
-from pfabrik.differential import mobility
-from pfabrik.enclosing import enclosing_radius
+from pfabrik.answers.differential import mobility
+from pfabrik.description.cones import cone_line
+from pfabrik.description.enclosing import enclosing_radius
+from pfabrik.description.home_mobility import end_effector_freedom, universal_axes
+from pfabrik.description.joint_types import JOINT_TYPES, KINDS
+from pfabrik.description.mechanism import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
-from pfabrik.freedom import end_effector_freedom, universal_axes
-from pfabrik.joint_types import JOINT_TYPES, KINDS
-from pfabrik.mechanism import Cone, Joint, Mechanism
 from pfabrik.tolerances import TOLERANCES
 
 Z = (0.0, 0.0, 1.0)

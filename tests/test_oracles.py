@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import oracles
 import pfabrik as pf
-from pfabrik.mechanism import Mechanism
+from pfabrik.description.mechanism import Mechanism
 
 NAMES = ("five_bar", "stewart", "nrpm")
 CIRCLES = {"five_bar": (200.0, 60.0), "stewart": (220.0, 60.0), "nrpm": (200.0, 100.0)}

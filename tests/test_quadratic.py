@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pfabrik.kernels._jit import kernel
-from pfabrik.kernels.quadratic import factorise, new_programme, solve_programme
+from pfabrik.kernels.qp import factorise, new_programme, solve_programme
 
 
 @kernel

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines import ring
 from pfabrik import Joint, Mechanism, Options, Solution, Status
-from pfabrik.flatten import flatten
-from pfabrik.kernels import plan as P
+from pfabrik.decomposition.plan import flatten
+from pfabrik.kernels.reaching import plan as P
 
 FIELDS = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
 

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 import closure_machines
 import pfabrik as pf
 from pfabrik import Joint, Mechanism, Status
+from pfabrik.description.task import Task, task_of
 from pfabrik.errors import InvalidMechanism
 from pfabrik.files import dumps, loads
-from pfabrik.task import Task, task_of
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 N = 4 if INTERPRETED else 100

@@ -11,36 +11,36 @@ __version__ = "0.1.0"
 
 # Where each public name lives. Modules are imported when a name is first used, so that `import pfabrik` is quick.
 _HOMES = {
-    "Cone": "mechanism",
-    "Joint": "mechanism",
-    "Leg": "legs",
-    "Mechanism": "mechanism",
+    "Cone": "description.mechanism",
+    "Joint": "description.mechanism",
+    "Leg": "description.legs",
+    "Mechanism": "description.mechanism",
     "load": "files",
     "save": "files",
     "catalog": "catalog",
     "pose": "poses",
     "Options": "options",
-    "Solution": "solution",
-    "Status": "solution",
-    "ActiveLimit": "limits",
-    "SubChain": "decompose",
-    "decompose": "decompose",
+    "Solution": "answers.solution",
+    "Status": "answers.solution",
+    "ActiveLimit": "answers.limits",
+    "SubChain": "decomposition.decompose",
+    "decompose": "decomposition.decompose",
     "solve_ik": "ik",
     "track": "track",
-    "Track": "tracked",
-    "reach": "reach",
-    "margins": "margins",
-    "AssemblyModes": "assembly",
-    "assembly_modes": "assembly",
-    "WorkingModes": "working",
-    "working_modes": "working",
-    "closure_residual": "residual",
-    "Mobility": "differential",
-    "Singularity": "differential",
-    "mobility": "differential",
-    "inverse_jacobian": "differential",
-    "forward_jacobian": "differential",
-    "singularity": "differential",
+    "Track": "answers.tracked",
+    "reach": "travel",
+    "margins": "answers.margins",
+    "AssemblyModes": "modes.assembly",
+    "assembly_modes": "modes.assembly",
+    "WorkingModes": "modes.working",
+    "working_modes": "modes.working",
+    "closure_residual": "answers.residual",
+    "Mobility": "answers.differential",
+    "Singularity": "answers.differential",
+    "mobility": "answers.differential",
+    "inverse_jacobian": "answers.differential",
+    "forward_jacobian": "answers.differential",
+    "singularity": "answers.differential",
     "solve_fk": "fk",
 }
 # Modules that are themselves public.
@@ -85,25 +85,25 @@ __all__ = [
 
 if TYPE_CHECKING:
     from . import errors, geometric
-    from .assembly import AssemblyModes, assembly_modes
+    from .answers.differential import Mobility, Singularity, forward_jacobian, inverse_jacobian, mobility, singularity
+    from .answers.limits import ActiveLimit
+    from .answers.margins import margins
+    from .answers.residual import closure_residual
+    from .answers.solution import Solution, Status
+    from .answers.tracked import Track
     from .catalog import catalog
-    from .decompose import SubChain, decompose
-    from .differential import Mobility, Singularity, forward_jacobian, inverse_jacobian, mobility, singularity
+    from .decomposition.decompose import SubChain, decompose
+    from .description.legs import Leg
+    from .description.mechanism import Cone, Joint, Mechanism
     from .files import load, save
     from .fk import solve_fk
     from .ik import solve_ik
-    from .legs import Leg
-    from .limits import ActiveLimit
-    from .margins import margins
-    from .mechanism import Cone, Joint, Mechanism
+    from .modes.assembly import AssemblyModes, assembly_modes
+    from .modes.working import WorkingModes, working_modes
     from .options import Options
     from .poses import pose
-    from .reach import reach
-    from .residual import closure_residual
-    from .solution import Solution, Status
     from .track import track
-    from .tracked import Track
-    from .working import WorkingModes, working_modes
+    from .travel import reach
 
 
 def __getattr__(name: str) -> Any:

@@ -9,21 +9,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closure import Closing, Closure, close, closure_of, platform_poses
-from .completion import actuators_of, coordinates_of, positions_of, set_actuators
-from .differential import mobility
+from .answers.differential import mobility
+from .answers.solution import Solution
+from .closure.close import Closing, Closure, close, closure_of, platform_poses
+from .closure.nearest import is_feasible, nearest
+from .closure.starts import same_random_starts
+from .decomposition.plan import flat_of
+from .description.mechanism import Mechanism, checked_mechanism
 from .errors import InvalidArgument
-from .flatten import flat_of
 from .ik import checked, seed_rows
-from .kernels import plan as P
-from .locked import reached_with_locked_legs
-from .mechanism import Mechanism, checked_mechanism
-from .nearest import is_feasible, nearest
+from .kernels.reaching import plan as P
 from .options import Options
 from .poses import as_floats
-from .rows import new_rows
-from .solution import Solution
-from .starts import same_random_starts
+from .reaching.completion import actuators_of, coordinates_of, positions_of, set_actuators
+from .reaching.locked import reached_with_locked_legs
+from .reaching.rows import new_rows
 from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]

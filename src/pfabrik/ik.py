@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .closure import closure_of
-from .closure_ik import answer_by_closure
-from .completion import coordinates_of
+from .answers.solution import Solution, Wanted
+from .closure.close import closure_of
+from .closure.solve import answer_by_closure
+from .decomposition.plan import Flat, flat_of
+from .description.mechanism import Mechanism, checked_mechanism
 from .errors import InvalidArgument
-from .flatten import Flat, flat_of
-from .kernels import plan as P
-from .mechanism import Mechanism, checked_mechanism
+from .kernels.reaching import plan as P
 from .options import Options
 from .poses import as_targets, what_is_wrong
-from .reaching import draw_near, leaves_projections, settings_of, solve_rows
-from .rows import new_rows
-from .solution import Solution, Wanted
+from .reaching.completion import coordinates_of
+from .reaching.rows import new_rows
+from .reaching.solve import draw_near, leaves_projections, settings_of, solve_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

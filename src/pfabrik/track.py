@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from .bends import Bends
-from .closure_ik import follow_by_closure
-from .completion import coordinates_of
+from .answers.solution import Solution, Wanted
+from .answers.tracked import Track, pace_of
+from .closure.solve import follow_by_closure
+from .closure.stretched import Bends
+from .decomposition.plan import Flat, flat_of
+from .description.mechanism import Mechanism
 from .errors import InvalidArgument
-from .flatten import Flat, flat_of
 from .ik import checked, handle_invalid, joints_near, seeds_of, start_coordinates
-from .kernels import plan as P
-from .mechanism import Mechanism
+from .kernels.reaching import plan as P
 from .options import Options
 from .poses import as_targets
-from .reaching import answer_from, draw_near, leaves_projections, settings_of
-from .rows import new_rows
-from .solution import Solution, Wanted
+from .reaching.completion import coordinates_of
+from .reaching.rows import new_rows
+from .reaching.solve import answer_from, draw_near, leaves_projections, settings_of
 from .tolerances import TOLERANCES
-from .tracked import Track, pace_of
 
 _STEPS_A_REPORT = 16
 
@@ -99,7 +99,7 @@ def _follow(
 
     After such an answer, the steps that follow it are made again from where it ends.
     """
-    from .kernels.solve import solve_by_iteration
+    from .kernels.reaching.solve import solve_by_iteration
 
     settings = settings_of(mechanism, options, seeded=True, chained=True)
     seeds = seeds_of(mechanism, flat, seed, ())

@@ -11,17 +11,17 @@ import click
 
 import pfabrik as pf
 
+from ..answers.words import Floats, as_sentence, by_bound, exceeded, loop_gap, readouts, rpy_angles
 from ..errors import ContinuumOfSolutions
-from ..report import Floats, as_sentence, by_bound, exceeded, loop_gap, readouts, rpy_angles
 from ..tolerances import TOLERANCES
 from .group import complain
 from .table import aligned
 
 if TYPE_CHECKING:
-    from ..mechanism import Mechanism
-    from ..modes import Modes
-    from ..report import Readout
-    from ..solution import Solution
+    from ..answers.solution import Solution
+    from ..answers.words import Readout
+    from ..description.mechanism import Mechanism
+    from ..modes.lists import Modes
 
 
 def describe(solution: Solution, asked: Floats | None = None) -> str:

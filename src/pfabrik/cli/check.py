@@ -11,12 +11,12 @@ import numpy as np
 
 import pfabrik as pf
 
-from ..motions import generic_of
-from ..task import task_of
+from ..description.task import task_of
+from ..motion.first_order import generic_of
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
-    from ..mechanism import Joint, Mechanism
+    from ..description.mechanism import Joint, Mechanism
 
 COUNTS = {"x": 1, "y": 1, "z": 1, "tilt": 2, "rotation": 3}
 """Freedoms that each part of a task asks for."""

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ..answers.solution import Solution
+    from ..answers.tracked import Track
     from ..reproduce.study import Case
-    from ..solution import Solution
-    from ..tracked import Track
 
 QUICK_STEPS = 36
 

@@ -10,9 +10,9 @@ import click
 import pfabrik as pf
 
 if TYPE_CHECKING:
-    from ..mechanism import Mechanism
-    from ..report import Floats
-    from ..solution import Solution
+    from ..answers.solution import Solution
+    from ..answers.words import Floats
+    from ..description.mechanism import Mechanism
 
 
 def finite_numbers(context: click.Context, parameter: click.Parameter, words: tuple[str, ...]) -> tuple[float, ...]:
@@ -54,7 +54,7 @@ def coordinates(mechanism: Mechanism, values: tuple[float, ...]) -> Floats:
     """The values as coordinates (n_a,) [length or rad]; a usage error for too few or too many."""
     import numpy as np
 
-    from ..report import readouts
+    from ..answers.words import readouts
 
     shown = readouts(mechanism)
     if len(values) != len(shown):

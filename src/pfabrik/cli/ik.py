@@ -15,9 +15,9 @@ from .finite import FINITE
 from .projecting import note_left_out, note_unused, options_projecting, projecting
 
 if TYPE_CHECKING:
-    from ..mechanism import Mechanism
-    from ..report import Floats
-    from ..solution import Solution
+    from ..answers.solution import Solution
+    from ..answers.words import Floats
+    from ..description.mechanism import Mechanism
 
 Triple = tuple[float, float, float]
 
@@ -87,7 +87,7 @@ def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | No
 
 def list_modes(mechanism: Mechanism, target: Floats, as_json: bool) -> int:
     """Print all working modes, each with its actuator values, and its pose where the task leaves it open."""
-    from ..report import readouts
+    from ..answers.words import readouts
 
     shown = readouts(mechanism)
     header = [f"{readout.name} [{readout.unit}]" for readout in shown]

@@ -11,14 +11,14 @@ import click
 
 import pfabrik as pf
 
-from ..decompose import closure_reason, engine_of
-from ..joint_types import KINDS
+from ..decomposition.decompose import closure_reason, engine_of
+from ..description.joint_types import KINDS
 from .table import aligned
 
 if TYPE_CHECKING:
-    from ..decompose import SubChain
-    from ..differential import Mobility
-    from ..mechanism import Joint, Mechanism
+    from ..answers.differential import Mobility
+    from ..decomposition.decompose import SubChain
+    from ..description.mechanism import Joint, Mechanism
 
 
 @click.command()

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 import pfabrik as pf
 
+from ..answers.words import readouts, rpy_angles, short_names
 from ..errors import near_miss
-from ..report import readouts, rpy_angles, short_names
 
 if TYPE_CHECKING:
     from _csv import Reader
 
-    from ..tracked import Track
+    from ..answers.tracked import Track
 
 Floats = NDArray[np.float64]
 POSITION = ("x", "y", "z")

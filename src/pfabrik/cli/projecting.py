@@ -10,7 +10,7 @@ import click
 import pfabrik as pf
 
 if TYPE_CHECKING:
-    from ..mechanism import Mechanism
+    from ..description.mechanism import Mechanism
     from ..options import Options
 
 Hold = Literal["orientation", "position"]

@@ -14,8 +14,8 @@ from .finite import FINITE
 from .table import aligned
 
 if TYPE_CHECKING:
-    from ..mechanism import Mechanism
-    from ..report import Floats
+    from ..answers.words import Floats
+    from ..description.mechanism import Mechanism
 
 Triple = tuple[float, float, float]
 

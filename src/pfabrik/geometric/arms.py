@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..decompose import Step, SubChain
+from ..decomposition.decompose import Step, SubChain
+from ..description.mechanism import Mechanism
 from ..kernels._jit import kernel, routine
-from ..mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .facts import Array, Interval, centre, home_of, range_of, require, tolerances
 from .struts import FOOT_SIZE, measure_strut, read_strut, strut_records, write_status, write_strut

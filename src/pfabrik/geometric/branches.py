@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decompose import decompose
+from ..decomposition.decompose import decompose
+from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
-from ..mechanism import Mechanism, checked_mechanism
 from ..poses import are_poses, as_targets, what_is_wrong
 from ..tolerances import TOLERANCES
 from .facts import Array, Unsuitable

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mechanism import Mechanism
+from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .facts import Array, require
 from .legs import Leg

@@ -8,8 +8,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decompose import Step
-from ..mechanism import Mechanism
+from ..decomposition.decompose import Step
+from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 
 Array: TypeAlias = NDArray[np.float64]

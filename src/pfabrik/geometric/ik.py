@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
-from ..mechanism import Mechanism, checked_mechanism
-from ..parallel import in_blocks
+from ..kernels.threads import in_blocks
 from ..poses import are_poses, as_floats, as_targets, what_is_wrong
 from .modes import Legs, solve_legs, start_of
 from .targets import INVALID, MISSED, REACHED, Statuses

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint_types import KINDS
-from ..joints import Joint
-from ..mechanism import Mechanism
+from ..description.joint_types import KINDS
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .facts import Array
 from .legs import Leg, Line

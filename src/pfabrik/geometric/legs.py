@@ -12,10 +12,10 @@ from itertools import combinations
 
 import numpy as np
 
-from ..cones import cone_line, opposite
-from ..decompose import SubChain, decompose
-from ..joints import Joint
-from ..mechanism import Mechanism
+from ..decomposition.decompose import SubChain, decompose
+from ..description.cones import cone_line, opposite
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .facts import Array, is_parallel, require
 from .rods import TIP, Passage, Rod, passage, read_rod

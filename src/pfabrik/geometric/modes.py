@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mechanism import Mechanism
+from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .drives import Drive, drive_of
 from .facts import HORIZON, Array, home_values, require

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..freedom import (
+from ..description.home_mobility import (
     body_twist,
     column_joints,
     end_effector_body,
@@ -16,7 +16,7 @@ from ..freedom import (
     orthonormal_rates,
     spanning_tree,
 )
-from ..mechanism import Mechanism, Vector
+from ..description.mechanism import Mechanism, Vector
 from ..tolerances import TOLERANCES
 from .facts import Array, Unsuitable, is_parallel, require
 from .legs import Leg

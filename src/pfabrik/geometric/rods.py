@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..freedom import universal_axes
-from ..joints import Joint
-from ..mechanism import Mechanism
+from ..description.home_mobility import universal_axes
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .facts import Array, is_parallel, require
 from .turns import Placed, aimed, anchored, shortest_turn

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..decompose import Step, SubChain
+from ..decomposition.decompose import Step, SubChain
+from ..description.mechanism import Mechanism
 from ..kernels._jit import kernel, routine
-from ..mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .facts import NO_CONE, Array, centre, home_of, is_parallel, least_cosine, range_of, require, tolerances
 from .targets import BLOCK, FREE, OVER, REACHED, Floats, Records, Statuses, load_block

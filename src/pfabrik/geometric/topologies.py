@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decompose import SubChain, decompose
+from ..decomposition.decompose import SubChain, decompose
+from ..description.mechanism import Mechanism
 from ..errors import NoClosedForm
-from ..mechanism import Mechanism
 from .arms import plan_arms, solve_arms
 from .drives import DRIVES
 from .dyads import plan_dyads, solve_dyads

@@ -1,1 +1,1 @@
-"""The reaching engine, compiled: positions in, positions out. Imports NumPy and Numba only."""
+"""The compiled code, by engine: numbers in, numbers out. Imports NumPy and Numba only."""

@@ -30,7 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 def _sources_digest(folder: Path) -> str:
     """Hash of all sources in a folder: Numba itself does not see an edit in another file's function."""
     digest = hashlib.sha256()
-    for path in sorted(folder.glob("*.py")):
+    for path in sorted(folder.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

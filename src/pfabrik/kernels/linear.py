@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ._jit import routine
-from .plan import Floats
+from .reaching.plan import Floats
 
 
 @routine

@@ -6,7 +6,7 @@ import math
 from typing import TypeAlias
 
 from ._jit import routine
-from .plan import Floats
+from .reaching.plan import Floats
 
 Vec: TypeAlias = tuple[float, float, float]
 # An angle beyond the end of its range by no more than this [rad] is on it, not a turn away.

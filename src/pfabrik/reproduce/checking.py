@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..residual import closure_residual
-from ..solution import Solution, Status
+from ..answers.residual import closure_residual
+from ..answers.solution import Solution, Status
 from ..tolerances import TOLERANCES
 from .feasible import worst_excess
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from ..solution import Solution, Status
+from ..answers.solution import Solution, Status
 from ..tolerances import TOLERANCES
 from .feasible import Model, model_of
 from .study import Tick

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..answers.solution import Solution, Status
 from ..fk import solve_fk
 from ..options import Options
-from ..solution import Solution, Status
 from ..track import track
 from .checking import Feasibility, feasibility
 from .study import SETTINGS, Case, Extent, Tick

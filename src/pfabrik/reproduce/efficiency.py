@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import geometric
-from ..flatten import Flat, flat_of
+from ..answers.solution import Solution, Status
+from ..decomposition.plan import Flat, flat_of
+from ..description.mechanism import Mechanism
 from ..geometric.topologies import closed_form
 from ..ik import solve_ik
-from ..kernels.plan import Rows, Seeds
-from ..mechanism import Mechanism
+from ..kernels.reaching.plan import Rows, Seeds
 from ..options import Options
 from ..poses import pose
-from ..reaching import settings_of
-from ..rows import new_rows
-from ..solution import Solution, Status
+from ..reaching.rows import new_rows
+from ..reaching.solve import settings_of
 from .checking import Feasibility, feasibility
 from .efficacy import rms
 from .one_by_one import closed_form_one_by_one, p_fabrik_one_by_one

@@ -13,9 +13,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..answers.solution import Solution
+from ..description.mechanism import Cone, Joint, Mechanism
 from ..errors import UnsupportedMechanism
-from ..mechanism import Cone, Joint, Mechanism
-from ..solution import Solution
 
 Floats = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels._jit import kernel
-from ..kernels.plan import Floats, Plan, Rows, Seeds, Settings
-from ..kernels.solve import solve_by_iteration, solve_directly
+from ..kernels.reaching.plan import Floats, Plan, Rows, Seeds, Settings
+from ..kernels.reaching.solve import solve_by_iteration, solve_directly
 
 _njit: Any = numba.njit(nogil=True, error_model="numpy")
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import geometric
+from ..answers.solution import Solution, Status
+from ..answers.words import short_names
+from ..description.mechanism import Mechanism
 from ..ik import solve_ik
-from ..mechanism import Mechanism
-from ..report import short_names
-from ..solution import Solution, Status
 from ..track import track
 from .checking import Feasibility, feasibility
 from .closest import Comparison, compare

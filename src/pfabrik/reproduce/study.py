@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..description.mechanism import Mechanism
 from ..files import load
-from ..mechanism import Mechanism
 from ..options import Options
 from ..poses import pose
 

@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from ..description.joint_types import KINDS
 from ..errors import InvalidArgument
-from ..joint_types import KINDS
 
 if TYPE_CHECKING:
-    from ..mechanism import Joint, Mechanism
-    from ..solution import Solution
+    from ..answers.solution import Solution
+    from ..description.mechanism import Joint, Mechanism
 
 Floats = NDArray[np.float64]
 Places = dict[str, Floats]

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ..report import Readout, readouts
+from ..answers.words import Readout, readouts
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from ..mechanism import Mechanism
-    from ..solution import Solution
+    from ..answers.solution import Solution
+    from ..description.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
 

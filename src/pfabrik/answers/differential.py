@@ -1,0 +1,75 @@
+"""To first order: mobility, Jacobians, and how near answers are to a singularity."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..motion.first_order import Mobility, Singularity, forward_map, generic_of, inverse_map, measures
+from .solution import Solution, checked_solution
+
+__all__ = ["Mobility", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]
+
+Floats = NDArray[np.float64]
+
+
+def mobility(mechanism: Mechanism) -> Mobility:
+    """Motions of a mechanism in general, counted at configurations reached from home without regard to limits.
+
+    Overconstrained mechanisms count right: the loops are closed exactly before conditions are compared.
+    """
+    return generic_of(checked_mechanism(mechanism)).mobility
+
+
+def forward_jacobian(mechanism: Mechanism, solution: Solution) -> Floats:
+    """Twist of the end effector per actuator rate, (..., 6, n_a), in the base frame.
+
+    Rows: velocity of the reference point [length/s], angular velocity [rad/s]; for a joint end effector only the
+    velocity of its centre, (..., 3, n_a). Columns: actuators in the order of `mechanism.actuators` [rad/s or length/s].
+
+    Rates that the mechanism cannot make are replaced by the nearest it can; freedoms that no actuator controls rest as
+    far as possible. At a type 2 singularity no such map exists: the direction gained is left out (see `singularity`).
+    INVALID rows are NaN.
+    """
+    forward: Floats = _shaped(solution, forward_map(mechanism, _coordinates(mechanism, solution)))
+    return forward
+
+
+def inverse_jacobian(mechanism: Mechanism, solution: Solution) -> Floats:
+    """Actuator rates per twist of the end effector, (..., n_a, 6), in the base frame.
+
+    Rows and columns are the columns and rows of `forward_jacobian`; (..., n_a, 3) for a joint end effector. The two are
+    inverses of each other where the mechanism has as many actuators as the end effector has freedoms in space, else
+    Moore-Penrose inverses (with lengths in units of L): twists that the mechanism cannot make are replaced by the
+    nearest it can, and of all actuator rates that make a twist, the smallest are given. At a type 1 singularity the
+    direction lost is left out (see `singularity`). INVALID rows are NaN.
+    """
+    inverse: Floats = _shaped(solution, inverse_map(mechanism, _coordinates(mechanism, solution)))
+    return inverse
+
+
+def singularity(mechanism: Mechanism, solution: Solution) -> Singularity:
+    """How near every configuration of a solution is to a singularity of each kind; INVALID rows are NaN."""
+    found = measures(mechanism, _coordinates(mechanism, solution))
+    return Singularity(
+        serial=_shaped(solution, found.serial),
+        parallel=_shaped(solution, found.parallel),
+        constraint=_shaped(solution, found.constraint),
+        passive=_shaped(solution, found.passive),
+        lost=_shaped(solution, found.lost),
+        gained=_shaped(solution, found.gained),
+        kinds=found.kinds[0] if solution.shape == () else found.kinds,
+    )
+
+
+def _coordinates(mechanism: Mechanism, solution: Solution) -> Floats:
+    """The solution's joint coordinates as deviations from home, (n, c), if it is one of this mechanism."""
+    return checked_solution(solution, mechanism)._coordinates
+
+
+def _shaped(solution: Solution, rows: Floats) -> Any:
+    shaped = rows.reshape(solution.shape + rows.shape[1:])
+    return shaped if shaped.ndim else shaped.item()

@@ -1,0 +1,156 @@
+"""Limits of a configuration: which of them it lies on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.cones import cone_line
+from ..description.joint_types import KINDS
+from ..description.mechanism import Joint, Mechanism
+from ..motion.displacements import centres, columns, displacements
+from ..tolerances import TOLERANCES
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ActiveLimit:
+    """A limit that holds an answer back.
+
+    Attributes
+    ----------
+    joint, bound : which limit of which joint.
+    value, limit : the coordinate (or the angle at the cone) and its bound [length or rad].
+    coordinate : which coordinate of the joint, as in `home_coordinate`: 0, or 1 for the second of a universal or
+        cylindrical joint.
+    multiplier : by how much the answer to a target comes nearer to it, at most, per unit by which the limit gives way
+        [length per length or rad]; rotations count as lengths by `Options.rotation_length`. By just so much where the
+        limits that hold are independent; those that act as one (two rods side by side) share what they hold, and
+        neither alone brings the answer nearer. None where no pose was asked for.
+    """
+
+    joint: str
+    bound: Literal["min", "max", "cone"]
+    value: float
+    limit: float
+    multiplier: float | None = None
+    coordinate: int = 0
+
+
+ALIKE = 0.999
+"""Share of a multiplier above which another counts as the same: they are known to about one in ten thousand."""
+
+
+def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[ActiveLimit, ...]]:
+    """The limits that each row of joint coordinates (n, columns), deviations from home, lies on; ranges first."""
+    found: list[list[ActiveLimit]] = [[] for _ in coordinates]
+    for joint in mechanism.joints:
+        for place, (values, bounds, scale) in enumerate(ranged(mechanism, joint, coordinates)):
+            near = TOLERANCES.active * scale
+            low, high = values - bounds[0] <= near, bounds[1] - values <= near
+            for row in np.flatnonzero(low):
+                found[row].append(ActiveLimit(joint.name, "min", float(values[row]), bounds[0], None, place))
+            for row in np.flatnonzero(high & ~low):
+                found[row].append(ActiveLimit(joint.name, "max", float(values[row]), bounds[1], None, place))
+    for joint, angles, half_angle in coned(mechanism, coordinates):
+        for row in np.flatnonzero(half_angle - angles <= TOLERANCES.active):
+            found[row].append(ActiveLimit(joint.name, "cone", float(angles[row]), half_angle))
+    return [tuple(each) for each in found]
+
+
+def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Floats) -> list[tuple[ActiveLimit, ...]]:
+    """The limits that hold each row of joint coordinates (n, columns) back, the hardest first.
+
+    Those that hold alike, as symmetry makes them, come as the description lists them.
+
+    Parameters
+    ----------
+    multipliers : (n, 2 columns + cones), as of `weighed_limits`.
+    """
+    found: list[list[ActiveLimit]] = [[] for _ in coordinates]
+    bounded, n = _bounds(mechanism), coordinates.shape[1]
+    angles = list(coned(mechanism, coordinates))
+    for row, place in ((row, place) for row, own in enumerate(multipliers) for place in _hardest_first(own)):
+        which = 0
+        if place < 2 * n:
+            name, which, home, bounds, unit = bounded[place // 2]
+            value, limit = float(coordinates[row, place // 2]) + home, bounds[place % 2]
+            bound: Literal["min", "max", "cone"] = "max" if place % 2 else "min"
+        else:
+            joint, values, limit = angles[place - 2 * n]
+            name, value, bound, unit = joint.name, float(values[row]), "cone", mechanism.characteristic_length
+        found[row].append(ActiveLimit(name, bound, value, limit, float(multipliers[row, place]) * unit, which))
+    return [tuple(each) for each in found]
+
+
+def _hardest_first(multipliers: Floats) -> list[int]:
+    """Places of the multipliers (k,) that hold, in falling order, but for those that are alike."""
+    alike: list[list[int]] = []
+    for place in np.argsort(-multipliers, kind="stable").tolist():
+        if multipliers[place] <= TOLERANCES.holding:
+            break
+        if alike and multipliers[place] > ALIKE * multipliers[alike[-1][0]]:
+            alike[-1].append(place)
+        else:
+            alike.append([place])
+    return [place for group in alike for place in sorted(group)]
+
+
+def _bounds(mechanism: Mechanism) -> list[tuple[str, int, float, tuple[float, float], float]]:
+    """Of every coordinate: its joint, its place there, its value at home, its bounds; and L for an angle, else 1."""
+    found = []
+    for joint in mechanism.joints:
+        kinds = KINDS[joint.type].coordinates
+        least = 0.0 if joint.along is not None else -np.inf  # a distance is not negative
+        bounds = [(least, np.inf)] * len(kinds) if joint.range is None else np.reshape(joint.range, (-1, 2)).tolist()
+        homes = np.ravel(mechanism.home_coordinate(joint.name)).tolist()
+        for place, (kind, home, (low, high)) in enumerate(zip(kinds, homes, bounds, strict=True)):
+            unit = 1.0 if kind == "length" else mechanism.characteristic_length
+            found.append((joint.name, place, home, (max(low, least), high), unit))
+    return found
+
+
+def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
+    """Count the angles of ranged revolute joints by whole turns into their ranges, where that is possible, in place."""
+    for joint in mechanism.joints:
+        if joint.type != "revolute" or joint.range is None:
+            continue
+        low, high = np.ravel(joint.range) - np.ravel(mechanism.home_coordinate(joint.name))
+        values = coordinates[:, columns(mechanism)[joint.name].start]  # a view
+        low, high = low - TOLERANCES.limit, high + TOLERANCES.limit
+        least = values + 2.0 * np.pi * np.ceil((low - values) / (2.0 * np.pi))
+        outside = (values < low) | (values > high)
+        values[:] = np.where(outside & (least <= high), least, values)
+
+
+def ranged(
+    mechanism: Mechanism, joint: Joint, coordinates: Floats
+) -> Iterator[tuple[Floats, tuple[float, float], float]]:
+    """Values (n,), bounds and unit of every ranged coordinate of a joint."""
+    if joint.range is None:
+        return
+    own = coordinates[:, columns(mechanism)[joint.name]] + np.ravel(mechanism.home_coordinate(joint.name))
+    for values, bounds, kind in zip(
+        own.T, np.reshape(joint.range, (-1, 2)).tolist(), KINDS[joint.type].coordinates, strict=True
+    ):
+        yield values, (bounds[0], bounds[1]), mechanism.characteristic_length if kind == "length" else 1.0
+
+
+def coned(mechanism: Mechanism, coordinates: Floats) -> Iterator[tuple[Joint, Floats, float]]:
+    """Every joint with a cone, the angles (n,) of its line to the cone's axis, and the half angle."""
+    joints = [joint for joint in mechanism.joints if joint.cone is not None]
+    if not joints:
+        return
+    bodies, points = displacements(mechanism, coordinates), centres(mechanism, coordinates)
+    for joint in joints:
+        if joint.cone is not None:
+            start, end = cone_line(mechanism, joint)
+            line = points[end.name] - points[start.name]
+            axis = bodies[joint.cone.fixed_to][:, :3, :3] @ np.asarray(joint.cone.axis)
+            across = np.linalg.norm(np.cross(axis, line), axis=1)
+            yield joint, np.arctan2(across, (axis * line).sum(axis=1)), joint.cone.half_angle

@@ -1,0 +1,39 @@
+"""The independent check: whether an answer closes its mechanism's loops, worked out from its joint coordinates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..description.mechanism import Mechanism
+from ..description.task import Task
+from ..motion.displacements import end_effector_pose, gaps
+from ..reaching.completion import joint_values
+from .solution import Solution, checked_solution
+
+
+def closure_residual(mechanism: Mechanism, solution: Solution) -> Any:
+    """Largest gap of any loop of an answer, by the closure engine, (...,) [length].
+
+    Bodies are posed from `solution.joints` alone, along one tree of joints. Compared are the two bodies of every other
+    joint, the end effector with the pose of the answer, and the actuated joints with its actuator values; angles count
+    times L. NaN for INVALID rows.
+
+    Raises
+    ------
+    InvalidArgument : what is no mechanism, or no answer of it; its limits may be others.
+    """
+    checked_solution(solution, mechanism)
+    length, rows, q = mechanism.characteristic_length, solution._rows, solution._coordinates
+    known = np.isfinite(q).all(axis=1)
+    found = np.full(len(q), np.nan)
+    compared = Task((True, True, True), 0 if mechanism.end_effector_is_joint else 3)
+    position, rotation = compared.errors(end_effector_pose(mechanism, q[known]), rows.poses[known])
+    found[known] = np.max([gaps(mechanism, q[known]), position, rotation * length], axis=0)
+    values = joint_values(mechanism, q[known])
+    for column, name in enumerate(mechanism.actuators):
+        unit = 1.0 if mechanism.joint(name).type == "prismatic" else length
+        off = np.abs(values[name] - rows.actuators[known, column]) * unit
+        found[known] = np.maximum(found[known], off)
+    return found.item() if solution.shape == () else found.reshape(solution.shape)

@@ -1,0 +1,300 @@
+"""What an answer is: a status, a configuration that is feasible, and what was measured of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from enum import IntEnum
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..closure.close import closure_of
+from ..closure.descend import weighed_limits
+from ..closure.projection import ways_of
+from ..decomposition.plan import flat_of
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..description.task import task_of
+from ..errors import InvalidArgument
+from ..kernels.reaching import plan as P
+from ..motion.displacements import centres
+from ..reaching.completion import coordinates_of, joint_values
+from ..reaching.points import joint_points
+from .limits import ActiveLimit, active_limits, holding_limits
+
+Floats = NDArray[np.float64]
+
+
+NUMBERS = tuple("bdoxXneEfFgG%")
+"""Types of format specifications by which a status is written as the number it is."""
+
+
+class Status(IntEnum):
+    """What became of a target; the worst of a batch is the largest.
+
+    REACHED : what was asked for, closed and within every limit.
+    PROJECTED : closed and within every limit, near what was asked for.
+    EXCEEDED : what was asked for, closed, but beyond a limit; only `assembly_modes` and `working_modes` look for such.
+    FAILED : no feasible configuration was found.
+    INVALID : what was asked for is no pose, or not finite; only where such rows are to be marked.
+    """
+
+    REACHED = P.REACHED
+    PROJECTED = P.PROJECTED
+    EXCEEDED = P.EXCEEDED
+    FAILED = P.FAILED
+    INVALID = P.INVALID
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __format__(self, spec: str) -> str:
+        return format(int(self) if spec[-1:] in NUMBERS else self.name, spec)
+
+
+class Wanted(NamedTuple):
+    """Poses that were asked for, (n, 4, 4), and how the distance from them counts; see `Options`."""
+
+    targets: Floats
+    hold: str | None
+    rotation_length: float | None
+
+
+class Solution:
+    """The answer to one target or, with leading batch axes on every field, to a batch.
+
+    What a status promises is measured on the configuration, not assumed: `residual` and `limit_excess` are there to
+    be read. Where the status is INVALID (a row that was no pose, marked), numbers are NaN.
+
+    Attributes
+    ----------
+    status : a `Status`; for a batch an integer array of them, (...,).
+    pose : T_base_platform achieved, (..., 4, 4) [length].
+    actuators : actuated coordinates in the order of `mechanism.actuators`, (..., n_a) [length or rad].
+    joints : joint name -> its coordinate, counted as the description counts it: (...,) for R and P, (..., 2) for U and
+        C, (..., 3) for S, whose rotation vector turns its second body against its first, from home [rad or length].
+        What a configuration leaves open (a rod's spin about itself) is nearest to the seed, or to home; angles count
+        on along a path.
+    points : joint name -> position of its centre in the base frame, (..., 3) [length]; joints that act as one are at
+        their common centre.
+    position_error, rotation_error : distance of the pose from the target, (...,) [length], [rad]; 0 where actuator
+        values were asked for, not a pose.
+    actuator_error : largest difference of an actuated coordinate from the asked value, (...,); lengths relative to L,
+        angles in rad; 0 where a pose was asked for.
+    residual : largest gap of any loop: open ends, stretched rigid links, links out of their plane, (...,) [length].
+    limit_excess : largest excess over any limit, (...,); lengths relative to L, angles in rad; 0 if all are kept.
+    held : what of the target a projected answer has all the same: "orientation", "position", or None; for a batch an
+        array of them, (...,). It is what `Options.hold` asked for, or None where no feasible pose has that.
+    iterations, rounds : passes over the chains, and revisions of the target, (...,).
+    active_limits : limits that hold a projected answer back, the hardest first, or that another one exceeds; for a
+        batch, one tuple a row, in row order. A projected answer may lie on other limits too; were one of those a little
+        wider, it would not come nearer. Where a chain is at full stretch there may be none.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        rows: P.Rows,
+        shape: tuple[int, ...],
+        joints_from: Callable[[], Floats] | None = None,
+        wanted: Wanted | None = None,
+    ) -> None:
+        """Wrap rows.
+
+        Parameters
+        ----------
+        joints_from : gives all joint coordinates where they are not those nearest to home.
+        wanted : the poses that were asked for, if any were.
+        """
+        self.mechanism = mechanism
+        self.shape = shape
+        self._rows = rows
+        self._joints_from = joints_from
+        self._wanted = wanted
+
+    def __getstate__(self) -> tuple[Mechanism, P.Rows, tuple[int, ...], Floats | None, Wanted | None]:
+        """What an answer is made of; all else follows again where it is unpickled."""
+        return self.mechanism, self._rows, self.shape, self._coordinates if self._joints_from else None, self._wanted
+
+    def __setstate__(self, state: tuple[Mechanism, P.Rows, tuple[int, ...], Floats | None, Wanted | None]) -> None:
+        mechanism, rows, shape, coordinates, wanted = state
+        joints_from = coordinates if coordinates is None else lambda: coordinates
+        Solution.__init__(self, mechanism, rows, shape, joints_from, wanted)
+
+    @cached_property
+    def _coordinates(self) -> Floats:
+        """All joint coordinates as deviations from home, row by row, (n, columns) [length or rad]."""
+        if self._joints_from is not None:
+            return self._joints_from()
+        return coordinates_of(self.mechanism, self._rows)
+
+    def _shaped(self, array: NDArray[Any]) -> Any:
+        shaped = array.reshape(self.shape + array.shape[1:])
+        return shaped if shaped.ndim else shaped.item()
+
+    @property
+    def status(self) -> Any:
+        return Status(int(self._rows.status[0])) if self.shape == () else self._shaped(self._rows.status)
+
+    @property
+    def pose(self) -> Floats:
+        return cast(Floats, self._shaped(self._rows.poses))
+
+    @property
+    def actuators(self) -> Floats:
+        return cast(Floats, self._shaped(self._rows.actuators))
+
+    @property
+    def position_error(self) -> Any:
+        return self._shaped(self._rows.measures[:, 0])
+
+    @property
+    def rotation_error(self) -> Any:
+        return self._shaped(self._rows.measures[:, 1])
+
+    @property
+    def residual(self) -> Any:
+        return self._shaped(self._rows.measures[:, 2])
+
+    @property
+    def limit_excess(self) -> Any:
+        return self._shaped(self._rows.measures[:, 3])
+
+    @property
+    def iterations(self) -> Any:
+        return self._shaped(self._rows.counters[:, 0])
+
+    @property
+    def rounds(self) -> Any:
+        return self._shaped(self._rows.counters[:, 1])
+
+    @property
+    def held(self) -> Any:
+        names = np.array([None, "orientation", "position"], dtype=object)
+        held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, 2], P.HOLD_NOTHING)]
+        return held[0] if self.shape == () else held.reshape(self.shape)
+
+    @property
+    def actuator_error(self) -> Any:
+        return self._shaped(self._rows.measures[:, 4])
+
+    @cached_property
+    def joints(self) -> Mapping[str, Floats]:
+        values = joint_values(self.mechanism, self._coordinates)
+        return MappingProxyType(
+            {name: self._shaped(value) for name, value in values.items() if value.shape[1:] != (0,)}
+        )
+
+    @cached_property
+    def points(self) -> Mapping[str, Floats]:
+        rows = self._rows
+        flat = flat_of(self.mechanism)
+        found = centres(self.mechanism, self._coordinates) if flat is None else joint_points(flat, rows)
+        order = [joint.name for joint in self.mechanism.joints if joint.name in found]
+        unknown = (rows.status == Status.INVALID)[:, None]
+        return MappingProxyType({name: self._shaped(np.where(unknown, np.nan, found[name])) for name in order})
+
+    @cached_property
+    def active_limits(self) -> Any:
+        rows = self._rows
+        held: list[tuple[ActiveLimit, ...]] = [()] * len(rows.status)
+        away = np.flatnonzero((rows.status != Status.REACHED) & (rows.status != Status.INVALID))
+        named = active_limits(self.mechanism, self._coordinates[away])
+        for row, found in zip(away, named, strict=True):
+            held[row] = found
+        projected = np.flatnonzero(rows.status == Status.PROJECTED)
+        if self._wanted is not None and len(projected):
+            for row, found in zip(projected, self._holding(self._wanted, projected), strict=True):
+                held[row] = found
+        return held[0] if self.shape == () else held
+
+    def _holding(self, wanted: Wanted, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
+        """The limits that hold projected rows back from the poses that were asked for."""
+        found: dict[int, tuple[ActiveLimit, ...]] = {}
+        closure, task = closure_of(self.mechanism), task_of(self.mechanism)
+        holds, ways = self._rows.counters[projected, 2], ways_of(self.mechanism, wanted.hold, wanted.rotation_length)
+        for way in ways:
+            rows = projected[holds == way.hold]
+            q = self._coordinates[rows]
+            weights = weighed_limits(closure, q, wanted.targets[rows], platform=way.weights, framed=task.is_framed)
+            found.update(zip(rows.tolist(), holding_limits(self.mechanism, q, weights), strict=True))
+        return [found[row] for row in projected.tolist()]
+
+    def __bool__(self) -> bool:
+        """Whether the target, or every target of the batch, is REACHED."""
+        return bool((self._rows.status == Status.REACHED).all())
+
+    def __len__(self) -> int:
+        if self.shape == ():
+            raise TypeError("the answer to one target has no length")
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> Solution:
+        """The answer at `index` of the batch axes; NumPy's rules for integers, slices and arrays."""
+        if self.shape == ():
+            raise TypeError("the answer to one target cannot be indexed")
+        chosen = np.arange(len(self._rows.status)).reshape(self.shape)[index]
+        places = np.ravel(chosen)
+        rows = P.Rows._make(np.ascontiguousarray(array[places]) for array in self._rows)
+        own = None if self._joints_from is None else lambda: self._coordinates[places]
+        wanted = None if self._wanted is None else self._wanted._replace(targets=self._wanted.targets[places])
+        return Solution(self.mechanism, rows, np.shape(chosen), own, wanted)
+
+    def __iter__(self) -> Iterator[Solution]:
+        return (self[i] for i in range(len(self)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as plain numbers, lists and dicts, ready for JSON; NaN (an INVALID row) becomes None."""
+        names = (
+            "pose",
+            "actuators",
+            "position_error",
+            "rotation_error",
+            "residual",
+            "actuator_error",
+            "limit_excess",
+            "iterations",
+            "rounds",
+        )
+        plain: dict[str, Any] = {"status": _plain_status(self.status)}
+        plain |= {name: as_plain(getattr(self, name)) for name in names}
+        plain["held"] = as_plain(self.held)
+        plain["joints"] = {name: as_plain(value) for name, value in self.joints.items()}
+        plain["points"] = {name: as_plain(point) for name, point in self.points.items()}
+        limits = [self.active_limits] if self.shape == () else self.active_limits
+        listed = [[vars(limit) for limit in row] for row in limits]
+        plain["active_limits"] = listed[0] if self.shape == () else listed
+        return plain
+
+    def __repr__(self) -> str:
+        counts = {status.name: int((self._rows.status == status).sum()) for status in Status}
+        found = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        return f"<{type(self).__name__} of '{self.mechanism.name}': {found or 'empty'}>"
+
+
+def checked_solution(solution: Any, mechanism: Mechanism) -> Solution:
+    """What was passed as an answer of a mechanism, its limits perhaps others; InvalidArgument where it is none."""
+    if not isinstance(solution, Solution):
+        raise InvalidArgument("solution", type(solution).__name__, "a Solution, as `solve_ik` returns")
+    own = solution.mechanism
+    if own != checked_mechanism(mechanism) and own.without_limits() != mechanism.without_limits():
+        raise InvalidArgument("solution", f"an answer of another '{own.name}'", f"one of '{mechanism.name}'")
+    return solution
+
+
+def _plain_status(status: Any) -> Any:
+    return (
+        status.name
+        if isinstance(status, Status)
+        else np.vectorize(lambda s: Status(s).name, otypes=[object])(status).tolist()
+    )
+
+
+def as_plain(value: Any) -> Any:
+    """An array as numbers and lists; what is not finite becomes None."""
+    array = np.asarray(value)
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        return np.where(np.isfinite(array), array.astype(object), np.array(None)).tolist()
+    return array.tolist()

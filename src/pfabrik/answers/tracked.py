@@ -1,0 +1,164 @@
+"""A path that was followed: where it leaps, and where it is too fast."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.mechanism import Mechanism
+from ..description.task import task_of
+from ..errors import InvalidArgument, UnknownName
+from ..poses import between
+from ..tolerances import TOLERANCES
+from .solution import Solution, Status, as_plain
+
+if TYPE_CHECKING:
+    from ..kernels.reaching import plan as P
+    from .solution import Wanted
+
+Floats = NDArray[np.float64]
+
+SUSPICIOUS, LEAST = 4.0, 1e-6
+"""An answer that moves so many times as far as its target, and farther than the least [L or rad], may have leapt."""
+
+SUBSTEPS = 8
+"""Steps that a suspicious one is divided into: a leap stays within one of them, a swift motion spreads over several."""
+
+LEAP = 0.5
+"""Share of the whole motion that one of them makes if it is a leap."""
+
+
+class Pace(NamedTuple):
+    """Time from one target to the next [s], and the highest speeds of the actuators, (n_a,) [length/s or rad/s]."""
+
+    sample_time: float
+    speed_limits: Floats
+
+
+class Track(Solution):
+    """The answers along a path, (n,), with what a machine that follows it must know.
+
+    Attributes
+    ----------
+    jumps : whether an answer leaps away from the one before it, (n,): no motion leads from one to the other while
+        the target moves between theirs. So it is where the nearest feasible pose itself jumps, as it can where a
+        workspace is not convex.
+    speeds : mean speed of every actuator since the answer before, (n, n_a) [length/s or rad/s]; 0 in the first row.
+        None without a sample time.
+    too_fast : actuators that cannot move as fast as they would have to, one tuple of names a row; None without a
+        sample time.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        rows: P.Rows,
+        joints_from: Callable[[], Floats],
+        wanted: Wanted,
+        follow: Callable[[Floats, Solution], Solution],
+        pace: Pace | None,
+    ) -> None:
+        """Wrap rows; `follow` answers another path, (k, 4, 4), from a seed, in the same way."""
+        super().__init__(mechanism, rows, (len(rows.status),), joints_from, wanted)
+        self._targets = wanted.targets
+        self._follow = follow
+        self._pace = pace
+
+    def __getstate__(self) -> Any:
+        """As that of a `Solution`; whether there are jumps is found out before."""
+        return *super().__getstate__(), self._pace, self.jumps
+
+    def __setstate__(self, state: Any) -> None:
+        *own, self._pace, self.jumps = state
+        super().__setstate__(tuple(own))
+
+    @cached_property
+    def jumps(self) -> NDArray[np.bool_]:
+        found = np.zeros(self.shape, bool)
+        moved = np.maximum(_moves(self.mechanism, self.pose), self._actuator_moves().max(axis=1, initial=0.0))
+        asked = np.maximum(SUSPICIOUS * _moves(self.mechanism, self._targets), LEAST)
+        for row in np.flatnonzero(moved > asked).tolist():
+            # where links are stretched out, only one direction may tell which way they bend
+            ways = [ends for ends in ((row - 1, row), (row, row - 1)) if self.status[ends[0]] < Status.FAILED]
+            found[row] = all(self._leaps(*ends, moved[row]) for ends in ways)
+        return found
+
+    def _leaps(self, start: int, end: int, moved: float) -> bool:
+        """Whether a step from one row to the next, or back, stays a leap where it is divided, or leads elsewhere."""
+        shares = np.arange(1, SUBSTEPS + 1)[:, None, None] / SUBSTEPS
+        here, there = (np.repeat(self._targets[row : row + 1], SUBSTEPS, axis=0) for row in (start, end))
+        way = [self[start], self._follow(between(here, there, shares), self[start]), self[end]]
+        poses = np.concatenate([each.pose.reshape(-1, 4, 4) for each in way])
+        actuators = np.concatenate([each.actuators.reshape(-1, self.actuators.shape[1]) for each in way])
+        steps = np.maximum(_moves(self.mechanism, poses), _scaled(self.mechanism, actuators).max(axis=1, initial=0.0))
+        return bool(steps.max() > LEAP * moved)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As that of a `Solution`, with the fields of a track."""
+        plain = super().to_dict()
+        plain["jumps"] = self.jumps.tolist()
+        plain["speeds"] = None if self.speeds is None else as_plain(self.speeds)
+        plain["too_fast"] = None if self.too_fast is None else [list(names) for names in self.too_fast]
+        return plain
+
+    def _actuator_moves(self) -> Floats:
+        return _scaled(self.mechanism, self.actuators)
+
+    @property
+    def speeds(self) -> Floats | None:
+        if self._pace is None:
+            return None
+        return np.abs(np.diff(self.actuators, axis=0, prepend=self.actuators[:1])) / self._pace.sample_time
+
+    @property
+    def too_fast(self) -> list[tuple[str, ...]] | None:
+        speeds = self.speeds
+        if self._pace is None or speeds is None:
+            return None
+        beyond = speeds > self._pace.speed_limits * (1.0 + TOLERANCES.speed)
+        names = self.mechanism.actuators
+        return [tuple(name for name, over in zip(names, row, strict=True) if over) for row in beyond]
+
+
+def pace_of(mechanism: Mechanism, sample_time: float | None, speed_limits: Any) -> Pace | None:
+    """What was said of time and speeds, checked."""
+    names = mechanism.actuators
+    if sample_time is None:
+        if speed_limits is not None:
+            raise InvalidArgument("sample_time", "None beside speed limits", "the time between two targets [s]")
+        return None
+    _require_positive("sample_time", sample_time)
+    limits = np.full(len(names), np.inf)
+    if isinstance(speed_limits, Mapping):
+        for name, limit in speed_limits.items():
+            if name not in names:
+                raise UnknownName("actuator", name, names)
+            _require_positive(f"speed_limits['{name}']", limit)
+            limits[names.index(name)] = limit
+    elif speed_limits is not None:
+        _require_positive("speed_limits", speed_limits)
+        limits[:] = speed_limits
+    return Pace(float(sample_time), limits)
+
+
+def _require_positive(name: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < np.inf:
+        raise InvalidArgument(name, repr(value), "a positive number")
+
+
+def _moves(mechanism: Mechanism, poses: Floats) -> Floats:
+    """How far each pose of a path is from the one before it in what the task counts, (n,) [L]; 0 for the first."""
+    position, rotation = task_of(mechanism).errors(poses[1:], poses[:-1])
+    moves = np.hypot(position, mechanism.rotation_length * rotation) / mechanism.characteristic_length
+    return np.concatenate([np.zeros(min(len(poses), 1)), moves])
+
+
+def _scaled(mechanism: Mechanism, actuators: Floats) -> Floats:
+    """How far each actuator moves in every step, (n, n_a) [L or rad]."""
+    slides = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuators])
+    units = np.where(slides, mechanism.characteristic_length, 1.0)
+    return np.asarray(np.abs(np.diff(actuators, axis=0, prepend=actuators[:1])) / units)

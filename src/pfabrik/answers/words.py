@@ -1,0 +1,253 @@
+"""A Solution in words and in the units that people read: degrees, and the mechanism's own length."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.joint_types import KINDS
+from ..motion.first_order import are_stretched
+from ..tolerances import TOLERANCES
+
+if TYPE_CHECKING:
+    from ..description.mechanism import Joint, Mechanism
+    from .limits import ActiveLimit
+    from .solution import Solution
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Readout:
+    """How the coordinate of an actuator is shown.
+
+    Attributes
+    ----------
+    name : of the actuator.
+    is_angle : whether the coordinate is an angle; a length otherwise.
+    unit : ``"deg"`` or the mechanism's length unit.
+    limits : lowest and highest value in `unit`, infinite where there is no limit.
+    """
+
+    name: str
+    is_angle: bool
+    unit: str
+    limits: tuple[float, float]
+
+    def display(self, values: Floats) -> Floats:
+        """Coordinates [rad or length] in `unit`."""
+        return np.degrees(values) if self.is_angle else values
+
+    def coordinate(self, shown: float) -> float:
+        """The coordinate [rad or length] that is shown as a value in `unit`."""
+        return math.radians(shown) if self.is_angle else shown
+
+
+def readouts(mechanism: Mechanism) -> tuple[Readout, ...]:
+    """One readout for each actuator, in the order of ``mechanism.actuators``."""
+    return tuple(readout(mechanism.joint(name), mechanism.length_unit) for name in mechanism.actuators)
+
+
+def readout(joint: Joint, length_unit: str) -> Readout:
+    """How the coordinate of one actuated revolute or prismatic joint is shown."""
+    is_angle = joint.type == "revolute"
+    low, high = (float(bound) for bound in joint.range or (-math.inf, math.inf))  # type: ignore[arg-type]
+    limits = (math.degrees(low), math.degrees(high)) if is_angle else (low, high)
+    return Readout(joint.name, is_angle, "deg" if is_angle else length_unit, limits)
+
+
+def rpy_angles(pose: Floats) -> Floats:
+    """Roll, pitch, yaw [rad] of poses, the inverse of ``pose(..., rpy=...)``: R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    Parameters
+    ----------
+    pose : (..., 4, 4)
+
+    Returns
+    -------
+    (..., 3); pitch lies within a quarter turn. At a quarter turn of pitch only yaw - roll (or yaw + roll) is
+    determined, and roll is given as 0.
+    """
+    rotation = np.asarray(pose)[..., :3, :3]
+    cos_pitch = np.hypot(rotation[..., 0, 0], rotation[..., 1, 0])
+    pitch = np.arctan2(-rotation[..., 2, 0], cos_pitch)
+    locked = cos_pitch < TOLERANCES.rotation
+    roll = np.where(locked, 0.0, np.arctan2(rotation[..., 2, 1], rotation[..., 2, 2]))
+    yaw = np.where(
+        locked,
+        np.arctan2(-rotation[..., 0, 1], rotation[..., 1, 1]),
+        np.arctan2(rotation[..., 1, 0], rotation[..., 0, 0]),
+    )
+    return np.stack([roll, pitch, yaw], axis=-1)
+
+
+def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
+    """What became of one target, or of the actuator values asked for, in one sentence.
+
+    For instance ``projected: 12.3 mm from the target; strut B3 at its maximum 250 mm; joint C1's cone at 45 deg``: how
+    far, what was to be held and is not, and the limits that hold it back, the hardest first.
+
+    Parameters
+    ----------
+    asked : actuator values (n_a,) [length or rad], where these were asked for and not a pose.
+    """
+    status = solution.status.name.lower()
+    if status == "reached":
+        return "reached"
+    if status == "projected" and asked is not None:
+        why = reasons(solution) or ["no limit is active: no configuration with these values was found"]
+        return "; ".join([f"projected: {actuator_distance(solution, asked)} from the values asked for", *why])
+    if status == "projected":
+        why = reasons(solution) or [f"no limit is active: {why_without_limits(solution)}"]
+        return "; ".join([f"projected: {distance(solution)} from the target", *given_up(solution), *why])
+    if status == "exceeded":
+        return f"exceeded: assembled, but beyond limits: {by_bound(exceeded(solution))}"
+    return f"{status}: no feasible configuration found; {what_is_wrong(solution)}"
+
+
+def given_up(solution: Solution) -> list[str]:
+    """What a projected answer was to hold of its target and does not: one phrase, or none."""
+    from ..closure.projection import ways_of
+    from ..kernels.reaching.plan import HOLD_NOTHING
+
+    wanted = solution._wanted
+    if wanted is None or solution.held is not None:
+        return []
+    first, *_ = ways_of(solution.mechanism, wanted.hold, wanted.rotation_length)
+    if first.hold == HOLD_NOTHING:
+        return []
+    other = "position" if wanted.hold == "orientation" else "orientation"
+    return [f"no {other} was found that suits the {wanted.hold}: both give way"]
+
+
+def why_without_limits(solution: Solution) -> str:
+    """What keeps an answer that no limit holds back from its target, as far as first order tells."""
+    inside, outside = missed(solution)
+    found = []
+    if inside and are_stretched(solution.mechanism, solution._coordinates).any():
+        found.append("the links are stretched out or folded")
+    if outside:
+        found.append("the mechanism has no freedom that way")
+    return ", and ".join(found) or "nothing nearer was found"
+
+
+def missed(solution: Solution) -> tuple[bool, bool]:
+    """Whether what is missed lies along motions of the end effector (at home and here), and whether across them.
+
+    Of a rotation that is missed, only the first is said.
+    """
+    from ..ik import solve_ik
+    from .differential import forward_jacobian
+
+    mechanism, wanted = solution.mechanism, solution._wanted
+    if wanted is None or solution.rotation_error > TOLERANCES.rotation:
+        return True, False
+    axes = [axis in mechanism.task for axis in "xyz"]
+    offset = (wanted.targets[0] - solution.pose)[:3, 3][axes]
+    answers = (solve_ik(mechanism, mechanism.home_pose), solution)
+    motions = np.hstack([forward_jacobian(mechanism, answer)[:3][axes] for answer in answers])
+    along = motions @ np.linalg.lstsq(motions, offset, rcond=TOLERANCES.alignment)[0]
+    least = TOLERANCES.alignment * float(np.linalg.norm(offset))
+    return bool(np.linalg.norm(along) > least), bool(np.linalg.norm(offset - along) > least)
+
+
+def what_is_wrong(solution: Solution) -> str:
+    """Open loops or, where they are closed, the limits that are exceeded."""
+    if solution.residual <= TOLERANCES.position * solution.mechanism.characteristic_length:
+        return f"limits exceeded: {by_bound(exceeded(solution))}"
+    return f"loops open by {loop_gap(solution)}"
+
+
+def distance(solution: Solution) -> str:
+    """Position error, rotation error, or both, where they exceed the tolerance."""
+    mechanism = solution.mechanism
+    parts = []
+    if solution.position_error > TOLERANCES.position * mechanism.characteristic_length:
+        parts.append(f"{float(solution.position_error):.3g} {mechanism.length_unit}")
+    if solution.rotation_error > TOLERANCES.rotation:
+        parts.append(f"{math.degrees(float(solution.rotation_error)):.3g} deg")
+    return " and ".join(parts) or "a hair"
+
+
+def actuator_distance(solution: Solution, asked: Floats) -> str:
+    """The largest differences between actuator coordinates and the values asked for: ``up to 12.3 mm and 4 deg``."""
+    worst: dict[str, float] = {}
+    for readout, off in zip(readouts(solution.mechanism), np.abs(solution.actuators - asked), strict=True):
+        worst[readout.unit] = max(float(readout.display(off)), worst.get(readout.unit, 0.0))
+    return "actuators up to " + " and ".join(f"{off:.3g} {unit}" for unit, off in worst.items() if off > 0.0)
+
+
+def loop_gap(solution: Solution) -> str:
+    """The largest loop gap with its unit."""
+    return f"{float(solution.residual):.1g} {solution.mechanism.length_unit}"
+
+
+def reasons(solution: Solution) -> list[str]:
+    """What holds a projected answer back, the hardest first, one phrase for those of a kind and value."""
+    names: dict[tuple[str, str], list[str]] = {}
+    for limit in solution.active_limits:
+        is_plain = solution.mechanism.joint(limit.joint).type != "universal"  # length or angle: the bound's unit tells
+        names.setdefault(in_words(limit, solution.mechanism), []).append(limit.joint if is_plain else name_of(limit))
+    return [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
+
+
+def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
+    """What kind of joint it is, and which of its bounds: ``("strut", "maximum 250 mm")``."""
+    joint = mechanism.joint(limit.joint)
+    noun = "joint" if joint.type != "prismatic" else "strut" if joint.along else "slider"
+    angle = math.degrees(limit.limit)
+    if limit.bound == "cone":
+        return noun, f"cone at {angle:.6g} deg"
+    bound = "maximum" if limit.bound == "max" else "minimum"
+    value = f"{limit.limit:.6g} {mechanism.length_unit}" if is_length(limit, joint) else f"{angle:.6g} deg"
+    return noun, f"{bound} {value}"
+
+
+def is_length(limit: ActiveLimit, joint: Joint) -> bool:
+    """Whether a limit is one of a length."""
+    return limit.bound != "cone" and KINDS[joint.type].coordinates[limit.coordinate] == "length"
+
+
+def name_of(limit: ActiveLimit) -> str:
+    """The joint, and where it is not its first, which of its coordinates."""
+    return f"{limit.joint} (second coordinate)" if limit.coordinate else limit.joint
+
+
+def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
+    """``strut B3 at its maximum 250 mm``, ``struts B1, B3 at their maximum 250 mm``, ``joint C1's cone at 45 deg``."""
+    subject = f"{noun}{'s' * (len(joints) > 1)} {', '.join(joints)}"
+    if bound.startswith("cone"):
+        return (
+            f"{subject}'s {bound}" if len(joints) == 1 else f"the cones of {subject} at{bound.removeprefix('cone at')}"
+        )
+    return f"{subject} at {'their' if len(joints) > 1 else 'its'} {bound}"
+
+
+def short_names(limits: Iterable[ActiveLimit]) -> str:
+    """Active limits in a cell of a table: ``B3 max; C1 cone``."""
+    return "; ".join(f"{name_of(limit)} {limit.bound}" for limit in limits)
+
+
+def exceeded(solution: Solution) -> list[ActiveLimit]:
+    """The limits that a failed answer exceeds, not those that it only lies on."""
+    return [limit for limit in solution.active_limits if is_exceeded(limit, solution.mechanism)]
+
+
+def is_exceeded(limit: ActiveLimit, mechanism: Mechanism) -> bool:
+    """Whether the coordinate is beyond its bound by more than the tolerance."""
+    scale = mechanism.characteristic_length if is_length(limit, mechanism.joint(limit.joint)) else 1.0
+    excess = limit.limit - limit.value if limit.bound == "min" else limit.value - limit.limit
+    return excess > TOLERANCES.limit * scale
+
+
+def by_bound(limits: Iterable[ActiveLimit]) -> str:
+    """Limits in a few words: ``max of B1, B2; cone of C1``."""
+    names: dict[str, dict[str, None]] = {}
+    for limit in limits:
+        names.setdefault(limit.bound, {})[name_of(limit)] = None
+    return "; ".join(f"{bound} of {', '.join(joints)}" for bound, joints in names.items())

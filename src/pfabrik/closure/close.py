@@ -1,0 +1,215 @@
+"""The closure engine: the joint coordinates of a whole mechanism, its loops closed to machine precision.
+
+Bodies are posed by products of exponentials along the paths from the base to the end effector; nothing here is shared
+with the reaching engine, so that each can check the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.joint_types import KINDS
+from ..description.mechanism import Mechanism
+from ..description.paths import end_body
+from ..kernels.closure import loops as K
+from ..kernels.threads import in_blocks
+from ..motion.displacements import columns, displacements
+from .loops import loops_of
+
+Floats = NDArray[np.float64]
+
+EVERYTHING_FREE = (0.0,) * 6
+HELD = (K.LOCKED,) * 6
+
+
+@dataclass(frozen=True)
+class Closure:
+    """A mechanism as the closure kernel takes it.
+
+    Attributes
+    ----------
+    scale : what a coordinate is multiplied by to be dimensionless: 1 / L for lengths, 1 for angles, (columns,).
+    turning : 1 for angles, 0 for lengths, (columns,).
+    last_balls : ball joints at the platform, each at the end of a path that shares no joint.
+    actuated, home : columns of the actuators, and their values at home, (n_a,).
+    """
+
+    mechanism: Mechanism
+    loops: K.Loops
+    scale: Floats
+    turning: Floats
+    actuated: NDArray[np.int64]
+    last_balls: frozenset[str]
+    home: Floats
+
+    @property
+    def idle(self) -> NDArray[np.bool_]:
+        """Which coordinates are on no path (a tool's hinge): nothing but their limits asks anything of them."""
+        idle = np.ones(len(self.scale), bool)
+        idle[self.loops.row_columns] = False
+        return idle
+
+    def layout(self, locked: frozenset[str]) -> K.Layout:
+        """The layout in which some joints do not move."""
+        return _layout(self.mechanism, locked)
+
+
+@lru_cache(maxsize=64)
+def closure_of(mechanism: Mechanism) -> Closure:
+    """Compile a mechanism for the closure kernel."""
+    loops = loops_of(mechanism)
+    kinds = [kind for joint in mechanism.joints for kind in KINDS[joint.type].coordinates]
+    turning = np.array([float(kind == "angle") for kind in kinds])
+    scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
+    actuated = np.array([columns(mechanism)[name].start for name in mechanism.actuators], np.int64)
+    home = np.array([np.ravel(mechanism.home_coordinate(name))[0] for name in mechanism.actuators])
+    ending = loops.columns[loops.visits[loops.paths[1:][loops.last_balls == 1] - 1, 0]]
+    starts = {span.start: name for name, span in columns(mechanism).items() if span.stop > span.start}
+    balls = frozenset(starts[int(first)] for first in ending)
+    return Closure(mechanism, loops, scale, turning, actuated, balls, home)
+
+
+@lru_cache(maxsize=256)
+def _layout(mechanism: Mechanism, locked: frozenset[str]) -> K.Layout:
+    loops = closure_of(mechanism).loops
+    free = np.ones(len(loops.group_of), bool)
+    for name, span in columns(mechanism).items():
+        if name in locked:
+            free[span] = False
+    slots = np.full(len(free), -1)
+    sizes = np.zeros(len(loops.groups) - 1, np.int64)
+    for j in np.flatnonzero(free):
+        group = loops.group_of[j]
+        slots[j] = sizes[group]
+        sizes[group] += 1
+    return K.Layout(slots, sizes)
+
+
+def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
+    """Poses (n, 4, 4) of the end effector, or of the body that carries it where it is a joint."""
+    return np.asarray(displacements(mechanism, coordinates)[end_body(mechanism)] @ mechanism.home_pose)
+
+
+class Closing(NamedTuple):
+    """What a search for closed loops found, row by row; lengths in the mechanism's unit.
+
+    Attributes
+    ----------
+    coordinates : deviations from home, (n, columns).
+    poses : of the platform, (n, 4, 4).
+    gaps : largest gap of the loops of each group of paths, (n, groups) [L or rad].
+    excesses : largest excess over the limits of each group, likewise.
+    misses : largest distance of a joint's centre from where it was wished, likewise.
+    iterations : (n,).
+    """
+
+    coordinates: Floats
+    poses: Floats
+    gaps: Floats
+    excesses: Floats
+    misses: Floats
+    iterations: NDArray[np.int64]
+
+    @property
+    def gap(self) -> Floats:
+        """The largest gap of each row [L or rad]."""
+        return np.asarray(self.gaps.max(axis=1, initial=0.0))
+
+    @property
+    def excess(self) -> Floats:
+        """The largest excess over any limit of each row [L or rad]."""
+        return np.asarray(self.excesses.max(axis=1, initial=0.0))
+
+
+def close(
+    closure: Closure,
+    coordinates: Floats,
+    poses: Floats,
+    *,
+    locked: frozenset[str] = frozenset(),
+    platform: Sequence[float] = EVERYTHING_FREE,
+    framed: bool = False,
+    targets: Floats | None = None,
+    weights: Floats | None = None,
+    anchors: Floats | None = None,
+    centres: Floats | None = None,
+    limits: bool = False,
+    margin: float = 0.0,
+    chained: bool = False,
+    plunging: bool = False,
+    closeness: float = 1e-13,
+    max_iterations: int = 100,
+) -> Closing:
+    """Close loops from given configurations, nearest to what is wished.
+
+    Parameters
+    ----------
+    coordinates, poses : where to start, (n, columns) and (n, 4, 4).
+    locked : joints that keep their coordinates.
+    platform : weights of the squares of the platform's distance from `targets` (default: `poses`), position [L], then
+        rotation [rad]; `LOCKED` holds that part where it starts.
+    framed : the weights of the rotation are about the axes of the targets, not of the base.
+    weights, anchors : weights of the squares of the coordinates' distances from anchors, (columns,), (n, columns).
+    centres : wished joint centres, (n, joints, 3); NaN for none.
+    limits : keep all limits too, by `margin` inside.
+    chained : every row starts from the free coordinates of the one before.
+    plunging : undamped steps, up and down: finds more of many solutions, but not the nearest.
+    closeness : largest gap, excess and miss that ends the search [L or rad].
+    """
+    n = len(coordinates)
+    follow = centres is None and not limits
+    length = closure.mechanism.characteristic_length
+    groups = len(closure.loops.groups) - 1
+    closed = K.Closed(
+        coordinates=coordinates * closure.scale,
+        poses=_in_lengths(poses, 1.0 / length),
+        gaps=np.full((n, groups), np.inf),
+        excesses=np.full((n, groups), np.inf),
+        misses=np.full((n, groups), np.inf),
+        iterations=np.zeros(n, np.int64),
+    )
+    none = np.zeros((n, 0, 3))
+    wishes = K.Wishes(
+        weights=np.zeros(len(closure.scale)) if weights is None else weights,
+        anchors=none[:, :, 0] if anchors is None else anchors * closure.scale,
+        platform=np.array(platform, dtype=float),
+        framed=int(framed),
+        targets=closed.poses.copy() if targets is None else _in_lengths(targets, 1.0 / length),
+        centres=none if centres is None else centres / length,
+        limits=int(limits),
+        margin=margin,
+        chained=int(chained),
+        balls_follow=int(follow),
+        plunging=int(plunging),
+        closeness=closeness,
+        max_iterations=max_iterations,
+    )
+    layout = closure.layout(locked | closure.last_balls if follow else locked)
+    _run(closure.loops, layout, wishes, closed)
+    return Closing(closed.coordinates / closure.scale, _in_lengths(closed.poses, length), *closed[2:])
+
+
+def _run(loops: K.Loops, layout: K.Layout, wishes: K.Wishes, closed: K.Closed) -> None:
+    """The kernel over all rows, on all cores."""
+    from ..kernels.closure.close import close as close_rows
+
+    def run(block: slice) -> None:
+        own = wishes._replace(
+            anchors=wishes.anchors[block], targets=wishes.targets[block], centres=wishes.centres[block]
+        )
+        close_rows(loops, layout, own, K.Closed._make(array[block] for array in closed))
+
+    n = len(closed.poses)
+    in_blocks(run, n, rows_a_block=max(n, 1) if wishes.chained else 64)
+
+
+def _in_lengths(poses: Floats, scale: float) -> Floats:
+    scaled = np.array(poses)
+    scaled[:, :3, 3] *= scale
+    return scaled

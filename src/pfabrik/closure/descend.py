@@ -1,0 +1,102 @@
+"""The nearest feasible configuration, exactly: a local search on joint coordinates, and what holds it back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.closure.loops import Closed
+from ..kernels.threads import in_blocks
+from ..tolerances import TOLERANCES
+from .close import Closing, Closure
+from .nearest import MARGIN
+
+if TYPE_CHECKING:
+    from ..description.mechanism import Mechanism
+    from ..kernels.closure.pose_objective import Aim
+
+Floats = NDArray[np.float64]
+
+SIGHT = 1e6
+"""How far off targets are looked for [L]: farther ones in the same direction have the same nearest pose."""
+
+MOST_STEPS = 200
+"""Steps of a search, including those that are taken back; most need a dozen."""
+
+
+def approached(
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+) -> Closing:
+    """Feasible configurations nearest to targets, (n, 4, 4): local minima of the distance, from given coordinates.
+
+    Parameters
+    ----------
+    coordinates : where to start, (n, columns): closed within all limits, or not far from it.
+    platform : what counts of the distance from the targets: weights of the squares of position [L] and rotation [rad];
+        LOCKED for what is to be as the target has it.
+    framed : of the rotation, only the direction of the platform's z axis counts.
+
+    Returns
+    -------
+    Closing : judge by `is_feasible`. Gaps and excesses are those of the whole, the same for every group.
+    """
+    found = _run(closure, coordinates, _aim(closure, targets, platform, framed, MOST_STEPS))[0]
+    found.poses[:, :3, 3] *= closure.mechanism.characteristic_length
+    return Closing(found.coordinates / closure.scale, *found[1:])
+
+
+def weighed_limits(
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+) -> Floats:
+    """How hard every limit holds configurations back from their targets: multipliers, (n, 2 columns + cones).
+
+    First the low and high bounds of the coordinates in turn, then the cones: by how much of L the target comes nearer,
+    per unit [L or rad] by which a limit gives way; 0 for limits that do not matter.
+    """
+    return _run(closure, coordinates, _aim(closure, within_sight(closure.mechanism, targets), platform, framed, 0))[1]
+
+
+def within_sight(mechanism: Mechanism, targets: Floats) -> Floats:
+    """Targets (n, 4, 4), those so far from home that no search could tell them from others there brought nearer."""
+    home, far = mechanism.home_pose[:3, 3], SIGHT * mechanism.characteristic_length
+    near, offset = targets.copy(), targets[:, :3, 3] - home
+    near[:, :3, 3] = home + offset * np.minimum(1.0, far / np.maximum(np.abs(offset).max(axis=1), far))[:, None]
+    return near
+
+
+def _run(closure: Closure, coordinates: Floats, aim: Aim) -> tuple[Closed, Floats]:
+    """The kernel over all rows, on all cores: where they ended, or what holds them where they are."""
+    from ..kernels.closure.descend import approach
+
+    closed, layout = _closed(closure, coordinates), closure.layout(frozenset())
+    weights = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
+
+    def run(block: slice) -> None:
+        own = Closed._make(array[block] for array in closed)
+        approach(closure.loops, layout, aim._replace(targets=aim.targets[block]), own, weights[block])
+
+    in_blocks(run, len(coordinates), rows_a_block=16)
+    return closed, weights
+
+
+def _aim(closure: Closure, targets: Floats, platform: Sequence[float], framed: bool, steps: int) -> Aim:
+    from ..kernels.closure.pose_objective import Aim
+
+    wanted = targets.copy()
+    wanted[:, :3, 3] /= closure.mechanism.characteristic_length
+    return Aim(wanted, np.array(platform, dtype=float), int(framed), MARGIN, TOLERANCES.active, steps)
+
+
+def _closed(closure: Closure, coordinates: Floats) -> Closed:
+    n, groups = len(coordinates), len(closure.loops.groups) - 1
+    return Closed(
+        coordinates=coordinates * closure.scale,
+        poses=np.zeros((n, 4, 4)) + np.eye(4),
+        gaps=np.zeros((n, groups)),
+        excesses=np.zeros((n, groups)),
+        misses=np.zeros((n, groups)),
+        iterations=np.zeros(n, np.int64),
+    )

@@ -1,0 +1,216 @@
+"""A mechanism as closed loops: unit motions, and the paths from the base to the end effector that visit them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.cones import cone_line, opposite
+from ..description.home_mobility import universal_axes
+from ..description.joint_types import KINDS
+from ..description.mechanism import Joint, Mechanism
+from ..description.paths import Path, independent_paths
+from ..kernels.closure import loops as K
+from ..motion.displacements import columns
+
+Floats = NDArray[np.float64]
+
+
+def loops_of(mechanism: Mechanism) -> K.Loops:
+    """The paths of a mechanism, its limits and cones, as the closure kernel takes them: lengths in L."""
+    builder = _Builder(mechanism)
+    for path in independent_paths(mechanism):
+        builder.add_path(path)
+    for joint in mechanism.joints:
+        builder.add_joint(joint)
+    return builder.build()
+
+
+class _Builder:
+    """Collects unit motions and visits, path by path."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.columns = columns(mechanism)
+        self.length = mechanism.characteristic_length
+        self.units: dict[str, list[int]] = {}
+        self.records: list[tuple[int, Any, Any, int]] = []
+        self.paths: list[list[tuple[int, int]]] = []
+        self.marks: list[list[tuple[int, int]]] = []
+        ends = (mechanism.base, mechanism.end_effector)
+        self.marked = {
+            joint.name: place
+            for place, joint in enumerate(mechanism.joints)
+            if joint.at is not None and not set(ends) & set(joint.connects)
+        }
+
+    def add_path(self, path: Path) -> None:
+        visits: list[tuple[int, int]] = []
+        marks: list[tuple[int, int]] = []
+        is_detour = len({passage.joint.name for passage in path}) < len(path)
+        for passage in path:
+            units = self.add_joint(passage.joint)
+            if units and passage.joint.name in self.marked and not is_detour:
+                marks.append((len(visits), self.marked[passage.joint.name]))
+            visits += [(k, 1) for k in units] if passage.forward else [(k, -1) for k in reversed(units)]
+        self.paths.append(visits)
+        self.marks.append(marks)
+
+    def add_joint(self, joint: Joint) -> list[int]:
+        """Numbers of a joint's unit motions, in the order from its first body to its second."""
+        if joint.name not in self.units:
+            first = self.columns[joint.name].start
+            motions = _motions(self.mechanism, joint)
+            self.units[joint.name] = list(range(len(self.records), len(self.records) + len(motions)))
+            point = np.zeros(3) if joint.at is None else np.array(joint.at) / self.length
+            self.records += [(kind, axis, point, first + place) for place, (kind, axis) in enumerate(motions)]
+        return self.units[joint.name]
+
+    def build(self) -> K.Loops:
+        groups = _connected([{k for k, _ in path} for path in self.paths])
+        order = [path for group in groups for path in group]
+        visits = [visit for path in order for visit in self.paths[path]]
+        starts = _starts(len(self.paths[path]) for path in order)
+        widths = [3 if self.records[k][0] == K.BALL else 1 for k, _ in visits]
+        n_columns = sum(len(KINDS[joint.type].coordinates) for joint in self.mechanism.joints)
+        group_of = np.zeros(n_columns, np.int64)
+        for number, group in enumerate(groups):
+            for k in {k for path in group for k, _ in self.paths[path]}:
+                group_of[self._columns_of(k)] = number
+        marks = [
+            (starts[place] + visit, joint) for place, path in enumerate(order) for visit, joint in self.marks[path]
+        ]
+        lo, hi = _ranges(self.mechanism, n_columns)
+        return K.Loops(
+            kinds=_ints(record[0] for record in self.records),
+            axes=_vectors(record[1] for record in self.records),
+            points=_vectors(record[2] for record in self.records),
+            columns=_ints(record[3] for record in self.records),
+            visits=_pairs(visits),
+            visit_rows=_ints(_starts(widths)),
+            row_columns=_ints(j for k, _ in visits for j in self._columns_of(k)),
+            paths=_ints(starts),
+            groups=_ints(_starts(map(len, groups))),
+            group_of=group_of,
+            last_balls=_ints(self._ends_with_own_ball(group) for group in groups for _ in group),
+            end=np.array(self.mechanism.reference_point) / self.length,
+            lo=lo,
+            hi=hi,
+            marks=_pairs(marks),
+            path_marks=_ints(_starts(len(self.marks[path]) for path in order)),
+            **self._cones(),
+        )
+
+    def _ends_with_own_ball(self, group: list[int]) -> bool:
+        last = self.paths[group[0]][-1:]
+        return len(group) == 1 and any(self.records[k][0] == K.BALL for k, _ in last)
+
+    def _columns_of(self, k: int) -> range:
+        kind, _, _, first = self.records[k]
+        return range(first, first + (3 if kind == K.BALL else 1))
+
+    def _cones(self) -> dict[str, Any]:
+        joints = [joint for joint in self.mechanism.joints if joint.cone is not None]
+        lines = [cone_line(self.mechanism, joint) for joint in joints]
+        offsets = [(np.asarray(end.at) - np.asarray(start.at)) / self.length for start, end in lines]
+        slides = [
+            _slides(self.mechanism, joint, end, offset, self.columns)
+            for joint, (_, end), offset in zip(joints, lines, offsets, strict=True)
+        ]
+        starts = _starts(map(len, slides))
+        return {
+            "cone_units": _pairs((self.units[joint.name][0], self.units[joint.name][-1] + 1) for joint in joints),
+            "cone_axes": _vectors(joint.cone.axis for joint in joints if joint.cone),
+            "cone_lines": _vectors(offsets),
+            "cone_angles": np.array([joint.cone.half_angle for joint in joints if joint.cone]),
+            "cone_outward": _ints(j.cone.fixed_to == j.connects[0] for j in joints if j.cone),
+            "cone_slides": _pairs(pairwise(starts)),
+            "slides": _ints(j for each in slides for j, _ in each),
+            "slide_axes": _vectors(axis for each in slides for _, axis in each),
+        }
+
+
+def _motions(mechanism: Mechanism, joint: Joint) -> list[tuple[int, Any]]:
+    """The unit motions of a joint and their axes, in the order from its first body to its second."""
+    if joint.type == "fixed":
+        return []
+    if joint.type == "spherical":
+        return [(K.BALL, np.zeros(3))]
+    if joint.type == "universal":
+        return [(K.TURN, axis) for axis in universal_axes(mechanism, joint)]
+    axis = mechanism.home_axis(joint.name)
+    slide, turn = (K.SLIDE, axis), (K.TURN, axis)
+    return {"revolute": [turn], "prismatic": [slide], "cylindrical": [turn, slide]}[joint.type]
+
+
+def _slides(
+    mechanism: Mechanism, joint: Joint, end: Joint, line: Floats, places: Mapping[str, slice]
+) -> list[tuple[int, Floats]]:
+    """The slides between a joint and the next that turn its line, and how the line moves with each."""
+    body, found = opposite(joint), []
+    seen = {joint.name}
+    while body not in end.connects:
+        passed = next(
+            each
+            for each in mechanism.joints
+            if each.name not in seen and each.type in ("prismatic", "fixed") and body in each.connects
+        )
+        seen.add(passed.name)
+        forward = passed.connects[0] == body
+        body = passed.connects[1 if forward else 0]
+        if passed.type == "prismatic":
+            axis = np.array(mechanism.home_axis(passed.name)) * (1.0 if forward else -1.0)
+            if passed.along is None or np.linalg.norm(np.cross(axis, line)) > 1e-9 * np.linalg.norm(line):
+                found.append((places[passed.name].start, axis))
+    return found
+
+
+def _connected(sets: Sequence[set[int]]) -> list[list[int]]:
+    """Indices of the sets, grouped so that sets of different groups share no element."""
+    groups: list[tuple[set[int], list[int]]] = []
+    for number, elements in enumerate(sets):
+        touching = [group for group in groups if group[0] & elements]
+        merged = (
+            elements.union(*(group[0] for group in touching)),
+            [*(m for group in touching for m in group[1]), number],
+        )
+        groups = [group for group in groups if group not in touching] + [merged]
+    return [members for _, members in groups]
+
+
+def _ranges(mechanism: Mechanism, n_columns: int) -> tuple[Floats, Floats]:
+    """Bounds of the deviations from home, (columns,) each, dimensionless; infinite where there are none.
+
+    A coordinate that is a distance has one even where the description gives none: it is not negative.
+    """
+    lo, hi = np.full(n_columns, -np.inf), np.full(n_columns, np.inf)
+    for joint in mechanism.joints:
+        span = columns(mechanism)[joint.name]
+        home = np.reshape(mechanism.home_coordinate(joint.name), (-1, 1))
+        lengths = np.array([kind == "length" for kind in KINDS[joint.type].coordinates])
+        units = np.where(lengths, mechanism.characteristic_length, 1.0)[:, None]
+        if joint.range is not None:
+            lo[span], hi[span] = ((np.reshape(joint.range, (-1, 2)) - home) / units).T
+        if joint.along is not None:
+            lo[span] = np.maximum(lo[span], -home[:, 0] / units[:, 0])
+    return lo, hi
+
+
+def _starts(sizes: Iterable[int]) -> list[int]:
+    return list(accumulate(sizes, initial=0))
+
+
+def _ints(values: Iterable[int]) -> NDArray[np.int64]:
+    return np.fromiter(values, np.int64)
+
+
+def _pairs(values: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
+    return np.array(list(values), np.int64).reshape(-1, 2)
+
+
+def _vectors(values: Iterable[Any]) -> Floats:
+    return np.array(list(values), dtype=float).reshape(-1, 3)

@@ -1,0 +1,190 @@
+"""Projection: the feasible configurations nearest to targets that are not reached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.mechanism import Mechanism
+from ..description.paths import end_body
+from ..description.task import Weights, task_of
+from ..kernels.closure.loops import LOCKED
+from ..kernels.reaching import plan as P
+from ..motion.displacements import displacements
+from ..poses import pose
+from .close import Closing, Closure, close, closure_of
+from .descend import approached
+from .nearest import MARGIN, is_feasible, nearest
+from .parasitic import differences, follows_task, has_parasitic_motion, strays
+from .starts import random_starts
+
+Floats = NDArray[np.float64]
+
+SAME = 1e-7
+"""Share by which a later start must come nearer to be preferred to an earlier one."""
+
+FAR_CORNER, TURNED_CORNER = 0.5, 0.5
+"""Where corners are looked for: so far from home [L], and turned so far [rad]."""
+
+
+CORNERS, CHANCES = 8, 128
+"""How many of them searches start from, and how many random configurations are closed to find some."""
+
+HITS = 7
+"""How many searches must end at the nearest configuration found before no other is looked for."""
+
+
+MISSED = 1e-6
+"""Most that an answer may miss of what it says it holds [L or rad]."""
+
+
+class Way(NamedTuple):
+    """A way to project: weights of the platform's position [L] and rotation [rad], and what of them is held."""
+
+    weights: Weights
+    hold: int
+
+    def distances(self, closure: Closure, poses: Floats, targets: Floats) -> Floats:
+        """How far poses (n, 4, 4) are from targets in what counts, (n,) [L]."""
+        position, rotation = task_of(closure.mechanism).errors(poses, targets)
+        turning = np.sqrt(max((weight for weight in self.weights[3:] if weight != LOCKED), default=0.0))
+        return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, turning * rotation))
+
+
+class Projected(NamedTuple):
+    """Answers: configurations, how far they are from their targets (inf where none was found), and what they hold."""
+
+    closing: Closing
+    distances: Floats
+    holds: NDArray[np.int64]
+
+
+def ways_of(mechanism: Mechanism, hold: str | None, rotation_length: float | None) -> list[Way]:
+    """The ways to project, in the order in which they are tried: what is to be held, then everything free."""
+    task = task_of(mechanism)
+    turning = ((rotation_length or mechanism.rotation_length) / mechanism.characteristic_length) ** 2
+    free = Way(task.weights(1.0, turning), P.HOLD_NOTHING)
+    if hold is None or not any(task.axes) or task.rotations == 0:
+        return [free]  # nothing is to be held, or nothing else could give way
+    if hold == "orientation":
+        return [Way(task.weights(1.0, LOCKED), P.HOLD_ORIENTATION), free]
+    return [Way(task.weights(LOCKED, turning), P.HOLD_POSITION), free]
+
+
+def kept(mechanism: Mechanism, holds: NDArray[np.int64], poses: Floats, targets: Floats) -> NDArray[np.int64]:
+    """What poses (n, 4, 4) have of their targets, of what they were to hold: targets out of sight were not sought."""
+    position, rotation = task_of(mechanism).errors(poses, targets)
+    turned = (holds == P.HOLD_ORIENTATION) & (rotation > MISSED)
+    moved = (holds == P.HOLD_POSITION) & (position > MISSED * mechanism.characteristic_length)
+    return np.where(turned | moved, P.HOLD_NOTHING, holds)
+
+
+def project(
+    closure: Closure, targets: Floats, starts: Sequence[Floats], ways: Sequence[Way], *, corners: bool
+) -> Projected:
+    """The nearest feasible configurations that local searches from several starts find.
+
+    Parameters
+    ----------
+    targets : (n, 4, 4); what does not count in them is as it may stay.
+    starts : joint coordinates (n, columns) each, feasible or nearly; of equal answers the first start's is taken.
+    ways : tried in turn, until one has an answer.
+    corners : search from the corners of the workspace too. Without, the search stays about where it starts.
+    """
+    n, framed = len(targets), task_of(closure.mechanism).is_framed
+    best = Projected(
+        close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, P.HOLD_NOTHING)
+    )
+    everywhere = [*starts, *(np.repeat(corner[None], n, axis=0) for corner in corners_of(closure.mechanism) if corners)]
+    for way in ways:
+        open_to_it, hits = np.isinf(best.distances), np.zeros(n, np.int64)
+        for start in everywhere:
+            waiting = np.flatnonzero(open_to_it & (hits < HITS))
+            if len(waiting):
+                found = approached(closure, start[waiting], targets[waiting], platform=way.weights, framed=framed)
+                hits[waiting] = _take_nearer(closure, best, waiting, found, targets, way, hits[waiting])
+        lost = np.flatnonzero(np.isinf(best.distances))
+        if len(lost) and LOCKED in way.weights:
+            placed = _placed(closure, starts[0][lost], targets[lost], way)
+            _take_nearer(closure, best, lost, placed, targets, way, np.zeros(len(lost), np.int64))
+    return best
+
+
+def _take_nearer(
+    closure: Closure,
+    best: Projected,
+    rows: NDArray[np.intp],
+    found: Closing,
+    targets: Floats,
+    way: Way,
+    hits: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Take over the rows that are feasible, and nearer than the best so far; how often each best was found by now."""
+    counts = is_feasible(found) & ~strays(closure.mechanism, found.poses)
+    distances = np.where(counts, way.distances(closure, found.poses, targets[rows]), np.inf)
+    least = best.distances[rows]
+    better = distances < (1.0 - SAME) * least
+    again = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)
+    best.distances[rows[better]], best.holds[rows[better]] = distances[better], way.hold
+    for array, own in zip(best.closing, found, strict=True):
+        array[rows[better]] = own[better]
+    return np.where(better, 1, hits + again)
+
+
+def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Closing:
+    """Nearest configurations from where the end effector is put as it is to be held, and the loops close on it.
+
+    Finds what is held where no short way leads to it.
+    """
+    task = task_of(closure.mechanism)
+    begin = displacements(closure.mechanism, start)[end_body(closure.mechanism)] @ closure.mechanism.home_pose
+    held = np.zeros((4, 4), bool)
+    held[:3, 3], held[:3, :3] = np.array(way.weights[:3]) == LOCKED, LOCKED in way.weights[3:]
+    placed = np.where(held, task.completed(targets, begin), begin)
+    closed = nearest(
+        closure, start, placed, platform=way.weights, framed=task.is_framed, targets=task.completed(targets, begin)
+    )
+    return approached(closure, closed.coordinates, targets, platform=way.weights, framed=task.is_framed)
+
+
+@lru_cache(maxsize=64)
+def corners_of(mechanism: Mechanism) -> tuple[Floats, ...]:
+    """Feasible configurations far from home and from each other, as joint coordinates (columns,).
+
+    Some are as far as the workspace goes from home in four directions; some are chanced upon, in parts of it to which
+    no way may lead from home.
+    """
+    closure = closure_of(mechanism)
+    directions = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]) / np.sqrt(3.0)
+    offsets = FAR_CORNER * mechanism.characteristic_length * directions
+    poses = [
+        pose(mechanism.home_pose[:3, 3] + offset, rotvec=TURNED_CORNER * direction)
+        for offset, direction in zip(offsets, directions, strict=True)
+    ]
+    turning = 0.0 if mechanism.end_effector_is_joint else 1.0
+    home = np.zeros((len(directions), len(closure.scale)))
+    ends = approached(closure, home, np.array(poses), platform=(1.0, 1.0, 1.0, turning, turning, turning))
+    chanced = _chanced_upon(closure)
+    coordinates = np.concatenate([home[:1], *(found.coordinates[is_feasible(found)] for found in (ends, chanced))])
+    places = np.concatenate([mechanism.home_pose[None], *(each.poses[is_feasible(each)] for each in (ends, chanced))])
+    chosen = [0]
+    while len(chosen) <= min(CORNERS, len(places) - 1):
+        apart = [differences(closure, places, np.repeat(places[i : i + 1], len(places), axis=0)) for i in chosen]
+        chosen.append(int(np.min(apart, axis=0).argmax()))
+    return tuple(coordinates[chosen[1:]])
+
+
+def _chanced_upon(closure: Closure) -> Closing:
+    """Configurations closed within all limits from random ones, in the assembly of home as far as a task tells it."""
+    coordinates, poses = random_starts(closure, CHANCES, np.random.default_rng(0))
+    platform = [0.0] * 6
+    if follows_task(closure.mechanism) and not has_parasitic_motion(closure.mechanism):
+        task = task_of(closure.mechanism)
+        home = np.repeat(closure.mechanism.home_pose[None], CHANCES, axis=0)
+        poses = task.completed(poses, home)
+        platform = [LOCKED if weight == 0.0 else 0.0 for weight in task.held]
+    return close(closure, coordinates, poses, platform=platform, limits=True, margin=MARGIN)

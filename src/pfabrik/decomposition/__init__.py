@@ -1,0 +1,1 @@
+"""TDS, the topological decomposition: a mechanism falls apart into sub-chains, and these become arrays."""

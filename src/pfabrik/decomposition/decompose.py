@@ -1,0 +1,240 @@
+"""TDS, the topological decomposition: the mechanism's graph falls apart into serial or branched sub-chains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, TypeAlias
+
+from ..description.graph import TIP, Edge, Stage, components, graph_of, is_tree, leads, stages
+from ..description.joint_types import KINDS
+from ..description.mechanism import Joint, Mechanism, checked_mechanism
+from .forms import BranchForm, NotExpressible, TrunkForm
+from .parallelograms import Parallelogram, parallelogram_of
+from .positions import express_branch, express_trunk
+
+Engine: TypeAlias = Literal["reaching", "closure"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A joint on the way from the base to the end effector; `forward` if its second body is the outward one."""
+
+    joint: Joint
+    forward: bool = True
+    ends: bool = False  # this joint, cut, is the end effector
+
+    @property
+    def sign(self) -> float:
+        """+1 if the joint's coordinate moves the outward body relative to the inward one, else -1."""
+        return 1.0 if self.forward else -1.0
+
+    @property
+    def inward(self) -> str:
+        """The body nearer to the base."""
+        return self.joint.connects[0 if self.forward else 1]
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """Itself, as the only joint of this part."""
+        return (self,)
+
+    def __str__(self) -> str:
+        return KINDS[self.joint.type].letter + ("*" if self.joint.actuated else "")
+
+
+@dataclass(frozen=True)
+class Split:
+    """Several ways from one body to another: branches, if that is the end effector, or a loop within the sub-chain.
+
+    Attributes
+    ----------
+    ways : the parts of each way in order, from the base outward.
+    parallelogram : what the ways form, if they are two equal and parallel rods.
+    """
+
+    ways: tuple[tuple[Part, ...], ...]
+    parallelogram: Parallelogram | None
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """All its joints, way by way."""
+        return tuple(step for way in self.ways for part in way for step in part.steps)
+
+    def __str__(self) -> str:
+        if self.parallelogram and self.parallelogram.pinned:
+            return "Pa" + "*" * any(step.joint.actuated for step in self.steps)
+        return f"[{', '.join(map(_written, self.ways))}]"
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Joints between two bodies that are neither in series nor side by side, such as a bridge."""
+
+    steps: tuple[Step, ...]
+
+    def __str__(self) -> str:
+        return f"{{{', '.join(map(str, self.steps))}}}"
+
+
+Part: TypeAlias = Step | Split | Mesh
+
+
+@dataclass(frozen=True)
+class SubChain:
+    """One sub-chain: its parts in series, from the base to the end effector.
+
+    Attributes
+    ----------
+    parts : joints, and splits where the chain branches or holds a loop.
+    reason : why positions alone cannot express it, or None.
+    """
+
+    parts: tuple[Part, ...]
+    reason: str | None
+    trunk_form: TrunkForm | None = None
+    branch_forms: tuple[BranchForm, ...] = ()
+
+    @property
+    def engine(self) -> Engine:
+        """The engine that could serve this chain; `engine_of` tells which one answers for the whole mechanism."""
+        return "reaching" if self.reason is None else "closure"
+
+    @property
+    def trunk(self) -> tuple[Step, ...]:
+        """The joints before the body at which a tree branches; empty for other chains."""
+        return _trunk_and_branches(self.parts)[0]
+
+    @property
+    def branches(self) -> tuple[tuple[Step, ...], ...]:
+        """The joints of each branch of a tree that branches once; one branch with all joints for other chains."""
+        return _trunk_and_branches(self.parts)[1]
+
+    @property
+    def parallelograms(self) -> tuple[Parallelogram, ...]:
+        """Those in it, branches that end on the end effector included."""
+        return tuple(_parallelograms(self.parts))
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """All joints of the sub-chain, from the base outward, branch by branch."""
+        return tuple(step for part in self.parts for step in part.steps)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of all its joints; a joint cut at the end effector belongs to every chain that ends there."""
+        return tuple(step.joint.name for step in self.steps)
+
+    def __str__(self) -> str:
+        return _written(self.parts)
+
+
+def _written(parts: Sequence[Part]) -> str:
+    return "-".join(map(str, parts))
+
+
+def _trunk_and_branches(parts: tuple[Part, ...]) -> tuple[tuple[Step, ...], tuple[tuple[Step, ...], ...]]:
+    *trunk, last = parts
+    if isinstance(last, Split) and _are_steps(trunk) and all(map(_are_steps, last.ways)):
+        return _steps(trunk), tuple(map(_steps, last.ways))
+    return (), (_steps(parts),)
+
+
+def _are_steps(parts: Sequence[Part]) -> bool:
+    return all(isinstance(part, Step) for part in parts)
+
+
+def _steps(parts: Sequence[Part]) -> tuple[Step, ...]:
+    return tuple(step for part in parts for step in part.steps)
+
+
+def _parallelograms(parts: Sequence[Part]) -> Iterator[Parallelogram]:
+    for part in parts:
+        if isinstance(part, Split):
+            if part.parallelogram:
+                yield part.parallelogram
+            for way in part.ways:
+                yield from _parallelograms(way)
+
+
+def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
+    """Split a mechanism into its sub-chains, in the order of their first joints.
+
+    The graph is cut at the base and at the end effector (a joint end effector is cut in two, and stands for a point).
+    Every connected rest that leads from one to the other is a sub-chain. It is decomposed again, the same way, between
+    the bodies that all its ways pass: where several ways leave a body, they are branches if they end at the end
+    effector, else a loop of its own. Each sub-chain says which engine could serve it, and why.
+
+    Source: the paper's TDS. Which chains positions can express: `pfabrik.positions`.
+    """
+    graph = graph_of(checked_mechanism(mechanism))
+    groups = components(graph.edges, graph.base, graph.end)
+    on_base = (group for group in groups if any(graph.base in edge.bodies for edge in group))
+    return tuple(_sub_chain(mechanism, group, graph.base, graph.end) for group in on_base)
+
+
+def _sub_chain(mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str) -> SubChain:
+    """The sub-chain made of edges that hang together, one of them at least on the base."""
+    if not leads(edges, base, end):
+        return SubChain(tuple(Step(edge.joint) for edge in edges), "does not lead to the end effector")
+    parts = _parts(mechanism, edges, base, end)
+    if not is_tree(edges, base, end):
+        return SubChain(parts, "has a loop of its own")
+    return _express(mechanism, SubChain(parts, None))
+
+
+def _parts(mechanism: Mechanism, edges: Sequence[Edge], start: str, goal: str) -> tuple[Part, ...]:
+    """What lies between two bodies, in series."""
+    return tuple(_part(mechanism, stage) for stage in stages(edges, start, goal))
+
+
+def _part(mechanism: Mechanism, stage: Stage) -> Part:
+    """A joint alone; ways side by side, each decomposed again; or a mesh, if they cannot be told apart."""
+    steps = tuple(Step(edge.joint, edge.bodies[0] == stage.inward, TIP in edge.bodies) for edge in stage.edges)
+    if len(steps) == 1:
+        return steps[0]
+    ways = components(stage.edges, stage.inward, stage.outward)
+    if len(ways) == 1:
+        return Mesh(steps)
+    parts = tuple(_parts(mechanism, way, stage.inward, stage.outward) for way in ways)
+    joints = [[step.joint for step in _steps(way)] for way in parts]
+    return Split(parts, parallelogram_of(joints, mechanism.characteristic_length))
+
+
+def _express(mechanism: Mechanism, chain: SubChain) -> SubChain:
+    """A tree in positions, or with the reason why not."""
+    splits = [part for part in chain.parts if isinstance(part, Split)]
+    try:
+        if splits and not chain.trunk:
+            raise NotExpressible("branches more than once")
+        trunk_form = express_trunk(mechanism, chain.trunk) if chain.trunk else None
+        forms = tuple(express_branch(mechanism, branch, on_base=not chain.trunk) for branch in chain.branches)
+    except NotExpressible as reason:
+        return SubChain(chain.parts, str(reason))
+    return SubChain(chain.parts, None, trunk_form, forms)
+
+
+def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
+    """Why positions alone cannot express a mechanism: sub-chains with their reasons, or motors in none of them."""
+    chains = decompose(mechanism)
+    reasons = tuple(f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None)
+    forms = (form for chain in chains for form in (chain.trunk_form, *chain.branch_forms) if form is not None)
+    known = {coordinate.joint for form in forms for coordinate in form.coordinates}
+    missing = (f"actuated joint {name} is in no sub-chain" for name in mechanism.actuators if name not in known)
+    return reasons or tuple(missing)
+
+
+@lru_cache(maxsize=64)
+def closure_reason(mechanism: Mechanism) -> str | None:
+    """Why the closure engine answers targets of a mechanism, for its task's sake or a chain's; else None."""
+    if mechanism.task != mechanism.whole_task:
+        return "the task leaves some of the pose free"
+    if any(chain.reason is not None for chain in decompose(mechanism)):
+        return "some sub-chain needs more than positions"
+    return next(iter(beyond_positions(mechanism)), None)
+
+
+def engine_of(mechanism: Mechanism) -> Engine:
+    """The engine that answers targets of a mechanism: one for all its sub-chains."""
+    return "reaching" if closure_reason(mechanism) is None else "closure"

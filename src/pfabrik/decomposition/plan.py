@@ -1,0 +1,266 @@
+"""Sub-chains to arrays: what the kernels are given, and the names of what they read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.mechanism import Mechanism
+from ..errors import UnsupportedMechanism
+from ..kernels.reaching import plan as P
+from .decompose import SubChain, beyond_positions, decompose, engine_of
+from .forms import BranchForm, Coordinate, TrunkForm
+
+_BRANCH_KINDS = {"passes": P.PASSES, "strut": P.STRUT, "dyad": P.DYAD, "rail_rod": P.RAIL_ROD}
+_CONE_KINDS = {"carrier": P.CARRIER_CONE, "link": P.LINK_CONE, "platform": P.PLATFORM_CONE}
+_COORDINATE_KINDS = {"stroke": P.STROKE, "rail": P.RAIL, "hinge": P.HINGE, "end_hinge": P.END_HINGE, "trunk": P.TRUNK}
+
+
+@dataclass(frozen=True)
+class JointPoint:
+    """Where a joint's centre is read: a node, moved by `shift` along the axis of its hinge."""
+
+    joint: str
+    node: int
+    shift: float
+    axis: NDArray[np.float64]
+    carrier: int  # what the axis turns with: a carrier, or -1 for the platform
+
+
+@dataclass(frozen=True)
+class Flat:
+    """A mechanism as arrays, and the names that go with them.
+
+    Attributes
+    ----------
+    plan : the arrays.
+    coordinates : joint name of each coordinate of the plan; the actuated ones come first, in order.
+    cones : joint name of each cone.
+    points : how the centres of joints follow from nodes.
+    """
+
+    plan: P.Plan
+    coordinates: tuple[str, ...]
+    cones: tuple[str, ...]
+    points: tuple[JointPoint, ...]
+    trunk_points: tuple[tuple[str, int], ...]
+    home_seed: P.Seeds
+    n_actuators: int
+
+
+@lru_cache(maxsize=64)
+def flatten(mechanism: Mechanism) -> Flat:
+    """Compile a mechanism; `UnsupportedMechanism` names every sub-chain that positions cannot express."""
+    reasons = beyond_positions(mechanism)
+    if reasons:
+        raise UnsupportedMechanism(mechanism.name, reasons)
+    builder = _Builder(mechanism)
+    for chain in decompose(mechanism):
+        builder.add_chain(chain)
+    return builder.build()
+
+
+@lru_cache(maxsize=64)
+def flat_of(mechanism: Mechanism) -> Flat | None:
+    """The mechanism, compiled; None if it is one for the closure engine: for a chain's sake, or the task's."""
+    return flatten(mechanism) if engine_of(mechanism) == "reaching" else None
+
+
+ROOM = 1e-6
+"""Range that leaves room to move [L or rad]: what is rigid is no strut."""
+
+
+class _Builder:
+    """Collects records, numbering nodes, branches and trunk joints as it goes."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.nodes: list[dict[str, Any]] = []
+        self.n_stored = 0
+        self.branches: list[dict[str, Any]] = []
+        self.chains: list[dict[str, Any]] = []
+        self.cones: list[dict[str, Any]] = []
+        self.cone_names: list[str] = []
+        self.trunks: list[dict[str, Any]] = []
+        self.trunk_joints: list[dict[str, Any]] = []
+        self.coordinates: list[tuple[Coordinate, dict[str, Any]]] = []
+        self.points: list[JointPoint] = []
+        self.trunk_points: list[tuple[str, int]] = []
+
+    def add_chain(self, chain: SubChain) -> None:
+        trunk = -1
+        first = len(self.branches)
+        if chain.trunk_form is not None:
+            trunk = len(self.trunks)
+            self._add_trunk(chain.trunk_form, first)
+        for form in chain.branch_forms:
+            self._add_branch(form, carrier=trunk + 1 if trunk >= 0 else 0)
+        self.chains.append({"first": first, "last": len(self.branches), "trunk": trunk})
+
+    def _add_trunk(self, form: TrunkForm, branch: int) -> None:
+        first = len(self.trunk_joints)
+        for coordinate, point, axis, slides, limits in zip(
+            form.coordinates, form.points, form.axes, form.slides, form.ranges, strict=True
+        ):
+            if self.mechanism.joint(coordinate.joint).at is not None:
+                self.trunk_points.append((coordinate.joint, len(self.trunk_joints)))
+            kind = P.SLIDE if slides else P.TURN
+            self.trunk_joints.append({"kind": kind, "point": point, "axis": axis, "lo": limits[0], "hi": limits[1]})
+            self._add_coordinate(coordinate, first + coordinate.index, branch)
+        self.trunks.append({"first": first, "last": len(self.trunk_joints)})
+
+    def _add_coordinate(self, coordinate: Coordinate, index: int, branch: int) -> None:
+        slides = self.mechanism.joint(coordinate.joint).type == "prismatic"
+        record = {
+            "kind": _COORDINATE_KINDS[coordinate.kind],
+            "index": index,
+            "branch": branch,
+            "sign": coordinate.sign,
+            "offset": coordinate.offset,
+            "lo": coordinate.limits[0],
+            "hi": coordinate.limits[1],
+            "scale": 1.0 / self.mechanism.characteristic_length if slides else 1.0,
+        }
+        self.coordinates.append((coordinate, record))
+
+    def _add_branch(self, form: BranchForm, carrier: int) -> None:
+        first, number = len(self.nodes), len(self.branches)
+        for k, node in enumerate(form.nodes):
+            self.nodes.append(
+                {
+                    "home": node.at,
+                    "stored": self._store(form, k),
+                    "lo": node.stroke[0],
+                    "hi": node.stroke[1],
+                    "hinge": int(node.hinge),
+                    "ranged": int(np.isfinite(node.turn).any()),
+                    "angle_home": node.angle_home,
+                    "angle_lo": node.turn[0],
+                    "angle_hi": node.turn[1],
+                }
+            )
+        for coordinate in form.coordinates:
+            self._add_coordinate(coordinate, first + coordinate.index, number)
+        cone_first = len(self.cones)
+        for cone in form.cones:
+            self.cone_names.append(cone.joint)
+            self.cones.append(
+                {
+                    "kind": _CONE_KINDS[cone.kind],
+                    "node": first + cone.node,
+                    "axis": cone.axis,
+                    "half_angle": cone.half_angle,
+                    "cosine": np.cos(cone.half_angle),
+                }
+            )
+        self._add_points(form, first, carrier)
+        self.branches.append(
+            self._branch_record(form, first, carrier) | {"cone_first": cone_first, "cone_last": len(self.cones)}
+        )
+
+    def _store(self, form: BranchForm, k: int) -> int:
+        """The place of node k of a branch among the stored ones, or -1 if pose and trunks tell where it is."""
+        if k == len(form.nodes) - 1 or (k == 0 and form.rail is None):
+            return -1
+        self.n_stored += 1
+        return self.n_stored - 1
+
+    def _branch_record(self, form: BranchForm, first: int, carrier: int) -> dict[str, Any]:
+        nodes, none = form.nodes, np.zeros(3)
+        several = len(nodes) > 1
+        reference = _unit(nodes[1].at - nodes[0].at) if several and form.planar else none
+        return {
+            "first": first,
+            "last": first + len(nodes) - 1,
+            "carrier": carrier,
+            "kind": _BRANCH_KINDS[form.kind],
+            "planar": form.planar,
+            "normal": form.normal,
+            "reference": reference,
+            "end": nodes[-1].at - np.array(self.mechanism.reference_point),
+            "end_plane": int(form.end_normal is not None and not form.align),
+            "end_normal": none if form.end_normal is None else form.end_normal,
+            "end_reference": _unit(nodes[-2].at - nodes[-1].at) if several else none,
+            "end_ranged": int(np.isfinite(form.end_turn).any()),
+            "end_angle_lo": form.end_turn[0],
+            "end_angle_hi": form.end_turn[1],
+            "align": int(form.align),
+            "rail": int(form.rail is not None),
+            "rail_axis": none if form.rail is None else form.rail,
+            "rail_lo": form.rail_range[0],
+            "rail_hi": form.rail_range[1],
+        }
+
+    def _add_points(self, form: BranchForm, first: int, carrier: int) -> None:
+        for k, node in enumerate(form.nodes):
+            at_end = k == len(form.nodes) - 1 and form.end_normal is not None
+            axis = form.end_normal if at_end and form.end_normal is not None else form.normal
+            turning = -1 if at_end else carrier
+            self.points += [JointPoint(name, first + k, node.shift, axis, turning) for name in node.joints]
+
+    def build(self) -> Flat:
+        order = {name: number for number, name in enumerate(self.mechanism.actuators)}
+        coordinates = sorted(self.coordinates, key=lambda pair: order.get(pair[0].joint, len(order)))
+        plan = P.Plan(
+            nodes=_records(self.nodes, P.NODE),
+            branches=_records(self.branches, P.BRANCH),
+            chains=_records(self.chains, P.CHAIN),
+            cones=_records(self.cones, P.CONE),
+            trunks=_records(self.trunks, P.TRUNK_SPAN),
+            trunk_joints=_records(self.trunk_joints, P.TRUNK_JOINT),
+            coordinates=_records([record for _, record in coordinates], P.COORDINATE),
+            scalars=self._scalars(),
+        )
+        names = tuple(coordinate.joint for coordinate, _ in coordinates)
+        home = P.Seeds(
+            self.mechanism.home_pose[None].copy(),
+            plan.nodes["home"][plan.nodes["stored"] >= 0][None],
+            np.zeros((1, len(self.trunk_joints))),
+        )
+        return Flat(
+            plan,
+            names,
+            tuple(self.cone_names),
+            tuple(self.points),
+            tuple(self.trunk_points),
+            home,
+            len(self.mechanism.actuators),
+        )
+
+    def _scalars(self) -> NDArray[np.float64]:
+        length = self.mechanism.characteristic_length
+        ends = np.array([branch["end"] for branch in self.branches])
+        span = float(np.sqrt(((ends - ends.mean(axis=0)) ** 2).sum(axis=1).mean()))
+        is_point = float(self.mechanism.end_effector_is_joint)
+        on_struts = float(self._is_on_struts())
+        span = span if span > 0.0 else length
+        return np.array([length, span, is_point, *self.mechanism.reference_point, on_struts])
+
+    def _is_on_struts(self) -> bool:
+        """Whether every branch is a strut, and every range leaves room to move."""
+        least = ROOM * self.mechanism.characteristic_length
+        struts = all(
+            branch["kind"] == P.STRUT
+            and branch["last"] > branch["first"]
+            and not any(branch[name] for name in ("planar", "end_plane", "align", "rail"))
+            and self.nodes[branch["last"]]["hi"] - self.nodes[branch["last"]]["lo"] > least
+            for branch in self.branches
+        )
+        room = all(j["hi"] - j["lo"] > (ROOM if j["kind"] == P.TURN else least) for j in self.trunk_joints)
+        return struts and room and all(cone["kind"] != P.LINK_CONE for cone in self.cones)
+
+
+def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _records(rows: list[dict[str, Any]], dtype: np.dtype[np.void]) -> P.Records:
+    array = np.zeros(len(rows), dtype)
+    for i, row in enumerate(rows):
+        for name, value in row.items():
+            array[i][name] = value
+    return array

@@ -1,0 +1,414 @@
+"""What a chain of joints means for the positions of its joint centres: nodes, segments, and restrictions on them.
+
+A sub-chain is expressible when every arrangement of nodes that keeps the restrictions can be assembled: leading
+parallel revolutes keep the first nodes in a plane, universal joints let the next link point anywhere, a spherical joint
+frees the twist, a last revolute keeps the last link in a plane of the platform, a first prismatic joint is a rail.
+Anything else carries orientation through the chain, and is said not to be expressible, with the reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from ..description.home_mobility import universal_axes
+from ..description.mechanism import Joint, Mechanism
+from ..tolerances import TOLERANCES
+from .forms import FREE, Array, BranchForm, ConeForm, Coordinate, Interval, NodeForm, NotExpressible, TrunkForm
+
+if TYPE_CHECKING:
+    from .decompose import Step
+
+
+_SPOT_KINDS: dict[str, Literal["R", "U", "S"]] = {"revolute": "R", "universal": "U", "spherical": "S"}
+
+
+@dataclass
+class _Spot:
+    """A joint centre on the way: what turns there, and the prismatic joint (if any) between it and the spot before."""
+
+    kind: Literal["R", "U", "S", "point"]
+    steps: list[Step]
+    at: Array
+    axis: Array | None = None
+    slider: Step | None = None
+
+
+@dataclass
+class _Draft:
+    """A branch being expressed."""
+
+    spots: list[_Spot]
+    rail: Step | None = None
+    planar: int = 0
+    normal: Array = field(default_factory=lambda: np.zeros(3))
+    ends_in_plane: bool = False
+    align: bool = False
+    coordinates: list[Coordinate] = field(default_factory=list)
+
+
+def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> TrunkForm:
+    """The trunk of a branched chain: revolute and prismatic joints in any order."""
+    points, axes, slides, ranges, coordinates = [], [], [], [], []
+    for index, step in enumerate(steps):
+        joint = step.joint
+        if joint.type not in ("revolute", "prismatic"):
+            raise NotExpressible(f"joint {joint.name}, below a branching body, is {joint.type}")
+        axes.append(np.array(mechanism.home_axis(joint.name)) * step.sign)
+        points.append(np.array(joint.at if joint.at is not None else (0.0, 0.0, 0.0)))
+        slides.append(joint.type == "prismatic")
+        home = _home(mechanism, joint)
+        limits = _limits(joint, home)
+        ranges.append((limits[0] - home, limits[1] - home))
+        coordinates.append(Coordinate(joint.name, "trunk", index, 1.0, home, limits, joint.actuated))
+    return TrunkForm(tuple(points), tuple(axes), tuple(slides), tuple(ranges), tuple(coordinates))
+
+
+def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -> BranchForm:
+    """One branch, from the base (or from the body it hangs on) to the end effector."""
+    near = TOLERANCES.alignment * mechanism.characteristic_length
+    draft = _Draft(_merge(mechanism, _spots(steps, mechanism.end_effector_is_joint), near))
+    _check_pointing(draft.spots)
+    if steps[0].joint.type == "prismatic" and len(draft.spots) > 0:
+        if not on_base:
+            raise NotExpressible(f"joint {steps[0].joint.name} slides on a moving body")
+        draft.rail, draft.spots[0].slider = draft.spots[0].slider, None
+    _classify(draft)
+    nodes = _place_nodes(mechanism, draft)
+    end_turn = _end_turn(mechanism, draft)
+    cones = tuple(
+        _cone(draft, nodes, k, step, near)
+        for k, spot in enumerate(draft.spots)
+        for step in spot.steps
+        if step.joint.cone
+    )
+    rail, rail_range = _rail(mechanism, draft)
+    return BranchForm(
+        nodes=tuple(nodes),
+        planar=draft.planar,
+        normal=draft.normal,
+        end_normal=draft.normal if draft.align else (draft.spots[-1].axis if draft.ends_in_plane else None),
+        align=draft.align,
+        end_turn=end_turn,
+        rail=rail,
+        rail_range=rail_range,
+        cones=cones,
+        coordinates=tuple(draft.coordinates),
+        kind=_kind(draft, nodes, rail),
+    )
+
+
+def _home(mechanism: Mechanism, joint: Joint) -> float:
+    home = mechanism.home_coordinate(joint.name)
+    if not isinstance(home, float):
+        raise NotExpressible(f"joint {joint.name} has more than one coordinate")
+    return home
+
+
+def _limits(joint: Joint, home: float) -> Interval:
+    """The range of a joint, which contains home: a description may be off by the rounding of its numbers."""
+    if joint.range is None:
+        return FREE
+    lo, hi = joint.range
+    if isinstance(lo, tuple) or isinstance(hi, tuple):
+        raise NotExpressible(f"joint {joint.name} has ranges about two axes")
+    return min(lo, home), max(hi, home)
+
+
+def _spots(steps: Sequence[Step], ends_in_point: bool) -> list[_Spot]:
+    """The joint centres along a branch, each with the prismatic joint before it."""
+    spots: list[_Spot] = []
+    slider: Step | None = None
+    for position, step in enumerate(steps):
+        joint = step.joint
+        if ends_in_point and position == len(steps) - 1:
+            if joint.range is not None or joint.cone is not None:
+                raise NotExpressible(f"joint {joint.name}, the end effector, has a limit that ties its chains together")
+            spots.append(_Spot("point", [], np.array(joint.at), None, slider))
+            slider = None
+        elif joint.type == "prismatic":
+            if slider is not None:
+                raise NotExpressible(f"two prismatic joints in a row, {slider.joint.name} and {joint.name}")
+            slider = step
+        elif joint.type == "cylindrical":
+            raise NotExpressible(f"joint {joint.name} is cylindrical")
+        else:
+            if joint.type == "universal" and joint.range is not None:
+                raise NotExpressible(f"joint {joint.name} has ranges about two axes")
+            if joint.axes is not None and not _are_square(*map(np.array, joint.axes)):
+                raise NotExpressible(f"joint {joint.name} turns about axes that are not square to each other")
+            kind = _SPOT_KINDS[joint.type]
+            axis = np.array(joint.axis) if joint.type == "revolute" else None
+            spots.append(_Spot(kind, [step], np.array(joint.at), axis, slider))
+            slider = None
+    if slider is not None:
+        raise NotExpressible(f"prismatic joint {slider.joint.name} carries the end effector")
+    return spots
+
+
+def _merge(mechanism: Mechanism, spots: list[_Spot], near: float) -> list[_Spot]:
+    """Joints whose centres are no farther apart than `near` act as one: R+R = U, R+R+R = U+R = R+U = S.
+
+    They do only if each axis is square to the next: about others they do not turn everywhere.
+    """
+    merged: list[_Spot] = []
+    for spot in spots:
+        last = merged[-1] if merged else None
+        centre = _common_centre(last, spot, near) if last is not None and spot.slider is None else None
+        if last is None or centre is None:
+            merged.append(spot)
+            continue
+        for step in last.steps + spot.steps:
+            if step.joint.actuated or step.joint.range is not None or step.joint.cone is not None:
+                raise NotExpressible(
+                    f"joint {step.joint.name} shares its centre with a neighbour and has a motor or a limit of its own"
+                )
+        for (one, axis), (other, next_axis) in pairwise(_turns(mechanism, last.steps + spot.steps)):
+            if not _are_square(axis, next_axis):
+                raise NotExpressible(f"joints {one} and {other} turn about axes that are not square to each other")
+        kind: Literal["U", "S"] = "U" if last.kind == spot.kind == "R" else "S"
+        merged[-1] = _Spot(kind, last.steps + spot.steps, centre, None, last.slider)
+    return merged
+
+
+def _common_centre(a: _Spot, b: _Spot, near: float) -> Array | None:
+    """Where two neighbouring joints act as one, or None."""
+    if "point" in (a.kind, b.kind) or (a.kind == "S" and b.kind == "S"):
+        return None
+    if a.kind == b.kind == "R":
+        assert a.axis is not None
+        assert b.axis is not None
+        across = np.cross(a.axis, b.axis)
+        sine = float(np.linalg.norm(across))
+        apart = b.at - a.at
+        if sine < TOLERANCES.alignment or abs(float(apart @ across)) / sine > near:
+            return None
+        along_a = float(np.cross(apart, b.axis) @ across) / sine**2
+        return np.asarray(a.at + along_a * a.axis)
+    if {a.kind, b.kind} == {"R", "U"} and float(np.linalg.norm(a.at - b.at)) <= near:
+        return a.at
+    return None
+
+
+def _check_pointing(spots: Sequence[_Spot]) -> None:
+    """See that universal joints with axes of their own let their links point wherever their cones do.
+
+    A link that is not square to the axis it carries, off by an angle, cannot come nearer than that angle to the other
+    axis. Axes that are not given are square to the link.
+    """
+    for k, spot in enumerate(spots):
+        joint = spot.steps[0].joint if spot.steps else None
+        if joint is None or spot.kind != "U" or joint.axes is None or len(spots) < 2:
+            continue
+        is_last = k == len(spots) - 1
+        line = spots[k - 1 if is_last else k + 1].at - spot.at
+        carried, other = (1, 0) if spot.steps[0].forward != is_last else (0, 1)
+        off = abs(float(np.array(joint.axes[carried]) @ line)) / float(np.linalg.norm(line))
+        if off > TOLERANCES.alignment and _nearest_to(joint, other) < math.asin(min(off, 1.0)):
+            raise NotExpressible(f"joint {joint.name} does not point anywhere: its link is not square to its axis")
+
+
+def _nearest_to(joint: Joint, axis: int) -> float:
+    """How near the cone of a universal joint lets its line come to one of its axes [rad]; 0 where nothing does."""
+    cone = joint.cone
+    if cone is None or joint.axes is None or cone.fixed_to != joint.connects[axis]:
+        return 0.0
+    cosine = min(abs(float(np.array(cone.axis) @ np.array(joint.axes[axis]))), 1.0)
+    return math.acos(cosine) - cone.half_angle
+
+
+def _turns(mechanism: Mechanism, steps: Sequence[Step]) -> list[tuple[str, Array]]:
+    """The axes of revolute and universal joints in a row, outward, with the names of their joints."""
+    turns: list[tuple[str, Array]] = []
+    for step in steps:
+        joint = step.joint
+        axes = [np.array(joint.axis)] if joint.type == "revolute" else list(universal_axes(mechanism, joint))
+        turns += [(joint.name, axis) for axis in (axes if step.forward else reversed(axes))]
+    return turns
+
+
+def _are_square(axis: Array, other: Array) -> bool:
+    return abs(float(axis @ other)) <= TOLERANCES.alignment
+
+
+def _classify(draft: _Draft) -> None:
+    """Count the leading hinges, and see that nothing else carries orientation through the chain."""
+    spots = draft.spots
+    if len(spots) == 1 and spots[0].kind in ("R", "U"):
+        raise NotExpressible(f"joint {spots[0].steps[0].joint.name} ties the end effector to the base by orientation")
+    if spots[0].axis is not None:
+        draft.normal = spots[0].axis
+        while draft.planar < len(spots) and _is_parallel(spots[draft.planar].axis, draft.normal):
+            draft.planar += 1
+    rest = spots[draft.planar :]
+    if spots[-1].kind == "point":
+        draft.planar = min(draft.planar, len(spots) - 1)
+        rest = spots[draft.planar : -1]
+    elif not rest:
+        draft.align = True
+    elif all(spot.kind != "S" for spot in spots):
+        names = "-".join(spot.kind for spot in spots)
+        raise NotExpressible(f"carries orientation to the end effector ({names}): no spherical joint frees the twist")
+    elif rest[-1].kind == "R" and len(rest) > 1:
+        draft.ends_in_plane = True
+        rest = rest[:-1]
+    for spot in rest:
+        if spot.kind == "R":
+            raise NotExpressible(
+                f"revolute joint {spot.steps[0].joint.name} turns about an axis that a moving link carries"
+            )
+
+
+def _is_parallel(axis: Array | None, normal: Array) -> bool:
+    return axis is not None and float(np.linalg.norm(np.cross(axis, normal))) <= TOLERANCES.alignment
+
+
+def _place_nodes(mechanism: Mechanism, draft: _Draft) -> list[NodeForm]:
+    """The nodes: centres of hinges moved along their axes into one plane, segments with their strokes."""
+    spots, planar = draft.spots, draft.planar
+    names = [tuple(step.joint.name for step in spot.steps) or (mechanism.end_effector,) for spot in spots]
+    nodes = [NodeForm(joints, spot.at) for joints, spot in zip(names, spots, strict=True)]
+    in_plane = spots[min(planar, len(spots) - 1)].at if not draft.align else spots[0].at
+    for k in range(planar):
+        shift = float(draft.normal @ (spots[k].at - in_plane))
+        nodes[k] = replace(nodes[k], at=spots[k].at - shift * draft.normal, shift=shift, hinge=k + 1 < len(spots))
+    if draft.ends_in_plane:
+        axis = spots[-1].axis
+        assert axis is not None
+        shift = float(axis @ (spots[-1].at - nodes[-2].at))
+        nodes[-1] = replace(nodes[-1], at=spots[-1].at - shift * axis, shift=shift)
+    for k in range(1, len(nodes)):
+        nodes[k] = replace(nodes[k], stroke=_stroke(mechanism, draft, nodes, k))
+    for k in range(planar):
+        if nodes[k].hinge:
+            nodes[k] = _range_hinge(mechanism, draft, nodes, k)
+    return nodes
+
+
+def _stroke(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: int) -> Interval:
+    """Lengths allowed between nodes k - 1 and k."""
+    step = nodes[k].at - nodes[k - 1].at
+    length = float(np.linalg.norm(step))
+    slider = draft.spots[k].slider
+    if length <= TOLERANCES.alignment * mechanism.characteristic_length:
+        raise NotExpressible(f"joints {nodes[k - 1].joint} and {nodes[k].joint} coincide")
+    if slider is None:
+        return length, length
+    joint = slider.joint
+    cosine = float(np.array(mechanism.home_axis(joint.name)) @ step) / length * slider.sign
+    if abs(cosine) < math.cos(2.0 * TOLERANCES.alignment):
+        raise NotExpressible(
+            f"prismatic joint {joint.name} does not point from {nodes[k - 1].joint} to {nodes[k].joint}"
+        )
+    sign = math.copysign(1.0, cosine)
+    home = _home(mechanism, joint)
+    limits = _limits(joint, home)
+    if joint.along is not None:
+        own = {each.joint.name for spot in draft.spots[k - 1 : k + 1] for each in spot.steps} | {nodes[k].joint}
+        if not set(joint.along) <= own:
+            raise NotExpressible(f"prismatic joint {joint.name} is measured along joints that are not its neighbours")
+        sign = 1.0
+    offset = home - sign * length
+    draft.coordinates.append(Coordinate(joint.name, "stroke", k, sign, offset, limits, joint.actuated))
+    lo, hi = sorted(((limits[0] - offset) * sign, (limits[1] - offset) * sign))
+    return max(lo, 0.0), hi
+
+
+def _range_hinge(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: int) -> NodeForm:
+    """Node k with the range of its hinge, as deviation from home about the branch's normal."""
+    step = draft.spots[k].steps[0]
+    sense = _sense(step, draft.normal)
+    home = _home(mechanism, step.joint)
+    limits = _limits(step.joint, home)
+    draft.coordinates.append(Coordinate(step.joint.name, "hinge", k, sense, home, limits, step.joint.actuated))
+    lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
+    before = nodes[k].at - nodes[k - 1].at if k > 0 else None
+    angle_home = _angle_about(draft.normal, before, nodes[k + 1].at - nodes[k].at) if before is not None else 0.0
+    return replace(nodes[k], turn=(lo, hi), angle_home=angle_home)
+
+
+def _sense(step: Step, normal: Array) -> float:
+    """+1 if the joint's coordinate grows when the outward body turns right-handed about `normal`."""
+    return math.copysign(1.0, float(np.array(step.joint.axis) @ normal) * step.sign)
+
+
+def _angle_about(normal: Array, a: Array, b: Array) -> float:
+    return math.atan2(float(normal @ np.cross(a, b)), float(a @ b))
+
+
+def _end_turn(mechanism: Mechanism, draft: _Draft) -> Interval:
+    """Range of the revolute on the platform, read as the turn of the last link seen from there."""
+    if not (draft.align or draft.ends_in_plane) or len(draft.spots) < 2:
+        return FREE
+    spot = draft.spots[-1]
+    normal = draft.normal if draft.align else spot.axis
+    assert normal is not None
+    sense = -_sense(spot.steps[0], normal)
+    joint = spot.steps[0].joint
+    home = _home(mechanism, joint)
+    limits = _limits(joint, home)
+    last = len(draft.spots) - 1
+    draft.coordinates.append(Coordinate(joint.name, "end_hinge", last, sense, home, limits, joint.actuated))
+    lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
+    return lo, hi
+
+
+def _rail(mechanism: Mechanism, draft: _Draft) -> tuple[Array | None, Interval]:
+    if draft.rail is None:
+        return None, FREE
+    joint = draft.rail.joint
+    axis = np.array(mechanism.home_axis(joint.name)) * draft.rail.sign
+    home = _home(mechanism, joint)
+    limits = _limits(joint, home)
+    draft.coordinates.append(Coordinate(joint.name, "rail", 0, 1.0, home, limits, joint.actuated))
+    return axis, (limits[0] - home, limits[1] - home)
+
+
+def _cone(draft: _Draft, nodes: list[NodeForm], k: int, step: Step, near: float) -> ConeForm:
+    """The cone of the joint at node k."""
+    cone, name = step.joint.cone, step.joint.name
+    assert cone is not None
+    axis, last = np.array(cone.axis), len(nodes) - 1
+    seen = k - 1 if cone.fixed_to != step.inward else k + 1
+    if 0 <= seen <= last and abs(nodes[seen].shift) > near:
+        raise NotExpressible(f"the cone of joint {name} is about a line to {nodes[seen].joint}, off the chain's plane")
+    outward = nodes[k + 1].at - nodes[k].at if k < last else None
+    if cone.fixed_to != step.inward:
+        if k == last and k > 0:
+            return ConeForm(name, "platform", k, axis, cone.half_angle)
+        if outward is not None and k > 0 and _is_parallel(axis, outward / np.linalg.norm(outward)):
+            sign = math.copysign(1.0, float(axis @ outward))
+            return ConeForm(name, "link", k, np.array([-sign, 0.0, 0.0]), cone.half_angle)
+        raise NotExpressible(f"the cone of joint {name} turns with a link whose twist positions do not show")
+    if outward is None:
+        raise NotExpressible(f"the cone of joint {name} limits a line of the end effector")
+    if k == 0:
+        return ConeForm(name, "carrier", k, axis, cone.half_angle)
+    link = nodes[k].at - nodes[k - 1].at
+    link = link / np.linalg.norm(link)
+    if k <= draft.planar:
+        across = np.cross(draft.normal, link)
+        parts = np.array([axis @ link, axis @ across, axis @ draft.normal])
+        return ConeForm(name, "link", k, parts, cone.half_angle)
+    if _is_parallel(axis, link):
+        parts = np.array([math.copysign(1.0, float(axis @ link)), 0.0, 0.0])
+        return ConeForm(name, "link", k, parts, cone.half_angle)
+    raise NotExpressible(f"the cone of joint {name} turns with a link whose twist positions do not show")
+
+
+def _kind(draft: _Draft, nodes: list[NodeForm], rail: Array | None) -> Literal["passes", "strut", "dyad", "rail_rod"]:
+    """Which closed form the branch has, if any."""
+    rigid = [node.stroke[0] == node.stroke[1] for node in nodes[1:]]
+    if rail is None and len(nodes) <= 2:
+        return "strut"
+    if rail is None and len(nodes) == 3 and all(rigid) and draft.planar >= 1:
+        return "dyad"
+    across = draft.planar == 0 or (rail is not None and abs(float(rail @ draft.normal)) <= TOLERANCES.alignment)
+    if rail is not None and len(nodes) == 2 and all(rigid) and across:
+        return "rail_rod"
+    return "passes"

@@ -1,0 +1,181 @@
+"""Rotational copies: one joint of a file stands for several, turned about an axis through the origin."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import Fault, near_miss
+from .form_faults import is_name, is_pair_of_names, is_point
+from .joints import Cone, Joint, Vector
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A joint as its file writes it, with the number of its copies and the unit vector that they are turned about.
+
+    Without copies, `count` and `axis` are None, and the pattern stands for its joint alone.
+    """
+
+    joint: Joint
+    count: int | None = None
+    axis: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Copy:
+    """One of the joints that a pattern stands for: copy `number` (from 1; 0 without copies) of pattern `index`."""
+
+    index: int
+    number: int
+    joint: Joint
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The patterns of a file, with the base and the end effector, which are never copied."""
+
+    patterns: tuple[Pattern, ...]
+    base: str
+    end_effector: str
+
+    def copied_bodies(self) -> dict[str, Pattern]:
+        """The bodies that have copies, each with the first pattern that says so."""
+        bodies: dict[str, Pattern] = {}
+        for pattern in self.patterns:
+            if pattern.count is not None:
+                for body in self._own_bodies(pattern):
+                    bodies.setdefault(body, pattern)
+        return bodies
+
+    def copied_joints(self) -> frozenset[str]:
+        """The names of the joints that have copies."""
+        return frozenset(
+            each.joint.name for each in self.patterns if each.count is not None and is_name(each.joint.name)
+        )
+
+    def _own_bodies(self, pattern: Pattern) -> list[str]:
+        bodies = pattern.joint.connects if is_pair_of_names(pattern.joint.connects) else ()
+        return [body for body in bodies if body not in (self.base, self.end_effector)]
+
+    def expanded(self) -> list[Copy]:
+        """All joints that the patterns stand for, pattern by pattern.
+
+        The number of a copy is put behind the names of its joint, of the bodies that it connects, and of the joints
+        that it runs along where these have copies.
+        """
+        bodies, joints = frozenset(self.copied_bodies()), self.copied_joints()
+        return [copy for index, pattern in enumerate(self.patterns) for copy in _copies(index, pattern, bodies, joints)]
+
+    def as_written(self, text: str, copy: Copy) -> str:
+        """A text about a copy with the names as its file writes them, without the copy's number."""
+        if copy.number > 0:
+            for name in (*self.copied_bodies(), *self.copied_joints()):
+                text = text.replace(f"'{name}{copy.number}'", f"'{name}'")
+        return text
+
+    def faults(self) -> Iterator[Fault]:
+        """What keeps the patterns from being expanded: ends that name nothing, copies that do not fit together."""
+        yield from self._end_faults()
+        shared = self.copied_bodies()
+        for index, pattern in enumerate(self.patterns):
+            for body in self._own_bodies(pattern):
+                if body in shared and shared[body].count != pattern.count:
+                    yield _misfit(index, pattern, body, shared[body])
+
+    def _end_faults(self) -> Iterator[Fault]:
+        """A base or end effector that names nothing, in the file or among the copies: any body could be meant."""
+        joints = [each.joint for each in self.patterns] + [copy.joint for copy in self.expanded()]
+        if not joints or not all(is_pair_of_names(joint.connects) and is_name(joint.name) for joint in joints):
+            return
+        bodies = dict.fromkeys(body for joint in joints for body in joint.connects)
+        names = dict.fromkeys(joint.name for joint in joints)
+        if self.base not in bodies:
+            found = f"'{self.base}', which no joint connects{near_miss(self.base, bodies)}"
+            yield Fault("base", found, "a body that a joint connects")
+        if self.end_effector not in bodies | names:
+            found = f"'{self.end_effector}', neither a body nor a joint{near_miss(self.end_effector, bodies | names)}"
+            yield Fault("end_effector", found, "a body or a joint")
+
+
+def _misfit(index: int, pattern: Pattern, body: str, first: Pattern) -> Fault:
+    """A joint that shares a copied body and has no copies, or another number of them."""
+    if pattern.count is None:
+        found = f"'{body}', which has {first.count} copies; did you mean '{body}1'?"
+        return Fault(f"joint[{index}].connects", found, "bodies without copies, or one of the copies")
+    found = f"{pattern.count}, but '{body}' has {first.count} copies at joint '{first.joint.name}'"
+    return Fault(f"joint[{index}].copies.count", found, str(first.count))
+
+
+def _copies(index: int, pattern: Pattern, bodies: frozenset[str], joints: frozenset[str]) -> Iterator[Copy]:
+    if pattern.count is None or pattern.axis is None:
+        yield Copy(index, 0, pattern.joint)
+        return
+    for number in range(1, pattern.count + 1):
+        copied = turned(pattern.joint, pattern.axis, number - 1, pattern.count)
+        yield Copy(index, number, _renamed(copied, number, bodies, joints))
+
+
+def _renamed(joint: Joint, number: int, bodies: frozenset[str], joints: frozenset[str]) -> Joint:
+    cone = joint.cone and dataclasses.replace(joint.cone, fixed_to=_numbered(joint.cone.fixed_to, number, bodies))
+    return dataclasses.replace(
+        joint,
+        name=_numbered(joint.name, number, joints),
+        connects=_numbered(joint.connects, number, bodies),
+        along=_numbered(joint.along, number, joints),
+        cone=cone,
+    )
+
+
+def _numbered(names: Any, number: int, copied: frozenset[str]) -> Any:
+    """The name, or each of the names, with the number behind it when it is copied; anything else as it is."""
+    if isinstance(names, tuple):
+        return tuple(_numbered(name, number, copied) for name in names)
+    return f"{names}{number}" if isinstance(names, str) and names in copied else names
+
+
+def turned(joint: Joint, axis: Vector, step: int, steps: int) -> Joint:
+    """The joint turned by `step` of `steps` equal parts of a full turn; by none, it is the same to the last bit."""
+    if step == 0:
+        return joint
+
+    def turn(vector: Any) -> Any:
+        return rotated(vector, axis, step, steps) if is_point(vector) else vector
+
+    axes: Any = tuple(map(turn, joint.axes)) if isinstance(joint.axes, tuple) else joint.axes
+    cone = joint.cone and Cone(turn(joint.cone.axis), joint.cone.half_angle, joint.cone.fixed_to)
+    return dataclasses.replace(joint, at=turn(joint.at), axis=turn(joint.axis), axes=axes, cone=cone)
+
+
+def rotated(vector: Vector, axis: Vector, step: int, steps: int) -> Vector:
+    """The vector turned about a unit axis by `step` of `steps` equal parts of a full turn, right-handed."""
+    cosine, sine = cos_sin(step, steps)
+    (x, y, z), (a, b, c) = vector, axis
+    parallel = x * a + y * b + z * c
+    cross = (b * z - c * y, c * x - a * z, a * y - b * x)
+    rotated = (
+        parallel * k + cosine * (v - parallel * k) + sine * w for v, k, w in zip(vector, axis, cross, strict=True)
+    )
+    first, second, third = rotated
+    return first, second, third
+
+
+def cos_sin(step: int, steps: int) -> tuple[float, float]:
+    """Cosine and sine of `step` of `steps` equal parts of a full turn, exact for multiples of 30 degrees that allow it.
+
+    So a point with three-fold or four-fold copies does not leave its plane of symmetry by a rounding error of pi.
+    """
+    quarters, rest = divmod(4 * step, steps)
+    angle = math.pi / 2 * rest / steps
+    cosine = 0.5 if 3 * rest == 2 * steps else math.cos(angle)
+    sine = 0.5 if 3 * rest == steps else math.sin(angle)
+    turns = ((cosine, sine), (-sine, cosine), (-cosine, -sine), (sine, -cosine))
+    return turns[quarters % 4]
+
+
+def count_of(patterns: Sequence[Pattern]) -> int:
+    """Number of joints that the patterns stand for."""
+    return sum(pattern.count or 1 for pattern in patterns)

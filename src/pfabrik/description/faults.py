@@ -1,0 +1,135 @@
+"""Everything that can be wrong with a description, found in one go."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..errors import Fault, near_miss
+from .form_faults import is_name, joint_faults, name_faults, number_faults, shown
+from .graph_faults import graph_faults
+from .home_faults import home_faults
+from .joint_types import TASK_COORDINATES, WHOLE_TASK
+
+if TYPE_CHECKING:
+    from .mechanism import Mechanism
+
+_FIELDS = ("name", "type", "connects", "at", "axis", "axes", "along", "actuated", "home", "range", "cone")
+_FIELD = re.compile(r"joint\[\d+\]\.(\w+)")
+_JOINT = re.compile(r"joint\[(\d+)\]")
+_LEG = re.compile(r"leg\[(\d+)\](?:\.([A-Za-z]+))?")
+_LEG_FIELDS = ("chain", "name", "connects", "base", "via", "platform", "axis", "stroke", "copies")
+
+
+def find_faults(mechanism: Mechanism) -> list[Fault]:
+    """Every fault of a description, in its order; an empty list for a mechanism that can be built.
+
+    Places are written as in a file: `joint[3].cone.half_angle`, with the index counted in `mechanism.joints`.
+    """
+    joints: Any = mechanism.joints
+    if not isinstance(joints, tuple) or not all(map(_is_joint, joints)) or not joints:
+        return [*_head_faults(mechanism), Fault("joint", _not_joints(joints), "at least one Joint")]
+    form = [list(joint_faults(f"joint[{index}]", joint)) for index, joint in enumerate(joints)]
+    sound = {joint.name: joint for joint, faults in zip(joints, form, strict=True) if not faults}
+    faults = [*_head_faults(mechanism), *(fault for each in form for fault in each)]
+    return in_order([*faults, *_point_faults(mechanism), *graph_faults(mechanism), *home_faults(mechanism, sound)])
+
+
+def in_order(faults: Sequence[Fault]) -> list[Fault]:
+    """The faults in the order of a description: the head first, then joint by joint and leg by leg, field by field."""
+    return sorted(faults, key=lambda fault: _rank(fault.place))
+
+
+def merged(first: Sequence[Fault], second: Sequence[Fault]) -> list[Fault]:
+    """All faults in order, without those of the second list that only follow from one of the first."""
+    places = [fault.place for fault in first]
+    own = [fault for fault in second if not any(_same_place(fault.place, place) for place in places)]
+    return in_order([*first, *own])
+
+
+def _same_place(one: str, other: str) -> bool:
+    """Whether one place is the other, or within it."""
+    short, long = sorted((one, other), key=len)
+    return long == short or long.startswith(f"{short}.") or (short != "joint" and long.startswith(f"{short}["))
+
+
+def _rank(place: str) -> tuple[int, int, int, str]:
+    leg = _LEG.match(place)
+    if leg is None:
+        return (0, joint_index(place), _field_rank(place), "")
+    key = leg[2] or ""
+    if key in _LEG_FIELDS:
+        return (1, int(leg[1]), _LEG_FIELDS.index(key), "")
+    return (1, int(leg[1]), len(_LEG_FIELDS), key if len(key) == 1 else "~")  # joints by their letters
+
+
+def joint_index(place: str) -> int:
+    """The index of the joint that a place is in, or -1 for the head."""
+    match = _JOINT.match(place)
+    return int(match[1]) if match else -1
+
+
+def _field_rank(place: str) -> int:
+    field = _FIELD.match(place)
+    return _FIELDS.index(field[1]) if field and field[1] in _FIELDS else len(_FIELDS)
+
+
+def _is_joint(value: object) -> bool:
+    return all(hasattr(value, field) for field in ("name", "type", "connects", "cone", "along"))
+
+
+def _not_joints(joints: Any) -> str:
+    if not isinstance(joints, tuple):
+        return shown(joints)
+    strangers = [shown(joint) for joint in joints if not _is_joint(joint)]
+    return strangers[0] if strangers else "no joints"
+
+
+def _head_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    for field in ("name", "base", "end_effector"):
+        yield from name_faults(field, getattr(mechanism, field))
+    yield from name_faults("units.length", mechanism.length_unit)
+    if mechanism.angle_unit not in ("deg", "rad"):
+        yield Fault("units.angle", shown(mechanism.angle_unit), "'deg' or 'rad'")
+    yield from _task_faults(mechanism.task, mechanism)
+
+
+def _task_faults(task: Any, mechanism: Mechanism) -> Iterator[Fault]:
+    """Faults of what targets set: at least one coordinate, none twice, and of the rotation all or the tilt."""
+    expected = f"some of {', '.join(TASK_COORDINATES)}"
+    if not isinstance(task, tuple) or not task:
+        yield Fault("task", shown(task), expected)
+        return
+    for each in task:
+        if each not in TASK_COORDINATES:
+            yield Fault("task", f"{shown(each)}{near_miss(each, TASK_COORDINATES)}", expected)
+    if len(set(map(str, task))) < len(task):
+        yield Fault("task", shown(list(task)), f"{expected}, none of them twice")
+    turns = [each for each in task if each in ("rotation", "tilt")]
+    if len(turns) == 2:
+        yield Fault("task", "both rotation and tilt", "one of the two: the tilt is a part of the rotation")
+    if turns and mechanism.whole_task == WHOLE_TASK[:3]:
+        yield Fault("task", turns[0], "some of x, y, z: the end effector is a joint, of which only the position counts")
+
+
+def _point_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    """Faults of the reference point: needed for a body, given by the joint for a joint."""
+    point: Any = mechanism.reference_point
+    tip = next((joint for joint in mechanism.joints if joint.name == mechanism.end_effector), None)
+    if not is_name(mechanism.end_effector):
+        return
+    if tip is not None:
+        if point != tip.at:
+            yield Fault("reference_point", shown(point), f"nothing: it is the centre of the joint '{tip.name}'")
+    elif point is None and _moves(mechanism, mechanism.end_effector):
+        yield Fault("reference_point", "nothing", "three numbers, the point of the end effector that targets place")
+    elif point is not None:
+        yield from number_faults("reference_point", point, 3)
+
+
+def _moves(mechanism: Mechanism, name: str) -> bool:
+    """Whether the name is that of a body other than the base."""
+    return name != mechanism.base and any(
+        isinstance(joint.connects, tuple) and name in joint.connects for joint in mechanism.joints
+    )

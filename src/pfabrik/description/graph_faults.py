@@ -1,0 +1,183 @@
+"""Faults of the graph: names that must agree between joints, bodies that must hang together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from string import digits
+from typing import TYPE_CHECKING
+
+from ..errors import Fault, near_miss
+from .cones import next_joints, opposite
+from .form_faults import is_name, is_pair_of_names, kind_of, shown
+
+if TYPE_CHECKING:
+    from .mechanism import Joint, Mechanism
+
+
+def graph_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    """All faults of how the joints, the base and the end effector refer to each other.
+
+    Where a name could not be read, whatever depends on it is left out: a fault is reported once, where it is.
+    """
+    yield from _duplicate_faults(mechanism)
+    yield from _actuator_faults(mechanism)
+    if all(is_name(joint.name) for joint in mechanism.joints):
+        yield from _along_faults(mechanism)
+    if not all(is_pair_of_names(joint.connects) for joint in mechanism.joints):
+        return
+    if not (is_name(mechanism.base) and is_name(mechanism.end_effector)):
+        return
+    names = list(_base_faults(mechanism)) + list(_end_effector_faults(mechanism)) + list(_dangling_faults(mechanism))
+    yield from names
+    if not names:
+        yield from _connection_faults(mechanism)
+    if all(is_name(joint.name) for joint in mechanism.joints):
+        yield from _cone_faults(mechanism)
+
+
+def _duplicate_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    seen: set[str] = set()
+    for index, joint in enumerate(mechanism.joints):
+        if is_name(joint.name) and joint.name in seen:
+            yield Fault(f"joint[{index}].name", f"'{joint.name}', the name of an earlier joint", "a name of its own")
+        elif is_name(joint.name):
+            seen.add(joint.name)
+
+
+def _actuator_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    if mechanism.joints and all(joint.actuated is False for joint in mechanism.joints):
+        yield Fault("joint", "no actuated joint", "at least one joint with `actuated = true`, or `*` in a chain")
+
+
+def _bodies(mechanism: Mechanism) -> Counter[str]:
+    """How many joints mention each body."""
+    return Counter(body for joint in mechanism.joints for body in joint.connects)
+
+
+def _base_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    bodies = _bodies(mechanism)
+    if mechanism.base not in bodies:
+        hint = near_miss(mechanism.base, bodies)
+        yield Fault("base", f"'{mechanism.base}', which no joint connects{hint}", "a body that a joint connects")
+
+
+def _end_effector_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    bodies, name = _bodies(mechanism), mechanism.end_effector
+    joints = {joint.name: joint for joint in mechanism.joints if is_name(joint.name)}
+    if name == mechanism.base:
+        yield Fault("end_effector", f"'{name}', which is the base", "a body that moves, or a joint")
+    elif name in bodies and name in joints:
+        yield Fault("end_effector", f"'{name}', which names both a body and a joint", "a name that only one has")
+    elif name in joints:
+        yield from _tip_faults(joints[name])
+    elif name not in bodies and len(joints) == len(mechanism.joints):
+        hint = near_miss(name, [*bodies, *joints])
+        yield Fault("end_effector", f"'{name}', neither a body nor a joint{hint}", "a body or a joint")
+
+
+def _tip_faults(joint: Joint) -> Iterator[Fault]:
+    if joint.type in ("prismatic", "cylindrical"):
+        expected = "a joint whose centre is the same point of both its bodies"
+        yield Fault("end_effector", f"'{joint.name}', a {joint.type} joint", expected)
+
+
+def _dangling_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    counts, allowed = _bodies(mechanism), {mechanism.base, mechanism.end_effector}
+    sound = {body for body, count in counts.items() if count > 1} | (allowed & set(counts))
+    for index, joint in enumerate(mechanism.joints):
+        if joint.name == mechanism.end_effector and mechanism.end_effector not in counts:
+            continue  # what hangs on the end effector alone is the tool
+        for body in joint.connects:
+            if body not in sound and body not in allowed:
+                found = f"'{body}', which no other joint connects{_meant(body, joint, [*sound, *allowed], counts)}"
+                yield Fault(f"joint[{index}].connects", found, "a body that other joints connect too")
+
+
+def _meant(body: str, joint: Joint, sound: Iterable[str], bodies: Iterable[str]) -> str:
+    """The body that was probably meant: a sound one, or one that is as lonely but not merely another copy."""
+    lonely = [each for each in bodies if each.rstrip(digits) != body.rstrip(digits)]
+    return near_miss(body, [each for each in (*sound, *lonely) if each not in joint.connects])
+
+
+def _connection_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    """Parts of the graph with no connection to the base; the end effector's is named as such."""
+    reached = _connected(mechanism, mechanism.base)
+    for index, joint in enumerate(mechanism.joints):
+        if joint.connects[0] in reached:
+            continue
+        part = _connected(mechanism, joint.connects[0])
+        reached |= part
+        tip = mechanism.end_effector in part or any(
+            each.name == mechanism.end_effector and each.connects[0] in part for each in mechanism.joints
+        )
+        if tip:
+            found = f"'{mechanism.end_effector}', to which no joints lead from the base '{mechanism.base}'"
+            yield Fault("end_effector", found, "an end effector connected to the base")
+        else:
+            bodies = ", ".join(f"'{body}'" for body in sorted(part))
+            yield Fault(f"joint[{index}].connects", f"{bodies}, apart from the rest", "bodies connected to the base")
+
+
+def _connected(mechanism: Mechanism, start: str) -> set[str]:
+    """The bodies that joints connect with `start`, itself included."""
+    neighbours: dict[str, list[str]] = {}
+    for first, second in (joint.connects for joint in mechanism.joints):
+        neighbours.setdefault(first, []).append(second)
+        neighbours.setdefault(second, []).append(first)
+    reached, waiting = {start}, [start]
+    while waiting:
+        new = set(neighbours.get(waiting.pop(), ())) - reached
+        reached |= new
+        waiting += new
+    return reached
+
+
+def _along_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    joints = {joint.name: joint for joint in mechanism.joints}
+    for index, joint in enumerate(mechanism.joints):
+        if (
+            joint.type != "prismatic"
+            or not is_pair_of_names(joint.along)
+            or joint.along is None
+            or joint.along[0] == joint.along[1]
+        ):
+            continue
+        faults = [fault for name in joint.along for fault in _end_faults(f"joint[{index}].along", joint, name, joints)]
+        yield from faults
+        ends = [joints[name].connects for name in joint.along if name in joints]
+        if not faults and all(map(is_pair_of_names, [joint.connects, *ends])) and not _on_both_sides(joint, ends):
+            found = f"{shown(joint.along)}, not one on each side of the joint"
+            first, second = joint.connects
+            yield Fault(f"joint[{index}].along", found, f"one joint of '{first}' and one joint of '{second}'")
+
+
+def _end_faults(place: str, joint: Joint, name: str, joints: dict[str, Joint]) -> Iterator[Fault]:
+    if name == joint.name:
+        yield Fault(place, f"'{name}', the joint itself", "two other joints")
+    elif name not in joints:
+        others = [other for other in joints if other != joint.name]
+        yield Fault(place, f"'{name}': no such joint{near_miss(name, others)}", "the names of two joints")
+    elif joints[name].at is None and joints[name].type == "prismatic":
+        yield Fault(place, f"'{name}', a joint without a centre", "joints with a centre")
+
+
+def _on_both_sides(joint: Joint, ends: list[tuple[str, str]]) -> bool:
+    (first, second), (one, other) = joint.connects, ends
+    return (first in one and second in other) or (first in other and second in one)
+
+
+def _cone_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    for index, joint in enumerate(mechanism.joints):
+        kind, cone = kind_of(joint), joint.cone
+        if cone is None or kind is None or not kind.coned or getattr(cone, "fixed_to", None) not in joint.connects:
+            continue
+        body = opposite(joint)
+        ends = [each.name for each in next_joints(mechanism.joints, joint, body)]
+        if len(ends) != 1:
+            found = f"'{body}', which leads to {_several(ends)}, on the other side"
+            yield Fault(f"joint[{index}].cone", found, "one next joint, so that the limited line is defined")
+
+
+def _several(names: list[str]) -> str:
+    return "several joints (" + ", ".join(f"'{name}'" for name in names) + ")" if names else "no other joint"

@@ -1,0 +1,79 @@
+"""From legs to their joints, and from faults of these joints back to what the description says of the legs."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+
+from ..errors import Fault
+from .chains import read_chain
+from .form_faults import is_pair_of_names
+from .leg_maker import LegJoint, LegMaker
+from .leg_points import count_legs
+from .legs import Leg
+
+__all__ = ["LegJoint", "at_legs", "count_joints", "legs_name", "placed_joints"]
+
+
+def placed_joints(
+    legs: Sequence[Leg], base: str, end_effector: str, tips: Collection[str] = ()
+) -> tuple[list[LegJoint], list[Fault]]:
+    """All joints that the legs stand for, leg by leg, and the faults of what they are made from.
+
+    Legs are counted on from one description to the next, by the name that comes before theirs.
+
+    Parameters
+    ----------
+    tips : names of other joints, in which no leg can end.
+    """
+    placed: list[LegJoint] = []
+    faults: list[Fault] = []
+    counted: Counter[str] = Counter()
+    for index, leg in enumerate(legs):
+        place = f"leg[{index}]"
+        if leg.connects is None and end_effector in tips:
+            found = f"nothing, but the end effector '{end_effector}' is a joint"
+            faults.append(Fault(f"{place}.connects", found, "the two bodies that the legs lead from and to"))
+        ends = leg.connects if leg.connects is not None and is_pair_of_names(leg.connects) else (base, end_effector)
+        maker = LegMaker(leg, place, ends, faults)
+        placed += maker.joints(counted[leg.name] + 1)
+        counted[leg.name] += maker.count
+    return placed, faults
+
+
+def count_joints(leg: Leg) -> int:
+    """How many joints legs stand for, as far as they can be read."""
+    copies = leg.copies.get("count") if isinstance(leg.copies, Mapping) else 1.0
+    turns = int(copies) if isinstance(copies, float) else 1
+    return count_legs(leg.base, leg.platform) * len(read_chain(leg.chain)) * turns
+
+
+def at_legs(faults: Sequence[Fault], first: int, placed: Sequence[LegJoint]) -> list[Fault]:
+    """The faults of joints that stand for legs at the places of their description, each reported of one leg only.
+
+    Parameters
+    ----------
+    first : index of the first of these joints among all joints.
+    """
+    written: list[Fault] = []
+    reporter: dict[str, int] = {}
+    for fault in faults:
+        match = re.match(r"joint\[(\d+)\]\.?(\w*)", fault.place)
+        if match is None or int(match[1]) < first:
+            written.append(fault)
+            continue
+        part = placed[int(match[1]) - first]
+        place = part.places.get(match[2], f"{part.place}.{match[2]}".rstrip(".")) + fault.place[match.end() :]
+        if reporter.setdefault(place, part.leg) == part.leg:
+            written.append(Fault(place, f"{fault.found} (joint {part.joint.name})", fault.expected))
+    return written
+
+
+def legs_name(legs: Sequence[Leg], placed: Sequence[LegJoint]) -> str:
+    """What the field calls a machine of such legs: `6-UPS`, `2-UPS/1-U`."""
+    kinds: Counter[str] = Counter()
+    for index, leg in enumerate(legs):
+        numbers_ = {part.leg for part in placed if part.place.startswith(f"leg[{index}].")}
+        kinds[re.sub(r"[^A-Z]", "", str(leg.chain))] += len(numbers_)
+    return "/".join(f"{count}-{kind}" for kind, count in kinds.items())

@@ -1,0 +1,268 @@
+"""Makes the joints that one description of legs stands for."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from ..errors import Fault, near_miss
+from .chains import chain_faults, read_chain
+from .coercion import unit_vector
+from .copies import turned
+from .directions import EXPECTED, PLACEHOLDER, axis_pairs, directions
+from .form_faults import direction_faults, is_pair_of_names, shown
+from .joints import Cone, Joint, Vector
+from .leg_points import Point, leg_points
+from .legs import CONE_KEYS, JOINT_KEYS, Leg
+
+
+@dataclass(frozen=True)
+class LegJoint:
+    """One of the joints that legs stand for.
+
+    Attributes
+    ----------
+    leg : the number of its leg, from 1.
+    place, places : where the description says things of the joint, and of single fields of it.
+    """
+
+    joint: Joint
+    leg: int
+    place: str
+    places: Mapping[str, str]
+
+
+class LegMaker:
+    """Makes the joints of one description of legs, and notes its faults."""
+
+    def __init__(self, leg: Leg, place: str, ends: tuple[str, str], faults: list[Fault]) -> None:
+        self.leg, self.place, self.ends, self.faults = leg, place, ends, faults
+        self.steps = read_chain(leg.chain)
+        faults += chain_faults(f"{place}.chain", leg.chain)
+        if leg.connects is not None and not is_pair_of_names(leg.connects):
+            faults.append(Fault(f"{place}.connects", shown(leg.connects), "the names of two bodies"))
+        self.points = leg_points(leg, self.steps, place, faults)
+        self.legs = len(self.points[0]) if self.points else 1
+        self.turns, self.about = self._copies()
+        self.count = self.legs * self.turns if self.steps else 0
+        self.centres = dict(zip((step.letter for step in self.steps if step.centred), self.points, strict=True))
+        self.said = self._said()
+        self.ranges = self._ranges()
+
+    def joints(self, number: int) -> Iterator[LegJoint]:
+        """The joints of all legs, of which the first has this number."""
+        patterns = [self._pattern(index) for index in range(len(self.steps))]
+        if self.leg.axis is not None and self.steps and not any(map(self._takes_axis, range(len(self.steps)))):
+            self.faults.append(Fault(f"{self.place}.axis", shown(self.leg.axis), "nothing: no joint needs it"))
+        for turn in range(self.turns):
+            for leg in range(self.legs):
+                for index, pattern in enumerate(patterns):
+                    placed = self._numbered(pattern[leg], index, number)
+                    yield dataclasses.replace(placed, joint=turned(placed.joint, self.about, turn, self.turns))
+                number += 1
+
+    def _copies(self) -> tuple[int, Vector]:
+        copies: Any = self.leg.copies
+        if copies is None:
+            return 1, PLACEHOLDER
+        place = f"{self.place}.copies"
+        if not isinstance(copies, Mapping) or not {"count", "axis"} >= set(copies):
+            self.faults.append(Fault(place, shown(copies), "a table: count, axis"))
+            return 1, PLACEHOLDER
+        count, axis = copies.get("count"), unit_vector(copies.get("axis"))
+        if not isinstance(count, float) or count < 1.0 or count % 1.0 != 0.0:
+            self.faults.append(Fault(f"{place}.count", shown(count), "a whole number, at least 1"))
+            count = 1.0
+        wrong = list(direction_faults(f"{place}.axis", axis))
+        self.faults += wrong
+        return int(count), PLACEHOLDER if wrong else axis
+
+    def _said(self) -> dict[str, Mapping[str, Any]]:
+        """What is said of single joints, by letter, as far as it makes sense."""
+        letters = [step.letter for step in self.steps]
+        by_letter: Any = self.leg.by_letter
+        said: dict[str, Mapping[str, Any]] = {}
+        if not isinstance(by_letter, Mapping):
+            self.faults.append(Fault(self.place, shown(by_letter), "what is said of joints, by their letters"))
+            return said
+        for letter, values in by_letter.items():
+            where = f"{self.place}.{letter}"
+            if self.steps and letter not in letters:
+                expected = f"one of {', '.join(letters)}, the joints of '{self.leg.chain}'"
+                self.faults.append(Fault(where, "a joint that the chain does not have", expected))
+            elif not isinstance(values, Mapping):
+                self.faults.append(Fault(where, shown(values), f"a table: {', '.join(JOINT_KEYS)}"))
+            else:
+                self._refuse_unknown(where, values, JOINT_KEYS)
+                said[letter] = values
+        return said
+
+    def _refuse_unknown(self, where: str, values: Mapping[str, Any], known: Sequence[str]) -> None:
+        for key in values:
+            if key not in known:
+                hint = f"an unknown key{near_miss(str(key), known)}"
+                self.faults.append(Fault(f"{where}.{key}", hint, f"one of {', '.join(known)}"))
+
+    def _ranges(self) -> dict[str, tuple[Any, str]]:
+        """The range of each joint that has one, and where it is said."""
+        ranges = {
+            letter: (values["range"], f"{self.place}.{letter}.range")
+            for letter, values in self.said.items()
+            if values.get("range") is not None
+        }
+        if self.leg.stroke is None or not self.steps:
+            return ranges
+        place = f"{self.place}.stroke"
+        slides = [step.letter for step in self.steps if not step.centred]
+        if len(slides) != 1:
+            several = f"the ranges of single joints: {', '.join(f'{letter}.range' for letter in slides)}"
+            expected = several if slides else f"nothing: no joint of '{self.leg.chain}' is prismatic"
+            self.faults.append(Fault(place, shown(self.leg.stroke), expected))
+        elif slides[0] in ranges:
+            self.faults.append(Fault(place, f"both `stroke` and `{slides[0]}.range`", "one of them"))
+        else:
+            ranges[slides[0]] = (self.leg.stroke, place)
+        return ranges
+
+    def _pattern(self, index: int) -> list[LegJoint]:
+        """The joint at one place in the chain, once for each leg, with names that have no number yet."""
+        step = self.steps[index]
+        said = self.said.get(step.letter, {})
+        bodies = self._bodies(index)
+        limits, limits_place = self.ranges.get(step.letter, (None, ""))
+        places = dict.fromkeys(("type", "actuated", "connects"), f"{self.place}.chain")
+        places |= {"name": f"{self.place}.name", "range": limits_place}
+        fields: list[dict[str, Any]] = [{} for _ in range(self.legs)]
+        self._give_axes(index, said, fields, places)
+        cones = self._cones(index, said.get("cone"), bodies)
+        made = []
+        for leg in range(self.legs):
+            at = self.centres[step.letter][leg] if step.centred else Point(None, self.place)
+            joint = Joint(
+                step.letter,
+                step.type,
+                bodies,
+                at=at.at or (PLACEHOLDER if step.centred else None),
+                actuated=step.actuated,
+                home=said.get("home", 0.0),
+                range=limits,
+                cone=cones[leg],
+                **fields[leg],
+            )
+            end = self._next_place(index, leg)
+            made.append(LegJoint(joint, leg, f"{self.place}.{step.letter}", places | {"at": at.place, "along": end}))
+        return made
+
+    def _next_place(self, index: int, leg: int) -> str:
+        """Where the point of the next joint is said."""
+        after = self.steps[index + 1 : index + 2]
+        return self.centres[after[0].letter][leg].place if after and after[0].centred else f"{self.place}.chain"
+
+    def _bodies(self, index: int) -> tuple[str, str]:
+        """The two bodies of a joint: those between joints A and B are called AB."""
+        letters = [step.letter for step in self.steps]
+        inner = [a + b for a, b in pairwise(letters)]
+        bodies = [self.ends[0], *inner, self.ends[1]]
+        return bodies[index], bodies[index + 1]
+
+    def _is_strut(self, index: int) -> bool:
+        """Whether the joint is a prismatic one that runs along the line of its neighbours."""
+        own_axis = self.said.get(self.steps[index].letter, {}).get("axis")
+        around = self.steps[index - 1 : index] + self.steps[index + 1 : index + 2]
+        return not self.steps[index].centred and own_axis is None and [each.centred for each in around] == [True, True]
+
+    def _takes_axis(self, index: int) -> bool:
+        """Whether the leg's own `axis` holds for the joint."""
+        step = self.steps[index]
+        one = step.type in ("revolute", "prismatic", "cylindrical")
+        return one and not self._is_strut(index) and self.said.get(step.letter, {}).get("axis") is None
+
+    def _give_axes(
+        self, index: int, said: Mapping[str, Any], fields: list[dict[str, Any]], places: dict[str, str]
+    ) -> None:
+        step = self.steps[index]
+        if said.get("axes") is not None:
+            pairs = axis_pairs(f"{self.place}.{step.letter}.axes", said["axes"], self._near(index), self.faults)
+            for leg, pair in enumerate(pairs):
+                fields[leg]["axes"] = pair
+        if self._is_strut(index):
+            for each in fields:
+                each["along"] = (self.steps[index - 1].letter, self.steps[index + 1].letter)
+            return
+        axis, place = said.get("axis"), f"{self.place}.{step.letter}.axis"
+        if self._takes_axis(index):
+            if self.leg.axis is None:
+                self.faults.append(Fault(place, f"nothing, for a {step.type} joint", EXPECTED))
+                axis = PLACEHOLDER
+            else:
+                axis, places["axis"] = self.leg.axis, f"{self.place}.axis"
+        if axis is not None:
+            found: list[Fault] = []
+            for leg, vector in enumerate(directions(places.get("axis", place), axis, self._near(index), found)):
+                fields[leg]["axis"] = vector
+            self.faults += [fault for fault in found if fault not in self.faults]
+
+    def _near(self, index: int) -> list[Vector | None]:
+        """For each leg the centre of the joint, or of the nearest one that has a centre."""
+        near = sorted(range(len(self.steps)), key=lambda other: abs(other - index))
+        found = next((self.centres[self.steps[each].letter] for each in near if self.steps[each].centred), None)
+        return [point.at for point in found] if found else [(0.0, 0.0, 0.0)] * self.legs
+
+    def _cones(self, index: int, cone: Any, bodies: tuple[str, str]) -> list[Cone | None]:
+        if cone is None:
+            return [None] * self.legs
+        place = f"{self.place}.{self.steps[index].letter}.cone"
+        if not isinstance(cone, Mapping):
+            self.faults.append(Fault(place, shown(cone), f"a table: {', '.join(CONE_KEYS)}"))
+            return [None] * self.legs
+        self._refuse_unknown(place, cone, CONE_KEYS)
+        last = index == len(self.steps) - 1 and index > 0
+        fixed_to: Any = cone.get("fixed_to")
+        if fixed_to is not None and fixed_to not in bodies:
+            hint = near_miss(fixed_to, bodies) if isinstance(fixed_to, str) else ""
+            self.faults.append(Fault(f"{place}.fixed_to", f"{shown(fixed_to)}{hint}", " or ".join(map(shown, bodies))))
+        if fixed_to not in bodies:
+            fixed_to = bodies[1 if last else 0]
+        axes = self._cone_axes(index, cone.get("axis"), f"{place}.axis", outward=fixed_to != bodies[1])
+        return [Cone(axis, cone.get("half_angle"), fixed_to) for axis in axes]  # type: ignore[arg-type]
+
+    def _cone_axes(self, index: int, axis: Any, place: str, outward: bool) -> list[Vector]:
+        """The axes of a joint's cones; by default the lines to the next joint, outward or inward, at home."""
+        if axis is not None:
+            return directions(place, axis, self._near(index), self.faults)
+        others = self.steps[index + 1 :] if outward else self.steps[:index][::-1]
+        step = self.steps[index]
+        ends = next((self.centres[other.letter] for other in others if other.centred), None)
+        if not step.centred or ends is None:
+            if step.centred:
+                self.faults.append(Fault(place, "nothing, and no next joint that it could point at", EXPECTED))
+            return [PLACEHOLDER] * self.legs
+        lines = zip(self.centres[step.letter], ends, strict=True)
+        return [_line(start.at, end.at) for start, end in lines]
+
+    def _numbered(self, part: LegJoint, index: int, number: int) -> LegJoint:
+        """The joint with the number of its leg behind its name and those of the leg's own bodies."""
+
+        def name(own: str) -> str:
+            return f"{self.leg.name}{own}{number}"
+
+        joint = part.joint
+        first = self.ends[0] if index == 0 else name(joint.connects[0])
+        second = self.ends[1] if index == len(self.steps) - 1 else name(joint.connects[1])
+        along = joint.along and (name(joint.along[0]), name(joint.along[1]))
+        cone = joint.cone
+        if cone is not None:
+            fixed_to = first if cone.fixed_to == joint.connects[0] else second
+            cone = dataclasses.replace(cone, fixed_to=fixed_to)
+        changed = dataclasses.replace(joint, name=name(joint.name), connects=(first, second), along=along, cone=cone)
+        return dataclasses.replace(part, joint=changed, leg=number)
+
+
+def _line(start: Vector | None, end: Vector | None) -> Vector:
+    if start is None or end is None or start == end:
+        return PLACEHOLDER
+    x, y, z = (b - a for a, b in zip(start, end, strict=True))
+    return (x, y, z)

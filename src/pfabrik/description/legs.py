@@ -1,0 +1,82 @@
+"""Legs: a chain, and the points of its joints at home, stand for the ordinary joints of one or more legs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from ..errors import InvalidArgument
+from .coercion import numbers, text, texts
+from .form_faults import shown
+from .joints import Cone, Range, set_fields
+
+JOINT_KEYS = ("axis", "axes", "home", "range", "cone")
+"""What can be said of one joint of a chain."""
+
+CONE_KEYS = ("axis", "half_angle", "fixed_to")
+"""What can be said of its cone."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """Legs of one kind: a chain, and where its joints are at home, in base coordinates. Angles in radians.
+
+    Attributes
+    ----------
+    chain : the joints from the base outward, `*` behind the actuated ones: "U-P*-S". They are called A, B, C by their
+        place in the chain, and A1, B1, C1 in the first leg.
+    base, platform : centres of the first and the last joint that has a centre (a prismatic one has none) [length]:
+        one point for each leg, or a single one.
+    via : centres of the joints between, one list of points for each joint; for a single joint the list alone.
+    axis : direction of the joints that need one: three numbers or a word ("radial", "tangential", "vertical", "x", "y",
+        "z", "-" before it for the opposite), for all legs or one for each leg.
+    stroke : range of the prismatic joint.
+    name : what comes before the names of joints and bodies.
+    connects : the bodies that the legs lead from and to; the base and the end effector by default.
+    by_letter : what is said of single joints, by their letters: {"A": {"axis": "radial", "range": (-1, 1)}}. Keys are
+        axis, axes, home, range and cone, as of a `Joint`, directions as above. A cone is a mapping too: half_angle;
+        axis, by default the line that it limits, at home; fixed_to, by default the base or the end effector at the
+        ends of the chain and the inner body between.
+    copies : {"count": 3, "axis": (0, 0, 1)}: rotational copies about an axis through the origin.
+    """
+
+    chain: str
+    base: Any = None
+    platform: Any = None
+    via: Any = None
+    axis: Any = None
+    stroke: Range | None = None
+    name: str = ""
+    connects: tuple[str, str] | None = None
+    by_letter: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    copies: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        deep = {name: numbers(getattr(self, name), 3) for name in ("base", "platform", "via", "axis", "stroke")}
+        plain = {"chain": text(self.chain), "name": text(self.name), "connects": texts(self.connects)}
+        set_fields(self, **deep, **plain, by_letter=_frozen(self.by_letter, 3), copies=_frozen(self.copies, 1))
+
+
+def as_legs(chain: Any, parts: Mapping[str, Any]) -> tuple[Leg, ...]:
+    """Legs from what a call names them by: a chain with its parts, or legs without."""
+    if isinstance(chain, str):
+        return (Leg(chain, **parts),)
+    legs = (chain,) if isinstance(chain, Leg) else tuple(chain) if isinstance(chain, Sequence) else ()
+    if not legs or not all(isinstance(leg, Leg) for leg in legs):
+        raise InvalidArgument("legs", shown(chain), "a chain such as 'U-P*-S', a Leg, or a list of them")
+    given = [name for name, value in parts.items() if value]
+    if given:
+        raise InvalidArgument(given[0], shown(parts[given[0]]), "nothing: legs have their own")
+    return legs
+
+
+def _frozen(value: Any, depth: int) -> Any:
+    """A copy that nobody can change, its numbers as floats. Among the values of one joint, a cone is a mapping too."""
+    if isinstance(value, Cone):
+        value = {key: getattr(value, key) for key in CONE_KEYS}
+    if not isinstance(value, Mapping) or depth == 0:
+        return numbers(value, 3)
+    inner = {key: depth - 1 if depth == 3 or key == "cone" else 0 for key in value}
+    return MappingProxyType({key: _frozen(each, inner[key]) for key, each in value.items()})

@@ -1,0 +1,90 @@
+"""A mechanism as the text of a mechanism file, laid out for people to read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from ..description.mechanism import Joint, Mechanism
+from .units import converted, exact_degrees
+
+
+def dumps(mechanism: Mechanism) -> str:
+    """The text of a mechanism file that describes this mechanism, joint by joint, exactly.
+
+    Angles are written in degrees if that is the mechanism's unit and every angle has exact degrees, else in radians.
+    """
+    degrees = mechanism.angle_unit == "deg" and all(exact_degrees(angle) is not None for angle in _angles(mechanism))
+    convert = _degrees if degrees else float
+    tables = ["\n".join(_head(mechanism, "deg" if degrees else "rad"))]
+    tables += ["\n".join(["[[joint]]", *_joint(joint, convert)]) for joint in mechanism.joints]
+    return "\n\n".join(tables) + "\n"
+
+
+def _head(mechanism: Mechanism, angle_unit: str) -> Iterator[str]:
+    yield "schema = 1"
+    yield f"name = {_value(mechanism.name)}"
+    yield f"units = {_value({'length': mechanism.length_unit, 'angle': angle_unit})}"
+    yield f"base = {_value(mechanism.base)}"
+    yield f"end_effector = {_value(mechanism.end_effector)}"
+    if not mechanism.end_effector_is_joint:
+        yield f"reference_point = {_value(mechanism.reference_point)}"
+    if mechanism.task != mechanism.whole_task:
+        yield f"task = {_value(mechanism.task)}"
+
+
+def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:
+    for field in ("name", "type", "actuated", "connects", "at", "axis", "axes", "along", "home", "range"):
+        value = getattr(joint, field)
+        if field in ("home", "range"):
+            value = converted(value, joint.type, convert)
+        left_out = value is None or value is False or (field == "home" and value in (0.0, (0.0, 0.0)))
+        if not left_out:
+            yield f"{field} = {_value(value)}"
+    if joint.cone is not None:
+        cone = joint.cone
+        yield f"cone = {_value({'axis': cone.axis, 'half_angle': convert(cone.half_angle), 'fixed_to': cone.fixed_to})}"
+
+
+def _angles(mechanism: Mechanism) -> Iterator[float]:
+    """Every angle of the description [rad]."""
+    found: list[float] = []
+
+    def note(angle: float) -> float:
+        found.append(angle)
+        return angle
+
+    for joint in mechanism.joints:
+        converted(joint.home, joint.type, note)
+        converted(joint.range, joint.type, note)
+        yield from found
+        found.clear()
+        if joint.cone is not None:
+            yield joint.cone.half_angle
+
+
+def _degrees(angle: float) -> float:
+    degrees = exact_degrees(angle)
+    assert degrees is not None
+    return degrees
+
+
+def _value(value: Any) -> str:
+    """A value in TOML."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {_value(item)}' for key, item in value.items())} }}"
+    return f'"{_ESCAPED.sub(_escape, value)}"'
+
+
+_ESCAPED = re.compile(r'[\\"\x00-\x1f\x7f]')
+
+
+def _escape(match: re.Match[str]) -> str:
+    return f"\\u{ord(match[0]):04x}" if match[0] not in '\\"' else f"\\{match[0]}"

@@ -1,0 +1,232 @@
+"""Closing loops: Levenberg-Marquardt on all joint coordinates and the platform's pose at once.
+
+The residual of a path is how its last body differs from the platform: position [L] and rotation vector [rad]. Every
+group of paths has coordinates of its own, so its share of the normal equations is eliminated by itself, and six
+equations in the platform's twist remain: the work grows with the number of legs, not with its cube.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import inlined, kernel
+from ..rotations import exponential, turn_ball
+from .equations import (
+    add_anchors,
+    add_cones,
+    add_paths,
+    add_platform,
+    add_ranges,
+    clear,
+    follow_platform,
+    out_of_frame,
+    turn_equations,
+)
+from .loops import BALL, LOCKED, SLIDE, Closed, Floats, Layout, Loops, Wishes
+from .path_kinematics import Equations, State, copy_state, load_row, new_equations, new_state, store_row
+
+LONGEST_STEP = 0.5
+"""Longest step of any coordinate [rad or L]: beyond it the linear model says nothing."""
+
+# What the next look at the equations is for: a step just tried, the way back from a bad one, or the last measures.
+TRY, RETURN, MEASURE = 0, 1, 2
+
+DAMPING = 0.01
+"""Damping at the start, relative to the sum of squares."""
+
+LEAST_DAMPING, MOST_DAMPING = 1e-14, 1e6
+"""Damping of the normal equations, whose entries are of order one: the least keeps idle motions (a rod's own spin)
+still without slowing convergence, the most ends a search that finds no way down."""
+
+
+@inlined
+def note(eq: Equations, row: int, closed: Closed) -> None:
+    """What was measured of the configuration that is the best so far."""
+    for group in range(len(eq.gaps)):
+        closed.gaps[row, group] = eq.gaps[group]
+        closed.excesses[row, group] = eq.excesses[group]
+        closed.misses[row, group] = eq.misses[group]
+
+
+@inlined
+def eliminate(A: Floats, C: Floats, b: Floats, size: int, damping: float, L: Floats, Y: Floats) -> None:
+    """Y = (A + damping)^-1 [C, -b], by Cholesky."""
+    for i in range(size):
+        for k in range(6):
+            Y[i, k] = C[i, k]
+        Y[i, 6] = -b[i]
+        for j in range(i + 1):
+            value = A[i, j]
+            for k in range(j):
+                value -= L[i, k] * L[j, k]
+            if j < i:
+                L[i, j] = value * L[j, j]
+            else:
+                L[i, i] = 1.0 / math.sqrt(max(value + damping, damping))
+        for k in range(7):
+            value = Y[i, k]
+            for j in range(i):
+                value -= L[i, j] * Y[j, k]
+            Y[i, k] = value * L[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(7):
+            value = Y[i, k]
+            for j in range(i + 1, size):
+                value -= L[j, i] * Y[j, k]
+            Y[i, k] = value * L[i, i]
+
+
+@inlined
+def solve_platform(S: Floats, damping: float, twist: Floats) -> None:
+    """Solve the six symmetric positive equations S (lower triangle, right-hand side last) in place."""
+    for i in range(6):
+        for j in range(i + 1):
+            value = S[i, j]
+            for k in range(j):
+                value -= S[i, k] * S[j, k]
+            S[i, j] = value * S[j, j] if j < i else 1.0 / math.sqrt(max(value + damping, damping))
+        value = S[i, 6]
+        for j in range(i):
+            value -= S[i, j] * twist[j]
+        twist[i] = value * S[i, i]
+    for i in range(5, -1, -1):
+        value = twist[i]
+        for j in range(i + 1, 6):
+            value -= S[j, i] * twist[j]
+        twist[i] = value * S[i, i]
+
+
+@inlined
+def solve(layout: Layout, damping: float, eq: Equations) -> None:
+    """The platform's twist, and in Y's last column the step of every free coordinate."""
+    for i in range(6):
+        for j in range(7):
+            eq.S[i, j] = eq.G[i, j]
+    for group in range(len(layout.sizes)):
+        size, C, Y = layout.sizes[group], eq.C[group], eq.Y[group]
+        eliminate(eq.A[group], C, eq.b[group], size, damping, eq.factor, Y)
+        for i in range(6):
+            for s in range(size):
+                for j in range(i + 1):
+                    eq.S[i, j] -= C[s, i] * Y[s, j]
+                eq.S[i, 6] += C[s, i] * Y[s, 6]
+    solve_platform(eq.S, damping, eq.twist)
+    for i in range(6):
+        if eq.G[i, i] >= LOCKED:
+            eq.twist[i] = 0.0
+    for group in range(len(layout.sizes)):
+        for s in range(layout.sizes[group]):
+            for i in range(6):
+                eq.Y[group, s, 6] += eq.Y[group, s, i] * eq.twist[i]
+
+
+@inlined
+def move(loops: Loops, layout: Layout, eq: Equations, state: State) -> float:
+    """Take the step, shortened where it turns too far, or slides farther than the largest gap; its largest part."""
+    gap = 1.0
+    for group in range(len(layout.sizes)):
+        gap = max(gap, eq.gaps[group] / LONGEST_STEP)
+    longest = 0.0
+    for i in range(6):
+        longest = max(longest, abs(eq.twist[i]) / (gap if i < 3 else 1.0))
+    for k in range(len(loops.kinds)):
+        j = loops.columns[k]
+        for i in range(3 if loops.kinds[k] == BALL else 1):
+            if layout.slots[j + i] >= 0:
+                part = abs(eq.Y[loops.group_of[j], layout.slots[j + i], 6])
+                longest = max(longest, part / (gap if loops.kinds[k] == SLIDE else 1.0))
+    scale = min(1.0, LONGEST_STEP / longest) if longest > 0.0 else 1.0
+    for k in range(len(loops.kinds)):
+        j = loops.columns[k]
+        Y = eq.Y[loops.group_of[j]]
+        if loops.kinds[k] != BALL:
+            if layout.slots[j] >= 0:
+                state.q[j] += scale * Y[layout.slots[j], 6]
+        elif layout.slots[j] >= 0:
+            s = layout.slots[j]
+            turn_ball(state.balls[k], scale * Y[s, 6], scale * Y[s + 1, 6], scale * Y[s + 2, 6])
+    X, V = state.X, eq.twist
+    for i in range(3):
+        X[i, 3] += scale * V[i]
+    # the platform turns about base axes: its rotation is multiplied from the left, column by column
+    w, x, y, z = exponential(scale * V[3], scale * V[4], scale * V[5])
+    for j in range(3):
+        a, b, c = X[0, j], X[1, j], X[2, j]
+        p, q, r = y * c - z * b, z * a - x * c, x * b - y * a
+        X[0, j] = a + 2.0 * (w * p + y * r - z * q)
+        X[1, j] = b + 2.0 * (w * q + z * p - x * r)
+        X[2, j] = c + 2.0 * (w * r + x * q - y * p)
+    return scale * longest
+
+
+@inlined
+def is_close(wishes: Wishes, eq: Equations) -> bool:
+    """Whether all that must hold does."""
+    largest = 0.0
+    for group in range(len(eq.gaps)):
+        largest = max(largest, eq.gaps[group], eq.misses[group])
+        if wishes.limits:
+            largest = max(largest, eq.excesses[group])
+    return largest <= wishes.closeness
+
+
+@kernel
+def close(loops: Loops, layout: Layout, wishes: Wishes, closed: Closed) -> None:
+    """Close the loops of every row, nearest to what is wished.
+
+    A row ends when all that must hold is within `wishes.closeness`, when its steps or gains vanish, or after
+    `wishes.max_iterations`; what was measured of it tells how far it came.
+    """
+    best, trial = new_state(loops), new_state(loops)
+    eq = new_equations(loops, layout)
+    plunging = wishes.plunging == 1
+    for row in range(len(closed.coordinates)):
+        load_row(loops, layout, wishes.chained == 1 and row > 0, row, closed, trial)
+        copy_state(trial, best)
+        cost, factor, step = math.inf, 1.0, math.inf
+        iterations, turn = 0, TRY
+        while True:
+            clear(layout, eq)
+            found = 0.0
+            if turn != MEASURE:
+                found += add_paths(loops, layout, wishes, row, trial, eq)
+            if wishes.limits == 1 or turn == MEASURE:
+                found += add_ranges(loops, layout.slots, trial, wishes.margin, eq)
+                found += add_cones(loops, layout.slots, trial, wishes.margin, eq)
+            if turn == MEASURE:
+                for group in range(len(layout.sizes)):
+                    closed.excesses[row, group] = eq.excesses[group]
+                break
+            found += add_anchors(loops, layout.slots, row, trial, wishes, eq)
+            if wishes.framed == 1:
+                turn_equations(wishes.targets[row], layout, eq)
+            found += add_platform(row, trial, wishes, eq)
+            if turn == TRY:
+                if found < cost or plunging:
+                    gained, cost = cost - found, found
+                    copy_state(trial, best)
+                    note(eq, row, closed)
+                    factor = max(factor / 4.0, 1e-3)
+                    if is_close(wishes, eq) or (gained <= 1e-13 * cost and not plunging):
+                        turn = MEASURE
+                else:
+                    factor *= 8.0
+                    turn = MEASURE if step < 1e-12 else RETURN
+                    copy_state(best, trial)
+            elif turn == RETURN:
+                turn = TRY
+            damping = LEAST_DAMPING if plunging else max(LEAST_DAMPING, DAMPING * factor * min(cost, 1.0))
+            if turn == TRY and (iterations == wishes.max_iterations or not damping < MOST_DAMPING):
+                turn = MEASURE
+            if turn == TRY:
+                solve(layout, damping, eq)
+                if wishes.framed == 1:
+                    out_of_frame(wishes.targets[row], eq.twist)
+                step = move(loops, layout, eq, trial)
+                iterations += 1
+            elif turn == MEASURE:
+                if wishes.balls_follow == 1:
+                    follow_platform(loops, best, eq)
+                copy_state(best, trial)
+        store_row(loops, row, best, closed)
+        closed.iterations[row] = iterations

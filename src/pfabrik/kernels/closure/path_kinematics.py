@@ -1,0 +1,237 @@
+"""Where joint coordinates put the ends of paths, and how these move with each of them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .._jit import allocator, inlined, routine
+from ..rotations import difference, logarithm, rotate_by, turn_ball
+from .loops import BALL, SLIDE, Closed, Floats, Layout, Loops
+
+
+class State(NamedTuple):
+    """One configuration under work."""
+
+    q: Floats  # (columns,): turns and slides
+    balls: Floats  # (units, 4): quaternions of ball joints
+    X: Floats  # (3, 4): the platform
+
+
+class Equations(NamedTuple):
+    """Normal equations, group by group, and what they are made of."""
+
+    rows: Floats  # (rows, 6): columns of the Jacobian: velocity of the path's end, angular velocity
+    at: Floats  # (rows, 3): a point of the axis of each
+    T: Floats  # (3, 4): the body a path has come to
+    e: Floats  # (6,)
+    arm: Floats  # (3,): from the platform's reference point to a joint of it
+    A: Floats  # (groups, m, m)
+    C: Floats  # (groups, m, 6)
+    b: Floats  # (groups, m)
+    factor: Floats  # (m, m)
+    Y: Floats  # (groups, m, 7): what the platform's twist does to each coordinate, and what is left for it to do
+    G: Floats  # (6, 7): the platform's equations, right-hand side last
+    S: Floats  # (6, 7): the same, being solved
+    twist: Floats  # (6,)
+    gaps: Floats  # (groups,)
+    excesses: Floats
+    misses: Floats
+
+
+@allocator
+def new_state(loops: Loops) -> State:
+    """Room for a configuration."""
+    return State(np.zeros(len(loops.lo)), np.zeros((len(loops.kinds), 4)), np.zeros((3, 4)))
+
+
+@allocator
+def new_equations(loops: Loops, layout: Layout) -> Equations:
+    """Room for the equations of one thread."""
+    groups, m, rows = len(loops.groups) - 1, max(1, layout.sizes.max()), len(loops.row_columns)
+    return Equations(
+        np.zeros((rows, 6)),
+        np.zeros((rows, 3)),
+        np.zeros((3, 4)),
+        np.zeros(6),
+        np.zeros(3),
+        np.zeros((groups, m, m)),
+        np.zeros((groups, m, 6)),
+        np.zeros((groups, m)),
+        np.zeros((m, m)),
+        np.zeros((groups, m, 7)),
+        np.zeros((6, 7)),
+        np.zeros((6, 7)),
+        np.zeros(6),
+        np.zeros(groups),
+        np.zeros(groups),
+        np.zeros(groups),
+    )
+
+
+@inlined
+def copy_state(source: State, target: State) -> None:
+    for j in range(len(source.q)):
+        target.q[j] = source.q[j]
+    for k in range(len(source.balls)):
+        for i in range(4):
+            target.balls[k, i] = source.balls[k, i]
+    for i in range(3):
+        for j in range(4):
+            target.X[i, j] = source.X[i, j]
+
+
+@inlined
+def load_row(loops: Loops, layout: Layout, chained: bool, row: int, closed: Closed, state: State) -> None:
+    """The configuration where a row starts."""
+    for j in range(len(state.q)):
+        if chained and layout.slots[j] >= 0:
+            closed.coordinates[row, j] = closed.coordinates[row - 1, j]
+        state.q[j] = closed.coordinates[row, j]
+    for k in range(len(loops.kinds)):
+        if loops.kinds[k] == BALL:
+            j = loops.columns[k]
+            state.balls[k, 0] = 1.0
+            state.balls[k, 1] = state.balls[k, 2] = state.balls[k, 3] = 0.0
+            turn_ball(state.balls[k], state.q[j], state.q[j + 1], state.q[j + 2])
+    for i in range(3):
+        for j in range(4):
+            state.X[i, j] = closed.poses[row, i, j]
+
+
+@inlined
+def store_row(loops: Loops, row: int, state: State, closed: Closed) -> None:
+    """The configuration where a row ended."""
+    for j in range(len(state.q)):
+        closed.coordinates[row, j] = state.q[j]
+    for k in range(len(loops.kinds)):
+        if loops.kinds[k] == BALL:
+            j, ball = loops.columns[k], state.balls[k]
+            x, y, z = logarithm(ball[0], ball[1], ball[2], ball[3])
+            closed.coordinates[row, j], closed.coordinates[row, j + 1], closed.coordinates[row, j + 2] = x, y, z
+    for i in range(3):
+        for j in range(4):
+            closed.poses[row, i, j] = state.X[i, j]
+
+
+@inlined
+def walk_path(loops: Loops, path: int, last: int, state: State, eq: Equations) -> None:
+    """Pose a path's bodies from the base outward up to a visit, noting the axis of every motion as it is passed."""
+    T = eq.T
+    for i in range(3):
+        for j in range(4):
+            T[i, j] = 1.0 if i == j else 0.0
+    for visit in range(loops.paths[path], last):
+        k, sign = loops.visits[visit, 0], float(loops.visits[visit, 1])
+        row, axis, point, kind = loops.visit_rows[visit], loops.axes[k], loops.points[k], loops.kinds[k]
+        if kind == SLIDE:
+            s = state.q[loops.columns[k]]
+            for i in range(3):
+                a = sign * (T[i, 0] * axis[0] + T[i, 1] * axis[1] + T[i, 2] * axis[2])
+                eq.rows[row, i] = a
+                eq.rows[row, i + 3] = 0.0
+                T[i, 3] += s * a
+            continue
+        if kind == BALL:
+            w, x, y, z = state.balls[k, 0], state.balls[k, 1], state.balls[k, 2], state.balls[k, 3]
+        else:
+            half = 0.5 * state.q[loops.columns[k]]
+            sine = math.sin(half)
+            w, x, y, z = math.cos(half), sine * axis[0], sine * axis[1], sine * axis[2]
+        if sign > 0.0:
+            note_axes(T, kind == BALL, sign, axis, point, row, eq.rows, eq.at)
+        turn_about(T, point, w, sign * x, sign * y, sign * z)
+        if sign < 0.0:
+            note_axes(T, kind == BALL, sign, axis, point, row, eq.rows, eq.at)
+
+
+@routine
+def note_axes(
+    T: Floats, is_ball: bool, sign: float, axis: Floats, point: Floats, row: int, rows: Floats, at: Floats
+) -> None:
+    """The present axis of a turn, or the three of a ball joint, and the point they pass through."""
+    for i in range(3):
+        centre = T[i, 0] * point[0] + T[i, 1] * point[1] + T[i, 2] * point[2] + T[i, 3]
+        at[row, i] = centre
+        if is_ball:
+            at[row + 1, i] = at[row + 2, i] = centre
+            for j in range(3):
+                rows[row + j, 3 + i] = sign * T[i, j]
+        else:
+            rows[row, 3 + i] = sign * (T[i, 0] * axis[0] + T[i, 1] * axis[1] + T[i, 2] * axis[2])
+
+
+@routine
+def turn_about(T: Floats, point: Floats, w: float, x: float, y: float, z: float) -> None:
+    """T = T times the rotation of a quaternion about a point."""
+    for i in range(3):
+        T[i, 3] += T[i, 0] * point[0] + T[i, 1] * point[1] + T[i, 2] * point[2]
+    rotate_by(T, w, x, y, z)
+    for i in range(3):
+        T[i, 3] -= T[i, 0] * point[0] + T[i, 1] * point[1] + T[i, 2] * point[2]
+
+
+@inlined
+def end_path(loops: Loops, path: int, last: int, end: Floats, eq: Equations) -> None:
+    """T's last column becomes a point of the body a path has come to; its velocities under the path's motions."""
+    T = eq.T
+    for i in range(3):
+        T[i, 3] += T[i, 0] * end[0] + T[i, 1] * end[1] + T[i, 2] * end[2]
+    for visit in range(loops.paths[path], last):
+        if loops.kinds[loops.visits[visit, 0]] == SLIDE:
+            continue
+        for r in range(loops.visit_rows[visit], loops.visit_rows[visit + 1]):
+            a, at = eq.rows[r], eq.at[r]
+            x, y, z = T[0, 3] - at[0], T[1, 3] - at[1], T[2, 3] - at[2]
+            a[0], a[1], a[2] = a[4] * z - a[5] * y, a[5] * x - a[3] * z, a[3] * y - a[4] * x
+
+
+@inlined
+def compare_end(loops: Loops, state: State, eq: Equations) -> float:
+    """The path's residual; its largest part."""
+    difference(eq.T, state.X, eq.e[3:])
+    position = rotation = 0.0
+    for i in range(3):
+        eq.e[i] = eq.T[i, 3] - state.X[i, 3]
+        position += eq.e[i] ** 2
+        rotation += eq.e[i + 3] ** 2
+    return math.sqrt(max(position, rotation))
+
+
+@inlined
+def pose_cone(loops: Loops, cone: int, state: State, eq: Equations) -> float:
+    """Pose the joint of a cone in its first body; the length of its line.
+
+    T's rotation becomes the joint's, S's first rows the axes of its motions, at most three. The first half of the twist
+    becomes what turns with the second body, the line or the cone's axis, and the second half the one that stays.
+    """
+    T, line, pair = eq.T, eq.e, eq.twist
+    for i in range(3):
+        for j in range(3):
+            T[i, j] = 1.0 if i == j else 0.0
+        line[i] = loops.cone_lines[cone, i]
+    for slide in range(loops.cone_slides[cone, 0], loops.cone_slides[cone, 1]):
+        for i in range(3):
+            line[i] += state.q[loops.slides[slide]] * loops.slide_axes[slide, i]
+    for k in range(loops.cone_units[cone, 0], loops.cone_units[cone, 1]):
+        if loops.kinds[k] == BALL:
+            for i in range(3):
+                for j in range(3):
+                    eq.S[j, i] = 1.0 if i == j else 0.0
+            w, x, y, z = state.balls[k, 0], state.balls[k, 1], state.balls[k, 2], state.balls[k, 3]
+        else:
+            axis, half = loops.axes[k], 0.5 * state.q[loops.columns[k]]
+            for i in range(3):
+                own = T[i, 0] * axis[0] + T[i, 1] * axis[1] + T[i, 2] * axis[2]
+                eq.S[k - loops.cone_units[cone, 0], i] = own
+            sine = math.sin(half)
+            w, x, y, z = math.cos(half), sine * axis[0], sine * axis[1], sine * axis[2]
+        rotate_by(T, w, x, y, z)
+    outward = loops.cone_outward[cone] == 1
+    for i in range(3):
+        moved = line if outward else loops.cone_axes[cone]
+        pair[i] = T[i, 0] * moved[0] + T[i, 1] * moved[1] + T[i, 2] * moved[2]
+        pair[3 + i] = loops.cone_axes[cone, i] if outward else line[i]
+    return math.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)

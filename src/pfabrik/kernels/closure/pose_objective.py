@@ -1,0 +1,118 @@
+"""What a search brings near: an end effector to its target, in what counts of a pose, with some of it held."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from .._jit import routine
+from ..rotations import difference
+from ..vectors import Vec, cross, dot, norm, scale
+from .loops import LOCKED, Floats
+
+ALIGNED = 1e-9
+"""Sine below which two directions have no axis across them."""
+
+
+class Aim(NamedTuple):
+    """What is to come near: lengths in L."""
+
+    targets: Floats  # (n, 4, 4)
+    platform: Floats  # (6,): weights of the squares of position and rotation; 0 for what does not count; LOCKED holds
+    framed: int  # 1: of the rotation only the direction of the platform's z axis counts
+    margin: float  # by how much inside their limits coordinates stay
+    near: float  # limits farther away are not looked at when multipliers are asked for
+    max_iterations: int
+
+
+class Pull(NamedTuple):
+    """What an aim asks of the end effector where it is."""
+
+    force: Floats  # (6,): gradient of the objective in its twist
+    holds: Floats  # (6, 6): what of its twist is held, one a row
+    errors: Floats  # (6,): by how much each of these is off
+    unit: Floats  # (1,): what the objective is multiplied by, so that its gradient is of order one
+    turn: Floats  # (6,)
+
+
+@routine
+def look_at_aim(want: Aim, target: Floats, X: Floats, pull: Pull) -> tuple[float, int]:
+    """The objective, and how many components of the twist are held."""
+    w, force, unit = pull.turn, pull.force, pull.unit[0]
+    difference(X, target, w[3:])
+    value, held = 0.0, 0
+    for i in range(6):
+        force[i] = 0.0
+        if i < 3:
+            w[i] = X[i, 3] - target[i, 3]
+        elif want.framed == 1:
+            continue
+        if want.platform[i] == LOCKED:
+            held = hold(pull, held, i, w[i])
+        else:
+            value += 0.5 * unit * want.platform[i] * w[i] * w[i]
+            force[i] = unit * want.platform[i] * w[i]
+    if want.framed == 1 and want.platform[3] == LOCKED:
+        held = hold_tilt(target, X, pull, held)
+    elif want.framed == 1 and want.platform[3] > 0.0:
+        value += tilt(target, unit * want.platform[3], X, force)
+    return value, held
+
+
+@routine
+def hold(pull: Pull, held: int, component: int, error: float) -> int:
+    """Note one more component of the twist that is held."""
+    pull.errors[held] = error
+    for i in range(6):
+        pull.holds[held, i] = 1.0 if i == component else 0.0
+    return held + 1
+
+
+@routine
+def hold_tilt(target: Floats, X: Floats, pull: Pull, held: int) -> int:
+    """The z axis keeps the target's direction: it has no part along the target's x and y axes.
+
+    The opposite direction has none either. So a z axis that is farther away than a right angle is asked to turn by the
+    shortest way, and not across it.
+    """
+    axis, angle = turn_of_tilt(target, X)
+    if angle > 0.5 * math.pi:
+        held = hold(pull, held, 3, angle)
+        held = hold(pull, held, 3, 0.0)
+        sway = cross(axis, (X[0, 2], X[1, 2], X[2, 2]))
+        for i in range(3):
+            pull.holds[held - 2, 3 + i] = -axis[i]
+            pull.holds[held - 1, 3 + i] = sway[i]
+        return held
+    for k in range(2):
+        off = 0.0
+        for i in range(3):
+            off += target[i, k] * X[i, 2]
+        held = hold(pull, held, 3, off)
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            pull.holds[held - 1, 3 + i] = X[a, 2] * target[b, k] - X[b, 2] * target[a, k]
+    return held
+
+
+@routine
+def tilt(target: Floats, weight: float, X: Floats, force: Floats) -> float:
+    """Half the weighted square of the angle between z axes, its gradient added to the force."""
+    axis, angle = turn_of_tilt(target, X)
+    for i in range(3):
+        force[3 + i] -= weight * angle * axis[i]
+    return 0.5 * weight * angle * angle
+
+
+@routine
+def turn_of_tilt(target: Floats, X: Floats) -> tuple[Vec, float]:
+    """The shortest turn of the z axis to the target's: about which axis, and how far; half a turn about any."""
+    here, there = (X[0, 2], X[1, 2], X[2, 2]), (target[0, 2], target[1, 2], target[2, 2])
+    axis = cross(here, there)
+    sine, cosine = norm(axis), dot(here, there)
+    angle = math.atan2(sine, cosine)
+    if sine > ALIGNED:
+        return scale(1.0 / sine, axis), angle
+    if cosine > 0.0:
+        return scale(1.0 / angle if angle > 0.0 else 0.0, axis), angle
+    return (X[0, 0], X[1, 0], X[2, 0]), angle

@@ -1,0 +1,217 @@
+"""Reaching: FABRIK's forward and backward passes on one branch, and the chains made of branches."""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import inlined, routine
+from ..linear import solve_spd
+from ..vectors import Vec, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec
+from .exact import reach_exact
+from .frames import move_carriers
+from .measure import measure_branch, measure_chain, measure_trunk
+from .plan import LENGTH, PASSES, PLATFORM_CONE, SLIDE, TURN, Configuration, Floats, Plan, Records, Settings
+from .restrict import NO_LENGTH, clamp_cone, clamp_stroke, cone_axis, restrict_step
+
+# A pass that improves the error by less than this share has stalled: the target is out of reach ...
+STALL = 1e-3
+# ... unless it moves on after a while: so many stalls in a row are believed.
+STALLS = 4
+# A rail that leaves the plane of its branch by more than this sine moves the plane along.
+OBLIQUE = 1e-6
+# Two Gauss-Newton steps fit a trunk well enough for one pass; damped where a joint moves no branch joint.
+FIT_STEPS, FIT_DAMPING = 2, 1e-12
+
+
+@routine
+def reach_forward(plan: Plan, b: int, now: Configuration) -> None:
+    """From the target toward the base: each node at its allowed distance from the one before it."""
+    branch, nodes = plan.branches[b], now.nodes
+    carrier = now.carriers[branch["carrier"]]
+    first, last = branch["first"], branch["last"]
+    put(nodes[last], move(now.pose, vec(branch["end"])))
+    normal = turn(carrier, vec(branch["normal"]))
+    base = move(carrier, vec(plan.nodes[first]["home"]))
+    oblique = branch["rail"] == 1 and abs(dot(normal, vec(branch["rail_axis"]))) > OBLIQUE
+    for k in range(last - 1, first - 1, -1):
+        d = sub(vec(nodes[k]), vec(nodes[k + 1]))
+        if k + 1 == last:
+            d = restrict_end_step(plan, branch, now, d)
+        length = norm(d)
+        if length <= NO_LENGTH:
+            d = turn(carrier, sub(vec(plan.nodes[k]["home"]), vec(plan.nodes[k + 1]["home"])))
+            length = norm(d)
+        reach = clamp_stroke(length, plan.nodes[k + 1]["lo"], plan.nodes[k + 1]["hi"])
+        p = along(vec(nodes[k + 1]), reach / length, d)
+        if branch["planar"] > 0 and k - first <= branch["planar"] and not oblique:
+            p = along(p, -dot(normal, sub(p, base)), normal)
+        put(nodes[k], p)
+
+
+@routine
+def restrict_end_step(plan: Plan, branch: Records, now: Configuration, d: Vec) -> Vec:
+    """The first step inward, as the platform's own joint allows it."""
+    if branch["end_plane"] == 1:
+        d = flatten(d, turn(now.pose, vec(branch["end_normal"])))
+    carrier = now.carriers[branch["carrier"]]
+    normal = turn(carrier, vec(branch["normal"]))
+    for c in range(branch["cone_first"], branch["cone_last"]):
+        cone = plan.cones[c]
+        if cone["kind"] == PLATFORM_CONE:
+            d = clamp_cone(cone_axis(cone, carrier, now.pose, normal, now.nodes), cone["half_angle"], d)
+    return d
+
+
+@routine
+def reach_backward(plan: Plan, b: int, now: Configuration) -> None:
+    """From the base out to the end: each node at its allowed distance and direction from the one before it."""
+    branch, nodes = plan.branches[b], now.nodes
+    carrier = now.carriers[branch["carrier"]]
+    first, last = branch["first"], branch["last"]
+    base = move(carrier, vec(plan.nodes[first]["home"]))
+    if branch["rail"] == 1:
+        axis = vec(branch["rail_axis"])
+        slide = dot(axis, sub(vec(nodes[first]), base))
+        base = along(base, clamp_stroke(slide, branch["rail_lo"], branch["rail_hi"]), axis)
+    put(nodes[first], base)
+    for k in range(first + 1, last + 1):
+        d = sub(vec(nodes[k]), vec(nodes[k - 1]))
+        if norm(d) <= NO_LENGTH:
+            d = turn(carrier, sub(vec(plan.nodes[k]["home"]), vec(plan.nodes[k - 1]["home"])))
+        d = restrict_step(plan, branch, k, carrier, now.pose, nodes, d)
+        length = norm(d)
+        reach = clamp_stroke(length, plan.nodes[k]["lo"], plan.nodes[k]["hi"])
+        put(nodes[k], along(vec(nodes[k - 1]), reach / length, d))
+
+
+@routine
+def end_gap(plan: Plan, b: int, now: Configuration) -> float:
+    """Distance between a branch's end and its target."""
+    branch = plan.branches[b]
+    return norm(sub(vec(now.nodes[branch["last"]]), move(now.pose, vec(branch["end"]))))
+
+
+@routine
+def chain_is_reached(plan: Plan, c: int, now: Configuration, slack: float) -> bool:
+    gap, excess = measure_chain(plan, c, now)
+    return gap <= slack and excess * plan.scalars[LENGTH] <= slack
+
+
+@inlined
+def reach_branch_exactly(
+    plan: Plan, b: int, now: Configuration, mode: float, settings: Settings
+) -> tuple[bool, float, float]:
+    """The closed form of one branch, in the seed's mode and, where allowed, in the other.
+
+    Whether it reaches with all limits kept, and the gap [length] and excess [L or rad] measured.
+    """
+    gap, excess = math.inf, math.inf
+    for _mode in range(1 + settings.any_mode):
+        if not reach_exact(plan, b, now, mode, settings.slack):
+            break
+        gap, excess = measure_branch(plan, b, now)
+        if gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack:
+            return True, gap, excess
+        mode = -mode
+    return False, gap, excess
+
+
+@inlined
+def reach_chain_directly(
+    plan: Plan, c: int, now: Configuration, modes: Floats, settings: Settings
+) -> tuple[bool, float, float]:
+    """One chain by closed forms alone, its trunk (if any) left where it is; returns as `reach_branch_exactly`."""
+    gap, excess = 0.0, measure_trunk(plan, plan.chains[c]["trunk"], now)
+    reached = excess * plan.scalars[LENGTH] <= settings.slack
+    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+        if reached:
+            reached = plan.branches[b]["kind"] != PASSES
+        if reached:
+            reached, branch_gap, branch_excess = reach_branch_exactly(plan, b, now, modes[b], settings)
+            gap, excess = max(gap, branch_gap), max(excess, branch_excess)
+    return reached, gap, excess
+
+
+@routine
+def try_directly(plan: Plan, c: int, now: Configuration, modes: Floats, settings: Settings) -> bool:
+    """`reach_chain_directly`, compiled once for the iterations to call."""
+    reached, _gap, _excess = reach_chain_directly(plan, c, now, modes, settings)
+    return reached
+
+
+@routine
+def pass_over_chain(plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats) -> float:
+    """One iteration, forward and backward, of all branches of a chain; the largest end gap it leaves."""
+    chain = plan.chains[c]
+    for b in range(chain["first"], chain["last"]):
+        reach_forward(plan, b, now)
+        put(wanted[b], vec(now.nodes[plan.branches[b]["first"]]))
+    if chain["trunk"] >= 0:
+        fit_trunk(plan, c, now, wanted, system)
+    gap = 0.0
+    for b in range(chain["first"], chain["last"]):
+        reach_backward(plan, b, now)
+        gap = max(gap, end_gap(plan, b, now))
+    return gap
+
+
+@routine
+def reach_by_passes(
+    plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats, enough: float, settings: Settings
+) -> tuple[float, int]:
+    """Forward and backward passes until the ends are within `enough` or K iterations are spent.
+
+    Where an exact step follows, they also end when they stall.
+    """
+    gap = pass_over_chain(plan, c, now, wanted, system)
+    stalls = 0
+    for iteration in range(1, settings.max_iterations):
+        if gap <= enough or (settings.exact == 1 and stalls >= STALLS):
+            return gap, iteration
+        previous = gap
+        gap = pass_over_chain(plan, c, now, wanted, system)
+        stalls = stalls + 1 if gap > (1.0 - STALL) * previous else 0
+    return gap, settings.max_iterations
+
+
+@routine
+def fit_trunk(plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats) -> None:
+    """Give the common body the pose, within its joints' ranges, that fits its branch joints best.
+
+    Gauss-Newton on the trunk's joint values; `wanted` holds where each branch would have its first node.
+    """
+    trunk = plan.chains[c]["trunk"]
+    first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
+    n = last - first
+    for _step in range(FIT_STEPS):
+        for i in range(n):
+            for j in range(n + 1):
+                system[i, j] = 0.0
+        for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+            present = move(now.carriers[trunk + 1], vec(plan.nodes[plan.branches[b]["first"]]["home"]))
+            miss = sub(vec(wanted[b]), present)
+            for i in range(n):
+                rate = scale(trunk_unit(plan, first + i), point_rate(plan, now, first + i, present))
+                system[i, n] += dot(rate, miss)
+                for j in range(n):
+                    other = scale(trunk_unit(plan, first + j), point_rate(plan, now, first + j, present))
+                    system[i, j] += dot(rate, other)
+        solve_spd(system, n, FIT_DAMPING)
+        for i in range(n):
+            joint = plan.trunk_joints[first + i]
+            value = now.trunks[first + i] + system[i, n] * trunk_unit(plan, first + i)
+            now.trunks[first + i] = min(max(value, joint["lo"]), joint["hi"])
+        move_carriers(plan, now)
+
+
+@routine
+def trunk_unit(plan: Plan, j: int) -> float:
+    """Size of one unit step of a trunk joint's unknown: unknowns are lengths."""
+    return 1.0 / plan.scalars[LENGTH] if plan.trunk_joints[j]["kind"] == TURN else 1.0
+
+
+@routine
+def point_rate(plan: Plan, now: Configuration, j: int, p: Vec) -> Vec:
+    """Velocity of the point `p` of a carrier per unit rate of its trunk joint `j`."""
+    axis = vec(now.screws[j, 1])
+    return axis if plan.trunk_joints[j]["kind"] == SLIDE else cross(axis, sub(p, vec(now.screws[j, 0])))

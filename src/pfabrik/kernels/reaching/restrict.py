@@ -1,0 +1,129 @@
+"""Restrictions on positions: strokes, hinges, cones; as clamps of a segment's direction and length."""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import inlined, routine
+from ..vectors import (
+    Vec,
+    add,
+    angle_about,
+    angle_between,
+    cross,
+    flatten,
+    norm,
+    rotate,
+    scale,
+    sub,
+    turn,
+    vec,
+    wrap,
+    wrap_into,
+)
+from .plan import CARRIER_CONE, PLATFORM_CONE, Floats, Plan, Records
+
+# Below this a vector has no direction; far under any length of a machine, far over the smallest normal number.
+NO_LENGTH = 1e-150
+# A vector within this angle of a cone's axis, or of its opposite, points to no side of it: the rest is rounding.
+NO_SIDE = 1e-12
+# A clamp to a cone keeps at least this share of the length, so that the direction survives.
+LEAST_SHARE = 1e-3
+# A sweep over the restrictions that turns a step by no more than rounding was the last.
+UNMOVED = 1e-15
+
+
+@routine
+def clamp_stroke(length: float, lo: float, hi: float) -> float:
+    """The paper's rule: a length inside its limits is left alone."""
+    return min(max(length, lo), hi)
+
+
+@routine
+def any_normal(a: Vec) -> Vec:
+    """A unit vector normal to `a`."""
+    helper = (1.0, 0.0, 0.0) if abs(a[0]) < 0.6 * norm(a) else (0.0, 1.0, 0.0)
+    n = cross(a, helper)
+    return scale(1.0 / norm(n), n)
+
+
+@routine
+def clamp_cone(axis: Vec, half_angle: float, d: Vec) -> Vec:
+    """The nearest vector to `d` within `half_angle` of the unit vector `axis`."""
+    angle = angle_between(axis, d)
+    if angle <= half_angle:
+        return d
+    radial = flatten(d, axis)
+    size = norm(radial)
+    radial = scale(1.0 / size, radial) if size > NO_SIDE * norm(d) else any_normal(axis)
+    kept = norm(d) * max(math.cos(angle - half_angle), LEAST_SHARE)
+    return add(scale(kept * math.cos(half_angle), axis), scale(kept * math.sin(half_angle), radial))
+
+
+@inlined
+def hinge_angle(plan: Plan, branch: Records, k: int, carrier: Floats, normal: Vec, nodes: Floats, d: Vec) -> float:
+    """Angle from home of the hinge at node `k` when the next segment is `d`."""
+    node = plan.nodes[k]
+    if k == branch["first"]:
+        angle = angle_about(normal, turn(carrier, vec(branch["reference"])), d)
+    else:
+        angle = angle_about(normal, sub(vec(nodes[k]), vec(nodes[k - 1])), d) - node["angle_home"]
+    return wrap_into(angle, node["angle_lo"], node["angle_hi"]) if node["ranged"] == 1 else wrap(angle, 0.0)
+
+
+@inlined
+def end_hinge_angle(branch: Records, pose: Floats, d: Vec) -> float:
+    """Angle from home of the hinge on the platform when the last segment, seen from there, is `d`."""
+    normal = turn(pose, vec(branch["end_normal"]))
+    angle = angle_about(normal, turn(pose, vec(branch["end_reference"])), d)
+    if branch["end_ranged"] == 1:
+        return wrap_into(angle, float(branch["end_angle_lo"]), float(branch["end_angle_hi"]))
+    return wrap(angle, 0.0)
+
+
+@inlined
+def cone_axis(cone: Records, carrier: Floats, pose: Floats, normal: Vec, nodes: Floats) -> Vec:
+    """The present direction of a cone's axis."""
+    a = vec(cone["axis"])
+    if cone["kind"] == CARRIER_CONE:
+        return turn(carrier, a)
+    if cone["kind"] == PLATFORM_CONE:
+        return turn(pose, a)
+    k = cone["node"]
+    link = sub(vec(nodes[k]), vec(nodes[k - 1]))
+    link = scale(1.0 / max(norm(link), NO_LENGTH), link)
+    return add(add(scale(a[0], link), scale(a[1], cross(normal, link))), scale(a[2], normal))
+
+
+@routine
+def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Floats, nodes: Floats, d: Vec) -> Vec:
+    """Turn the step `d` from node k-1 to node k until hinges and cones at its two ends allow it."""
+    normal = turn(carrier, vec(branch["normal"]))
+    before = plan.nodes[k - 1]
+    at_end = k == branch["last"]
+    # several restrictions on one step are met in turn; three sweeps settle all but pathological cones
+    for _sweep in range(3):
+        start = d
+        if before["hinge"] == 1:
+            d = flatten(d, normal)
+            if norm(d) <= NO_LENGTH:
+                d = turn(carrier, vec(branch["reference"]))
+            if before["ranged"] == 1:
+                angle = hinge_angle(plan, branch, k - 1, carrier, normal, nodes, d)
+                inside = min(max(angle, before["angle_lo"]), before["angle_hi"])
+                if inside != angle:
+                    kept = max(math.cos(inside - angle), LEAST_SHARE)
+                    d = scale(kept, rotate(d, normal, inside - angle))
+        if at_end and branch["end_plane"] == 1:
+            d = flatten(d, turn(pose, vec(branch["end_normal"])))
+        for c in range(branch["cone_first"], branch["cone_last"]):
+            cone = plan.cones[c]
+            if cone["kind"] == PLATFORM_CONE:
+                if at_end:
+                    axis = scale(-1.0, cone_axis(cone, carrier, pose, normal, nodes))
+                    d = clamp_cone(axis, cone["half_angle"], d)
+            elif cone["node"] == k - 1:
+                d = clamp_cone(cone_axis(cone, carrier, pose, normal, nodes), cone["half_angle"], d)
+        if norm(sub(d, start)) <= UNMOVED * norm(start):
+            break
+    return d

@@ -1,0 +1,57 @@
+"""Batches on all cores: blocks of rows, each a kernel call that has released the GIL."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .reaching import plan as P
+
+T = TypeVar("T")
+Kernel = Callable[[P.Plan, NDArray[np.float64], P.Seeds, P.Settings, P.Rows], int]
+
+
+def n_cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@lru_cache(maxsize=1)
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(n_cores(), thread_name_prefix="pfabrik")
+
+
+if hasattr(os, "register_at_fork"):  # threads do not survive a fork: the child starts its own
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
+def run_in_blocks(
+    kernel: Kernel,
+    plan: P.Plan,
+    targets: NDArray[np.float64],
+    seeds: P.Seeds,
+    settings: P.Settings,
+    rows: P.Rows,
+    rows_a_block: int,
+) -> int:
+    """The kernel over all rows, in blocks spread over the cores; the sum of what it returns."""
+
+    def run(block: slice) -> int:
+        own = seeds if len(seeds.poses) == 1 else P.Seeds._make(array[block] for array in seeds)
+        return kernel(plan, targets[block], own, settings, P.Rows._make(array[block] for array in rows))
+
+    return sum(in_blocks(run, len(targets), rows_a_block))
+
+
+def in_blocks(run: Callable[[slice], T], n: int, rows_a_block: int) -> list[T]:
+    """What `run` returns for the blocks of n rows, in order; it must release the GIL for other cores to help."""
+    blocks = [slice(start, start + rows_a_block) for start in range(0, n, rows_a_block)]
+    if len(blocks) <= 1 or n_cores() == 1:
+        return [run(block) for block in blocks]
+    return list(_pool().map(run, blocks))

@@ -1,0 +1,1 @@
+"""Searches for every configuration: all assembly modes of actuator values, all working modes of a target."""

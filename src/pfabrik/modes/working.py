@@ -1,0 +1,118 @@
+"""Working modes: every configuration in which a mechanism has its end effector on a target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..answers.solution import Solution
+from ..closure.close import close, closure_of
+from ..closure.nearest import is_feasible
+from ..decomposition.plan import flat_of
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..description.task import task_of
+from ..errors import InvalidArgument
+from ..kernels.reaching import plan as P
+from ..poses import are_poses, as_targets, made_exact, what_is_wrong
+from ..reaching.completion import actuators_of, positions_of
+from ..reaching.rows import new_rows
+from .branches import BranchSearch, Listed
+from .lists import BATCH, Modes, as_count
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WorkingModes(Modes):
+    """The working modes that were found, nearest to home first, and what that is worth: see `Modes`.
+
+    Attributes
+    ----------
+    hits : how many starts led to the rarest branch of a leg in each.
+    branches : for every pose of the platform and each leg, how many starts led to each branch of the leg. There are as
+        many modes as combinations of one branch a leg, and more than are listed where the list was cut.
+    """
+
+    branches: tuple[tuple[tuple[int, ...], ...], ...]
+
+    @property
+    def total(self) -> int:
+        return sum(prod(map(len, legs)) for legs in self.branches)
+
+    @property
+    def _found_once(self) -> int:
+        return sum(hits == 1 for legs in self.branches for leg in legs for hits in leg)
+
+
+def working_modes(mechanism: Mechanism, target: Any, *, most_starts: int = 40_000, most: int = 4096) -> WorkingModes:
+    """All configurations that have the end effector on a target in what the task counts, limits or not.
+
+    Newton's method from random configurations of all joints, undamped, until every branch of every leg has been found
+    ten times and at least 1024 starts have been made, or `most_starts`. Below a platform at rest legs are independent,
+    and so modes are all combinations of their branches; where the task leaves part of the pose open, for every pose
+    that is found. This is a search, not a proof: each mode listed exists, its loops are closed to machine precision,
+    and it is listed once; `unseen` of the result says how likely another start is to find a branch that is not. The
+    same call gives the same answer.
+
+    Modes are told apart by actuator values and joint centres. The spin of a rod, or a strut turned half about itself
+    by the universal joint at its end, makes no further ones: given is the configuration nearest to home within limits.
+
+    Parameters
+    ----------
+    target : one pose (4, 4) of the end effector in the base frame [length], or position (3,) at home orientation.
+    most : modes listed at most, the nearest to home; `total` of the result is how many there are.
+
+    Returns
+    -------
+    WorkingModes : empty where no configuration has the end effector on the target.
+
+    Raises
+    ------
+    ContinuumOfSolutions : actuators still move with the end effector on the target: a redundant machine, a task that
+        asks for less than the actuators do, or a serial singularity (a stretched wrist). The message names them.
+    InvalidArgument : a batch of targets, or what is no pose.
+    """
+    pose = _as_pose(mechanism, target)
+    most_starts, most = as_count("most_starts", most_starts, 1), as_count("most", most, 0)
+    search = BranchSearch(closure_of(mechanism), pose)
+    while search.starts < most_starts and not search.is_done:
+        search.go_on(BATCH)
+    listed = search.listed(most)
+    branches = tuple(tuple(tuple(leg.hits) for leg in legs) for legs in search.legs)
+    return WorkingModes(tuple(_answered(mechanism, pose, listed)), listed.hits, search.starts, branches)
+
+
+def _as_pose(mechanism: Mechanism, target: Any) -> Floats:
+    """The one target as an exact pose (4, 4)."""
+    checked_mechanism(mechanism)
+    targets, shape = as_targets(target)
+    if shape != ():
+        raise InvalidArgument("target", f"batch shape {shape}", "one target: a pose (4, 4) or a position (3,)")
+    if not are_poses(targets)[0]:
+        raise InvalidArgument("target", what_is_wrong(targets[0]), "a finite pose whose rotation is one")
+    exact: Floats = made_exact(targets)[0]
+    return exact
+
+
+def _answered(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
+    """Configurations as answers to one target: measured, not changed."""
+    coordinates, poses, n = listed.coordinates, listed.poses.copy(), len(listed.poses)
+    measured = close(closure_of(mechanism), coordinates, poses, max_iterations=0)
+    flat = flat_of(mechanism)
+    rows = new_rows(mechanism, flat, n)
+    if mechanism.end_effector_is_joint:
+        poses[:, :3, :3] = target[:3, :3]
+    rows.status[:] = np.where(is_feasible(measured), P.REACHED, P.EXCEEDED)
+    rows.counters[:] = 0
+    rows.poses[:] = poses
+    rows.actuators[:] = actuators_of(mechanism, coordinates)
+    position, rotation = task_of(mechanism).errors(poses, np.repeat(target[None], n, axis=0))
+    gap = measured.gap * mechanism.characteristic_length
+    rows.measures[:] = np.stack([position, rotation, gap, measured.excess, np.zeros(n)], axis=1)
+    if flat is not None:
+        positions_of(mechanism, flat, coordinates, rows)
+    return Solution(mechanism, rows, (n,), lambda: coordinates)

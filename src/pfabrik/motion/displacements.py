@@ -1,0 +1,334 @@
+"""Where every body is, from the coordinates of all joints: products of exponentials along a tree from the base.
+
+The coordinate vector q, shape (n, c), holds the deviations from home of all joints' coordinates, in the order of
+`mechanism.joints`; each moves the joint's second body relative to its first:
+
+- revolute: angle [rad] about the home axis through the joint's centre;
+- prismatic: displacement [length] along the home axis;
+- universal: two angles [rad], the first about the axis fixed in the first body, the second about the other;
+- cylindrical: angle [rad] about, then displacement [length] along the home axis;
+- spherical: rotation vector [rad], in home coordinates, about the joint's centre;
+- fixed: nothing.
+
+The displacement of a body is a matrix (4, 4) that takes its points from where they are at home to where they are now,
+both in base coordinates [length]; the base has the identity. A row of q that holds a NaN gives NaN for all but
+what rests on the base.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.home_mobility import (
+    Tree,
+    column_joints,
+    end_effector_body,
+    joint_screws,
+    spanning_tree,
+    universal_axes,
+)
+from ..description.mechanism import Joint, Mechanism
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Geometry:
+    """What displacements need of a mechanism, at home, in base coordinates, per joint (j) or per coordinate (c).
+
+    Attributes
+    ----------
+    tree : the joints that lead to each body.
+    places : body -> its index in stacks of displacements.
+    firsts, seconds : the two bodies of every joint, (j,).
+    owners : the joint of every coordinate, (c,).
+    centres : fixed points of the joints' rotations, (j, 3) [length]; the reference point where there is no centre.
+    turns : rotation vectors of the joints' first and second rotation per coordinate, (2, c, j, 3).
+    slides : translations of the joints per coordinate, (c, j, 3).
+    screws : unit screws of the coordinates, (c, 6): angular velocity, velocity at the origin [L].
+    spherical : whether a coordinate is a spherical joint's, (c,).
+    """
+
+    tree: Tree
+    places: Mapping[str, int]
+    firsts: NDArray[np.intp]
+    seconds: NDArray[np.intp]
+    owners: NDArray[np.intp]
+    centres: Floats
+    turns: Floats
+    slides: Floats
+    screws: Floats
+    spherical: NDArray[np.bool_]
+
+
+@lru_cache(maxsize=64)
+def columns(mechanism: Mechanism) -> Mapping[str, slice]:
+    """Joint name -> its coordinates, as a slice of the columns of q."""
+    bounds = np.searchsorted(column_joints(mechanism), np.arange(len(mechanism.joints) + 1)).tolist()
+    return MappingProxyType(
+        {joint.name: slice(*bounds[index : index + 2]) for index, joint in enumerate(mechanism.joints)}
+    )
+
+
+def displacements(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
+    """Body -> its displacements, (n, 4, 4) [length], in base coordinates.
+
+    Parameters
+    ----------
+    q : coordinates as deviations from home, (n, c) [rad or length].
+    """
+    geometry = _geometry(mechanism)
+    bodies = _bodies(geometry, _motions(geometry, q)[0])
+    return {body: bodies[:, place] for body, place in geometry.places.items()}
+
+
+def centres(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
+    """Joint name -> present position of its centre, as a point of its first body, (n, 3) [length], in base coordinates.
+
+    Joints without a centre (prismatic joints without `at`) are left out.
+    """
+    geometry = _geometry(mechanism)
+    present = _centres(geometry, _bodies(geometry, _motions(geometry, q)[0]))
+    return {joint.name: present[:, j] for j, joint in enumerate(mechanism.joints) if joint.at is not None}
+
+
+def end_effector_pose(mechanism: Mechanism, q: Floats) -> Floats:
+    """Pose of the end effector, T_base_platform, (n, 4, 4) [length].
+
+    Of a joint end effector, the pose is the present centre of the joint, unrotated.
+    """
+    displaced = displacements(mechanism, q)[end_effector_body(mechanism)] @ mechanism.home_pose
+    if mechanism.end_effector_is_joint:
+        displaced[:, :3, :3] = np.eye(3)
+    return displaced
+
+
+def screws(mechanism: Mechanism, q: Floats) -> Floats:
+    """Present unit screws of all coordinates, (n, c, 6), in base coordinates.
+
+    A screw is the angular velocity, and the velocity of the point at the base origin in units of L (the characteristic
+    length), of the joint's second body relative to its first: per unit rate of an angle [1/s], or of a displacement
+    [L/s]. The three of a spherical joint are the rotations about the base's x, y and z axes through the present centre:
+    they span what the joint can do, but are not the rates of its rotation vector (see `stepped`).
+    """
+    geometry = _geometry(mechanism)
+    motions, turned = _motions(geometry, q)
+    frames = _frames(geometry, _bodies(geometry, motions), turned)
+    angular = np.einsum("ncij,cj->nci", frames[..., :3, :3], geometry.screws[:, :3])
+    linear = np.einsum("ncij,cj->nci", frames[..., :3, :3], geometry.screws[:, 3:])
+    offset = frames[..., :3, 3] / mechanism.characteristic_length
+    return np.concatenate([angular, linear + np.cross(offset, angular)], axis=-1)
+
+
+def gaps(mechanism: Mechanism, q: Floats) -> Floats:
+    """Largest gap of any loop, (n,) [length]; zero where there are no loops.
+
+    At every joint that closes a loop, its second body is compared with where its first body and its coordinates put it:
+    the distance at the joint's centre (at the reference point where it has none), and the angle times L.
+    """
+    turns, shifts, _ = _openings(mechanism, q)
+    angles, _ = _angle_and_sines(turns)
+    sizes = np.concatenate([angles * mechanism.characteristic_length, np.linalg.norm(shifts, axis=-1)], axis=-1)
+    return np.asarray(np.max(sizes, axis=-1, initial=0.0))
+
+
+def loop_errors(mechanism: Mechanism, q: Floats) -> Floats:
+    """The small screw motions that open the loops, (n, loops, 6), in base coordinates; in the units of `screws`.
+
+    One for every joint that closes a loop: the motion of its second body away from where its first body and its
+    coordinates put it. To first order: of a large rotation, the axis times the angle.
+    """
+    turns, shifts, points = _openings(mechanism, q)
+    angles, sines = _angle_and_sines(turns)
+    rotations = sines / np.sinc(angles / np.pi)[..., None]
+    velocity = (shifts - np.cross(rotations, points)) / mechanism.characteristic_length
+    return np.concatenate([rotations, velocity], axis=-1)
+
+
+def stepped(mechanism: Mechanism, q: Floats, step: Floats) -> Floats:
+    """The coordinates after every joint made a step along its present screws, (n, c) [rad or length].
+
+    Parameters
+    ----------
+    q : coordinates, (n, c) [rad or length].
+    step : as the rates of `screws`, (n, c) [rad or L]. The step of a spherical joint is a rotation vector in base
+        coordinates; it is composed with the rotation the joint has already.
+    """
+    geometry = _geometry(mechanism)
+    moved = q + step * rate_units(mechanism)
+    bodies = _bodies(geometry, _motions(geometry, q)[0])
+    for name, column in columns(mechanism).items():
+        if mechanism.joint(name).type == "spherical":
+            first = bodies[:, geometry.firsts[geometry.owners[column.start]], :3, :3]
+            turn = np.einsum("nji,nj->ni", first, step[:, column])
+            moved[:, column] = _composed(turn, q[:, column])
+    return moved
+
+
+@lru_cache(maxsize=64)
+def rate_units(mechanism: Mechanism) -> Floats:
+    """What the rates of `screws` are counted in, (c,): 1 for an angle [1/s], L for a displacement [L/s]."""
+    turning = _geometry(mechanism).screws[:, :3].any(axis=1)
+    units = np.where(turning, 1.0, mechanism.characteristic_length)
+    units.setflags(write=False)
+    return units
+
+
+@lru_cache(maxsize=64)
+def _geometry(mechanism: Mechanism) -> _Geometry:
+    joints, owners = mechanism.joints, column_joints(mechanism)
+    places = {body: place for place, body in enumerate(mechanism.bodies)}
+    turns, slides = np.zeros((2, len(owners), len(joints), 3)), np.zeros((len(owners), len(joints), 3))
+    for j, joint in enumerate(joints):
+        column = columns(mechanism)[joint.name]
+        turns[:, column, j], slides[column, j] = _exponents(mechanism, joint)
+    return _Geometry(
+        tree=spanning_tree(mechanism),
+        places=places,
+        firsts=np.array([places[joint.connects[0]] for joint in joints]),
+        seconds=np.array([places[joint.connects[1]] for joint in joints]),
+        owners=owners,
+        centres=np.array([mechanism.reference_point if joint.at is None else joint.at for joint in joints]),
+        turns=turns,
+        slides=slides,
+        screws=np.vstack([joint_screws(mechanism, joint) for joint in joints]),
+        spherical=np.array([joint.type == "spherical" for joint in joints])[owners],
+    )
+
+
+def _exponents(mechanism: Mechanism, joint: Joint) -> tuple[Floats, Floats]:
+    """Vectors of a joint's first and second rotation, (2, freedoms, 3), and of its translation, (freedoms, 3)."""
+    none, one = np.zeros(3), np.eye(3)
+    if joint.type == "spherical":
+        return np.array([one, np.zeros((3, 3))]), np.zeros((3, 3))
+    if joint.type == "universal":
+        first, second = universal_axes(mechanism, joint)
+        return np.array([[first, none], [none, second]]), np.zeros((2, 3))
+    if joint.type == "fixed":
+        return np.zeros((2, 0, 3)), np.zeros((0, 3))
+    axis = np.array(mechanism.home_axis(joint.name))
+    if joint.type == "cylindrical":
+        return np.array([[axis, none], [none, none]]), np.array([none, axis])
+    if joint.type == "prismatic":
+        return np.zeros((2, 1, 3)), axis[None]
+    return np.array([[axis], [none]]), np.zeros((1, 3))
+
+
+def _motions(geometry: _Geometry, q: Floats) -> tuple[Floats, Floats]:
+    """Displacement of every joint's second body relative to its first, (n, j, 4, 4); its first rotation, (n, j, 3, 3).
+
+    Both are in home coordinates.
+    """
+    shape = (len(q), *geometry.centres.shape)
+    first, second = (_rotation((q @ turn.reshape(len(turn), -1)).reshape(shape)) for turn in geometry.turns)
+    slides = (q @ geometry.slides.reshape(len(geometry.slides), -1)).reshape(shape)
+    return _about(geometry.centres, first @ second, slides), first
+
+
+def _about(centres: Floats, rotations: Floats, slides: Floats) -> Floats:
+    """The motions (..., 4, 4) that turn about a centre, then slide."""
+    motions = np.zeros((*rotations.shape[:-2], 4, 4))
+    motions[..., :3, :3] = rotations
+    motions[..., :3, 3] = centres - np.einsum("...ij,...j->...i", rotations, centres) + slides
+    motions[..., 3, 3] = 1.0
+    return motions
+
+
+def _rotation(vectors: Floats) -> Floats:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) [rad]."""
+    angles = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    skew = np.cross(np.eye(3), vectors[..., None, :])
+    # sinc: exact down to zero, so that there is no branch for small angles
+    return np.asarray(
+        np.eye(3) + np.sinc(angles / np.pi) * skew + 0.5 * np.sinc(0.5 * angles / np.pi) ** 2 * (skew @ skew)
+    )
+
+
+def _bodies(geometry: _Geometry, motions: Floats) -> Floats:
+    """Displacements of all bodies, (n, bodies, 4, 4), in the order of `places`."""
+    bodies = np.empty((len(motions), len(geometry.places), 4, 4))
+    bodies[:] = np.eye(4)
+    for j, forward in geometry.tree.steps:
+        first, second = geometry.firsts[j], geometry.seconds[j]
+        if forward:
+            bodies[:, second] = bodies[:, first] @ motions[:, j]
+        else:
+            bodies[:, first] = bodies[:, second] @ _inverse(motions[:, j])
+    return bodies
+
+
+def _inverse(motions: Floats) -> Floats:
+    inverse = motions.copy()
+    inverse[..., :3, :3] = np.swapaxes(motions[..., :3, :3], -1, -2)
+    inverse[..., :3, 3] = -np.einsum("...ij,...j->...i", inverse[..., :3, :3], motions[..., :3, 3])
+    return inverse
+
+
+def _centres(geometry: _Geometry, bodies: Floats) -> Floats:
+    """Present centres of all joints, as points of their first bodies, (n, j, 3)."""
+    return _moved(bodies[:, geometry.firsts], geometry.centres)
+
+
+def _moved(motions: Floats, points: Floats) -> Floats:
+    return np.asarray(np.einsum("...ij,...j->...i", motions[..., :3, :3], points) + motions[..., :3, 3])
+
+
+def _frames(geometry: _Geometry, bodies: Floats, turned: Floats) -> Floats:
+    """Displacements (n, c, 4, 4) that take the home screws to the present ones.
+
+    An axis of a joint's second rotation is carried by the first rotation too; a spherical joint's axes stay parallel.
+    """
+    owners, inner = geometry.owners, geometry.turns[1].any(axis=(1, 2))
+    frames = bodies[:, geometry.firsts[owners]]
+    carried = owners[inner]
+    frames[:, inner] = frames[:, inner] @ _about(geometry.centres[carried], turned[:, carried], np.zeros(3))
+    balls = owners[geometry.spherical]
+    frames[..., :3, 3][:, geometry.spherical] = _centres(geometry, bodies)[:, balls] - geometry.centres[balls]
+    frames[:, geometry.spherical, :3, :3] = np.eye(3)
+    return frames
+
+
+def _openings(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats, Floats]:
+    """How far the loops are open at their closing joints, and where, in base coordinates.
+
+    Rotations (n, loops, 3, 3) and distances (n, loops, 3) [length] from where the first body and the coordinates put
+    the second body to where it is, and the points (n, loops, 3) [length] at which the distances are measured.
+    """
+    geometry = _geometry(mechanism)
+    motions = _motions(geometry, q)[0]
+    bodies = _bodies(geometry, motions)
+    closing = np.array(geometry.tree.closing, dtype=np.intp)
+    put = bodies[:, geometry.firsts[closing]] @ motions[:, closing]
+    found = bodies[:, geometry.seconds[closing]]
+    points = _moved(put, geometry.centres[closing])
+    turns = found[..., :3, :3] @ np.swapaxes(put[..., :3, :3], -1, -2)
+    return turns, _moved(found, geometry.centres[closing]) - points, points
+
+
+def _angle_and_sines(rotations: Floats) -> tuple[Floats, Floats]:
+    """Angles (...,) [rad], accurate down to zero, and axes times their sines (..., 3), of matrices (..., 3, 3)."""
+    skew = rotations - np.swapaxes(rotations, -1, -2)
+    sines = 0.5 * np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
+    cosine = 0.5 * (np.trace(rotations, axis1=-2, axis2=-1) - 1.0)
+    return np.asarray(np.arctan2(np.linalg.norm(sines, axis=-1), cosine)), sines
+
+
+def _composed(after: Floats, before: Floats) -> Floats:
+    """Rotation vector of two rotations one after the other, (n, 3) [rad], at most pi long."""
+    (w, v), (w0, v0) = _quaternion(after), _quaternion(before)
+    scalar = w * w0 - np.sum(v * v0, axis=-1)
+    vector = w[..., None] * v0 + w0[..., None] * v + np.cross(v, v0)
+    half = np.arctan2(np.linalg.norm(vector, axis=-1), np.abs(scalar))
+    return np.asarray(vector * np.copysign(2.0 / np.sinc(half / np.pi), scalar)[..., None])
+
+
+def _quaternion(vectors: Floats) -> tuple[Floats, Floats]:
+    """Scalar (n,) and vector part (n, 3) of the unit quaternions of rotation vectors (n, 3) [rad]."""
+    half = 0.5 * np.linalg.norm(vectors, axis=-1)
+    return np.cos(half), 0.5 * np.sinc(half / np.pi)[..., None] * vectors
