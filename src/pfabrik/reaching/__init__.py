@@ -1,1 +1,1 @@
-"""P-FABRIK on joint positions: targets answered by passes and closed forms; joint coordinates from positions and back."""
+"""P-FABRIK on joint positions: targets answered by passes and closed forms; joints from positions and back."""
