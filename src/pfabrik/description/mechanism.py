@@ -146,10 +146,10 @@ class Mechanism:
             warnings.warn(f"'{self.name}': {doubt}", MobilityWarning, stacklevel=4)
 
     def _doubts_of_freedom(self) -> Iterator[str]:
-        left = end_effector_freedom(self, frozenset(self.actuators))
+        left = end_effector_freedom(self, frozenset(self.actuator_names))
         if left > 0:
             freedoms = "1 freedom" if left == 1 else f"{left} freedoms"
-            yield f"{len(self.actuators)} actuators leave the end effector {freedoms} at home"
+            yield f"{len(self.actuator_names)} actuators leave the end effector {freedoms} at home"
         missed_by = inexactness(self)
         if missed_by > 0.0:
             yield (
@@ -171,7 +171,7 @@ class Mechanism:
         return {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
 
     @cached_property
-    def actuators(self) -> tuple[str, ...]:
+    def actuator_names(self) -> tuple[str, ...]:
         """Names of the actuated joints, in the order of `joints`."""
         return tuple(joint.name for joint in self.joints if joint.actuated)
 
