@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..description.cones import cone_line
+from ..description.graph import cone_line
 from ..description.joint_types import KINDS
 from ..description.mechanism import Joint, Mechanism
 from ..motion.displacements import centres, columns, displacements
