@@ -47,7 +47,10 @@ def forward(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
     drawn = draw(mechanism, rng, 4 * n, 0.2, 0.2)
     targets = drawn[struts.solve(drawn)[1]][:n]
     values, seeds = struts.lengths(targets), beside(mechanism, targets, rng)
-    from_home, from_seeds = partial(pf.solve_fk, mechanism, values), partial(pf.solve_fk, mechanism, values, start=seeds)
+    from_home, from_seeds = (
+        partial(pf.solve_fk, mechanism, values),
+        partial(pf.solve_fk, mechanism, values, start=seeds),
+    )
     for found in (from_home(), from_seeds()):
         same_poses(found, targets)
     few = list(values[:100])

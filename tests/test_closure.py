@@ -10,7 +10,7 @@ from pfabrik.reaching.solve.completion import actuators_of, set_actuators
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.answers.limits import active_limits
-from pfabrik.description.paths import end_body, independent_paths
+from pfabrik.description.paths import independent_paths
 from pfabrik.motion.displacements import columns, displacements, gaps, stepped
 from pfabrik.tolerances import TOLERANCES
 
@@ -66,7 +66,7 @@ def test_gaps_are_those_between_displaced_bodies(name: str) -> None:
     found = close(closure_of(mechanism), q, poses, limits=True, max_iterations=0)
     bodies = displacements(mechanism, q)
     serial = len(independent_paths(mechanism)) == 1
-    ends = bodies[end_body(mechanism)] @ mechanism.home_pose
+    ends = bodies[mechanism.end_effector_body] @ mechanism.home_pose
     off = np.linalg.norm((ends - poses)[:, :3, 3], axis=1) / mechanism.characteristic_length
     turned = np.arccos(np.clip((np.trace(ends[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1, 1))
     one_path = np.maximum(off, turned)
@@ -82,7 +82,9 @@ def test_excesses_are_those_of_the_limits_themselves(name: str) -> None:
     start = around_home(mechanism, 60, 1.5, seed=4)
     found = close(closure_of(mechanism), start, platform_poses(mechanism, start))
     closed = found.gap <= 1e-12
-    if any(mechanism.joint(each).along for each in mechanism.actuator_names):  # pulled through its foot, a strut points back
+    if any(
+        mechanism.joint(each).along for each in mechanism.actuator_names
+    ):  # pulled through its foot, a strut points back
         closed &= (actuators_of(mechanism, found.coordinates) > 0.0).all(axis=1)
     excess = found.excess[closed]
     length = mechanism.characteristic_length

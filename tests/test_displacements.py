@@ -220,3 +220,25 @@ class TestGaps:
 
     def test_a_machine_without_loops_has_no_gap(self):
         assert np.array_equal(gaps(arm(), anywhere(arm())), np.zeros(3))
+
+
+@pytest.mark.parametrize("connects", [("base", "rocker"), ("rocker", "base")])
+def test_a_joint_end_effector_on_the_base_goes_with_its_other_body(connects: tuple[str, str]) -> None:
+    """Also with the loop open: a quarter turn of the crank about the origin takes all that hangs on it along."""
+    joints = [
+        Joint("o", "revolute", ("base", "crank"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True),
+        Joint("p", "revolute", ("crank", "rocker"), at=(1, 2, 0), axis=(0, 0, 1)),
+        Joint("tip", "revolute", connects, at=(3, 0, 0), axis=(0, 0, 1)),
+    ]
+    machine = Mechanism("triangle", joints, "tip")
+    assert machine.end_effector_body == "rocker"
+    pose = end_effector_pose(machine, np.array([[np.pi / 2, 0.0, 0.0]]))[0]
+    np.testing.assert_allclose(pose[:3, 3], [0.0, 3.0, 0.0], atol=1e-12)
+
+
+def test_coordinates_are_named_in_the_order_of_their_columns() -> None:
+    machine = arm()
+    assert machine.coordinate_names == ("R", "P", "U[0]", "U[1]", "C[0]", "C[1]", "S[0]", "S[1]", "S[2]")
+    for name, place in columns(machine).items():
+        owned = machine.coordinate_names[place]
+        assert len(owned) == place.stop - place.start and all(each.partition("[")[0] == name for each in owned)

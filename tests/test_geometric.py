@@ -553,7 +553,9 @@ def test_a_batch_is_answered_row_by_row(name: str) -> None:
     flat = pf.geometric.solve_ik(mechanism, wanted)
     assert flat.shape == (len(wanted),)
     assert not flat
-    np.testing.assert_array_equal(np.isnan(flat.actuators), np.tile(~flat.reached, (len(mechanism.actuator_names), 1)).T)
+    np.testing.assert_array_equal(
+        np.isnan(flat.actuators), np.tile(~flat.reached, (len(mechanism.actuator_names), 1)).T
+    )
     folded = pf.geometric.solve_ik(mechanism, wanted.reshape(2, -1, 4, 4))
     assert folded.shape == folded.reached.shape == (2, len(wanted) // 2)
     np.testing.assert_array_equal(folded.actuators.reshape(flat.actuators.shape), flat.actuators)

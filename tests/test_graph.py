@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from pfabrik import Joint
-from pfabrik.description.graph import Edge, components, is_tree, stages
+from pfabrik.decomposition.stages import is_tree, stages
+from pfabrik.description.graph import Edge, components
 
 START, GOAL = "start", "goal"
 BODIES = (START, "a", "b", "c", "d", GOAL)

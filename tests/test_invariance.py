@@ -233,7 +233,9 @@ def test_other_names_order_and_viewpoints_give_the_same_answer(name: str, seed: 
     other, names = relabelled(original, np.random.default_rng(seed))
     targets = some_targets(original, seed)
     expected, answer = pf.solve_ik(original, targets), pf.solve_ik(other, targets)
-    places = [original.actuator_names.index(back) for mate in other.actuators for back, new in names.items() if new == mate]
+    places = [
+        original.actuator_names.index(back) for mate in other.actuators for back, new in names.items() if new == mate
+    ]
     actuators = (expected.actuators * signs(original, other, names))[:, places]
     assert_same_answers(name, answer, expected, expected.pose, actuators)
     reached = expected.status == Status.REACHED

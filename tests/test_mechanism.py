@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pfabrik.answers.differential import mobility
-from pfabrik.description.cones import cone_line
 from pfabrik.description.enclosing import enclosing_radius
+from pfabrik.description.graph import cone_line
 from pfabrik.description.home_mobility import end_effector_freedom, universal_axes
 from pfabrik.description.joint_types import JOINT_TYPES, KINDS
 from pfabrik.description.mechanism import Cone, Joint, Mechanism
@@ -100,6 +100,13 @@ class TestDerived:
         machine = stewart()
         assert machine.actuator_names == tuple(f"B{leg}" for leg in range(6))
         assert machine.bodies[:4] == ("base", "cylinder0", "rod0", "platform")
+
+    def test_it_introduces_itself_in_one_line(self):
+        assert repr(stewart()) == "<Mechanism 'hexapod': 18 joints, 6 actuators, task x y z rotation>"
+        crank = [Joint("a", "revolute", ("base", "crank"), at=(0, 0, 0), axis=Z, actuated=True)]
+        assert repr(Mechanism("crank", crank, "crank", (1, 0, 0), task=["tilt"])) == (
+            "<Mechanism 'crank': 1 joint, 1 actuator, task tilt>"
+        )
 
     def test_end_effector_joint_gives_reference_point_and_task(self):
         machine = Mechanism("5", five_bar(), "tip")

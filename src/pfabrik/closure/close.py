@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ..description.joint_types import KINDS
 from ..description.mechanism import Mechanism
-from ..description.paths import end_body
 from ..kernels.closure import loops as K
 from ..kernels.threads import in_blocks
 from ..motion.displacements import columns, displacements
@@ -101,7 +100,7 @@ def _layout(mechanism: Mechanism, locked: frozenset[str]) -> K.Layout:
 
 def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
     """Poses (n, 4, 4) of the end effector, or of the body that carries it where it is a joint."""
-    return np.asarray(displacements(mechanism, coordinates)[end_body(mechanism)] @ mechanism.home_pose)
+    return np.asarray(displacements(mechanism, coordinates)[mechanism.end_effector_body] @ mechanism.home_pose)
 
 
 class Closing(NamedTuple):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..description.cones import cone_line, opposite
+from ..description.graph import cone_line, opposite
 from ..description.home_mobility import universal_axes
 from ..description.joint_types import KINDS
 from ..description.mechanism import Joint, Mechanism
@@ -51,12 +51,12 @@ class _Builder:
     def add_path(self, path: Path) -> None:
         visits: list[tuple[int, int]] = []
         marks: list[tuple[int, int]] = []
-        is_detour = len({passage.joint.name for passage in path}) < len(path)
-        for passage in path:
-            units = self.add_joint(passage.joint)
-            if units and passage.joint.name in self.marked and not is_detour:
-                marks.append((len(visits), self.marked[passage.joint.name]))
-            visits += [(k, 1) for k in units] if passage.forward else [(k, -1) for k in reversed(units)]
+        is_detour = len({step.joint.name for step in path}) < len(path)
+        for step in path:
+            units = self.add_joint(step.joint)
+            if units and step.joint.name in self.marked and not is_detour:
+                marks.append((len(visits), self.marked[step.joint.name]))
+            visits += [(k, 1) for k in units] if step.forward else [(k, -1) for k in reversed(units)]
         self.paths.append(visits)
         self.marks.append(marks)
 

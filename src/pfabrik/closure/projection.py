@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..description.mechanism import Mechanism
-from ..description.paths import end_body
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
 from ..kernels.reaching import plan as P
@@ -140,7 +139,7 @@ def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Closi
     Finds what is held where no short way leads to it.
     """
     task = task_of(closure.mechanism)
-    begin = displacements(closure.mechanism, start)[end_body(closure.mechanism)] @ closure.mechanism.home_pose
+    begin = displacements(closure.mechanism, start)[closure.mechanism.end_effector_body] @ closure.mechanism.home_pose
     held = np.zeros((4, 4), bool)
     held[:3, 3], held[:3, :3] = np.array(way.weights[:3]) == LOCKED, LOCKED in way.weights[3:]
     placed = np.where(held, task.completed(targets, begin), begin)

@@ -7,41 +7,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
-from ..description.graph import TIP, Edge, Stage, components, graph_of, is_tree, leads, stages
-from ..description.joint_types import KINDS
-from ..description.mechanism import Joint, Mechanism, checked_mechanism
+from ..description.graph import Edge, Step, components
+from ..description.mechanism import Mechanism, checked_mechanism
 from .forms import BranchForm, NotExpressible, TrunkForm
 from .parallelograms import Parallelogram, parallelogram_of
 from .positions import express_branch, express_trunk
+from .stages import TIP, Stage, graph_of, is_tree, leads, stages
 
 Engine: TypeAlias = Literal["reaching", "closure"]
-
-
-@dataclass(frozen=True)
-class Step:
-    """A joint on the way from the base to the end effector; `forward` if its second body is the outward one."""
-
-    joint: Joint
-    forward: bool = True
-    ends: bool = False  # this joint, cut, is the end effector
-
-    @property
-    def sign(self) -> float:
-        """+1 if the joint's coordinate moves the outward body relative to the inward one, else -1."""
-        return 1.0 if self.forward else -1.0
-
-    @property
-    def inward(self) -> str:
-        """The body nearer to the base."""
-        return self.joint.connects[0 if self.forward else 1]
-
-    @property
-    def steps(self) -> tuple[Step, ...]:
-        """Itself, as the only joint of this part."""
-        return (self,)
-
-    def __str__(self) -> str:
-        return KINDS[self.joint.type].letter + ("*" if self.joint.actuated else "")
 
 
 @dataclass(frozen=True)

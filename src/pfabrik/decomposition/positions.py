@@ -12,18 +12,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
+from ..description.graph import Step
 from ..description.home_mobility import universal_axes
 from ..description.mechanism import Joint, Mechanism
 from ..tolerances import TOLERANCES
 from .forms import FREE, Array, BranchForm, ConeForm, Coordinate, Interval, NodeForm, NotExpressible, TrunkForm
-
-if TYPE_CHECKING:
-    from .decompose import Step
-
 
 _SPOT_KINDS: dict[str, Literal["R", "U", "S"]] = {"revolute": "R", "universal": "U", "spherical": "S"}
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import Fault, near_miss
 from .form_faults import is_name, joint_faults, name_faults, number_faults, shown
 from .graph_faults import graph_faults
 from .home_faults import home_faults
 from .joint_types import TASK_COORDINATES, WHOLE_TASK
-
-if TYPE_CHECKING:
-    from .mechanism import Mechanism
+from .structure import Structure
 
 _FIELDS = ("name", "type", "connects", "at", "axis", "axes", "along", "actuated", "home", "range", "cone")
 _FIELD = re.compile(r"joint\[\d+\]\.(\w+)")
@@ -22,7 +20,7 @@ _LEG = re.compile(r"leg\[(\d+)\](?:\.([A-Za-z]+))?")
 _LEG_FIELDS = ("chain", "name", "connects", "base", "via", "platform", "axis", "stroke", "copies")
 
 
-def find_faults(mechanism: Mechanism) -> list[Fault]:
+def find_faults(mechanism: Structure) -> list[Fault]:
     """Every fault of a description, in its order; an empty list for a mechanism that can be built.
 
     Places are written as in a file: `joint[3].cone.half_angle`, with the index counted in `mechanism.joints`.
@@ -86,7 +84,7 @@ def _not_joints(joints: Any) -> str:
     return strangers[0] if strangers else "no joints"
 
 
-def _head_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _head_faults(mechanism: Structure) -> Iterator[Fault]:
     for field in ("name", "base", "end_effector"):
         yield from name_faults(field, getattr(mechanism, field))
     yield from name_faults("units.length", mechanism.length_unit)
@@ -95,7 +93,7 @@ def _head_faults(mechanism: Mechanism) -> Iterator[Fault]:
     yield from _task_faults(mechanism.task, mechanism)
 
 
-def _task_faults(task: Any, mechanism: Mechanism) -> Iterator[Fault]:
+def _task_faults(task: Any, mechanism: Structure) -> Iterator[Fault]:
     """Faults of what targets set: at least one coordinate, none twice, and of the rotation all or the tilt."""
     expected = f"some of {', '.join(TASK_COORDINATES)}"
     if not isinstance(task, tuple) or not task:
@@ -113,7 +111,7 @@ def _task_faults(task: Any, mechanism: Mechanism) -> Iterator[Fault]:
         yield Fault("task", turns[0], "some of x, y, z: the end effector is a joint, of which only the position counts")
 
 
-def _point_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _point_faults(mechanism: Structure) -> Iterator[Fault]:
     """Faults of the reference point: needed for a body, given by the joint for a joint."""
     point: Any = mechanism.reference_point
     tip = next((joint for joint in mechanism.joints if joint.name == mechanism.end_effector), None)
@@ -128,7 +126,7 @@ def _point_faults(mechanism: Mechanism) -> Iterator[Fault]:
         yield from number_faults("reference_point", point, 3)
 
 
-def _moves(mechanism: Mechanism, name: str) -> bool:
+def _moves(mechanism: Structure, name: str) -> bool:
     """Whether the name is that of a body other than the base."""
     return name != mechanism.base and any(
         isinstance(joint.connects, tuple) and name in joint.connects for joint in mechanism.joints

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 import reprlib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from ..errors import Fault, near_miss
 from ..tolerances import TOLERANCES
 from .joint_types import JOINT_TYPES, KINDS, Coordinate, JointKind
-
-if TYPE_CHECKING:
-    from .mechanism import Cone, Joint
+from .joints import Cone, Joint
 
 LARGEST_NUMBER = 1e12
 """Largest length or angle accepted: beyond it, squares and differences of lengths lose every digit that matters."""

@@ -1,21 +1,33 @@
-"""A mechanism as a graph: its bodies, welded where joints are fixed, and the joints between them."""
+"""The graph of a mechanism, bodies joined by joints, and the walks through it that everything else is built on.
+
+- `spanning_tree`: which joints lead from one body to every other, and the loops that the other joints close;
+- `components`: what hangs together once the graph is cut at some bodies;
+- `next_joints`: where the rigid parts around a joint end.
+"""
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, groupby
+from heapq import heappop, heappush
+from itertools import chain
 
-from .mechanism import Joint, Mechanism
+import numpy as np
+from numpy.typing import NDArray
 
-TIP = "(tip)"
-"""The point body that a joint end effector, cut in two, stands for."""
+from ..errors import InvalidArgument
+from .joint_types import KINDS
+from .joints import Joint
+from .structure import Structure
+
+PASSED_THROUGH = ("prismatic", "fixed")
+"""Joint types that do not end a line: their two bodies keep their orientation relative to each other."""
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A joint between two welded bodies."""
+    """A joint and the two bodies it is between: its own, or those that stand for them."""
 
     joint: Joint
     bodies: tuple[str, str]
@@ -26,57 +38,105 @@ class Edge:
 
 
 @dataclass(frozen=True)
-class Graph:
-    """The edges in the order of the description, and the bodies that stand for the base and the end effector."""
+class Step:
+    """A joint on a way through the graph; `forward` if its second body is the one it leads to."""
 
-    edges: tuple[Edge, ...]
-    base: str
-    end: str
+    joint: Joint
+    forward: bool = True
+    ends: bool = False  # this joint, cut, is the end effector
+
+    @property
+    def sign(self) -> float:
+        """+1 if the joint's coordinate moves the body it leads to relative to the one before, else -1."""
+        return 1.0 if self.forward else -1.0
+
+    @property
+    def inward(self) -> str:
+        """The body that the way comes from."""
+        return self.joint.connects[0 if self.forward else 1]
+
+    @property
+    def back(self) -> Step:
+        """The same joint, passed the other way."""
+        return Step(self.joint, not self.forward, self.ends)
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """Itself, as the only joint of this part of a sub-chain."""
+        return (self,)
+
+    def __str__(self) -> str:
+        return KINDS[self.joint.type].letter + ("*" if self.joint.actuated else "")
 
 
 @dataclass(frozen=True)
-class Stage:
-    """What every way from one body to another passes: a single joint, or joints that form loops between the two."""
+class Tree:
+    """The edges that lead from one body, the root, to all others, and the loops that the other edges close.
 
-    inward: str
-    outward: str
-    edges: tuple[Edge, ...]
+    Attributes
+    ----------
+    steps : index of each of the tree's edges, in the order in which it grows, and whether it leads from the edge's
+        first body to the second.
+    closing : indices of the edges that close a loop each.
+    paths : body -> (edges,): +1 for an edge that the way from the root passes from its first body to its second, -1
+        for one that it passes backward, 0 for the others. Bodies that cannot be reached are missing.
+    loops : the same for every loop, (loops, edges); the closing edge has -1.
+    """
+
+    steps: tuple[tuple[int, bool], ...]
+    closing: tuple[int, ...]
+    paths: Mapping[str, NDArray[np.float64]]
+    loops: NDArray[np.float64]
+
+    def way(self, body: str) -> list[tuple[int, bool]]:
+        """The steps from the root to a body, in order."""
+        return [step for step in self.steps if self.paths[body][step[0]]]
 
 
-def graph_of(mechanism: Mechanism) -> Graph:
-    """The graph of a mechanism; a joint that is the end effector becomes two edges, each to the tip."""
-    weld = _welded(mechanism)
-    edges = []
-    for joint in mechanism.joints:
-        first, second = (weld[body] for body in joint.connects)
-        if mechanism.end_effector_is_joint and joint.name == mechanism.end_effector:
-            edges += [Edge(joint, (first, TIP)), Edge(joint, (second, TIP))]
-        elif joint.type != "fixed":
-            edges.append(Edge(joint, (first, second)))
-    end = TIP if mechanism.end_effector_is_joint else weld[mechanism.end_effector]
-    return Graph(tuple(edges), weld[mechanism.base], end)
+def edges_of(joints: Sequence[Joint]) -> tuple[Edge, ...]:
+    """Every joint between its own two bodies."""
+    return tuple(Edge(joint, joint.connects) for joint in joints)
 
 
-def _welded(mechanism: Mechanism) -> dict[str, str]:
-    """Each body's representative: bodies joined by fixed joints are one."""
-    root = {body: body for body in mechanism.bodies}
+def tree_of(mechanism: Structure) -> Tree:
+    """The spanning tree of a mechanism's joints that grows from the base."""
+    return spanning_tree(edges_of(mechanism.joints), mechanism.base)
 
-    def find(body: str) -> str:
-        while root[body] != body:
-            body = root[body]
-        return body
 
-    for joint in mechanism.joints:
-        if joint.type == "fixed" and joint.name != mechanism.end_effector:
-            keep, drop = (find(body) for body in joint.connects)
-            if drop == find(mechanism.base):
-                keep, drop = drop, keep
-            root[drop] = keep
-    return {body: find(body) for body in root}
+def spanning_tree(edges: Sequence[Edge], root: str) -> Tree:
+    """The tree that grows from the root, always by the first edge that touches a body already on it."""
+    touching: dict[str, list[int]] = defaultdict(list)
+    for index, edge in enumerate(edges):
+        for body in edge.bodies:
+            touching[body].append(index)
+    one = np.eye(len(edges))
+    paths = {root: np.zeros(len(edges))}
+    steps: list[tuple[int, bool]] = []
+    loops: dict[int, NDArray[np.float64]] = {}
+    waiting = list(touching[root])
+    taken = set(waiting)
+    while waiting:
+        index = heappop(waiting)
+        first, second = edges[index].bodies
+        if first in paths and second in paths:
+            loops[index] = paths[second] - paths[first] - one[index]
+            continue
+        forward = first in paths
+        steps.append((index, forward))
+        reached = second if forward else first
+        paths[reached] = paths[first] + one[index] if forward else paths[second] - one[index]
+        for new in touching[reached]:
+            if new not in taken:
+                taken.add(new)
+                heappush(waiting, new)
+    return Tree(tuple(steps), tuple(loops), paths, np.array(list(loops.values())).reshape(-1, len(edges)))
 
 
 def components(edges: Sequence[Edge], *cut: str) -> list[list[Edge]]:
-    """Groups of edges that hang together without passing through the bodies at which the graph is cut."""
+    """Groups of edges that hang together without passing through the bodies at which the graph is cut.
+
+    Groups come in the order of their first edges, and edges in their own order.
+    """
     group_of: dict[str, int] = {}
     groups: dict[int, list[int]] = {}
     for number, edge in enumerate(edges):
@@ -89,61 +149,40 @@ def components(edges: Sequence[Edge], *cut: str) -> list[list[Edge]]:
     return [[edges[member] for member in sorted(groups[number])] for number in sorted(groups)]
 
 
-def is_tree(edges: Sequence[Edge], base: str, end: str) -> bool:
-    """Whether edges that hang together form a tree with one joint to the base, once cut at the end effector."""
-    bodies = {body for edge in edges for body in edge.bodies} - {base, end}
-    between = [edge for edge in edges if end not in edge.bodies]  # a tree on n bodies and the base has n of them
-    return sum(base in edge.bodies for edge in edges) == 1 and len(between) == len(bodies)
+def next_joints(joints: Sequence[Joint], joint: Joint, body: str) -> list[Joint]:
+    """The joints nearest to `joint` on its side `body`, in number of joints passed through; empty when it ends there.
 
-
-def leads(edges: Sequence[Edge], start: str, goal: str) -> bool:
-    """Whether there is a way from one body to another."""
-    return goal in _tree(edges, start)
-
-
-def stages(edges: Sequence[Edge], start: str, goal: str) -> list[Stage]:
-    """What lies between two bodies, in series; what does not lead from one to the other is left out.
-
-    These are the blocks of the graph: edges that lie on a common loop belong to one. Edges on the loops that a spanning
-    tree closes share a block if the loops share an edge, and every way to the goal passes the same blocks.
+    Prismatic and fixed joints are passed through. The bodies and names of all joints must be well formed.
     """
-    inward = _tree(edges, start)
-    block = list(range(len(edges)))
-
-    def path(body: str) -> list[int]:
-        passed = []
-        while body != start:
-            passed.append(inward[body])
-            body = edges[passed[-1]].other(body)
-        return passed
-
-    for number, edge in enumerate(edges):
-        one, other = edge.bodies
-        if one in inward and other in inward and number not in (inward.get(one), inward.get(other)):
-            joined = {block[member] for member in {number} | set(path(one)) ^ set(path(other))}
-            block = [number if own in joined else own for own in block]
-    found, here = [], start
-    for own, passed in groupby(reversed(path(goal)), key=block.__getitem__):
-        there = here
-        for member in passed:
-            there = edges[member].other(there)
-        found.append(Stage(here, there, tuple(edge for edge, its in zip(edges, block, strict=True) if its == own)))
-        here = there
-    return found
+    seen, bodies = {*joint.connects}, [body]
+    while bodies:
+        around = [each for each in joints if each.name != joint.name and any(side in bodies for side in each.connects)]
+        ends = [each for each in around if each.type not in PASSED_THROUGH]
+        if ends:
+            return ends
+        bodies = [side for each in around for side in each.connects if side not in seen]
+        seen.update(bodies)
+    return []
 
 
-def _tree(edges: Sequence[Edge], start: str) -> dict[str, int]:
-    """Body -> the edge that leads from it toward the start, of a spanning tree; the start itself with -1."""
-    at: dict[str, list[int]] = defaultdict(list)
-    for number, edge in enumerate(edges):
-        for body in edge.bodies:
-            at[body].append(number)
-    inward, waiting = {start: -1}, deque([start])
-    while waiting:
-        body = waiting.popleft()
-        for number in at[body]:
-            other = edges[number].other(body)
-            if other not in inward:
-                inward[other] = number
-                waiting.append(other)
-    return inward
+def opposite(joint: Joint) -> str:
+    """The body whose line the joint's cone limits: the one that the cone is not fixed to."""
+    first, second = joint.connects
+    return second if joint.cone is not None and joint.cone.fixed_to == first else first
+
+
+def cone_line(mechanism: Structure, joint: Joint) -> tuple[Joint, Joint]:
+    """The two joints between which the line limited by `joint.cone` runs.
+
+    Returns
+    -------
+    The joint itself, and the nearest joint with a centre that is reached through the body that the cone is not fixed
+    to, passing through prismatic joints (a strut's two parts carry one line).
+
+    Raises
+    ------
+    InvalidArgument : the joint has no cone.
+    """
+    if joint.cone is None:
+        raise InvalidArgument("joint", f"'{joint.name}', which has no cone", "a joint with a cone")
+    return joint, next_joints(mechanism.joints, joint, opposite(joint))[0]

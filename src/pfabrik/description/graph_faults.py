@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from string import digits
-from typing import TYPE_CHECKING
 
 from ..errors import Fault, near_miss
-from .cones import next_joints, opposite
 from .form_faults import is_name, is_pair_of_names, kind_of, shown
+from .graph import components, edges_of, next_joints, opposite
+from .joints import Joint
+from .structure import Structure
 
-if TYPE_CHECKING:
-    from .mechanism import Joint, Mechanism
 
-
-def graph_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def graph_faults(mechanism: Structure) -> Iterator[Fault]:
     """All faults of how the joints, the base and the end effector refer to each other.
 
     Where a name could not be read, whatever depends on it is left out: a fault is reported once, where it is.
@@ -36,7 +34,7 @@ def graph_faults(mechanism: Mechanism) -> Iterator[Fault]:
         yield from _cone_faults(mechanism)
 
 
-def _duplicate_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _duplicate_faults(mechanism: Structure) -> Iterator[Fault]:
     seen: set[str] = set()
     for index, joint in enumerate(mechanism.joints):
         if is_name(joint.name) and joint.name in seen:
@@ -45,24 +43,24 @@ def _duplicate_faults(mechanism: Mechanism) -> Iterator[Fault]:
             seen.add(joint.name)
 
 
-def _actuator_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _actuator_faults(mechanism: Structure) -> Iterator[Fault]:
     if mechanism.joints and all(joint.actuated is False for joint in mechanism.joints):
         yield Fault("joint", "no actuated joint", "at least one joint with `actuated = true`, or `*` in a chain")
 
 
-def _bodies(mechanism: Mechanism) -> Counter[str]:
+def _bodies(mechanism: Structure) -> Counter[str]:
     """How many joints mention each body."""
     return Counter(body for joint in mechanism.joints for body in joint.connects)
 
 
-def _base_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _base_faults(mechanism: Structure) -> Iterator[Fault]:
     bodies = _bodies(mechanism)
     if mechanism.base not in bodies:
         hint = near_miss(mechanism.base, bodies)
         yield Fault("base", f"'{mechanism.base}', which no joint connects{hint}", "a body that a joint connects")
 
 
-def _end_effector_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _end_effector_faults(mechanism: Structure) -> Iterator[Fault]:
     bodies, name = _bodies(mechanism), mechanism.end_effector
     joints = {joint.name: joint for joint in mechanism.joints if is_name(joint.name)}
     if name == mechanism.base:
@@ -82,7 +80,7 @@ def _tip_faults(joint: Joint) -> Iterator[Fault]:
         yield Fault("end_effector", f"'{joint.name}', a {joint.type} joint", expected)
 
 
-def _dangling_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _dangling_faults(mechanism: Structure) -> Iterator[Fault]:
     counts, allowed = _bodies(mechanism), {mechanism.base, mechanism.end_effector}
     sound = {body for body, count in counts.items() if count > 1} | (allowed & set(counts))
     for index, joint in enumerate(mechanism.joints):
@@ -100,40 +98,22 @@ def _meant(body: str, joint: Joint, sound: Iterable[str], bodies: Iterable[str])
     return near_miss(body, [each for each in (*sound, *lonely) if each not in joint.connects])
 
 
-def _connection_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _connection_faults(mechanism: Structure) -> Iterator[Fault]:
     """Parts of the graph with no connection to the base; the end effector's is named as such."""
-    reached = _connected(mechanism, mechanism.base)
-    for index, joint in enumerate(mechanism.joints):
-        if joint.connects[0] in reached:
+    for part in components(edges_of(mechanism.joints)):
+        bodies = {body for edge in part for body in edge.bodies}
+        if mechanism.base in bodies:
             continue
-        part = _connected(mechanism, joint.connects[0])
-        reached |= part
-        tip = mechanism.end_effector in part or any(
-            each.name == mechanism.end_effector and each.connects[0] in part for each in mechanism.joints
-        )
-        if tip:
+        if mechanism.end_effector in bodies | {edge.joint.name for edge in part}:
             found = f"'{mechanism.end_effector}', to which no joints lead from the base '{mechanism.base}'"
             yield Fault("end_effector", found, "an end effector connected to the base")
         else:
-            bodies = ", ".join(f"'{body}'" for body in sorted(part))
-            yield Fault(f"joint[{index}].connects", f"{bodies}, apart from the rest", "bodies connected to the base")
+            index = mechanism.joints.index(part[0].joint)
+            names = ", ".join(f"'{body}'" for body in sorted(bodies))
+            yield Fault(f"joint[{index}].connects", f"{names}, apart from the rest", "bodies connected to the base")
 
 
-def _connected(mechanism: Mechanism, start: str) -> set[str]:
-    """The bodies that joints connect with `start`, itself included."""
-    neighbours: dict[str, list[str]] = {}
-    for first, second in (joint.connects for joint in mechanism.joints):
-        neighbours.setdefault(first, []).append(second)
-        neighbours.setdefault(second, []).append(first)
-    reached, waiting = {start}, [start]
-    while waiting:
-        new = set(neighbours.get(waiting.pop(), ())) - reached
-        reached |= new
-        waiting += new
-    return reached
-
-
-def _along_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _along_faults(mechanism: Structure) -> Iterator[Fault]:
     joints = {joint.name: joint for joint in mechanism.joints}
     for index, joint in enumerate(mechanism.joints):
         if (
@@ -167,7 +147,7 @@ def _on_both_sides(joint: Joint, ends: list[tuple[str, str]]) -> bool:
     return (first in one and second in other) or (first in other and second in one)
 
 
-def _cone_faults(mechanism: Mechanism) -> Iterator[Fault]:
+def _cone_faults(mechanism: Structure) -> Iterator[Fault]:
     for index, joint in enumerate(mechanism.joints):
         kind, cone = kind_of(joint), joint.cone
         if cone is None or kind is None or not kind.coned or getattr(cone, "fixed_to", None) not in joint.connects:

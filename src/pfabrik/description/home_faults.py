@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import Fault
 from ..tolerances import TOLERANCES
-from .cones import next_joints, opposite
 from .enclosing import enclosing_radius
 from .form_faults import angle_text, coordinate_text, is_pair_of_names, is_point, kind_of, range_text
+from .graph import next_joints, opposite
 from .joint_types import Coordinate
-
-if TYPE_CHECKING:
-    from .mechanism import Joint, Mechanism
+from .joints import Joint
+from .structure import Structure
 
 SMALLEST_LENGTH = 1e-9
 """Smallest characteristic length accepted: below it, a unit is wrong or joints are meant to coincide."""
 
 
-def home_faults(mechanism: Mechanism, sound: dict[str, Joint]) -> Iterator[Fault]:
+def home_faults(mechanism: Structure, sound: dict[str, Joint]) -> Iterator[Fault]:
     """All faults of the home configuration that can be seen in the joints that have no other fault.
 
     Parameters
@@ -70,7 +69,7 @@ def _outside(place: str, value: float, bounds: Any, coordinate: Coordinate, scal
         yield Fault(place, range_text(bounds, coordinate), expected)
 
 
-def _angle_faults(place: str, joint: Joint, mechanism: Mechanism, sound: dict[str, Joint]) -> Iterator[Fault]:
+def _angle_faults(place: str, joint: Joint, mechanism: Structure, sound: dict[str, Joint]) -> Iterator[Fault]:
     """Home outside the joint's cone, or no line to measure."""
     if joint.cone is None or not all(is_pair_of_names(each.connects) for each in mechanism.joints):
         return

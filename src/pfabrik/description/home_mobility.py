@@ -7,19 +7,16 @@ the twists of its two bodies differ by its own screws only. The null space of th
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..tolerances import TOLERANCES
-from .cones import next_joints
+from .graph import next_joints, tree_of
 from .joint_types import KINDS
-
-if TYPE_CHECKING:
-    from .mechanism import Joint, Mechanism
+from .joints import Joint
+from .structure import Structure
 
 NEARLY_IMPLIED = 1e-3
 """Singular value [L and rad] below which a condition of the loops is hardly one of its own: in machines that move, such
@@ -30,53 +27,6 @@ ROUNDING = 1e-12
 """Singular value [L and rad] up to which a condition follows from the others exactly: rounding leaves 1e-15. From 1e-11
 on, searches for nearest poses take conditions that miss each other for ones to keep, and stop early.
 """
-
-
-@dataclass(frozen=True)
-class Tree:
-    """The joints that lead from the base to every body, and the loops that the other joints close.
-
-    Attributes
-    ----------
-    steps : index of each of the tree's joints, in the order in which it grows, and whether it leads from the joint's
-        first body to the second.
-    closing : indices of the joints that close a loop each.
-    paths : body -> (joints,): +1 for a joint that the way from the base passes from its first body to its second, -1
-        for one that it passes backward, 0 for the others.
-    loops : the same for every loop, (loops, joints); the closing joint has -1.
-    """
-
-    steps: tuple[tuple[int, bool], ...]
-    closing: tuple[int, ...]
-    paths: Mapping[str, NDArray[np.float64]]
-    loops: NDArray[np.float64]
-
-
-def spanning_tree(mechanism: Mechanism) -> Tree:
-    """The tree that grows from the base, always by the first joint that reaches a body already on it."""
-    one = np.eye(len(mechanism.joints))
-    paths = {mechanism.base: np.zeros(len(mechanism.joints))}
-    steps: list[tuple[int, bool]] = []
-    loops: dict[int, NDArray[np.float64]] = {}
-    waiting = list(range(len(mechanism.joints)))
-    while waiting:
-        index = waiting.pop(_next_reached(mechanism, waiting, paths))
-        first, second = mechanism.joints[index].connects
-        if first in paths and second in paths:
-            loops[index] = paths[second] - paths[first] - one[index]
-            continue
-        steps.append((index, first in paths))
-        if first in paths:
-            paths[second] = paths[first] + one[index]
-        else:
-            paths[first] = paths[second] - one[index]
-    return Tree(tuple(steps), tuple(loops), paths, np.array(list(loops.values())).reshape(-1, len(one)))
-
-
-def _next_reached(mechanism: Mechanism, waiting: list[int], reached: Container[str]) -> int:
-    """Place in `waiting` of the first joint of a body that is reached already."""
-    connects = (mechanism.joints[index].connects for index in waiting)
-    return next(place for place, bodies in enumerate(connects) if any(body in reached for body in bodies))
 
 
 def body_twist(path: NDArray[np.float64], screws: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,7 +52,7 @@ def loop_conditions(loops: NDArray[np.float64], screws: NDArray[np.float64]) -> 
     return conditions.reshape(*screws.shape[:-2], 6 * len(loops), screws.shape[-2])
 
 
-def end_effector_freedom(mechanism: Mechanism, locked: frozenset[str]) -> int:
+def end_effector_freedom(mechanism: Structure, locked: frozenset[str]) -> int:
     """Number of independent motions of the end effector at home, with some joints locked.
 
     Parameters
@@ -121,7 +71,7 @@ def end_effector_freedom(mechanism: Mechanism, locked: frozenset[str]) -> int:
     return _rank((twist[3:] + np.cross(twist[:3], centre, axisa=0, axisc=0)) @ motions)
 
 
-def inexactness(mechanism: Mechanism) -> float:
+def inexactness(mechanism: Structure) -> float:
     """By how much conditions of the loops at home fail to follow from the others, and yet hardly are their own.
 
     Returns
@@ -136,14 +86,7 @@ def inexactness(mechanism: Mechanism) -> float:
     return float(unclear.max(initial=0.0))
 
 
-def end_effector_body(mechanism: Mechanism) -> str:
-    """The body that carries the end effector; of a joint end effector, the first of its two."""
-    if not mechanism.end_effector_is_joint:
-        return mechanism.end_effector
-    return mechanism.joint(mechanism.end_effector).connects[0]
-
-
-def universal_axes(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
+def universal_axes(mechanism: Structure, joint: Joint) -> NDArray[np.float64]:
     """The two axes of a universal joint at home, shape (2, 3): its own, or the default where none are given.
 
     The default axes are normal to each other and to the line to the only next joint (on the second body, else on the
@@ -159,7 +102,7 @@ def universal_axes(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
     return np.asarray(normals)
 
 
-def joint_screws(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
+def joint_screws(mechanism: Structure, joint: Joint) -> NDArray[np.float64]:
     """Unit screws of a joint's coordinates at home, (freedoms, 6): angular velocity, velocity at the origin [L].
 
     The three of a spherical joint are the rotations about x, y and z.
@@ -179,13 +122,13 @@ def joint_screws(mechanism: Mechanism, joint: Joint) -> NDArray[np.float64]:
     return np.vstack([turn, np.concatenate([np.zeros(3), turn[0, :3]])])
 
 
-def column_joints(mechanism: Mechanism) -> NDArray[np.intp]:
+def column_joints(mechanism: Structure) -> NDArray[np.intp]:
     """Index of the joint that every coordinate of the mechanism belongs to, shape (c,)."""
     counts = [len(KINDS[joint.type].coordinates) for joint in mechanism.joints]
     return np.repeat(np.arange(len(counts)), counts)
 
 
-def orthonormal_rates(mechanism: Mechanism) -> NDArray[np.float64]:
+def orthonormal_rates(mechanism: Structure) -> NDArray[np.float64]:
     """Combinations of coordinates that turn a joint about orthonormal axes, shape (c, c), one a row.
 
     They count what a universal joint can do, however close its axes are; for all other joints they change nothing.
@@ -206,14 +149,14 @@ def _rotations(axes: ArrayLike, centre: NDArray[np.float64]) -> NDArray[np.float
     return np.hstack([directions, np.cross(centre, directions)])
 
 
-def _home_motion(mechanism: Mechanism, locked: frozenset[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _home_motion(mechanism: Structure, locked: frozenset[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Twist of the end effector, (6, rates), and loop conditions, (6 loops, rates), per rate of what is not locked."""
     screws = np.vstack([joint_screws(mechanism, joint) for joint in mechanism.joints])
     owners = column_joints(mechanism)
     moving = np.array([joint.name not in locked for joint in mechanism.joints])[owners]
     screws, owners = (orthonormal_rates(mechanism) @ screws)[moving], owners[moving]
-    tree = spanning_tree(mechanism)
-    path = tree.paths[end_effector_body(mechanism)]
+    tree = tree_of(mechanism)
+    path = tree.paths[mechanism.end_effector_body]
     return body_twist(path[owners], screws), loop_conditions(tree.loops[:, owners], screws)
 
 

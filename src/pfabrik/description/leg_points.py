@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import Fault
 from .chains import Step
 from .form_faults import number_faults, shown
 from .joints import Vector
-
-if TYPE_CHECKING:
-    from .legs import Leg
+from .legs import Leg
 
 
 @dataclass(frozen=True)

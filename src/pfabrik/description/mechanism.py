@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
-from .coercion import items, numbers, text, texts, unit_vector
-from .enclosing import enclosing_radius
+from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from .faults import find_faults, in_order, merged
 from .form_faults import joint_faults
 from .home_mobility import end_effector_freedom, inexactness
-from .joint_types import JOINT_TYPES, KINDS, TASK_COORDINATES, WHOLE_TASK, JointType
+from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import at_legs, legs_name, placed_joints
 from .legs import Leg, as_legs
+from .structure import Structure
 
 __all__ = ["JOINT_TYPES", "Cone", "Joint", "JointType", "Limit", "Mechanism", "Range", "Vector", "checked_mechanism"]
 
@@ -33,8 +27,8 @@ MOST_JOINTS_FOR_FREEDOM = 200
 Limit: TypeAlias = Range | tuple[Range, Range] | Cone | None
 
 
-@dataclass(frozen=True)
-class Mechanism:
+@dataclass(frozen=True, eq=False, repr=False)
+class Mechanism(Structure):
     """A closed-loop machine: joints between named bodies, one body fixed, one body (or joint) to be placed.
 
     Construction checks everything and raises `InvalidMechanism` with every fault; afterwards nothing changes. A
@@ -50,26 +44,17 @@ class Mechanism:
         default everything. What it leaves out follows from the mechanism.
     """
 
-    name: str
-    joints: tuple[Joint, ...]
-    end_effector: str
-    reference_point: Vector = None  # type: ignore[assignment]  # never None once constructed
-    base: str = "base"
-    length_unit: str = "mm"
-    angle_unit: Literal["deg", "rad"] = field(default="deg", compare=False)
-    task: tuple[str, ...] = None  # type: ignore[assignment]  # never None once constructed
-
     def __post_init__(self) -> None:
-        joints = items(self.joints)
-        set_fields(self, joints=joints, reference_point=numbers(self.reference_point))
-        set_fields(self, **{name: text(getattr(self, name)) for name in _TEXT_FIELDS})
-        if cast(Any, self.reference_point) is None:
-            set_fields(self, reference_point=_centre_of(joints, self.end_effector))
-        if cast(Any, self.task) is None:
-            set_fields(self, task=self.whole_task)
-        set_fields(self, task=_in_order(texts(self.task)))
+        super().__post_init__()
         self._check()
         self._warn_of_freedom()
+
+    def __repr__(self) -> str:
+        return f"<Mechanism '{self.name}': {self._counts()}, task {' '.join(self.task)}>"
+
+    def _counts(self) -> str:
+        counts = {"joint": len(self.joints), "actuator": len(self.actuator_names)}
+        return ", ".join(f"{count} {noun}{'s' * (count != 1)}" for noun, count in counts.items())
 
     @classmethod
     def from_legs(
@@ -159,108 +144,6 @@ class Mechanism:
         elif left == 0 and end_effector_freedom(self, frozenset()) == 0:
             yield "the loops hold the end effector at home: it cannot move"
 
-    def __hash__(self) -> int:
-        return self._hash
-
-    @cached_property
-    def _hash(self) -> int:
-        return hash(tuple(getattr(self, each.name) for each in dataclasses.fields(self) if each.compare))
-
-    def __getstate__(self) -> dict[str, Any]:
-        """The description alone: what is derived is computed again, read-only again."""
-        return {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
-
-    @cached_property
-    def actuator_names(self) -> tuple[str, ...]:
-        """Names of the actuated joints, in the order of `joints`."""
-        return tuple(joint.name for joint in self.joints if joint.actuated)
-
-    @cached_property
-    def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies, in the order in which the joints mention them."""
-        return tuple(dict.fromkeys(body for joint in self.joints for body in joint.connects))
-
-    @cached_property
-    def end_effector_is_joint(self) -> bool:
-        """Whether `end_effector` names a joint rather than a body."""
-        return self.end_effector not in self.bodies
-
-    @cached_property
-    def whole_task(self) -> tuple[str, ...]:
-        """All that a target can set: the position of the reference point and, for a body, its rotation."""
-        return WHOLE_TASK[:3] if _has_joint(self.joints, self.end_effector) else WHOLE_TASK
-
-    @cached_property
-    def home_pose(self) -> NDArray[np.float64]:
-        """Pose of the end effector at home, T_base_platform, shape (4, 4) [length]: the reference point, unrotated."""
-        T_base_platform = np.eye(4)
-        T_base_platform[:3, 3] = self.reference_point
-        T_base_platform.setflags(write=False)
-        return T_base_platform
-
-    @cached_property
-    def characteristic_length(self) -> float:
-        """Radius of the smallest sphere around the home joint centres [length].
-
-        Where all centres coincide (a spherical wrist), the reference point is included. Where that coincides too (a
-        gantry of slides), the longest stroke stands for it. Without one the description contains no length, nothing
-        scales with it, and 1 stands for "the unit".
-        """
-        centres = [joint.at for joint in self.joints if joint.at is not None]
-        size = enclosing_radius(centres) or enclosing_radius([*centres, self.reference_point])
-        return size or max(map(_stroke, self.joints), default=0.0) or 1.0
-
-    @cached_property
-    def rotation_length(self) -> float:
-        """Length by which a rotation of the end effector counts as a distance [length per rad].
-
-        The root mean square distance of the joints on the end effector from their centre: turning it by a small angle
-        moves them by about that much. The characteristic length where it has fewer than two, or all in one place.
-        """
-        centres = np.array([j.at for j in self.joints if self.end_effector in j.connects and j.at is not None])
-        spread = float(np.sqrt(centres.var(axis=0).sum())) if len(centres) else 0.0
-        return spread or self.characteristic_length
-
-    @cached_property
-    def _by_name(self) -> dict[str, Joint]:
-        return {joint.name: joint for joint in self.joints}
-
-    def joint(self, name: str) -> Joint:
-        """The joint of that name; `UnknownName` if there is none."""
-        if name not in self._by_name:
-            raise UnknownName("joint", name, self._by_name)
-        return self._by_name[name]
-
-    def home_coordinate(self, name: str) -> float | tuple[float, ...]:
-        """Value of a joint's coordinate in the home configuration [rad or length].
-
-        One number for R and P (the distance of the two joints, for a P with `along`), two for U and C, the zero
-        rotation vector for S, nothing for a fixed joint.
-        """
-        joint = self.joint(name)
-        if joint.along is not None:
-            return math.dist(*self._centres_along(joint))
-        return (0.0,) * len(KINDS[joint.type].coordinates) if joint.type in ("spherical", "fixed") else joint.home
-
-    def home_axis(self, name: str) -> Vector:
-        """Unit vector of the axis of an R, P or C at home, in base coordinates.
-
-        For a P with `along`, it points from the joint on its first body to the joint on its second, so that a growing
-        coordinate moves the second body forward.
-        """
-        joint = self.joint(name)
-        if joint.along is None:
-            return cast(Vector, joint.axis)
-        start, end = self._centres_along(joint)
-        return cast(Vector, unit_vector(tuple(b - a for a, b in zip(start, end, strict=True))))
-
-    def _centres_along(self, joint: Joint) -> tuple[Vector, Vector]:
-        """Centres of the two joints of `along`: of the one on the first body, then of the one on the second."""
-        first, second = (self.joint(name) for name in joint.along or ())
-        if joint.connects[0] not in first.connects or joint.connects[1] not in second.connects:
-            first, second = second, first
-        return cast(Vector, first.at), cast(Vector, second.at)
-
     def with_limits(self, limits: Mapping[str, Limit] | None = None, /, **by_name: Limit) -> Mechanism:
         """A copy with other limits.
 
@@ -299,36 +182,9 @@ def checked_mechanism(mechanism: Any) -> Mechanism:
     return mechanism
 
 
-_TEXT_FIELDS = ("name", "end_effector", "base", "length_unit", "angle_unit")
-
-
 def _limited(joint: Joint, limit: Limit) -> Joint:
     if limit is None:
         return dataclasses.replace(joint, range=None, cone=None)
     if isinstance(limit, Cone):
         return dataclasses.replace(joint, cone=limit)
     return dataclasses.replace(joint, range=limit)
-
-
-def _has_joint(joints: Any, name: str) -> bool:
-    joints = joints if isinstance(joints, tuple) else ()
-    return any(isinstance(joint, Joint) and joint.name == name for joint in joints)
-
-
-def _in_order(task: Any) -> Any:
-    """A task's coordinates in their usual order; anything else as it is, for `find_faults` to name."""
-    known = isinstance(task, tuple) and all(each in TASK_COORDINATES for each in task)
-    return tuple(sorted(task, key=TASK_COORDINATES.index)) if known else task
-
-
-def _stroke(joint: Joint) -> float:
-    """Length of a prismatic joint's range; 0 where it has none."""
-    if joint.type != "prismatic" or joint.range is None:
-        return 0.0
-    low, high = cast(Range, joint.range)
-    return high - low if math.isfinite(high - low) else 0.0
-
-
-def _centre_of(joints: Any, name: str) -> Vector | None:
-    joints = joints if isinstance(joints, tuple) else ()
-    return next((joint.at for joint in joints if isinstance(joint, Joint) and joint.name == name), None)

@@ -2,40 +2,23 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import reduce
 from itertools import chain
 from operator import xor
 
 from ..errors import UnsupportedMechanism
-from .mechanism import Joint, Mechanism
+from .graph import Edge, Step, edges_of, spanning_tree
+from .structure import Structure
 
 MOST_PATHS = 100_000
 """Most paths looked at: a graph as dense as that is no machine."""
 
-
-@dataclass(frozen=True)
-class Passage:
-    """A joint on a path; `forward` if the path passes it from its first body to its second."""
-
-    joint: Joint
-    forward: bool
+Path = tuple[Step, ...]
 
 
-Path = tuple[Passage, ...]
-
-
-def end_body(mechanism: Mechanism) -> str:
-    """The body that the paths lead to; of a joint end effector, its first body that is not the base."""
-    if not mechanism.end_effector_is_joint:
-        return mechanism.end_effector
-    first, second = mechanism.joint(mechanism.end_effector).connects
-    return second if first == mechanism.base else first
-
-
-def independent_paths(mechanism: Mechanism) -> tuple[Path, ...]:
+def independent_paths(mechanism: Structure) -> tuple[Path, ...]:
     """Paths from the base to the end effector: enough that every loop of the graph lies between two of them.
 
     First those that pass no body twice, shortest first; then, for loops that none of them passes (a gripper's),
@@ -50,9 +33,8 @@ def independent_paths(mechanism: Mechanism) -> tuple[Path, ...]:
     number = {joint.name: 1 << place for place, joint in enumerate(mechanism.joints)}
     chosen: list[Path] = []
     basis: list[int] = []
-    direct = _paths(mechanism, end_body(mechanism))
-    for path in chain(direct, (_detour(mechanism, joint, chosen[0]) for joint in mechanism.joints)):
-        rest = _reduce(reduce(xor, (number[passage.joint.name] for passage in path), 0), basis)
+    for path in chain(_simple_paths(mechanism), _detours(mechanism, chosen)):
+        rest = _reduce(reduce(xor, (number[step.joint.name] for step in path), 0), basis)
         if rest:
             basis.append(rest)
             chosen.append(path)
@@ -61,32 +43,25 @@ def independent_paths(mechanism: Mechanism) -> tuple[Path, ...]:
     return tuple(chosen)
 
 
-def _detour(mechanism: Mechanism, joint: Joint, path: Path) -> Path:
-    """A path that goes around a loop first: out to a joint, over it, and back from its other side."""
-    out, back = (_way(mechanism, body, path) for body in joint.connects)
-    walk: list[Passage] = []
-    for passage in (*out, Passage(joint, True), *_reversed(back), *path):
-        if walk and walk[-1] == Passage(passage.joint, not passage.forward):
-            walk.pop()  # there and back again
-        else:
-            walk.append(passage)
-    return tuple(walk)
+def _detours(mechanism: Structure, chosen: list[Path]) -> Iterator[Path]:
+    """Paths that go around a loop first: out to a joint, over it, back from its other side, then the first chosen."""
+    direct = chosen[0]
+    on_path = {step.joint.name for step in direct}
+    edges: list[Edge] = sorted(edges_of(mechanism.joints), key=lambda edge: edge.joint.name not in on_path)
+    tree = spanning_tree(edges, mechanism.base)  # holds the path, whose joints come first
 
+    def way(body: str) -> Path:
+        return tuple(Step(edges[index].joint, forward) for index, forward in tree.way(body))
 
-def _way(mechanism: Mechanism, body: str, path: Path) -> Path:
-    """A way from the base to a body, along a path as far as that leads."""
-    passed = [mechanism.base, *(passage.joint.connects[1 if passage.forward else 0] for passage in path)]
-    ways = {each: path[:place] for place, each in enumerate(passed)}
-    while body not in ways:
-        for joint in mechanism.joints:
-            for forward, (here, there) in ((True, joint.connects), (False, joint.connects[::-1])):
-                if here in ways and there not in ways:
-                    ways[there] = (*ways[here], Passage(joint, forward))
-    return ways[body]
-
-
-def _reversed(path: Path) -> Path:
-    return tuple(Passage(passage.joint, not passage.forward) for passage in reversed(path))
+    for joint in mechanism.joints:
+        out, back = map(way, joint.connects)
+        walk: list[Step] = []
+        for step in (*out, Step(joint), *(each.back for each in reversed(back)), *direct):
+            if walk and walk[-1] == step.back:
+                walk.pop()  # there and back again
+            else:
+                walk.append(step)
+        yield tuple(walk)
 
 
 def _reduce(path: int, basis: list[int]) -> int:
@@ -96,23 +71,23 @@ def _reduce(path: int, basis: list[int]) -> int:
     return path
 
 
-def _paths(mechanism: Mechanism, end: str) -> Iterator[Path]:
-    """All paths that pass no body twice, the shortest first."""
-    at: dict[str, list[Joint]] = {body: [] for body in mechanism.bodies}
-    for joint in mechanism.joints:
-        for body in joint.connects:
-            at[body].append(joint)
+def _simple_paths(mechanism: Structure) -> Iterator[Path]:
+    """All paths from the base to the end effector that pass no body twice, the shortest first."""
+    touching: dict[str, list[Edge]] = defaultdict(list)
+    for edge in edges_of(mechanism.joints):
+        for body in edge.bodies:
+            touching[body].append(edge)
     waiting: deque[tuple[str, frozenset[str], Path]] = deque([(mechanism.base, frozenset({mechanism.base}), ())])
     for _ in range(MOST_PATHS):
         if not waiting:
             return
         body, passed, path = waiting.popleft()
-        if body == end:
+        if body == mechanism.end_effector_body:
             yield path
             continue
-        for joint in at[body]:
-            forward = joint.connects[0] == body
-            other = joint.connects[1 if forward else 0]
+        for edge in touching[body]:
+            other = edge.other(body)
             if other not in passed:
-                waiting.append((other, passed | {other}, (*path, Passage(joint, forward))))
+                step = Step(edge.joint, edge.bodies[0] == body)
+                waiting.append((other, passed | {other}, (*path, step)))
     raise UnsupportedMechanism(mechanism.name, [f"more than {MOST_PATHS} paths lead from base to end effector"])

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decomposition.decompose import Step
+from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from ..decomposition.decompose import SubChain, decompose
-from ..description.cones import cone_line, opposite
+from ..description.graph import cone_line, opposite
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES

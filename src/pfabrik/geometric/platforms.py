@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..description.graph import tree_of
 from ..description.home_mobility import (
     body_twist,
     column_joints,
-    end_effector_body,
     joint_screws,
     loop_conditions,
     orthonormal_rates,
-    spanning_tree,
 )
 from ..description.mechanism import Mechanism, Vector
 from ..tolerances import TOLERANCES
@@ -80,10 +79,10 @@ def _home_motions(mechanism: Mechanism) -> Array:
     """The twists that the end effector has at home, one a column, (6, k): angular, then of the origin [L]."""
     screws = np.vstack([joint_screws(mechanism, joint) for joint in mechanism.joints])
     screws, owners = orthonormal_rates(mechanism) @ screws, column_joints(mechanism)
-    tree = spanning_tree(mechanism)
+    tree = tree_of(mechanism)
     _, values, rows = np.linalg.svd(loop_conditions(tree.loops[:, owners], screws))
     free = rows[np.count_nonzero(values > TOLERANCES.alignment) :].T
-    return np.asarray(body_twist(tree.paths[end_effector_body(mechanism)][owners], screws) @ free)
+    return np.asarray(body_twist(tree.paths[mechanism.end_effector_body][owners], screws) @ free)
 
 
 def _still_point(mechanism: Mechanism) -> Array:

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..decomposition.decompose import Step, SubChain
+from ..decomposition.decompose import SubChain
+from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..kernels._jit import kernel, routine
 from ..tolerances import TOLERANCES

@@ -25,12 +25,10 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from ..description.graph import Tree, tree_of
 from ..description.home_mobility import (
-    Tree,
     column_joints,
-    end_effector_body,
     joint_screws,
-    spanning_tree,
     universal_axes,
 )
 from ..description.mechanism import Joint, Mechanism
@@ -126,7 +124,7 @@ def end_effector_pose(mechanism: Mechanism, q: Floats) -> Floats:
 
     Of a joint end effector, the pose is the present centre of the joint, unrotated.
     """
-    displaced = displacements(mechanism, q)[end_effector_body(mechanism)] @ mechanism.home_pose
+    displaced = displacements(mechanism, q)[mechanism.end_effector_body] @ mechanism.home_pose
     if mechanism.end_effector_is_joint:
         displaced[:, :3, :3] = np.eye(3)
     return displaced
@@ -212,7 +210,7 @@ def _geometry(mechanism: Mechanism) -> _Geometry:
         column = columns(mechanism)[joint.name]
         turns[:, column, j], slides[column, j] = _exponents(mechanism, joint)
     return _Geometry(
-        tree=spanning_tree(mechanism),
+        tree=tree_of(mechanism),
         places=places,
         firsts=np.array([places[joint.connects[0]] for joint in joints]),
         seconds=np.array([places[joint.connects[1]] for joint in joints]),

@@ -20,13 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..description.graph import tree_of
 from ..description.home_mobility import (
     body_twist,
     column_joints,
-    end_effector_body,
     loop_conditions,
     orthonormal_rates,
-    spanning_tree,
 )
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
@@ -303,8 +302,8 @@ class _Graph:
 
 @lru_cache(maxsize=64)
 def _graph(mechanism: Mechanism) -> _Graph:
-    tree, owners = spanning_tree(mechanism), column_joints(mechanism)
-    path = tree.paths[end_effector_body(mechanism)][owners]
+    tree, owners = tree_of(mechanism), column_joints(mechanism)
+    path = tree.paths[mechanism.end_effector_body][owners]
     orthonormal = np.linalg.qr(tree.loops.T)[0].T
     return _Graph(path, tree.loops[:, owners], orthonormal[:, owners], orthonormal_rates(mechanism))
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..description.cones import cone_line
+from ..description.graph import cone_line
 from ..description.joint_types import KINDS
 from ..description.mechanism import Joint, Mechanism
 from ..tolerances import TOLERANCES
