@@ -47,7 +47,10 @@ def forward(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
     drawn = draw(mechanism, rng, 4 * n, 0.2, 0.2)
     targets = drawn[struts.solve(drawn)[1]][:n]
     values, seeds = struts.lengths(targets), beside(mechanism, targets, rng)
-    from_home, from_seeds = partial(pf.solve_fk, mechanism, values), partial(pf.solve_fk, mechanism, values, seed=seeds)
+    from_home, from_seeds = (
+        partial(pf.solve_fk, mechanism, values),
+        partial(pf.solve_fk, mechanism, values, start=seeds),
+    )
     for found in (from_home(), from_seeds()):
         same_poses(found, targets)
     few = list(values[:100])
@@ -83,11 +86,11 @@ def forward_alone(mechanism: pf.Mechanism, what: str, rng: np.random.Generator, 
     there = pf.solve_ik(mechanism, targets)
     there = there[np.flatnonzero(there.status == pf.Status.REACHED)[:n]]
     seeds = beside(mechanism, there.pose, rng, seed=there)
-    same_poses(pf.solve_fk(mechanism, there.actuators, seed=seeds), there.pose)
+    same_poses(pf.solve_fk(mechanism, there.actuators, start=seeds), there.pose)
     with one_core():
         ours, inverse = best_times(
             runs,
-            lambda: pf.solve_fk(mechanism, there.actuators, seed=seeds),
+            lambda: pf.solve_fk(mechanism, there.actuators, start=seeds),
             lambda: pf.solve_ik(mechanism, there.pose),
         )
     return Row(f"{what}, FK, batch, seeded, one core", n, ours / n, "its inverse kinematics", inverse / n)
@@ -107,7 +110,7 @@ def beside(
     start = targets.copy()
     start[:, :3, 3] += moves[:, :3, 3] - mechanism.reference_point
     start[:, :3, :3] = moves[:, :3, :3] @ start[:, :3, :3]
-    found = pf.solve_ik(mechanism, start, seed=seed)
+    found = pf.solve_ik(mechanism, start, start=seed)
     assert found.joints
     return found
 

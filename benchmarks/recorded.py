@@ -29,7 +29,7 @@ def targets_of(mechanism: pf.Mechanism) -> np.ndarray:
     rng = np.random.default_rng(20261122)
     length, home, third = mechanism.characteristic_length, mechanism.home_pose, TARGETS // 3
     start = pf.solve_ik(mechanism, home).actuators
-    slides = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuators])
+    slides = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names])
     span = np.where(slides, 0.15 * length, 0.4)
     forward = pf.solve_fk(mechanism, start + rng.uniform(-1.0, 1.0, (third, len(start))) * span)
     reach = np.repeat([0.2, 1.0], third) * np.repeat([1.0, 3.0], third) * length
@@ -52,7 +52,7 @@ def answers(mechanism: pf.Mechanism, targets: np.ndarray) -> dict[str, np.ndarra
     """What is recorded of a machine, name -> array."""
     cold = pf.solve_ik(mechanism, targets)
     start = next(each for each in cold if each)
-    started = pf.solve_ik(mechanism, targets, seed=start)
+    started = pf.solve_ik(mechanism, targets, start=start)
     found = {"targets": targets}
     for name, solution in (("cold", cold), ("started", started)):
         found[f"{name}.status"] = np.asarray(solution.status, np.int8)

@@ -33,7 +33,7 @@ for name in ("five_bar", "nrpm", "stewart"):
     far.active_limits
     pf.track(m, np.array([m.reference_point] * 2))
     pf.solve_fk(m, far.actuators * 1.1).joints
-    pf.singularity(m, far)
+    pf.singularity(far)
 print(time.perf_counter() - start)
 """
 IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.perf_counter() - start)"

@@ -61,7 +61,7 @@ def section(name: str) -> str:
         "mobility": mobility(pf.mobility(mechanism)),
         "sub-chains": sub_chains(mechanism),
         "engine": engine(mechanism),
-        "actuators": ", ".join(f"`{actuator}`" for actuator in mechanism.actuators),
+        "actuators": ", ".join(f"`{actuator}`" for actuator in mechanism.actuator_names),
         "task": " ".join(mechanism.task),
     }
     lines = [

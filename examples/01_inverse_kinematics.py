@@ -6,7 +6,7 @@ mechanism = pf.load("stewart")
 
 near = pf.solve_ik(mechanism, pf.pose([10, 0, 190], rpy=[0, 0.1, 0]))
 print(near.status.name)
-for name, length in zip(mechanism.actuators, near.actuators, strict=True):
+for name, length in zip(mechanism.actuator_names, near.actuators, strict=True):
     print(f"  strut {name}: {length:.3f} {mechanism.length_unit}")
 
 # A target beyond the struts' stroke is no error: the answer is a feasible pose near it, and says what holds it back.

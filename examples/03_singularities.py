@@ -16,7 +16,7 @@ stewart = pf.load("stewart")
 here = pf.solve_ik(stewart, pf.pose([10, 0, 190]))
 there = pf.solve_ik(stewart, pf.pose([10.1, 0, 190.05], rotvec=[0, 1e-3, 0]))
 twist = [0.1, 0, 0.05, 0, 1e-3, 0]  # the same motion: of the reference point [mm], and rotation [rad]
-predicted = pf.inverse_jacobian(stewart, here) @ twist
+predicted = pf.inverse_jacobian(here) @ twist
 print(f"strut lengths predicted to {np.abs(predicted - (there.actuators - here.actuators)).max():.0e} mm")
 
 # A 5-bar on the line between its cranks. Far down, its forearms lie in one line: locked, it still gives way up and down
@@ -25,7 +25,7 @@ five_bar = pf.load("five_bar").without_limits()
 aligned, stretched = np.sqrt(110**2 - 95**2), np.sqrt(255**2 - 50**2)
 heights = np.array([175, 100, 60, aligned + 1e-3, 175, 220, 249, stretched - 1e-7])
 path = pf.track(five_bar, np.stack([0 * heights, 0 * heights, heights], axis=1))
-near = pf.singularity(five_bar, path)
+near = pf.singularity(path)
 print("height   serial     parallel   singular      lost          gained")
 for row, height in enumerate(heights):
     directions = f"{np.abs(near.lost[row]).round(2)}  {np.abs(near.gained[row]).round(2)}"
@@ -50,7 +50,7 @@ with warnings.catch_warnings(record=True) as raised:
     similar = pf.Mechanism("similar hexagons", legs, "platform", reference_point=placed[:3, 3])
 print(raised[0].message)
 home = pf.solve_ik(similar, similar.home_pose)
-print(f"parallel measure {pf.singularity(similar, home).parallel:.0e}")
+print(f"parallel measure {pf.singularity(home).parallel:.0e}")
 try:
     pf.assembly_modes(similar, home.actuators)
 except pf.errors.ContinuumOfSolutions as error:

@@ -54,7 +54,7 @@ def worst_excess(mechanism: Mechanism, solution: Solution) -> np.ndarray:
     pose = solution.pose.reshape(-1, 4, 4)
     excess = [np.zeros(len(pose))]
     values = solution.actuators.reshape(len(pose), -1)
-    for column, name in enumerate(mechanism.actuators):
+    for column, name in enumerate(mechanism.actuator_names):
         joint = mechanism.joint(name)
         if joint.range is not None:
             scale = mechanism.characteristic_length if joint.type == "prismatic" else 1.0

@@ -141,7 +141,7 @@ def five_bar_tips(mechanism: Mechanism, actuators: Sequence[float]) -> list[Arra
     tip = mechanism.joint(mechanism.end_effector)
     normal = np.array(tip.axis)
     elbows, radii = [], []
-    for name, value in zip(mechanism.actuators, actuators, strict=True):
+    for name, value in zip(mechanism.actuator_names, actuators, strict=True):
         crank = mechanism.joint(name)
         link = crank.connects[1]
         (elbow,) = (j for j in mechanism.joints if link in j.connects and j.name != name)

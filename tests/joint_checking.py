@@ -77,7 +77,7 @@ def worst_opening(mechanism: Mechanism, solution: Solution) -> Array:
     point = (body @ np.append(mechanism.reference_point, 1.0))[:, :3]
     worst = np.maximum(worst, np.linalg.norm(point - pose[:, :3, 3], axis=1) / length)
     values = solution.actuators.reshape(len(pose), -1)
-    for column, name in enumerate(mechanism.actuators):
+    for column, name in enumerate(mechanism.actuator_names):
         unit = length if mechanism.joint(name).type == "prismatic" else 1.0
         worst = np.maximum(worst, np.abs(np.ravel(solution.joints[name]) - values[:, column]) / unit)
     return np.asarray(worst)

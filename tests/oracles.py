@@ -50,7 +50,7 @@ def reachable(mechanism: Mechanism, targets: Array) -> Bools:
 def actuators(mechanism: Mechanism, targets: Array) -> Array:
     """Actuated coordinates of the configuration with the largest margin; shape ``(n, n_a)``, NaN where none closes.
 
-    The columns are in the order of ``mechanism.actuators``. Only the 6-UPS has no choice: a 5-bar answers in the
+    The columns are in the order of ``mechanism.actuator_names``. Only the 6-UPS has no choice: a 5-bar answers in the
     working mode with the largest margin, the redundant mechanism in the middle of its freedom.
     """
     topology = _topology(mechanism)
@@ -60,7 +60,7 @@ def actuators(mechanism: Mechanism, targets: Array) -> Array:
         values = {strut.slide.name: strut.length(targets) for strut in _struts(mechanism)}
     else:
         values = _nrpm_values(mechanism, targets)
-    return np.stack([values[name] for name in mechanism.actuators], axis=1)
+    return np.stack([values[name] for name in mechanism.actuator_names], axis=1)
 
 
 def random_targets(mechanism: Mechanism, rng: np.random.Generator, n: int) -> Array:
@@ -212,7 +212,7 @@ class _Crank:
         ]
         return np.stack(values, axis=2), slack
 
-    def margins(self, tips: Array) -> Array:
+    def margins(tips: Array) -> Array:
         """Margin of either mode, ``(n, 2)``."""
         values, slack = self.solve(tips)
         ranges = (self.shoulder.range, self.elbow.range)

@@ -68,8 +68,8 @@ def drawn_actuators(mechanism: Mechanism, count: int, seed: int) -> Array:
     """
     farthest = 0.15 if INTERPRETED else 0.5
     random = np.random.default_rng(seed)
-    ranges = [mechanism.joint(name).range or (-np.pi, np.pi) for name in mechanism.actuators]
-    home = np.array([mechanism.home_coordinate(name) for name in mechanism.actuators])
+    ranges = [mechanism.joint(name).range or (-np.pi, np.pi) for name in mechanism.actuator_names]
+    home = np.array([mechanism.home_coordinate(name) for name in mechanism.actuator_names])
     away = random.uniform(*np.transpose(ranges), (count, len(ranges))) - home
     return home + random.uniform(0, farthest, (count, 1)) * away
 
@@ -85,7 +85,7 @@ def random_poses(mechanism: Mechanism, count: int, seed: int) -> Array:
     turn = random.standard_normal((count, 3))
     turn *= np.pi * scale / np.linalg.norm(turn, axis=1, keepdims=True)
     moved = np.hstack([1.5 * scale * random.uniform(-1, 1, (count, 3)), turn])
-    rates = pf.forward_jacobian(mechanism, pf.solve_ik(mechanism, mechanism.home_pose))
+    rates = pf.forward_jacobian(pf.solve_ik(mechanism, mechanism.home_pose))
     if mechanism.end_effector_is_joint:
         moved, rates = moved[:, :3], rates[:3]
     rates = rates / np.where(np.arange(len(rates)) < 3, mechanism.characteristic_length, 1.0)[:, None]
@@ -129,7 +129,7 @@ def assert_feasible(mechanism: Mechanism, solution: Solution) -> None:
     assert np.isfinite(solution.pose).all()
     assert np.isfinite(solution.actuators).all()
     assert (solution.status <= Status.PROJECTED).all()
-    assert pf.closure_residual(mechanism, solution).max() <= KEPT * mechanism.characteristic_length
+    assert pf.closure_residual(solution).max() <= KEPT * mechanism.characteristic_length
     explicit = with_axes(mechanism)
     assert joint_checking.worst_opening(explicit, solution).max() <= 2 * KEPT
     assert joint_checking.worst_excess(explicit, solution).max() <= 2 * KEPT
@@ -233,7 +233,7 @@ def test_forward_kinematics_undoes_inverse_kinematics(name: str, count: int) -> 
     for _, found in (anywhere(name, count), inside(name, count), at_bounds(name, count)):
         reached = found[found.status == Status.REACHED]
         if len(reached):
-            back = pf.solve_fk(machine(name), reached.actuators, seed=reached)
+            back = pf.solve_fk(machine(name), reached.actuators, start=reached)
             assert (back.status == Status.REACHED).all()
             assert distance(machine(name), back.pose, reached.pose).max() <= 1e-8
 
@@ -275,7 +275,7 @@ def test_home_is_reached_and_is_where_the_file_says(name: str) -> None:
     mechanism = machine(name)
     home = pf.solve_ik(mechanism, mechanism.home_pose)
     assert home.status is Status.REACHED
-    expected = [mechanism.home_coordinate(actuator) for actuator in mechanism.actuators]
+    expected = [mechanism.home_coordinate(actuator) for actuator in mechanism.actuator_names]
     np.testing.assert_allclose(home.actuators, expected, atol=1e-9 * mechanism.characteristic_length)
 
 
@@ -345,7 +345,7 @@ def test_the_orthoglide_is_within_its_transmission_factors_just_so(corner: float
     mechanism = machine("orthoglide")
     found = pf.solve_ik(mechanism, [corner] * 3)
     assert found
-    gains = np.linalg.svd(pf.forward_jacobian(mechanism, found)[:3], compute_uv=False)
+    gains = np.linalg.svd(pf.forward_jacobian(found)[:3], compute_uv=False)
     np.testing.assert_allclose(sorted(gains), factors, atol=1e-6)
 
 
@@ -387,7 +387,7 @@ def test_the_scara_moves_its_tool_as_its_parameters_say() -> None:
     expected[:, 0, 3] = 325 * np.cos(first) + 275 * np.cos(first + second)
     expected[:, 1, 3] = 325 * np.sin(first) + 275 * np.sin(first + second)
     expected[:, 2, 3] = 387 - drop
-    home = [mechanism.home_coordinate(name) for name in mechanism.actuators]
+    home = [mechanism.home_coordinate(name) for name in mechanism.actuator_names]
     about_z = first + second - wrist - (home[0] + home[1] - home[3])
     expected[:, :3, :3] = Rotation.from_rotvec(np.outer(about_z, [0, 0, 1])).as_matrix()
     found = pf.solve_fk(mechanism, np.stack([first, second, drop, wrist], axis=1))

@@ -305,7 +305,7 @@ def test_reach_tells_the_distances_that_the_library_does(run: Callable[..., Resu
     assert (result.exit_code, header) == (0, ["x", "y", "z", "reach", "[mm]"])
     axes = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
     assert [[float(cell) for cell in row[:3]] for row in rows] == axes
-    expected = pf.reach(machine, machine.home_pose, axes)
+    expected = pf.travel(machine, machine.home_pose, axes)
     assert [float(row[3]) for row in rows] == pytest.approx(expected, rel=1e-5)
 
 
@@ -332,7 +332,7 @@ def test_reach_starts_where_it_is_told(run: Callable[..., Result]) -> None:
     ]
     answer = json.loads(run(*line, "--json").stdout)
     origin, rays = pf.pose([10, 0, 200], rpy=np.radians([0, 5, 0])), [[0, -1, -1], [1, 0, 0]]
-    assert answer["reach"] == pf.reach(pf.load("stewart"), origin, rays).tolist()
+    assert answer["reach"] == pf.travel(pf.load("stewart"), origin, rays).tolist()
     assert (answer["from"], answer["directions"]) == (origin.tolist(), rays)
 
 
@@ -694,7 +694,7 @@ def test_every_starting_file_has_room_around_home(name: str) -> None:
         moved[:2, 3] += 0.02 * mechanism.characteristic_length
     solution = pf.solve_ik(mechanism, moved)
     assert solution.status == pf.Status.REACHED
-    low, high = np.array([mechanism.joint(actuator).range for actuator in mechanism.actuators]).T
+    low, high = np.array([mechanism.joint(actuator).range for actuator in mechanism.actuator_names]).T
     assert (solution.actuators > low).all() and (solution.actuators < high).all()
     assert pf.mobility(mechanism).uncontrolled == 0
 

@@ -82,7 +82,9 @@ def test_excesses_are_those_of_the_limits_themselves(name: str) -> None:
     start = around_home(mechanism, 60, 1.5, seed=4)
     found = close(closure_of(mechanism), start, platform_poses(mechanism, start))
     closed = found.gap <= 1e-12
-    if any(mechanism.joint(each).along for each in mechanism.actuators):  # pulled through its foot, a strut points back
+    if any(
+        mechanism.joint(each).along for each in mechanism.actuator_names
+    ):  # pulled through its foot, a strut points back
         closed &= (actuators_of(mechanism, found.coordinates) > 0.0).all(axis=1)
     excess = found.excess[closed]
     length = mechanism.characteristic_length
@@ -133,7 +135,7 @@ def test_a_chained_row_starts_from_the_one_before() -> None:
 
 def test_actuated_values_survive_the_way_into_coordinates_and_back() -> None:
     mechanism = pf.load("nrpm")
-    values = np.random.default_rng(7).uniform(50, 150, (4, len(mechanism.actuators)))
+    values = np.random.default_rng(7).uniform(50, 150, (4, len(mechanism.actuator_names)))
     q = np.zeros((4, len(closure_of(mechanism).scale)))
     set_actuators(mechanism, q, values)
     np.testing.assert_allclose(actuators_of(mechanism, q), values)

@@ -38,14 +38,14 @@ def every_machine(*but: str) -> list[str]:
 
 
 def home_values(mechanism: Mechanism) -> np.ndarray:
-    return np.array([mechanism.home_coordinate(name) for name in mechanism.actuators])
+    return np.array([mechanism.home_coordinate(name) for name in mechanism.actuator_names])
 
 
 def random_values(mechanism: Mechanism, n: int, share: float = 1.0, seed: int = 0) -> np.ndarray:
     """Actuator values within a share of their ranges, from home, (n, n_a)."""
     rng, length = np.random.default_rng(seed), mechanism.characteristic_length
     columns = []
-    for name, home in zip(mechanism.actuators, home_values(mechanism), strict=True):
+    for name, home in zip(mechanism.actuator_names, home_values(mechanism), strict=True):
         own = mechanism.joint(name)
         reach = 0.4 * length if own.type == "prismatic" else 1.5
         low, high = own.range or (home - reach, home + reach)
@@ -79,7 +79,7 @@ def assert_feasible(mechanism: Mechanism, answer: Solution) -> None:
     """Every row is an assembled configuration within all limits, by its own `joints`."""
     assert np.max(answer.status) <= Status.PROJECTED
     assert np.max(joint_checking.worst_opening(mechanism, answer)) <= 2e-9
-    assert np.max(pf.closure_residual(mechanism, answer)) <= 1e-9 * mechanism.characteristic_length
+    assert np.max(pf.closure_residual(answer)) <= 1e-9 * mechanism.characteristic_length
     assert np.max(joint_checking.worst_excess(mechanism, answer)) <= 1.0001e-9
 
 
@@ -117,10 +117,10 @@ def test_what_forward_kinematics_assembles_is_reached_and_gives_the_same_pose_ag
     there = pf.solve_fk(mechanism, random_values(mechanism, 4 if INTERPRETED else 12, 0.6))
     assert_feasible(mechanism, there)
     for seed in (None, there):
-        answer = pf.solve_ik(mechanism, there.pose, seed=seed)
+        answer = pf.solve_ik(mechanism, there.pose, start=seed)
         assert np.all(answer.status == Status.REACHED)
         assert_honest(mechanism, there.pose, answer)
-        again = pf.solve_fk(mechanism, answer.actuators, seed=answer)
+        again = pf.solve_fk(mechanism, answer.actuators, start=answer)
         assert np.all(again.status == Status.REACHED)
         assert np.max(errors(mechanism, again.pose, answer.pose)) <= 1e-8
 
@@ -141,7 +141,7 @@ def test_any_finite_target_has_an_honest_answer_whatever_a_projection_holds(name
     home = pf.solve_ik(mechanism, mechanism.home_pose)
     targets = random_targets(mechanism, 64, seed=1)
     for seed in (None, home):
-        answer = pf.solve_ik(mechanism, targets, seed=seed, options=Options(hold=hold))
+        answer = pf.solve_ik(mechanism, targets, start=seed, options=Options(hold=hold))
         assert_honest(mechanism, targets, answer)
 
 
@@ -152,7 +152,7 @@ def test_any_finite_actuator_values_have_an_honest_answer(name: str) -> None:
     asked = random_values(mechanism, 6, share=3.0)
     answer = pf.solve_fk(mechanism, asked)
     assert_feasible(mechanism, answer)
-    slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuators])
+    slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuator_names])
     off = np.abs(answer.actuators - asked) / np.where(slides, mechanism.characteristic_length, 1.0)
     assert np.array_equal(answer.status == Status.REACHED, off.max(axis=1) <= 1e-9)
 
@@ -191,7 +191,7 @@ def test_rows_that_are_no_poses_are_marked_and_spoil_nothing(name: str) -> None:
     answer = pf.solve_ik(mechanism, targets, options=Options(on_invalid="mark"))
     assert answer.status.tolist() == [Status.REACHED, Status.INVALID, Status.INVALID, Status.REACHED]
     assert all(np.isnan(value[1]).all() and np.isfinite(value[3]).all() for value in answer.joints.values())
-    assert np.isnan(pf.closure_residual(mechanism, answer)).tolist() == [False, True, True, False]
+    assert np.isnan(pf.closure_residual(answer)).tolist() == [False, True, True, False]
 
 
 @compiled
@@ -260,7 +260,7 @@ def test_a_projection_is_never_further_away_than_where_it_started() -> None:
     for turn in np.linspace(2.0, 3.1, 8):
         target = mechanism.home_pose.copy()
         target[:3, :3] = Rotation.from_rotvec([turn, 0.0, 0.0]).as_matrix()
-        answer = pf.solve_ik(mechanism, target, seed=home)
+        answer = pf.solve_ik(mechanism, target, start=home)
         chord = np.linalg.norm(answer.pose[:3, :3] - target[:3, :3])
         started = np.linalg.norm(mechanism.home_pose[:3, :3] - target[:3, :3])
         away = np.hypot(chord, answer.position_error / mechanism.characteristic_length)
@@ -271,7 +271,7 @@ def test_a_projection_is_never_further_away_than_where_it_started() -> None:
 def test_a_seed_far_away_keeps_its_working_mode_as_a_path_does() -> None:
     """A single step of Newton's method leaps over a wrist's singularity."""
     mechanism, followed = machine("arm"), 0
-    there = pf.solve_fk(mechanism, random_values(mechanism, 120, 0.8, seed=11))
+    there = pf.solve_fk(mechanism, random_values(mechanism, 120, 0.8, start=11))
     for row in range(0, 120, 2):
         begin, end = there.pose[row], there.pose[row + 1]
         share = np.linspace(0, 1, 100)[:, None]
@@ -279,10 +279,10 @@ def test_a_seed_far_away_keeps_its_working_mode_as_a_path_does() -> None:
         turn = Rotation.from_matrix(end[:3, :3] @ begin[:3, :3].T).as_rotvec()
         path[:, :3, :3] = Rotation.from_rotvec(share * turn).as_matrix() @ begin[:3, :3]
         path[:, :3, 3] += share * (end - begin)[:3, 3]
-        tracked = pf.track(mechanism, path, seed=there[row])
+        tracked = pf.track(mechanism, path, start=there[row])
         if not tracked:
             continue
-        answer = pf.solve_ik(mechanism, path[-1], seed=there[row])
+        answer = pf.solve_ik(mechanism, path[-1], start=there[row])
         if answer:  # fewer steps than the path has may end at a limit
             followed += 1
             assert turned_by(mechanism, answer, tracked[-1]) <= 1e-6
@@ -305,7 +305,7 @@ def arm_with_tool(tip: str) -> Mechanism:
 def test_a_loop_beyond_the_end_effector_is_closed_too(name: str) -> None:
     mechanism = machine(name)
     values = np.repeat(home_values(mechanism)[None], 5, axis=0)
-    values[:, mechanism.actuators.index("g1")] = np.linspace(-0.3, 0.3, 5)
+    values[:, mechanism.actuator_names.index("g1")] = np.linspace(-0.3, 0.3, 5)
     answer = pf.solve_fk(mechanism, values)
     assert np.all(answer.status == Status.REACHED)
     assert_feasible(mechanism, answer)
@@ -370,7 +370,7 @@ def test_slides_without_ranges_reach_however_far(distance: float) -> None:
     targets = mechanism.home_pose[:3, 3] + distance * directions
     answers = pf.solve_ik(mechanism, targets)
     assert (answers.status == Status.REACHED).all()
-    assert pf.closure_residual(mechanism, answers).max() <= 1e-9 * distance
+    assert pf.closure_residual(answers).max() <= 1e-9 * distance
 
 
 @compiled

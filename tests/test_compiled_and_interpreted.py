@@ -143,15 +143,15 @@ def test_every_kernel_is_compiled_for_one_signature(name: str) -> None:
         pf.solve_ik(mechanism, other)
     seed = pf.solve_ik(mechanism, targets)
     for answer in (
-        pf.solve_ik(mechanism, targets, seed=seed),
-        pf.solve_ik(mechanism, targets[::-1], seed=seed[::-1]),
-        pf.solve_ik(mechanism, targets, seed=seed[0]),
+        pf.solve_ik(mechanism, targets, start=seed),
+        pf.solve_ik(mechanism, targets[::-1], start=seed[::-1]),
+        pf.solve_ik(mechanism, targets, start=seed[0]),
         pf.solve_ik(mechanism, far, options=pf.Options(hold=None, max_rounds=3, tolerance=1)),
         pf.solve_ik(mechanism, far, options=pf.Options.paper()),
-        pf.track(mechanism, targets, seed=seed[1], on_progress=lambda done, total: None),
+        pf.track(mechanism, targets, start=seed[1], on_progress=lambda done, total: None),
     ):
         assert answer.active_limits is not None
-        assert pf.solve_fk(mechanism, answer.actuators, seed=answer).joints
+        assert pf.solve_fk(mechanism, answer.actuators, start=answer).joints
     for dispatcher in (solve.solve_directly, solve.solve_by_iteration, close.close):
         assert len(dispatcher.signatures) == 1
 
@@ -165,8 +165,8 @@ def test_inputs_are_never_written_to(name: str) -> None:
     flat = flatten(mechanism)
     watched = [targets, *seed._rows, *flat.plan, *flat.home_seed]
     before = [array.copy() for array in watched]
-    answer = pf.solve_ik(mechanism, targets, seed=seed)
-    followed = pf.track(mechanism, targets, seed=seed[0])
+    answer = pf.solve_ik(mechanism, targets, start=seed)
+    followed = pf.track(mechanism, targets, start=seed[0])
     assert answer.active_limits is not None
     answer.pose[:] = answer.actuators[:] = np.nan
     followed.pose[:] = np.nan

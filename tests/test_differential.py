@@ -184,7 +184,7 @@ def driven(machine: Mechanism, q: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def drives(machine: Mechanism) -> list[int]:
-    return [columns(machine)[each].start for each in machine.actuators]
+    return [columns(machine)[each].start for each in machine.actuator_names]
 
 
 CATALOGUE = ("five_bar", "nrpm", "stewart")
@@ -214,7 +214,7 @@ def home(machine: Mechanism) -> np.ndarray:
 
 
 def at_home(machine: Mechanism):
-    return singularity(machine, answer(machine, home(machine), ()))
+    return singularity(answer(machine, home(machine), ()))
 
 
 class TestMobility:
@@ -320,7 +320,7 @@ class TestJacobians:
     def test_a_hexapods_inverse_jacobian_is_its_strut_lines(self):
         machine = pf.load("stewart")
         rows = inverse_map(machine, home(machine))[0]
-        for name, row in zip(machine.actuators, rows, strict=True):
+        for name, row in zip(machine.actuator_names, rows, strict=True):
             a, c = (np.array(machine.joint(each).at) for each in machine.joint(name).along)
             d = (c - a) / np.linalg.norm(c - a)
             assert row == pytest.approx([*d, *np.cross(c - machine.reference_point, d)], abs=1e-10)
@@ -336,9 +336,9 @@ class TestJacobians:
     def test_results_take_the_shape_of_the_solution(self, shape):
         machine, q = closed("stewart")
         found = answer(machine, q[: int(np.prod(shape))], shape)
-        assert forward_jacobian(machine, found).shape == (*shape, 6, 6)
-        assert inverse_jacobian(machine, found).shape == (*shape, 6, 6)
-        near = singularity(machine, found)
+        assert forward_jacobian(found).shape == (*shape, 6, 6)
+        assert inverse_jacobian(found).shape == (*shape, 6, 6)
+        near = singularity(found)
         assert np.shape(near.serial) == np.shape(near.parallel) == np.shape(near.passive) == shape
         assert near.lost.shape == near.gained.shape == (*shape, 6)
         assert near.kinds == () if shape == () else near.kinds == [(), ()]
@@ -358,8 +358,8 @@ class TestJacobians:
     def test_no_rows_give_no_rows(self):
         machine = pf.load("stewart")
         none = answer(machine, np.zeros((0, 36)), (0,))
-        assert forward_jacobian(machine, none).shape == inverse_jacobian(machine, none).shape == (0, 6, 6)
-        assert singularity(machine, none).kinds == []
+        assert forward_jacobian(none).shape == inverse_jacobian(none).shape == (0, 6, 6)
+        assert singularity(none).kinds == []
 
     def test_a_solution_of_another_machine_is_refused(self):
         machine, q = closed("stewart")
@@ -425,7 +425,7 @@ class TestSingularity:
         assert near.kinds == ("parallel",)
         twist = near.gained * ([machine.characteristic_length] * 3 + [1] * 3)
         assert np.abs(twist[[0, 1, 3, 4]]).max() < 1e-9
-        for name in machine.actuators:
+        for name in machine.actuator_names:
             a, c = (np.array(machine.joint(each).at) for each in machine.joint(name).along)
             d = (c - a) / np.linalg.norm(c - a)
             assert d @ (twist[:3] + np.cross(twist[3:], c - machine.reference_point)) == pytest.approx(0, abs=1e-9)
@@ -465,7 +465,7 @@ class TestSingularity:
         assert near.kinds[-1] == "constraint"
         twist = near.gained * ([machine.characteristic_length] * 3 + [1] * 3)
         assert twist[3:5] / twist[5] == pytest.approx([0, 0], abs=1e-9)
-        for name in machine.actuators:  # the actuators hold every strut's length
+        for name in machine.actuator_names:  # the actuators hold every strut's length
             a, c = (np.array(machine.joint(each).at) for each in machine.joint(name).along)
             velocity = twist[:3] + np.cross(twist[3:], c - machine.reference_point)
             assert (c - a) @ velocity == pytest.approx(0, abs=1e-9 * np.linalg.norm(c - a) * np.linalg.norm(velocity))

@@ -152,7 +152,7 @@ def test_a_grid_of_candidates_finds_nearly_every_reachable_target_and_no_other()
 
 def arm_slacks(mechanism: Mechanism, wanted: oracles.Array, values: oracles.Array) -> oracles.Array:
     """Smallest slack of every arm at the swings and extensions among actuator values (n, n_a), shape (n, arms)."""
-    column = mechanism.actuators.index
+    column = mechanism.actuator_names.index
     slacks = []
     for arm in oracles._arms(mechanism):
         swing, extension = values[:, column(arm.hinge.name)], values[:, column(arm.slide.name)]
@@ -166,7 +166,7 @@ def test_redundant_answers_close_and_keep_every_limit() -> None:
     answer = pf.geometric.solve_ik(mechanism, wanted)
     wanted, values = wanted[answer.reached], answer.actuators[answer.reached]
     assert (arm_slacks(mechanism, wanted, values) > -ON_THE_EDGE).all()
-    column = mechanism.actuators.index
+    column = mechanism.actuator_names.index
     for arm in oracles._arms(mechanism):
         table = arm.lines(wanted, values[:, column(arm.hinge.name)]).table
         extension = values[:, column(arm.slide.name)]
@@ -303,14 +303,14 @@ def grid_of(mechanism: Mechanism) -> oracles.Array:
 def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(seeded: bool) -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism, 200, seed=2)
-    column = mechanism.actuators.index
-    seeds = np.tile([mechanism.home_coordinate(name) for name in mechanism.actuators], (len(wanted), 1))
+    column = mechanism.actuator_names.index
+    seeds = np.tile([mechanism.home_coordinate(name) for name in mechanism.actuator_names], (len(wanted), 1))
     if seeded:
         rng = np.random.default_rng(4)
         for arm in oracles._arms(mechanism):
             for joint in (arm.hinge, arm.slide):
                 seeds[:, column(joint.name)] = rng.uniform(*joint.range, len(wanted))
-    answer = pf.geometric.solve_ik(mechanism, wanted, seed=SimpleNamespace(actuators=seeds) if seeded else None)
+    answer = pf.geometric.solve_ik(mechanism, wanted, start=SimpleNamespace(actuators=seeds) if seeded else None)
     grid = grid_of(mechanism)
     found = np.ones(len(wanted), bool)
     stayed = 0
@@ -341,12 +341,12 @@ def test_an_answer_as_seed_keeps_its_redundant_coordinates() -> None:
     wanted = wanted[first.reached]
     first = pf.geometric.solve_ik(mechanism, wanted)
     for again in (
-        pf.geometric.solve_ik(mechanism, wanted, seed=first),
-        pf.geometric.solve_ik(mechanism, wanted, seed=SimpleNamespace(actuators=first.actuators.tolist())),
+        pf.geometric.solve_ik(mechanism, wanted, start=first),
+        pf.geometric.solve_ik(mechanism, wanted, start=SimpleNamespace(actuators=first.actuators.tolist())),
     ):
         np.testing.assert_allclose(again.actuators, first.actuators, rtol=0, atol=1e-9)
     solution = pf.solve_ik(mechanism, wanted)
-    from_solution = pf.geometric.solve_ik(mechanism, wanted, seed=solution)
+    from_solution = pf.geometric.solve_ik(mechanism, wanted, start=solution)
     np.testing.assert_allclose(from_solution.actuators, solution.actuators, rtol=0, atol=1e-6)
 
 
@@ -354,11 +354,11 @@ def test_a_single_seed_serves_every_row_as_it_serves_one() -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism, 400)
     near = pf.geometric.solve_ik(mechanism, pf.pose([30, 20, 215]))
-    batch = pf.geometric.solve_ik(mechanism, wanted, seed=near)
+    batch = pf.geometric.solve_ik(mechanism, wanted, start=near)
     rows = SimpleNamespace(actuators=np.tile(near.actuators, (len(wanted), 1)))
-    np.testing.assert_array_equal(batch.actuators, pf.geometric.solve_ik(mechanism, wanted, seed=rows).actuators)
+    np.testing.assert_array_equal(batch.actuators, pf.geometric.solve_ik(mechanism, wanted, start=rows).actuators)
     for row in range(0, len(wanted), 37):
-        single = pf.geometric.solve_ik(mechanism, wanted[row], seed=near)
+        single = pf.geometric.solve_ik(mechanism, wanted[row], start=near)
         np.testing.assert_array_equal(single.actuators, batch.actuators[row])
 
 
@@ -366,13 +366,13 @@ def test_a_seed_out_of_range_does_not_stay() -> None:
     mechanism = pf.load("nrpm")
     home = pf.geometric.solve_ik(mechanism, mechanism.home_pose).actuators
     for joint, value, slack in (("A1", np.radians(135), 1e-9), ("B2", 130.0, 1e-9 * mechanism.characteristic_length)):
-        wide = relimited(mechanism, **{name: None for name in mechanism.actuators if name[0] == "D"})
+        wide = relimited(mechanism, **{name: None for name in mechanism.actuator_names if name[0] == "D"})
         wide = wide.with_limits(dict.fromkeys(("CL1", "CR1", "EL1", "ER1", "CL2", "CR2", "EL2", "ER2")))
-        column = mechanism.actuators.index(joint)
+        column = mechanism.actuator_names.index(joint)
         for beyond, stays in ((0.5 * slack, True), (2 * slack, False)):
             seed = home.copy()
             seed[column] = value + beyond
-            answer = pf.geometric.solve_ik(wide, mechanism.home_pose, seed=SimpleNamespace(actuators=seed))
+            answer = pf.geometric.solve_ik(wide, mechanism.home_pose, start=SimpleNamespace(actuators=seed))
             assert answer
             assert (answer.actuators[column] == seed[column]) == stays
             assert answer.actuators[column] == pytest.approx(value)
@@ -425,7 +425,7 @@ def test_a_range_is_kept_to_its_tolerance_and_no_further(name: str, joint: str) 
         limits = (low, value - inside) if value > home else (value + inside, high)
         answer = pf.geometric.solve_ik(relimited(mechanism, **{joint: limits}), target)
         if name == "nrpm":  # the arm moves, and so the limit is kept
-            assert (answer.actuators[mechanism.actuators.index(joint)] == pytest.approx(value, abs=1e-6)) == stays
+            assert (answer.actuators[mechanism.actuator_names.index(joint)] == pytest.approx(value, abs=1e-6)) == stays
         else:
             assert answer.reached is stays
 
@@ -449,8 +449,8 @@ def test_a_cone_on_a_crossbar_moves_the_arm_when_it_is_exceeded(joint: str, othe
     nrpm, target = pf.load("nrpm"), BESIDE["nrpm"]
     angle = cone_angle(nrpm, joint, other, target)  # at home's arms a crossbar is where it is at home
     cone = nrpm.joint(joint).cone
-    columns = [nrpm.actuators.index(f"{letter}{joint[-1]}") for letter in "AB"]
-    at_home = [nrpm.home_coordinate(nrpm.actuators[column]) for column in columns]
+    columns = [nrpm.actuator_names.index(f"{letter}{joint[-1]}") for letter in "AB"]
+    at_home = [nrpm.home_coordinate(nrpm.actuator_names[column]) for column in columns]
     for inside, stays in ((0.5e-9, True), (2e-9, False)):
         limited = relimited(nrpm, **{joint: dataclasses.replace(cone, half_angle=angle - inside)})
         answer = pf.geometric.solve_ik(limited, target)
@@ -475,7 +475,7 @@ def test_a_strut_without_length_keeps_every_cone() -> None:
     foot = np.array(stewart.joint("AL1").at)
     answer = pf.geometric.solve_ik(stewart.with_limits(only), foot - head)
     assert answer
-    assert answer.actuators[stewart.actuators.index("BL1")] == pytest.approx(0.0, abs=1e-12)
+    assert answer.actuators[stewart.actuator_names.index("BL1")] == pytest.approx(0.0, abs=1e-12)
 
 
 # --- descriptions that count otherwise -------------------------------------------------------------------------------
@@ -518,7 +518,7 @@ def test_arms_and_cranks_may_be_described_from_their_other_end() -> None:
     for mechanism, other, signs in ((nrpm, turned_arm, {}), (bar, turned_crank, {"p5": -1.0})):
         wanted = some_targets(mechanism, 400)
         plain, answer = pf.geometric.solve_ik(mechanism, wanted), pf.geometric.solve_ik(other, wanted)
-        expected = plain.actuators * [signs.get(name, 1.0) for name in mechanism.actuators]
+        expected = plain.actuators * [signs.get(name, 1.0) for name in mechanism.actuator_names]
         np.testing.assert_array_equal(answer.reached, plain.reached)
         np.testing.assert_allclose(answer.actuators, expected, rtol=0, atol=1e-9)
 
@@ -553,7 +553,9 @@ def test_a_batch_is_answered_row_by_row(name: str) -> None:
     flat = pf.geometric.solve_ik(mechanism, wanted)
     assert flat.shape == (len(wanted),)
     assert not flat
-    np.testing.assert_array_equal(np.isnan(flat.actuators), np.tile(~flat.reached, (len(mechanism.actuators), 1)).T)
+    np.testing.assert_array_equal(
+        np.isnan(flat.actuators), np.tile(~flat.reached, (len(mechanism.actuator_names), 1)).T
+    )
     folded = pf.geometric.solve_ik(mechanism, wanted.reshape(2, -1, 4, 4))
     assert folded.shape == folded.reached.shape == (2, len(wanted) // 2)
     np.testing.assert_array_equal(folded.actuators.reshape(flat.actuators.shape), flat.actuators)
@@ -762,7 +764,7 @@ def test_wrong_calls_are_told() -> None:
         (stewart, [0, 0, 190], pf.geometric.solve_ik(stewart, [0, 0, 1e4]), "seed"),
     ):
         with pytest.raises(InvalidArgument) as caught:
-            pf.geometric.solve_ik(mechanism, target, seed=seed)
+            pf.geometric.solve_ik(mechanism, target, start=seed)
         assert caught.value.argument == argument
 
 

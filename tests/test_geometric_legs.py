@@ -97,7 +97,7 @@ def moved(mechanism: Mechanism, driver: Joint, joint: Joint, values: Array) -> A
 
 def misfits(mechanism: Mechanism, name: str, poses: Array, actuators: Array) -> Array:
     """How much any rod is too long or too short at poses (n, 4, 4) with actuators (n, n_a), (n, rods) [L]."""
-    column = mechanism.actuators.index
+    column = mechanism.actuator_names.index
     found = []
     for driver, foot, head in rods(mechanism, name):
         start = moved(mechanism, driver, foot, actuators[:, column(driver.name)])
@@ -171,7 +171,7 @@ def test_struts_are_as_long_as_their_ends_are_apart(name: str) -> None:
     wanted = some_targets(mechanism)
     answer = pf.geometric.solve_ik(mechanism, wanted)
     assert answer.reached.any()
-    for column, strut in enumerate(mechanism.actuators):
+    for column, strut in enumerate(mechanism.actuator_names):
         foot, head = (mechanism.joint(each + strut[1:]) for each in STRUTS[name])
         apart = on_end_effector(mechanism, head, answer.pose) - foot.at
         np.testing.assert_allclose(answer.actuators[:, column], np.linalg.norm(apart, axis=1), rtol=1e-12)
@@ -183,7 +183,7 @@ def test_the_forward_engine_returns_to_the_pose(name: str) -> None:
     mechanism = pf.load(name)
     scale = [
         mechanism.characteristic_length if mechanism.joint(each).type == "prismatic" else 1.0
-        for each in mechanism.actuators
+        for each in mechanism.actuator_names
     ]
     values = home_values(mechanism) + np.random.default_rng(3).uniform(-0.1, 0.1, (20, len(scale))) * scale
     forward = pf.solve_fk(mechanism, values)
@@ -328,7 +328,7 @@ def test_legs_of_any_shape_and_kind_are_mixed(seed: int) -> None:
     two = sum(joint.actuated and joint.along is None for joint in mechanism.joints)
     assert len(modes) == 2**two
     for poses, values in ((modes.poses, modes.actuators), (answer.pose, answer.actuators)):
-        for column, driver in enumerate(map(mechanism.joint, mechanism.actuators)):
+        for column, driver in enumerate(map(mechanism.joint, mechanism.actuator_names)):
             foot, head = (mechanism.joint(letter + driver.name[1:]) for letter in ("AC" if driver.along else "BC"))
             start = np.array(foot.at) if driver.along else moved(mechanism, driver, foot, values[:, column])
             apart = np.linalg.norm(on_end_effector(mechanism, head, poses) - start, axis=1)
@@ -362,13 +362,13 @@ def test_a_seed_keeps_its_working_mode(name: str) -> None:
     modes = pf.geometric.working_modes(mechanism, target)
     assert len(modes) > 1
     seeds = SimpleNamespace(actuators=modes.actuators, pose=modes.poses)
-    answer = pf.geometric.solve_ik(mechanism, np.tile(target, (len(modes), 1, 1)), seed=seeds)
+    answer = pf.geometric.solve_ik(mechanism, np.tile(target, (len(modes), 1, 1)), start=seeds)
     assert answer
     np.testing.assert_allclose(answer.actuators, modes.actuators, rtol=0, atol=1e-7)
     np.testing.assert_allclose(answer.pose, modes.poses, rtol=0, atol=1e-7)
     for k in range(0, len(modes), 7):
         one = SimpleNamespace(actuators=modes.actuators[k], pose=modes.poses[k])
-        again = pf.geometric.solve_ik(mechanism, target, seed=one)
+        again = pf.geometric.solve_ik(mechanism, target, start=one)
         np.testing.assert_allclose(again.actuators, modes.actuators[k], rtol=0, atol=1e-7)
     from_home = pf.geometric.solve_ik(mechanism, target)
     np.testing.assert_allclose(from_home.actuators, modes.actuators[0], rtol=0, atol=1e-7)
@@ -586,4 +586,4 @@ def test_wrong_calls_are_told() -> None:
 
 
 def _seeded(mechanism: Mechanism, **seed: Any) -> Any:
-    return pf.geometric.solve_ik(mechanism, mechanism.home_pose, seed=SimpleNamespace(**seed))
+    return pf.geometric.solve_ik(mechanism, mechanism.home_pose, start=SimpleNamespace(**seed))

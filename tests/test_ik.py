@@ -56,7 +56,7 @@ def test_reached_exactly_where_the_closed_form_says_for_10000_targets_cold_and_w
     cold = pf.solve_ik(machine, targets)
     assert_same_as_closed_form(machine, targets, cold)
     seeds = cold[rng.permutation(len(targets))]
-    warm = pf.solve_ik(machine, targets, seed=seeds, options=pf.Options(working_mode="any"))
+    warm = pf.solve_ik(machine, targets, start=seeds, options=pf.Options(working_mode="any"))
     assert_same_as_closed_form(machine, targets, warm)
 
 
@@ -126,7 +126,7 @@ def test_home_is_reached_with_the_coordinates_of_the_description(name: str) -> N
     mechanism = _machine(name)
     answer = pf.solve_ik(mechanism, mechanism.home_pose)
     assert answer.status is pf.Status.REACHED
-    home = [mechanism.home_coordinate(actuator) for actuator in mechanism.actuators]
+    home = [mechanism.home_coordinate(actuator) for actuator in mechanism.actuator_names]
     np.testing.assert_allclose(answer.actuators, home, atol=1e-9 * mechanism.characteristic_length)
     for joint, point in answer.points.items():
         np.testing.assert_allclose(point, mechanism.joint(joint).at, atol=1e-9 * mechanism.characteristic_length)
@@ -186,7 +186,7 @@ def test_home_seeds_the_answer_where_no_seed_is_given() -> None:
     mechanism = pf.load("five_bar").without_limits()
     targets = oracles.inside_targets(pf.load("five_bar"), np.random.default_rng(7), 10)
     home = pf.solve_ik(mechanism, mechanism.home_pose)
-    seeded = pf.solve_ik(mechanism, targets, seed=home)
+    seeded = pf.solve_ik(mechanism, targets, start=home)
     np.testing.assert_allclose(seeded.actuators, pf.solve_ik(mechanism, targets).actuators)
 
 
@@ -206,7 +206,7 @@ def test_projection_names_the_limits_that_hold_it_back() -> None:
     mechanism = pf.load("stewart")
     answer = pf.solve_ik(mechanism, np.add(mechanism.reference_point, (0, 0, 1000.0)))
     assert answer.status is pf.Status.PROJECTED
-    assert {limit.joint for limit in answer.active_limits} == set(mechanism.actuators)
+    assert {limit.joint for limit in answer.active_limits} == set(mechanism.actuator_names)
     assert {limit.bound for limit in answer.active_limits} == {"max"}
     assert answer.rotation_error <= 1e-9
     sideways = pf.solve_ik(mechanism, np.add(mechanism.reference_point, (1000.0, 0, 0)))
@@ -297,7 +297,7 @@ def test_seeds_that_do_not_fit_are_refused() -> None:
     pair = pf.solve_ik(mechanism, np.tile(mechanism.home_pose, (2, 1, 1)))
     for seed in (other, pair, mechanism.home_pose):
         with pytest.raises(InvalidArgument, match="seed"):
-            pf.solve_ik(mechanism, mechanism.home_pose, seed=seed)
+            pf.solve_ik(mechanism, mechanism.home_pose, start=seed)
 
 
 def test_options_refuse_what_they_do_not_know() -> None:

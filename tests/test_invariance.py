@@ -132,7 +132,7 @@ def signs(mechanism: Mechanism, other: Mechanism, names: dict[str, str]) -> np.n
             common = set.intersection(*mates)
             bodies.setdefault(body, common)
     found = []
-    for name in mechanism.actuators:
+    for name in mechanism.actuator_names:
         joint, mate = mechanism.joint(name), other.joint(names[name])
         same = mate.connects[0] in bodies[joint.connects[0]] and mate.connects[1] in bodies[joint.connects[1]]
         found.append(1.0 if same or joint.along is not None else -1.0)
@@ -144,7 +144,7 @@ def assert_same_answers(
 ) -> None:
     """`answer` against `expected`, the answer of the original, and what its poses and actuator values become."""
     length = size * expected.mechanism.characteristic_length
-    slides = np.array([answer.mechanism.joint(a).type == "prismatic" for a in answer.mechanism.actuators])
+    slides = np.array([answer.mechanism.joint(a).type == "prismatic" for a in answer.mechanism.actuator_names])
     place = np.abs(answer.pose - pose)[:, :3, 3].max(axis=1) / length
     turn = np.abs(answer.pose - pose)[:, :3, :3].max(axis=(1, 2))
     coordinate = (np.abs(answer.actuators - actuators) / np.where(slides, length, 1.0)).max(axis=1)
@@ -190,7 +190,7 @@ def test_moving_the_machine_moves_the_answer(
 def scaled_answers(name: str, size: float, seed: int) -> tuple[Solution, Solution, np.ndarray, np.ndarray]:
     """The original's answer, the scaled machine's, and what the original's poses and actuator values become."""
     original = machine(name)
-    slides = np.array([original.joint(a).type == "prismatic" for a in original.actuators])
+    slides = np.array([original.joint(a).type == "prismatic" for a in original.actuator_names])
     larger = np.ones((4, 4))
     larger[:3, 3] = size
     targets = some_targets(original, seed)
@@ -233,7 +233,9 @@ def test_other_names_order_and_viewpoints_give_the_same_answer(name: str, seed: 
     other, names = relabelled(original, np.random.default_rng(seed))
     targets = some_targets(original, seed)
     expected, answer = pf.solve_ik(original, targets), pf.solve_ik(other, targets)
-    places = [original.actuators.index(back) for mate in other.actuators for back, new in names.items() if new == mate]
+    places = [
+        original.actuator_names.index(back) for mate in other.actuators for back, new in names.items() if new == mate
+    ]
     actuators = (expected.actuators * signs(original, other, names))[:, places]
     assert_same_answers(name, answer, expected, expected.pose, actuators)
     reached = expected.status == Status.REACHED

@@ -21,13 +21,13 @@ def test_every_limit_has_one_margin() -> None:
         expected = {(joint.name, bound) for joint in machine.joints if joint.range for bound in ("min", "max")}
         expected |= {(joint.name, "cone") for joint in machine.joints if joint.cone}
         home = pf.solve_ik(machine, machine.home_pose)
-        assert set(pf.margins(machine, home)) == expected
+        assert set(pf.margins(home)) == expected
 
 
 def test_margins_of_a_hexapod_are_shares_of_half_its_stroke_and_of_its_cones() -> None:
     machine = pf.load("stewart")
     target = pf.pose((12.0, -7.0, 205.0), rpy=(0.1, 0.05, -0.1))
-    found = pf.margins(machine, pf.solve_ik(machine, target))
+    found = pf.margins(pf.solve_ik(machine, target))
     for strut in (joint for joint in machine.joints if joint.along):
         foot, head = (machine.joint(name) for name in strut.along)
         line = target[:3, 3] + target[:3, :3] @ np.subtract(head.at, machine.reference_point) - foot.at
@@ -47,7 +47,7 @@ def test_margins_are_0_on_the_limits_that_hold_an_answer_back() -> None:
         machine = pf.load(name)
         answer = pf.solve_ik(machine, np.add(machine.reference_point, (0.0, 10.0, 300.0)))
         assert answer.active_limits
-        found = pf.margins(machine, answer)
+        found = pf.margins(answer)
         for limit in answer.active_limits:
             assert abs(found[limit.joint, limit.bound]) <= 1e-6
         assert min(found.values()) >= -1e-8
@@ -56,7 +56,7 @@ def test_margins_are_0_on_the_limits_that_hold_an_answer_back() -> None:
 def test_margins_are_negative_beyond_a_limit() -> None:
     machine = pf.load("five_bar")
     (exceeded, *_) = [mode for mode in pf.working_modes(machine, (0, 10, 180)) if mode.status == Status.EXCEEDED]
-    found = pf.margins(machine, exceeded)
+    found = pf.margins(exceeded)
     beyond = {(limit.joint, limit.bound) for limit in exceeded.active_limits}
     assert beyond == {limit for limit, margin in found.items() if margin < 0.0}
 
@@ -74,13 +74,13 @@ def slide(low: float, high: float, home: float = 0.0) -> Mechanism:
 def test_margins_count_from_where_the_joint_does() -> None:
     machine = slide(4.0, 12.0, home=6.0)
     home = pf.solve_ik(machine, machine.reference_point)
-    found = pf.margins(machine, home)
+    found = pf.margins(home)
     assert (found["X", "min"], found["X", "max"]) == (pytest.approx(0.5), pytest.approx(1.5))
 
 
 def test_a_range_without_room_has_a_margin_on_it_and_none_off_it() -> None:
     machine = slide(6.0, 6.0, home=6.0)
-    found = pf.margins(machine, pf.solve_ik(machine, machine.reference_point))
+    found = pf.margins(pf.solve_ik(machine, machine.reference_point))
     assert (found["X", "min"], found["X", "max"]) == (0.0, 0.0)
 
 
@@ -91,8 +91,8 @@ def test_of_two_ranges_of_a_joint_the_nearer_counts() -> None:
         Joint("C", "cylindrical", ("cart", "tool"), at=(0, 0, 9), axis=(0, 0, 1), range=((-0.5, 0.5), (-5, 5))),
     ]
     machine = Mechanism("plotter", joints, "tool", (0, 0, 30))
-    lifted = pf.margins(machine, pf.solve_ik(machine, pf.pose((0, 0, 34), rpy=(0, 0, 0.1))))
-    turned = pf.margins(machine, pf.solve_ik(machine, pf.pose((0, 0, 31), rpy=(0, 0, -0.4))))
+    lifted = pf.margins(pf.solve_ik(machine, pf.pose((0, 0, 34), rpy=(0, 0, 0.1))))
+    turned = pf.margins(pf.solve_ik(machine, pf.pose((0, 0, 31), rpy=(0, 0, -0.4))))
     assert (lifted["C", "max"], lifted["C", "min"]) == (pytest.approx(0.2), pytest.approx(1.2))
     assert (turned["C", "min"], turned["C", "max"]) == (pytest.approx(0.2), pytest.approx(0.8))
 
@@ -102,15 +102,15 @@ def test_margins_have_the_shape_of_the_answers() -> None:
     targets = np.add(machine.reference_point, np.zeros((2, 3, 3)))
     targets[1, 2, 0] = np.nan
     answers = pf.solve_ik(machine, targets, options=Options(on_invalid="mark"))
-    for margin in pf.margins(machine, answers).values():
+    for margin in pf.margins(answers).values():
         assert margin.shape == (2, 3)
         assert np.isnan(margin[1, 2]) and np.isfinite(np.delete(margin.ravel(), 5)).all()
-    assert all(isinstance(margin, float) for margin in pf.margins(machine, answers[0, 0]).values())
+    assert all(isinstance(margin, float) for margin in pf.margins(answers[0, 0]).values())
 
 
 def test_margins_cannot_be_written_to() -> None:
     machine = pf.load("five_bar")
-    found = pf.margins(machine, pf.solve_ik(machine, machine.reference_point))
+    found = pf.margins(pf.solve_ik(machine, machine.reference_point))
     with pytest.raises(TypeError):
         found["p1", "min"] = 0.0  # type: ignore[index]
 
@@ -121,8 +121,8 @@ def test_an_answer_of_another_mechanism_is_refused() -> None:
     wider = machine.with_limits(p1=(-1.5, 1.5))
     for other, answer in ((pf.load("stewart"), home), (machine, home.pose), (machine, None), ("five_bar", home)):
         with pytest.raises(InvalidArgument, match=r"expected (one of|a Solution|a Mechanism)"):
-            pf.margins(other, answer)  # type: ignore[arg-type]
-    assert pf.margins(wider, home)["p1", "max"] == pytest.approx(1.0 - home.actuators[0] / 1.5)
+            pf.margins(answer)  # type: ignore[arg-type]
+    assert pf.margins(home)["p1", "max"] == pytest.approx(1.0 - home.actuators[0] / 1.5)
 
 
 def test_a_limit_at_home_has_no_margin() -> None:
@@ -132,4 +132,4 @@ def test_a_limit_at_home_has_no_margin() -> None:
     angle = np.arccos(line[2] / np.linalg.norm(line))
     tight = machine.with_limits(AL1=replace(joint.cone, half_angle=angle + 1e-12))
     home = pf.solve_ik(tight, tight.home_pose)
-    assert pf.margins(tight, home)["AL1", "cone"] == pytest.approx(0.0, abs=1e-8)
+    assert pf.margins(home)["AL1", "cone"] == pytest.approx(0.0, abs=1e-8)

@@ -98,7 +98,7 @@ class TestValues:
 class TestDerived:
     def test_names_come_in_the_order_of_the_joints(self):
         machine = stewart()
-        assert machine.actuators == tuple(f"B{leg}" for leg in range(6))
+        assert machine.actuator_names == tuple(f"B{leg}" for leg in range(6))
         assert machine.bodies[:4] == ("base", "cylinder0", "rod0", "platform")
 
     def test_it_introduces_itself_in_one_line(self):
@@ -196,8 +196,8 @@ class TestFreedom:
         machine = stewart()
         assert mobility(machine).mobility == 6
         assert end_effector_freedom(machine, frozenset()) == 6
-        assert end_effector_freedom(machine, frozenset(machine.actuators)) == 0
-        assert end_effector_freedom(machine, frozenset(machine.actuators[1:])) == 1
+        assert end_effector_freedom(machine, frozenset(machine.actuator_names)) == 0
+        assert end_effector_freedom(machine, frozenset(machine.actuator_names[1:])) == 1
 
     def test_struts_between_spherical_joints_spin_without_moving_the_platform(self):
         joints = [

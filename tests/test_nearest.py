@@ -67,7 +67,7 @@ def check_feasible(mechanism: Mechanism, targets: np.ndarray, answers: Solution)
     assert all(np.isfinite(array).all() for array in (answers.pose, answers.actuators, *answers.joints.values()))
     assert worst_gap(mechanism, answers).max() <= FEASIBLE
     assert worst_excess(mechanism, answers).max() <= FEASIBLE
-    assert pf.closure_residual(mechanism, answers).max() <= FEASIBLE * mechanism.characteristic_length
+    assert pf.closure_residual(answers).max() <= FEASIBLE * mechanism.characteristic_length
     problems = [Problem(mechanism, target, None, answer) for target, answer in zip(targets, answers, strict=True)]
     assert max(problem.excess(problem.answer) for problem in problems) <= FEASIBLE
 

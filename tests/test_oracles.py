@@ -144,7 +144,7 @@ def test_naming_the_bodies_of_a_joint_the_other_way_round_reverses_its_coordinat
     targets = oracles.inside_targets(mechanism, np.random.default_rng(2), 20)
     reversed_ = dataclasses.replace(mechanism, joints=tuple(map(other_way_round, mechanism.joints)))
     assert oracles.margin(reversed_, targets) == pytest.approx(oracles.margin(mechanism, targets), abs=1e-8)
-    own = [k for k, key in enumerate(mechanism.actuators) if mechanism.joint(key).along is None]
+    own = [k for k, key in enumerate(mechanism.actuator_names) if mechanism.joint(key).along is None]
     there, here = oracles.actuators(reversed_, targets)[:, own], oracles.actuators(mechanism, targets)[:, own]
     assert there == pytest.approx(-here, abs=1e-4)
 
@@ -222,7 +222,7 @@ def test_leg_lengths_agree_with_a_published_hexapod(
 
 def test_stewart_actuators_are_the_leg_lengths_of_its_joint_positions() -> None:
     mechanism, targets = sample("stewart", 50)
-    along = [mechanism.joint(name).along for name in mechanism.actuators]
+    along = [mechanism.joint(name).along for name in mechanism.actuator_names]
     base = np.array([mechanism.joint(foot).at for foot, _ in along])
     platform = np.array([mechanism.joint(head).at for _, head in along]) - np.array(mechanism.reference_point)
     assert oracles.actuators(mechanism, targets) == pytest.approx(oracles.leg_lengths(base, platform, targets))
@@ -320,7 +320,7 @@ def test_nrpm_margin_does_not_depend_on_how_finely_it_is_searched() -> None:
 def test_nrpm_actuators_attain_the_margin() -> None:
     mechanism = pf.load("nrpm")
     targets = oracles.inside_targets(mechanism, np.random.default_rng(5), 30)
-    values = dict(zip(mechanism.actuators, oracles.actuators(mechanism, targets).T, strict=True))
+    values = dict(zip(mechanism.actuator_names, oracles.actuators(mechanism, targets).T, strict=True))
     attained = [
         [arm_slack(mechanism, leg, targets[k : k + 1], values["A" + leg][k], values["B" + leg][k])[0] for leg in "123"]
         for k in range(len(targets))

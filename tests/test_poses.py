@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from pfabrik.errors import InvalidArgument
-from pfabrik.poses import as_targets, is_rotation
+from pfabrik.poses import as_poses, is_rotation
 
 ANGLES = [0.0, 1e-300, 1e-16, 1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.1, 1.0, 3.0, np.pi, 4.0, 100.0]
 
@@ -121,7 +121,7 @@ def test_rotation_matrices_are_accepted_up_to_the_stated_deviation(deviation: fl
 )
 def test_targets_are_flattened_and_their_batch_shape_kept(shape: tuple[int, ...], batch: tuple[int, ...]) -> None:
     given = np.random.default_rng(4).normal(size=shape)
-    poses, found = as_targets(given)
+    poses, found = as_poses(given)
     assert found == batch
     assert poses.shape == (int(np.prod(batch)), 4, 4)
     assert poses.dtype == np.float64
@@ -137,24 +137,24 @@ def test_targets_are_flattened_and_their_batch_shape_kept(shape: tuple[int, ...]
 @pytest.mark.parametrize("shape", [(), (4,), (3, 4), (4, 3, 4), (2,), (0,)])
 def test_other_shapes_are_no_targets(shape: tuple[int, ...]) -> None:
     with pytest.raises(InvalidArgument, match="target"):
-        as_targets(np.zeros(shape))
+        as_poses(np.zeros(shape))
 
 
 def test_a_rotation_alone_is_no_target() -> None:
     """Its matrix would pass for three positions."""
     with pytest.raises(InvalidArgument, match="target"):
-        as_targets(Rotation.identity())
+        as_poses(Rotation.identity())
 
 
 @pytest.mark.skipif(not hasattr(transform, "RigidTransform"), reason="SciPy before 1.16")
 def test_rigid_transforms_are_targets() -> None:
     R = Rotation.from_rotvec([[0.1, 0, 0], [0, 0.2, 0]])
     transforms = transform.RigidTransform.from_components([[1, 2, 3], [4, 5, 6]], R)
-    poses, batch = as_targets(transforms)
+    poses, batch = as_poses(transforms)
     assert batch == (2,)
     np.testing.assert_allclose(poses[:, :3, :3], R.as_matrix(), rtol=0, atol=1e-15)
     np.testing.assert_array_equal(poses[:, :3, 3], [[1, 2, 3], [4, 5, 6]])
-    assert as_targets(transforms[0])[1] == ()
+    assert as_poses(transforms[0])[1] == ()
     machine = pf.load("stewart")
     near_home = transform.RigidTransform.from_matrix(pf.pose([1, 2, 196], rotvec=[0.05, 0, 0]))
     expected = pf.solve_ik(machine, near_home.as_matrix())

@@ -53,8 +53,8 @@ def test_a_path_that_leaves_the_workspace_and_returns_ends_as_it_began(angle: fl
 def test_a_projection_keeps_the_working_mode_of_its_seed() -> None:
     machine = five_bar()
     home = pf.solve_ik(machine, machine.home_pose)
-    projected = pf.solve_ik(machine, [500, 130, 0], seed=home)
-    back = pf.solve_ik(machine, machine.home_pose, seed=projected)
+    projected = pf.solve_ik(machine, [500, 130, 0], start=home)
+    back = pf.solve_ik(machine, machine.home_pose, start=projected)
     np.testing.assert_allclose(back.actuators, home.actuators, atol=1e-9)
 
 

@@ -43,7 +43,7 @@ def test_closed_forms_reach_all_the_way_and_no_farther(name: str) -> None:
     mechanism = pf.load(name)
     origin = mechanism.reference_point
     rays = directions_of(mechanism, 2 if INTERPRETED else 12)
-    distances = pf.reach(mechanism, origin, rays)
+    distances = pf.travel(mechanism, origin, rays)
     assert (distances > 0.01 * mechanism.characteristic_length).all()
     for ray, far in zip(rays, distances, strict=True):
         beside = BESIDE * mechanism.characteristic_length
@@ -56,7 +56,7 @@ def test_the_border_of_a_hexapod_is_where_its_tightest_limit_is_met() -> None:
     mechanism = pf.load("stewart")
     origin = pf.pose(np.add(mechanism.reference_point, (10.0, -5.0, 20.0)), rpy=(0.05, -0.1, 0.1))
     rays = directions_of(mechanism, 3 if INTERPRETED else 20)
-    distances = pf.reach(mechanism, origin, rays)
+    distances = pf.travel(mechanism, origin, rays)
     for ray, far in zip(rays, distances, strict=True):
         beside = BESIDE * mechanism.characteristic_length
         at = along(origin[:3, 3], ray, np.array([0.0, 0.5 * far, far - beside, far + beside]))
@@ -94,28 +94,28 @@ def test_a_gantry_reaches_the_sides_of_its_box() -> None:
     """By the closure engine, and for ever where nothing limits a slide."""
     machine = gantry((-5.0, 5.0), (-1.0, 7.0), None)
     rays = np.array([(2, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -3, 0), (0, 0, 1), (0, 0, -1), (1, 1, 0)])
-    distances = pf.reach(machine, (2, 2, 3), rays)
+    distances = pf.travel(machine, (2, 2, 3), rays)
     np.testing.assert_allclose(distances[[0, 1, 2, 3, 6]], [4, 6, 7, 1, 4 * np.sqrt(2)], atol=1e-8)
     assert np.isinf(distances[4:6]).all()
 
 
 def test_a_hexapod_without_limits_goes_on_for_ever() -> None:
     machine = pf.load("stewart").without_limits()
-    assert np.isinf(pf.reach(machine, machine.home_pose, (0, 0, 1)))
+    assert np.isinf(pf.travel(machine, machine.home_pose, (0, 0, 1)))
 
 
 def test_where_there_is_no_freedom_there_is_no_way() -> None:
     machine = pf.load("five_bar")
-    assert pf.reach(machine, machine.reference_point, (1, 0, 0)) <= 2e-9 * machine.characteristic_length
+    assert pf.travel(machine, machine.reference_point, (1, 0, 0)) <= 2e-9 * machine.characteristic_length
 
 
 def test_what_a_task_leaves_out_follows() -> None:
     """A 3-RPS goes up until its struts are out, shifting as it must: it does not where it stays level."""
     machine = tripod_rps()
-    stroke = max(machine.joint(name).range[1] for name in machine.actuators)
-    foot, head = (np.array(machine.joint(name).at) for name in machine.joint(machine.actuators[0]).along)
+    stroke = max(machine.joint(name).range[1] for name in machine.actuator_names)
+    foot, head = (np.array(machine.joint(name).at) for name in machine.joint(machine.actuator_names[0]).along)
     height = np.sqrt(stroke**2 - np.sum((head - foot)[:2] ** 2)) - (head - foot)[2]
-    assert pf.reach(machine, machine.reference_point, (0, 0, 1)) == pytest.approx(height, rel=1e-7)
+    assert pf.travel(machine, machine.reference_point, (0, 0, 1)) == pytest.approx(height, rel=1e-7)
 
 
 def test_the_seed_tells_the_working_mode() -> None:
@@ -125,17 +125,17 @@ def test_the_seed_tells_the_working_mode() -> None:
     flipped = pf.solve_ik(machine, low)
     assert flipped
     with pytest.raises(InvalidArgument, match="origin"):
-        pf.reach(machine, low, (0, 0, 1), seed=pf.solve_ik(machine, machine.home_pose))
-    assert pf.reach(machine, low, (0, 0, 1), seed=flipped) > 0.0
+        pf.travel(machine, low, (0, 0, 1), start=pf.solve_ik(machine, machine.home_pose))
+    assert pf.travel(machine, low, (0, 0, 1), start=flipped) > 0.0
 
 
 @pytest.mark.parametrize("shape", [(), (1,), (4,), (2, 3), (0,)])
 def test_distances_have_the_shape_of_the_directions(shape: tuple[int, ...]) -> None:
     machine = pf.load("stewart")
     rays = np.random.default_rng(6).normal(size=(*shape, 3))
-    distances = pf.reach(machine, machine.home_pose, rays)
+    distances = pf.travel(machine, machine.home_pose, rays)
     assert np.shape(distances) == shape
-    one_by_one = [pf.reach(machine, machine.reference_point, 7.0 * ray) for ray in rays.reshape(-1, 3)]
+    one_by_one = [pf.travel(machine, machine.reference_point, 7.0 * ray) for ray in rays.reshape(-1, 3)]
     np.testing.assert_allclose(np.ravel(distances), one_by_one, rtol=0, atol=2e-9 * machine.characteristic_length)
 
 
@@ -154,18 +154,18 @@ def test_distances_have_the_shape_of_the_directions(shape: tuple[int, ...]) -> N
 )
 def test_wrong_arguments_are_named(origin: Any, rays: Any, named: str) -> None:
     with pytest.raises(InvalidArgument, match=named):
-        pf.reach(pf.load("stewart"), origin, rays)
+        pf.travel(pf.load("stewart"), origin, rays)
 
 
 def test_a_task_without_a_position_has_no_reach() -> None:
     machine = pf.load("agile_eye")
     with pytest.raises(InvalidArgument, match="task has a position"):
-        pf.reach(machine, machine.home_pose, (0, 0, 1))
+        pf.travel(machine, machine.home_pose, (0, 0, 1))
 
 
 def test_options_count() -> None:
     machine = pf.load("stewart")
     with pytest.raises(InvalidArgument, match="seed"):
-        pf.reach(machine, machine.home_pose, (0, 0, 1), seed=pf.solve_ik(pf.load("nrpm"), pf.load("nrpm").home_pose))
-    coarse = pf.reach(machine, machine.home_pose, (0, 0, 1), options=Options(tolerance=1e-6))
-    assert coarse == pytest.approx(pf.reach(machine, machine.home_pose, (0, 0, 1)), abs=1e-4)
+        pf.travel(machine, machine.home_pose, (0, 0, 1), start=pf.solve_ik(pf.load("nrpm"), pf.load("nrpm").home_pose))
+    coarse = pf.travel(machine, machine.home_pose, (0, 0, 1), options=Options(tolerance=1e-6))
+    assert coarse == pytest.approx(pf.travel(machine, machine.home_pose, (0, 0, 1)), abs=1e-4)

@@ -149,7 +149,7 @@ def test_branches_start_where_their_trunk_carries_them() -> None:
     machine = pf.load("nrpm")
     answer = pf.solve_ik(machine, pf.pose([30, 50, 210], rotvec=[0.1, -0.2, 0.3]))
     assert answer
-    values = dict(zip(machine.actuators, answer.actuators, strict=True))
+    values = dict(zip(machine.actuator_names, answer.actuators, strict=True))
     assert max(abs(values[f"A{arm}"] - np.pi / 2) for arm in (1, 2, 3)) > 1e-2
     for arm in (1, 2, 3):
         hinge, slide = machine.joint(f"A{arm}"), machine.joint(f"B{arm}")
@@ -213,7 +213,7 @@ def test_limits_are_active_up_to_the_stated_distance(
         expected = angle + distance
     else:
         gap = distance * stewart.characteristic_length
-        lengths = dict(zip(stewart.actuators, answer.actuators, strict=True))
+        lengths = dict(zip(stewart.actuator_names, answer.actuators, strict=True))
         homeward = 1 if bound == "min" else -1
         free = (n for n, v in lengths.items() if n not in held and homeward * (stewart.home_coordinate(n) - v) > 0)
         joint = stewart.joint(next(free))

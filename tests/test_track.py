@@ -51,7 +51,7 @@ def test_redundant_actuators_move_continuously_along_a_circle_within_reach() -> 
     assert followed
     pace = 60.0 * 2 * np.pi / STEPS
     steps = np.abs(np.diff(followed.actuators, axis=0))
-    turns = np.array([machine.joint(actuator).type == "revolute" for actuator in machine.actuators])
+    turns = np.array([machine.joint(actuator).type == "revolute" for actuator in machine.actuator_names])
     assert steps[:, ~turns].max() <= 3 * pace
     assert steps[:, turns].max() <= 3 * pace / 90.0
 
@@ -78,7 +78,7 @@ def test_tracking_is_answering_step_by_step_from_the_answer_before(name: str) ->
     followed = pf.track(machine, path)
     seed = None
     for i, target in enumerate(path):
-        seed = pf.solve_ik(machine, target, seed=seed, options=Options(working_mode="keep"))
+        seed = pf.solve_ik(machine, target, start=seed, options=Options(working_mode="keep"))
         assert followed.status[i] == seed.status
         np.testing.assert_allclose(followed.pose[i], seed.pose, rtol=0, atol=1e-8 * length)
         np.testing.assert_allclose(followed.actuators[i], seed.actuators, rtol=0, atol=1e-8 * length)
@@ -114,7 +114,7 @@ def test_the_seed_decides_the_working_mode() -> None:
     """Started with the left elbow flipped, the way back to home ends with it flipped."""
     machine, path = two_modes()
     flipped = pf.solve_ik(machine, path[-1])
-    followed = pf.track(machine, path[::-1], seed=flipped)
+    followed = pf.track(machine, path[::-1], start=flipped)
     assert followed
     home = elbow_sides(machine, pf.solve_ik(machine, path[:1]))
     np.testing.assert_array_equal(elbow_sides(machine, followed), np.tile(home * [[-1], [1]], len(path)))
@@ -123,7 +123,7 @@ def test_the_seed_decides_the_working_mode() -> None:
 def test_a_path_starts_from_its_seed() -> None:
     machine = pf.load("nrpm")
     seed = pf.solve_ik(machine, np.add(machine.reference_point, (20.0, 30.0, -20.0)))
-    from_seed = pf.track(machine, seed.pose[None], seed=seed)
+    from_seed = pf.track(machine, seed.pose[None], start=seed)
     np.testing.assert_allclose(from_seed.actuators[0], seed.actuators, rtol=0, atol=1e-9)
 
 
@@ -214,7 +214,7 @@ def test_a_path_starts_from_a_single_feasible_answer_of_its_machine() -> None:
     unknown = pf.solve_ik(machine, [[np.nan] * 3], options=Options(on_invalid="mark"))[0]
     for seed in (pair, other, unknown, machine.home_pose):
         with pytest.raises(InvalidArgument, match="seed"):
-            pf.track(machine, [machine.reference_point], seed=seed)
+            pf.track(machine, [machine.reference_point], start=seed)
 
 
 def test_a_path_may_be_empty() -> None:
@@ -241,7 +241,7 @@ def past_the_hole(offset: float, targets: int = 21) -> np.ndarray:
 def test_an_answer_leaps_where_its_target_passes_the_centre_of_a_hole() -> None:
     """There every point of the rim is as near; on the line before and behind it, only one is the nearest."""
     machine, path = arm(None), past_the_hole(0.0)
-    followed = pf.track(machine, path, seed=pf.solve_ik(machine, (-2.0, 0.0, 0.0)))
+    followed = pf.track(machine, path, start=pf.solve_ik(machine, (-2.0, 0.0, 0.0)))
     assert (followed.status == Status.PROJECTED).all()
     np.testing.assert_allclose(followed.position_error, 1.0 - np.abs(path[:, 0]), rtol=NEAREST)
     np.testing.assert_allclose(followed.pose[:10, 0, 3], -1.0, atol=1e-4)
@@ -253,7 +253,7 @@ def test_an_answer_leaps_where_its_target_passes_the_centre_of_a_hole() -> None:
 def test_an_answer_that_swings_round_beside_the_centre_does_not_leap() -> None:
     """At a fifth of a step from the centre the arm makes most of half a turn in two steps, and yet it moves."""
     machine, path = arm(None), past_the_hole(0.01)
-    followed = pf.track(machine, path, seed=pf.solve_ik(machine, (-2.0, 0.0, 0.0)))
+    followed = pf.track(machine, path, start=pf.solve_ik(machine, (-2.0, 0.0, 0.0)))
     np.testing.assert_allclose(followed.position_error, 1.0 - np.linalg.norm(path, axis=1), rtol=NEAREST)
     assert not followed.jumps.any()
 
@@ -271,7 +271,7 @@ def test_an_answer_at_a_limit_leaps_once_when_the_other_side_has_become_nearer()
     machine, home = arm((-2.0, 2.0)), np.arctan2(2.0, 3.0)
     angle = np.linspace(home + 1.5, home + 2 * np.pi - 1.5, 60)
     path = 3.0 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    followed = pf.track(machine, path, seed=pf.solve_ik(machine, path[0]))
+    followed = pf.track(machine, path, start=pf.solve_ik(machine, path[0]))
     away = np.flatnonzero(followed.status == Status.PROJECTED)
     (leap,) = np.flatnonzero(followed.jumps)
     here, there = waiting_at(2.0, path), waiting_at(-2.0, path)
@@ -327,7 +327,7 @@ def test_links_that_were_stretched_out_beyond_reach_bend_back_the_way_they_did(m
     share = np.concatenate([share, share[-2::-1]])
     home = machine.home_pose[:3, 3]
     followed = pf.track(machine, home + share[:, None] * machine.characteristic_length * way)
-    assert pf.singularity(machine, followed).serial.min() < 1e-3  # links are stretched out on the way
+    assert pf.singularity(followed).serial.min() < 1e-3  # links are stretched out on the way
     assert followed.status[-1] == Status.REACHED
     assert not followed.jumps.any()
     np.testing.assert_allclose(followed.actuators[-1], followed.actuators[0], rtol=0, atol=1e-9)
@@ -378,7 +378,7 @@ def test_a_row_that_is_no_pose_where_links_are_stretched_out_is_passed_over(on_i
             pf.track(machine, path)
         return
     followed = pf.track(machine, path, options=Options(on_invalid="mark"))
-    assert pf.singularity(machine, whole).serial[7] < 1e-3
+    assert pf.singularity(whole).serial[7] < 1e-3
     assert followed.status[8] == Status.INVALID
     others = np.arange(12) != 8
     np.testing.assert_allclose(
@@ -454,7 +454,7 @@ def test_a_track_tells_its_fields_as_plain_numbers() -> None:
 def test_a_track_survives_pickling() -> None:
     machine, path = arm(None), past_the_hole(0.0)
     seed = pf.solve_ik(machine, (-2.0, 0.0, 0.0))
-    followed = pf.track(machine, path, seed=seed, sample_time=0.1, speed_limits=1.0)
+    followed = pf.track(machine, path, start=seed, sample_time=0.1, speed_limits=1.0)
     again = pickle.loads(pickle.dumps(followed))
     np.testing.assert_array_equal(again.jumps, followed.jumps)
     np.testing.assert_array_equal(again.speeds, followed.speeds)

@@ -29,7 +29,7 @@ def apart(one: pf.Solution, other: pf.Solution) -> float:
     """Largest difference of two configurations in joint centres [L] and actuators (angles as points on a circle)."""
     mechanism = one.mechanism
     off = [np.abs(one.points[name] - other.points[name]).max() / mechanism.characteristic_length for name in one.points]
-    for name, a, b in zip(mechanism.actuators, one.actuators, other.actuators, strict=True):
+    for name, a, b in zip(mechanism.actuator_names, one.actuators, other.actuators, strict=True):
         turns = mechanism.joint(name).type == "revolute"
         off.append(2 * abs(np.sin((a - b) / 2)) if turns else abs(a - b) / mechanism.characteristic_length)
     return float(max(off))
@@ -40,7 +40,7 @@ def assert_modes(modes: Sequence[pf.Solution], target: np.ndarray) -> None:
     for mode in modes:
         mechanism = mode.mechanism
         length = mechanism.characteristic_length
-        assert pf.closure_residual(mechanism, mode) <= 1e-9 * length
+        assert pf.closure_residual(mode) <= 1e-9 * length
         assert fk_oracles.joint_gap(mechanism, mode) <= 1e-8
         offset = np.abs(mode.pose - target)
         if not mechanism.end_effector_is_joint and "rotation" in mechanism.task:
@@ -290,7 +290,7 @@ def test_catalogue_machines_have_the_modes_of_textbooks(name: str, count: int) -
     modes = pf.working_modes(mechanism, mechanism.home_pose)
     assert_modes(modes, mechanism.home_pose)
     assert len(modes) == count
-    home = {name: np.ravel(mechanism.home_coordinate(name)) for name in mechanism.actuators}
+    home = {name: np.ravel(mechanism.home_coordinate(name)) for name in mechanism.actuator_names}
     np.testing.assert_allclose(modes[0].actuators, np.concatenate(list(home.values())), rtol=0, atol=1e-7)
     assert modes[0]
 
@@ -323,7 +323,7 @@ def test_a_redundant_machine_is_told_what_still_moves() -> None:
         pf.working_modes(mechanism, mechanism.home_pose)
     assert isinstance(caught.value, PfabrikError)
     assert caught.value.freedoms == 6
-    assert set(caught.value.moving) == set(mechanism.actuators)
+    assert set(caught.value.moving) == set(mechanism.actuator_names)
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
@@ -486,7 +486,7 @@ def test_an_answer_stays_on_the_branch_of_its_seed(name: str, mode: str | None) 
     mechanism = make().without_limits()
     options = pf.Options(working_mode=mode)
     for seed in pf.working_modes(mechanism, here)[::5]:
-        answer = pf.solve_ik(mechanism, there, seed=seed, options=options)
+        answer = pf.solve_ik(mechanism, there, start=seed, options=options)
         assert answer
         assert apart(answer, seed) <= 0.1  # branches are further apart
 
@@ -504,7 +504,7 @@ def test_without_a_seed_the_answer_is_the_mode_of_home(name: str) -> None:
     free = make().without_limits()
     modes = pf.working_modes(free, here)
     wrong = max(modes, key=lambda mode: apart(mode, modes[0]))
-    home = np.array([np.ravel(free.home_coordinate(each))[0] for each in free.actuators])
+    home = np.array([np.ravel(free.home_coordinate(each))[0] for each in free.actuator_names])
     del wrong, home
 
 
@@ -513,7 +513,7 @@ def barred(name: str) -> tuple[pf.Mechanism, object]:
     make, target, _ = SEEDED[name]
     free = make().without_limits()
     modes = pf.working_modes(free, target)
-    for k, actuator in enumerate(free.actuators):
+    for k, actuator in enumerate(free.actuator_names):
         value = modes[0].actuators[k]
         for other in modes[1:]:
             away = (np.sign(value) * (value - other.actuators[k])) % (2 * np.pi)  # back past home
@@ -529,7 +529,7 @@ def test_a_branch_that_cannot_reach_is_left_where_that_is_allowed(name: str) -> 
     mechanism, target = barred(name)
     assert pf.solve_ik(mechanism, target)
     seed = pf.solve_ik(mechanism, mechanism.home_pose)
-    assert pf.solve_ik(mechanism, target, seed=seed, options=pf.Options(working_mode="any"))
+    assert pf.solve_ik(mechanism, target, start=seed, options=pf.Options(working_mode="any"))
 
 
 @pytest.mark.slow
@@ -538,7 +538,7 @@ def test_a_branch_that_cannot_reach_is_left_where_that_is_allowed(name: str) -> 
 def test_a_branch_that_cannot_reach_is_kept_where_it_is_to_be(name: str, mode: str | None) -> None:
     mechanism, target = barred(name)
     seed = pf.solve_ik(mechanism, mechanism.home_pose)
-    answer = pf.solve_ik(mechanism, target, seed=seed, options=pf.Options(working_mode=mode))
+    answer = pf.solve_ik(mechanism, target, start=seed, options=pf.Options(working_mode=mode))
     assert answer.status is pf.Status.PROJECTED
     # a limit of one actuator by 0.02 beyond: what keeps it on the same branch is near
     assert apart(answer, pf.working_modes(mechanism.without_limits(), target)[0]) <= 0.2

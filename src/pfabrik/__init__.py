@@ -28,7 +28,9 @@ _HOMES = {
     "solve_ik": "ik",
     "track": "track",
     "Track": "answers.tracked",
-    "reach": "travel",
+    "Travel": "travel",
+    "travel": "travel",
+    "configuration": "configuration",
     "margins": "answers.margins",
     "AssemblyModes": "modes.assembly",
     "assembly_modes": "modes.assembly",
@@ -60,11 +62,13 @@ __all__ = [
     "Status",
     "SubChain",
     "Track",
+    "Travel",
     "WorkingModes",
     "__version__",
     "assembly_modes",
     "catalog",
     "closure_residual",
+    "configuration",
     "decompose",
     "errors",
     "forward_jacobian",
@@ -74,12 +78,12 @@ __all__ = [
     "margins",
     "mobility",
     "pose",
-    "reach",
     "save",
     "singularity",
     "solve_fk",
     "solve_ik",
     "track",
+    "travel",
     "working_modes",
 ]
 
@@ -92,6 +96,7 @@ if TYPE_CHECKING:
     from .answers.solution import Solution, Status
     from .answers.tracked import Track
     from .catalog import catalog
+    from .configuration import configuration
     from .decomposition.decompose import SubChain, decompose
     from .description.legs import Leg
     from .description.mechanism import Cone, Joint, Mechanism
@@ -103,7 +108,7 @@ if TYPE_CHECKING:
     from .options import Options
     from .poses import pose
     from .track import track
-    from .travel import reach
+    from .travel import Travel, travel
 
 
 def __getattr__(name: str) -> Any:

@@ -2,37 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .answers.differential import mobility
-from .answers.solution import Solution
+from .answers.solution import Solution, Status
+from .answers.starts import Start, measured, start_of
 from .closure.close import Closing, Closure, close, closure_of, platform_poses
+from .closure.configurations import Configurations, joint_coordinates
 from .closure.nearest import is_feasible, nearest
 from .closure.starts import same_random_starts
-from .decomposition.plan import flat_of
 from .description.mechanism import Mechanism, checked_mechanism
-from .errors import InvalidArgument
-from .ik import checked, seed_rows
-from .kernels.reaching import plan as P
-from .options import Options
+from .engine import engine_of
+from .errors import InvalidArgument, UnknownName
+from .motion.first_order import generic_of
+from .options import Options, checked_options
 from .poses import as_floats
-from .reaching.completion import actuators_of, coordinates_of, positions_of, set_actuators
-from .reaching.locked import reached_with_locked_legs
-from .reaching.rows import new_rows
 from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]
 
+Actuators: TypeAlias = ArrayLike | Mapping[str, ArrayLike]
+"""Actuated coordinates (..., n_a) in the order of `mechanism.actuator_names`, or joint name -> values (...,)."""
+
 STRIDES = 8
-"""Steps in which actuators are taken from the seed's values to the asked ones where one step strays."""
+"""Steps in which actuators are taken from the start's values to the asked ones where one step strays."""
 
 STARTS = 48
-"""Random starts where nothing else assembles and no seed says in which mode to stay."""
+"""Random starts where nothing else assembles and no start says in which mode to stay."""
 
 SAME = 1e-3
 """Share by which distances or gaps may differ and still count as the same: those of mirror images are."""
@@ -51,18 +51,19 @@ SIGHT = 3.0
 
 
 def solve_fk(
-    mechanism: Mechanism, actuators: Any, *, seed: Solution | None = None, options: Options | None = None
+    mechanism: Mechanism, actuators: Actuators, *, start: Start | None = None, options: Options | None = None
 ) -> Solution:
     """The pose of the end effector, and all joints, at given actuator values.
 
-    Newton's method closes the loops from the seed with the actuators locked. Where it strays, the actuators are led to
-    their values in steps, then the reaching engine assembles the legs with the actuators locked; without a seed other
-    starts follow. The assembly mode is the seed's wherever the first two succeed: see `assembly_modes` for all.
+    Newton's method closes the loops from the start with the actuators locked. Where it strays, the actuators are led to
+    their values in steps, then the reaching engine assembles the legs with the actuators locked; without a start other
+    starts follow. The assembly mode is the start's wherever the first two succeed: see `assembly_modes` for all.
 
     Parameters
     ----------
-    actuators : actuated coordinates (..., n_a) in the order of `mechanism.actuators` [length or rad].
-    seed : an answer to start from, single or one for each row. Default: home.
+    actuators : actuated coordinates (..., n_a) in the order of `mechanism.actuator_names` [length or rad]; or joint
+        name -> its values (...,), for every actuator.
+    start : a Solution or joint vector q to start from, single or one for each row. Default: home.
     options : of these, `actuator_tolerance` and `on_invalid`.
 
     Returns
@@ -74,54 +75,59 @@ def solve_fk(
 
     Raises
     ------
-    InvalidArgument : values of the wrong shape or, unless marked, not finite; a seed that does not fit.
+    InvalidArgument : values of the wrong shape or, unless marked, not finite; a start that does not fit.
     """
-    options = checked(mechanism, options)
+    options = checked_options(options)
     values, shape = as_values(mechanism, actuators)
     known = np.asarray(np.isfinite(values).all(axis=1))
     if options.on_invalid == "raise" and not known.all():
         bad = np.flatnonzero(~known)[:5].tolist() if shape else ()
         raise InvalidArgument("actuators", "a value that is not finite", "finite values", rows=bad)
-    coordinates, poses = _starts(mechanism, seed, shape, len(values))
+    begin = start_of(mechanism, start, shape)
+    coordinates = np.repeat(joint_coordinates(mechanism, begin), 1 if begin and len(begin) > 1 else len(values), axis=0)
     asked = np.clip(values[known], -HORIZON, HORIZON)
-    closing = _assemble(mechanism, coordinates[known], poses[known], asked, seeded=seed is not None)
-    return _as_solution(mechanism, closing, values, known, shape, options.actuator_tolerance)
+    closing = _assemble(mechanism, coordinates[known], asked, seeded=start is not None)
+    found = _judged(mechanism, closing, values[known], options.actuator_tolerance)
+    return Solution(mechanism, found.among(known), shape)
 
 
-def answered(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:
+def assembled(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:
     """Joint coordinates (n, columns) as the answer to actuated values (n, n_a): measured, not changed."""
-    closing = close(closure_of(mechanism), coordinates, platform_poses(mechanism, coordinates), max_iterations=0)
-    return _as_solution(mechanism, closing, values, np.ones(len(values), bool), (len(values),), TOLERANCES.position)
+    found = _judged(mechanism, measured(mechanism, coordinates), values, TOLERANCES.position)
+    return Solution(mechanism, found, (len(values),))
 
 
-def as_values(mechanism: Mechanism, actuators: Any) -> tuple[Floats, tuple[int, ...]]:
+def as_values(mechanism: Mechanism, actuators: Actuators) -> tuple[Floats, tuple[int, ...]]:
     """Actuated values (n, n_a), and the batch shape they came in."""
-    n = len(checked_mechanism(mechanism).actuators)
-    expected = f"shape (..., {n}): {', '.join(mechanism.actuators)}"
+    names = checked_mechanism(mechanism).actuator_names
+    expected = f"shape (..., {len(names)}): {', '.join(names)}"
+    if isinstance(actuators, Mapping):
+        actuators = _by_name(names, actuators)
     array = as_floats("actuators", actuators, expected)
-    if array.shape[-1:] != (n,):
+    if array.shape[-1:] != (len(names),):
         raise InvalidArgument("actuators", f"shape {array.shape}", expected)
-    return array.reshape(-1, n), array.shape[:-1]
+    return array.reshape(-1, len(names)), array.shape[:-1]
 
 
-def _starts(mechanism: Mechanism, seed: Solution | None, shape: tuple[int, ...], n: int) -> tuple[Floats, Floats]:
-    """Coordinates (n, columns) and platform poses (n, 4, 4) where the rows start."""
-    if seed is None:
-        start = np.zeros((1, len(closure_of(mechanism).scale)))
-        poses = mechanism.home_pose[None]
-    else:
-        poses = seed_rows(mechanism, seed, shape).poses
-        start = seed._coordinates
-        if mechanism.end_effector_is_joint:
-            poses = platform_poses(mechanism, start)
-    if len(start) == n:
-        return start.copy(), poses.copy()
-    return np.repeat(start, n, axis=0), np.repeat(poses, n, axis=0)
+def _by_name(names: Sequence[str], actuators: Mapping[str, ArrayLike]) -> Floats:
+    """Values (..., n_a) from values by name; each name once, all of them, of shapes that agree."""
+    for name in actuators:
+        if name not in names:
+            raise UnknownName("actuator", name, names)
+    missing = [name for name in names if name not in actuators]
+    if missing:
+        raise InvalidArgument("actuators", f"no value of {', '.join(missing)}", f"one for each of {', '.join(names)}")
+    values = [as_floats(f"actuators['{name}']", actuators[name], "values of shape (...)") for name in names]
+    try:
+        return np.stack(np.broadcast_arrays(*values), axis=-1)
+    except ValueError:
+        found = f"shapes {', '.join(str(value.shape) for value in values)}"
+        raise InvalidArgument("actuators", found, "shapes that agree") from None
 
 
-def _assemble(mechanism: Mechanism, coordinates: Floats, poses: Floats, values: Floats, seeded: bool) -> Closing:
+def _assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, seeded: bool) -> Closing:
     """Close the loops at the asked values, or as near to them as can be."""
-    closure = closure_of(mechanism)
+    closure, poses = closure_of(mechanism), platform_poses(mechanism, coordinates)
     best = _locked(closure, coordinates, poses, values)
     if not is_feasible(best).all():
         attempts = [] if _over_determined(mechanism) else [_led, _reached]
@@ -137,20 +143,20 @@ def _assemble(mechanism: Mechanism, coordinates: Floats, poses: Floats, values: 
 
 def _over_determined(mechanism: Mechanism) -> bool:
     """Whether there are more actuators than motions: then most values contradict each other."""
-    counted = mobility(mechanism)
+    counted = generic_of(mechanism).mobility
     return counted.actuators > counted.mobility - counted.idle
 
 
 def _locked(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
     """Newton's method with the actuators locked."""
     start = coordinates.copy()
-    set_actuators(closure.mechanism, start, values)
-    return close(closure, start, poses, locked=frozenset(closure.mechanism.actuators))
+    closure.put_actuators(start, values)
+    return close(closure, start, poses, locked=frozenset(closure.mechanism.actuator_names))
 
 
 def _led(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
     """The actuators led from where they are to the asked values."""
-    begin = actuators_of(closure.mechanism, coordinates)
+    begin = closure.actuators(coordinates)
     for stride in range(1, STRIDES + 1):
         found = _locked(closure, coordinates, poses, begin + (values - begin) * stride / STRIDES)
         coordinates, poses = found.coordinates, found.poses
@@ -158,13 +164,9 @@ def _led(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -
 
 
 def _reached(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
-    """Legs of locked length, assembled by the reaching engine around the platform of the start."""
-    mechanism = closure.mechanism
-    rows = reached_with_locked_legs(mechanism, coordinates, poses, values)
-    if rows is not None:
-        coordinates = coordinates_of(mechanism, rows)
-        poses = rows.poses if not mechanism.end_effector_is_joint else platform_poses(mechanism, coordinates)
-    return _locked(closure, coordinates, poses, values)
+    """Legs of locked length, assembled in positions around the platform of the start, where these express them."""
+    assembled = engine_of(closure.mechanism).assemble(coordinates, poses, values)
+    return _locked(closure, *(assembled or (coordinates, poses)), values)
 
 
 def _scattered(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
@@ -177,7 +179,7 @@ def _scattered(closure: Closure, coordinates: Floats, poses: Floats, values: Flo
         equal = np.abs(tried_off - off) <= SAME * off
         better = np.flatnonzero(np.where(equal, distance < from_start, tried_off < off))
         off[better], from_start[better] = tried_off[better], distance[better]
-        _take(best, better, tried, better)
+        best.take(better, tried, better)
     return best
 
 
@@ -198,12 +200,7 @@ def _improve(best: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
     """Take over the rows that are feasible, or are less open."""
     is_open = best.gap[rest] > TOLERANCES.position
     better = np.flatnonzero(is_feasible(tried) | (is_open & (tried.gap < best.gap[rest])))
-    _take(best, rest[better], tried, better)
-
-
-def _take(best: Closing, places: NDArray[np.intp], found: Closing, rows: NDArray[np.intp]) -> None:
-    for array, own in zip(best, found, strict=True):
-        array[places] = own[rows]
+    best.take(rest[better], tried, better)
 
 
 def _project(
@@ -230,7 +227,7 @@ def _project(
         tried = _nearest_actuators(closure, start[0][waiting], start[1][waiting], asked)
         _take_nearer(closure, found, distance, waiting, tried, values)
     feasible = np.flatnonzero(is_feasible(found))
-    _take(best, rest[feasible], found, feasible)
+    best.take(rest[feasible], found, feasible)
 
 
 def _newton_ends(closure: Closure, values: Floats) -> Iterator[tuple[Floats, Floats]]:
@@ -247,13 +244,13 @@ def _take_nearer(
     errors = np.linalg.norm(_actuator_errors(closure, tried.coordinates, values[rows]), axis=1)
     better = np.flatnonzero(is_feasible(tried) & (errors < (1.0 - SAME) * distance[rows]))
     distance[rows[better]] = errors[better]
-    _take(found, rows[better], tried, better)
+    found.take(rows[better], tried, better)
 
 
 def _nearest_actuators(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
     """Feasible configurations whose actuators differ least from the values, by least squares; a local search."""
     anchors = coordinates.copy()
-    set_actuators(closure.mechanism, anchors, values)
+    closure.put_actuators(anchors, values)
     weights = np.zeros(len(closure.scale))
     weights[closure.actuated] = 1.0
     return nearest(closure, anchors, poses, weights=weights, anchors=anchors)
@@ -262,54 +259,22 @@ def _nearest_actuators(closure: Closure, coordinates: Floats, poses: Floats, val
 def _within_sight(closure: Closure, coordinates: Floats, values: Floats) -> Floats:
     """Values no further than a few sizes of the machine, or radians, from where they are."""
     far = SIGHT / closure.scale[closure.actuated]
-    present = actuators_of(closure.mechanism, coordinates)
+    present = closure.actuators(coordinates)
     return np.asarray(np.clip(values, present - far, present + far))
 
 
 def _actuator_errors(closure: Closure, coordinates: Floats, values: Floats) -> Floats:
     """How far actuators are from values, (n, n_a) [L or rad]."""
-    off = actuators_of(closure.mechanism, coordinates) - values
+    off = closure.actuators(coordinates) - values
     return np.asarray(off * closure.scale[closure.actuated])
 
 
-def _as_solution(
-    mechanism: Mechanism,
-    closing: Closing,
-    values: Floats,
-    known: NDArray[np.bool_],
-    shape: tuple[int, ...],
-    tolerance: float,
-) -> Solution:
-    """Wrap what was found for the values that are known; the other rows are INVALID, and NaN."""
-    flat = flat_of(mechanism)
-    rows = new_rows(mechanism, flat, len(values))
-    coordinates = np.full((len(values), len(closure_of(mechanism).scale)), np.nan)
-    for array in (rows.poses, rows.nodes, rows.trunks, rows.actuators, rows.measures):
-        array[:] = np.nan
-    rows.status[:], rows.counters[:] = P.INVALID, 0
-    own = P.Rows._make(array[known] for array in rows)
-    _fill(mechanism, closing, values[known], tolerance, own)
-    if flat is not None:
-        positions_of(mechanism, flat, closing.coordinates, own)
-    for array, part in zip((*rows, coordinates), (*own, closing.coordinates), strict=True):
-        array[known] = part
-    return Solution(mechanism, rows, shape, lambda: coordinates)
-
-
-def _fill(mechanism: Mechanism, closing: Closing, values: Floats, tolerance: float, rows: P.Rows) -> None:
-    """Write answers with what was measured of them."""
-    rows.counters[:, 0] = closing.iterations
-    rows.poses[:] = closing.poses
-    if mechanism.end_effector_is_joint:
-        rows.poses[:, :3, :3] = np.eye(3)
-    rows.actuators[:] = actuators_of(mechanism, closing.coordinates)
-    rows.measures[:, :2] = 0.0
-    rows.measures[:, 2] = closing.gap * mechanism.characteristic_length
-    rows.measures[:, 3] = np.maximum(closing.excess, 0.0)
-    error = _actuator_errors(closure_of(mechanism), closing.coordinates, values)
-    rows.measures[:, 4] = np.abs(error).max(axis=1, initial=0.0)
-    asked = rows.measures[:, 4] <= tolerance
-    closed = closing.gap <= TOLERANCES.position
-    rows.status[:] = np.where(closed & asked, P.EXCEEDED, P.FAILED)
-    rows.status[is_feasible(closing)] = P.PROJECTED
-    rows.status[is_feasible(closing) & asked] = P.REACHED
+def _judged(mechanism: Mechanism, closing: Closing, values: Floats, tolerance: float) -> Configurations:
+    """Configurations as answers to actuated values (n, n_a): which are what was asked for, and which are feasible."""
+    found = engine_of(mechanism).at(closing)
+    error = np.abs(_actuator_errors(closure_of(mechanism), closing.coordinates, values)).max(axis=1, initial=0.0)
+    found.rows.measures[:, 4] = error
+    asked, feasible = error <= tolerance, is_feasible(closing)
+    open_or_beyond = np.where((closing.gap <= TOLERANCES.position) & asked, Status.EXCEEDED, Status.FAILED)
+    found.rows.status[:] = np.where(feasible, np.where(asked, Status.REACHED, Status.PROJECTED), open_or_beyond)
+    return found

@@ -82,3 +82,10 @@ class Options:
 def _is_a(kind: type, value: object) -> bool:
     """Whether a value is such a number; a truth value is none."""
     return isinstance(value, kind) and not isinstance(value, bool)
+
+
+def checked_options(options: Options | None) -> Options:
+    """The options to use, the usual ones for None; InvalidArgument for anything else."""
+    if not isinstance(options, Options | None):
+        raise InvalidArgument("options", type(options).__name__, "Options, or None")
+    return options or Options()

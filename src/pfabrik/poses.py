@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgument
+from .rotations import from_quaternion, from_rotvec, from_rpy, nearest_rotations
 from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]
+
+
+@runtime_checkable
+class SupportsMatrix(Protocol):
+    """A rotation or rigid transform of another library, such as SciPy's."""
+
+    def as_matrix(self) -> Floats: ...
 
 
 def pose(
@@ -20,49 +29,59 @@ def pose(
     rotvec: ArrayLike | None = None,
     quat_xyzw: ArrayLike | None = None,
     quat_wxyz: ArrayLike | None = None,
-    rotation: Any = None,
+    rotation: ArrayLike | SupportsMatrix | None = None,
+    degrees: bool = False,
 ) -> Floats:
-    """A pose T_base_platform, shape (4, 4), from a position and at most one rotation.
+    """Poses T_base_platform, shape (..., 4, 4), from positions and at most one kind of rotation.
+
+    Leading axes of positions and rotations are broadcast against each other.
 
     Parameters
     ----------
-    xyz : position of the reference point in the base frame, shape (3,) [length].
-    rpy : roll, pitch, yaw [rad] about the fixed x, y and z axes, in this order: R = Rz(yaw) Ry(pitch) Rx(roll).
-    rotvec : rotation vector, shape (3,) [rad].
-    quat_xyzw, quat_wxyz : quaternion of any nonzero norm, scalar last or first as the name says.
-    rotation : a (3, 3) matrix, or an object with ``as_matrix`` such as a SciPy Rotation.
+    xyz : position of the reference point in the base frame, shape (..., 3) [length].
+    rpy : roll, pitch, yaw (..., 3) about the fixed x, y and z axes, in this order: R = Rz(yaw) Ry(pitch) Rx(roll).
+    rotvec : rotation vector, shape (..., 3).
+    quat_xyzw, quat_wxyz : quaternion (..., 4) of any nonzero norm, scalar last or first as the name says.
+    rotation : matrices (..., 3, 3), or an object with ``as_matrix`` such as a SciPy Rotation.
+    degrees : whether `rpy` and `rotvec` are in degrees; else in radians.
 
     Raises
     ------
     InvalidArgument : a wrong shape, a number that is not finite, more than one rotation, or not a rotation.
     """
-    given = {
-        name: value
-        for name, value in (
-            ("rpy", rpy),
-            ("rotvec", rotvec),
-            ("quat_xyzw", quat_xyzw),
-            ("quat_wxyz", quat_wxyz),
-            ("rotation", rotation),
-        )
-        if value is not None
-    }
+    rotations = {"rpy": rpy, "rotvec": rotvec, "quat_xyzw": quat_xyzw, "quat_wxyz": quat_wxyz, "rotation": rotation}
+    given = [name for name, value in rotations.items() if value is not None]
     if len(given) > 1:
         raise InvalidArgument("pose", " and ".join(given), "at most one rotation")
-    T_base_platform = np.eye(4)
-    T_base_platform[:3, 3] = _numbers("xyz", xyz, (3,))
-    for name, value in given.items():
-        T_base_platform[:3, :3] = _ROTATIONS[name](name, value)
+    positions = _numbers("xyz", xyz, (3,))
+    turned = np.eye(3)
+    for name in given:
+        value = rotations[name]
+        value = value.as_matrix() if isinstance(value, SupportsMatrix) else value
+        numbers = _numbers(name, value, {"rotation": (3, 3), "rpy": (3,), "rotvec": (3,)}.get(name, (4,)))
+        in_degrees = degrees and name in ("rpy", "rotvec")
+        turned = _ROTATIONS[name](name, np.radians(numbers) if in_degrees else numbers)
+    try:
+        shape = np.broadcast_shapes(positions.shape[:-1], turned.shape[:-2])
+    except ValueError:
+        found = f"shape {positions.shape} beside rotations of batch shape {turned.shape[:-2]}"
+        raise InvalidArgument("xyz", found, "batch shapes that agree") from None
+    T_base_platform = np.zeros((*shape, 4, 4))
+    T_base_platform[..., :3, :3], T_base_platform[..., :3, 3], T_base_platform[..., 3, 3] = turned, positions, 1.0
     return T_base_platform
 
 
 def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> Floats:
-    array = as_floats(name, value, f"finite numbers of shape {shape}")
-    if array.shape != shape:
-        raise InvalidArgument(name, f"shape {array.shape}", f"shape {shape}")
+    array = as_floats(name, value, f"finite numbers of shape {_batch(shape)}")
+    if array.shape[-len(shape) :] != shape:
+        raise InvalidArgument(name, f"shape {array.shape}", f"shape {_batch(shape)}")
     if not np.isfinite(array).all():
         raise InvalidArgument(name, "a number that is not finite", "finite numbers")
     return array
+
+
+def _batch(shape: tuple[int, ...]) -> str:
+    return f"(..., {', '.join(map(str, shape))})"
 
 
 def as_floats(name: str, value: Any, expected: str) -> Floats:
@@ -76,49 +95,23 @@ def as_floats(name: str, value: Any, expected: str) -> Floats:
     return np.require(array, np.float64, ["C", "W"])  # the one memory layout that kernels are compiled for
 
 
-def _from_rpy(name: str, value: Any) -> Floats:
-    roll, pitch, yaw = _numbers(name, value, (3,))
-    x, y, z = np.eye(3)
-    return _from_rotvec(name, yaw * z) @ _from_rotvec(name, pitch * y) @ _from_rotvec(name, roll * x)
-
-
-def _from_rotvec(name: str, value: Any) -> Floats:
-    x, y, z = _numbers(name, value, (3,))
-    angle = float(np.linalg.norm((x, y, z)))
-    # the half angle's sine over the angle: exact down to zero, so that there is no small-angle branch
-    half = 0.5 * float(np.sinc(0.5 * angle / np.pi))
-    return _from_xyzw(np.array([x * half, y * half, z * half, np.cos(0.5 * angle)]))
-
-
-def _from_xyzw(quaternion: Floats) -> Floats:
-    x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def _from_quaternion(name: str, value: Any) -> Floats:
-    quaternion = _numbers(name, value, (4,))
-    if not np.any(quaternion):
+def _from_quaternion(name: str, value: Floats) -> Floats:
+    largest = np.abs(value).max(axis=-1, keepdims=True)
+    if not largest.all():
         raise InvalidArgument(name, "a zero quaternion", "a quaternion of nonzero norm")
-    quaternion = quaternion / np.abs(quaternion).max()
-    return _from_xyzw(quaternion if name == "quat_xyzw" else np.roll(quaternion, -1))
+    quaternions = value / largest  # so that no square is too large, or too small, to be represented
+    return from_quaternion(quaternions if name == "quat_xyzw" else np.roll(quaternions, -1, axis=-1))
 
 
-def _from_matrix(name: str, value: Any) -> Floats:
-    matrix = _numbers(name, value.as_matrix() if hasattr(value, "as_matrix") else value, (3, 3))
-    if not is_rotation(matrix):
+def _from_matrix(name: str, value: Floats) -> Floats:
+    if not all(map(is_rotation, value.reshape(-1, 3, 3))):
         raise InvalidArgument(name, "a matrix that is not a rotation", "R^T R = I and det R = 1")
-    return matrix
+    return value
 
 
-_ROTATIONS = {
-    "rpy": _from_rpy,
-    "rotvec": _from_rotvec,
+_ROTATIONS: dict[str, Callable[[str, Floats], Floats]] = {
+    "rpy": lambda _, angles: from_rpy(angles),
+    "rotvec": lambda _, vectors: from_rotvec(vectors),
     "quat_xyzw": _from_quaternion,
     "quat_wxyz": _from_quaternion,
     "rotation": _from_matrix,
@@ -134,8 +127,8 @@ def is_rotation(matrix: Floats) -> bool:
 _EXPECTED = "poses of shape (..., 4, 4) or positions of shape (..., 3)"
 
 
-def as_targets(target: Any) -> tuple[Floats, tuple[int, ...]]:
-    """Targets as poses (n, 4, 4), C-contiguous, and the batch shape they came in.
+def as_poses(target: Any) -> tuple[Floats, tuple[int, ...]]:
+    """Poses (n, 4, 4), C-contiguous, and the batch shape they came in.
 
     Accepts poses (..., 4, 4), positions (..., 3) (at home orientation) and objects with ``as_matrix`` that give poses,
     such as a SciPy RigidTransform. Whether the numbers make poses is for the kernel to see.
@@ -168,9 +161,8 @@ def are_poses(targets: Floats) -> NDArray[np.bool_]:
 
 def made_exact(poses: Floats) -> Floats:
     """Poses (n, 4, 4) with the rotations nearest to theirs: targets are typed with a few digits."""
-    U, _, Vt = np.linalg.svd(poses[:, :3, :3])
     exact = np.zeros_like(poses)
-    exact[:, :3, :3], exact[:, :3, 3], exact[:, 3, 3] = U @ Vt, poses[:, :3, 3], 1.0
+    exact[:, :3, :3], exact[:, :3, 3], exact[:, 3, 3] = nearest_rotations(poses[:, :3, :3]), poses[:, :3, 3], 1.0
     return exact
 
 
@@ -186,7 +178,7 @@ def what_is_wrong(target: Floats) -> str:
 def between(begin: Floats, end: Floats, share: Any) -> Floats:
     """Poses a share of the way from one to another: straight positions, the shortest turn."""
     way = begin + (end - begin) * share
-    U, _, Vt = np.linalg.svd(way[:, :3, :3])  # the rotation nearest to the blend of the two
-    proper = np.linalg.det(U @ Vt) > 0.0
-    way[:, :3, :3] = np.where(proper[:, None, None], U @ Vt, begin[:, :3, :3])
+    blend = nearest_rotations(way[:, :3, :3])
+    proper = np.linalg.det(blend) > 0.0
+    way[:, :3, :3] = np.where(proper[:, None, None], blend, begin[:, :3, :3])
     return np.asarray(way)

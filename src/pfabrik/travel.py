@@ -1,143 +1,261 @@
-"""How far the end effector can go, and in which directions."""
+"""How far the end effector can go from where it is, along and about each axis, and what stops it."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .answers.solution import Solution
-from .closure.solve import reached_by_closure
-from .decomposition.plan import flat_of
-from .description.mechanism import Mechanism, checked_mechanism
+from .answers.limits import ActiveLimit, active_limits
+from .answers.solution import Solution, Status, checked_solution
+from .description.mechanism import Mechanism
 from .description.task import task_of
+from .engine import engine_of
 from .errors import InvalidArgument
-from .ik import solve_ik
-from .kernels.reaching import plan as P
-from .options import Options
-from .poses import as_floats, as_targets
-from .reaching.rows import new_rows
-from .reaching.solve import settings_of, solve_rows
+from .kernels.reaching.plan import REACHED
+from .options import Options, checked_options
+from .poses import as_floats
+from .rotations import from_rotvec
 from .tolerances import TOLERANCES
 
 Floats = NDArray[np.float64]
 
 STEP = 1.0 / 32.0
-"""How far one look ahead goes at first [L]: what is narrower may be stepped over."""
+"""How far one look ahead goes at first [L or rad]: what is narrower may be stepped over."""
 
 NEARBY, LONGEST, HORIZON = 4.0, 64.0, 1e3
-"""How far looks are so short, beyond which each goes twice as far as the one before; how far one goes at most, as an
-engine that takes limited steps can follow; and beyond which none goes [L]."""
+"""How far looks along a line are so short, beyond which each goes twice as far as the one before; how far one goes at
+most, as an engine that takes limited steps can follow; and beyond which none goes [L]."""
+
+FULL_TURN = 2.0 * np.pi
+"""How far is looked about an axis [rad]: after a full turn the poses repeat."""
 
 
-def reach(
-    mechanism: Mechanism, origin: Any, directions: Any, *, seed: Solution | None = None, options: Options | None = None
-) -> Any:
-    """How far the end effector can go from a pose in given directions, its orientation kept, until a limit stops it.
+@dataclass(frozen=True)
+class Reach:
+    """How far it is in one direction.
 
-    Rays are looked along in steps of L/32, each from the configuration before it and in its working mode; where a step
-    is not reached, the last pose that is reached is found by bisection, to the tolerance of a pose. All rays are
-    followed at once.
+    Attributes
+    ----------
+    kind : "along" an axis, or "about" it.
+    direction : unit vector in the base frame.
+    distance : how far the end effector can go [length or rad]; inf where nothing stops it.
+    stopped_by : the limits met there, and which of their bounds; empty where the links are stretched out, or nothing
+        stops it.
+    end : the last configuration on the way; None where nothing stops it.
+    """
+
+    kind: Literal["along", "about"]
+    direction: tuple[float, float, float]
+    distance: float
+    stopped_by: tuple[ActiveLimit, ...]
+    end: Solution | None
+
+
+@dataclass(frozen=True)
+class Travel(Sequence[Reach]):
+    """What `travel` found, one `Reach` a direction, in the order they were asked for."""
+
+    origin: Solution
+    reaches: tuple[Reach, ...]
+
+    @property
+    def distances(self) -> Floats:
+        """How far it is in every direction, (n,) [length or rad]."""
+        return np.array([reach.distance for reach in self.reaches])
+
+    def __len__(self) -> int:
+        return len(self.reaches)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.reaches[index]
+
+    def __iter__(self) -> Iterator[Reach]:
+        return iter(self.reaches)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers, lists and dicts, ready for JSON; an endless distance becomes None."""
+        rows = [
+            {
+                "kind": reach.kind,
+                "direction": list(reach.direction),
+                "distance": reach.distance if np.isfinite(reach.distance) else None,
+                "stopped_by": [{"joint": limit.joint, "bound": limit.bound} for limit in reach.stopped_by],
+            }
+            for reach in self
+        ]
+        return {"from": self.origin.pose.tolist(), "travel": rows}
+
+
+def travel(
+    solution: Solution,
+    *,
+    along: ArrayLike | None = None,
+    about: ArrayLike | None = None,
+    pivot: ArrayLike | None = None,
+    options: Options | None = None,
+) -> Travel:
+    """How far the end effector can go from a configuration, in its working mode, until a limit or a link stops it.
+
+    Directions are looked along in steps of L/32 or 1/32 rad, each from the configuration before it; where a step is not
+    reached, the last pose that is reached is found by bisection, to the tolerance of a pose. All are followed at once.
 
     Parameters
     ----------
-    origin : pose (4, 4) or position (3,) to start from, in the base frame [length]; must be reachable.
-    directions : (..., 3), of any length but zero, in the base frame, along axes that the task has.
-    seed : an answer that tells the working mode; default home.
+    solution : one feasible configuration.
+    along : directions (n, 3) or (3,) of any length but zero, in the base frame, within the axes that the task has; the
+        orientation is kept. Default: both ways along each axis of the task, unless `about` is given.
+    about : axes of rotation (n, 3) or (3,), right-handed, in the base frame. Default, unless `along` is given: both
+        ways about each axis of the base where the task has a rotation, about the platform's x and y axes where it has a
+        tilt.
+    pivot : point (3,) in the base frame that stays where it is as the end effector turns [length]; default: its
+        reference point.
+    options : of these, the tolerances.
 
     Returns
     -------
-    Distances (...,) [length]; inf where nothing stops it within 1000 L. Where a task leaves coordinates out, these
-    follow from the mechanism.
+    Travel : how far in each direction and what stops it; first along, then about. Distances are inf where nothing stops
+        it within 1000 L, or a full turn. Where a task leaves coordinates out, these follow from the mechanism.
 
     Raises
     ------
-    InvalidArgument : an origin that is no pose or is not reached, directions that are none or that leave the task, or a
-        mechanism whose task has no position.
+    InvalidArgument : a batch, or a configuration that is not feasible; directions that are none or that the task
+        leaves out.
     """
-    if not any(task_of(checked_mechanism(mechanism)).axes):
-        raise InvalidArgument("mechanism", f"task {' '.join(mechanism.task)}", "one whose task has a position")
-    rays, shape = _as_directions(mechanism, directions)
-    poses, single = as_targets(origin)
-    if single != ():
-        raise InvalidArgument("origin", f"batch shape {single}", "one pose")
-    length = mechanism.characteristic_length
-    start = solve_ik(mechanism, poses[0], seed=seed, options=options)
-    if not start:
-        raise InvalidArgument("origin", f"a pose that is {start.status.name}", "a pose that can be reached")
-    search = _Rays(mechanism, poses[0], rays, start, options or Options())
-    near, step = np.zeros(len(rays)), np.full(len(rays), STEP * length)
-    moving = np.arange(len(rays))
-    while len(moving):  # ahead, until something stops each ray
-        ahead = near[moving] + step[moving]
-        reached = search.go_on(moving, ahead)
-        moving = moving[reached]
-        near[moving] = ahead[reached]
-        distant = moving[near[moving] > NEARBY * length]
-        step[distant] = np.minimum(2.0 * step[distant], LONGEST * length)
-        near[near > HORIZON * length] = np.inf
-        moving = moving[np.isfinite(near[moving])]
-    bounded = np.flatnonzero(np.isfinite(near))
-    far = near + step
-    while len(bounded):
-        middle = 0.5 * (near[bounded] + far[bounded])
-        reached = search.go_on(bounded, middle)
-        near[bounded[reached]], far[bounded[~reached]] = middle[reached], middle[~reached]
-        bounded = bounded[far[bounded] - near[bounded] > TOLERANCES.position * length]
-    return near.reshape(shape) if shape else near.item()
+    mechanism, options = checked_solution(solution).mechanism, checked_options(options)
+    if solution.shape != () or solution.status > Status.PROJECTED:
+        found = f"batch shape {solution.shape}" if solution.shape else f"an answer that is {solution.status.name}"
+        raise InvalidArgument("solution", found, "one feasible configuration")
+    default = along is None and about is None
+    lines = _lines(mechanism, along, default)
+    axes = _axes(mechanism, solution, about, default)
+    centre = solution.pose[:3, 3] if pivot is None else _vector("pivot", pivot)
+    search = _Search(solution, lines, axes, centre, options)
+    distances = search.run()
+    ends = Solution(mechanism, search.best, (len(distances),))
+    named = active_limits(mechanism, ends._coordinates)
+    reaches = []
+    for row, (distance, direction) in enumerate(zip(distances.tolist(), search.directions.tolist(), strict=True)):
+        kind: Literal["along", "about"] = "along" if row < len(lines) else "about"
+        bounded = np.isfinite(distance)
+        stop, end = (named[row], ends[row]) if bounded else ((), None)
+        x, y, z = direction
+        reaches.append(Reach(kind, (x, y, z), distance, stop, end))
+    return Travel(solution, tuple(reaches))
 
 
-def _as_directions(mechanism: Mechanism, directions: Any) -> tuple[Floats, tuple[int, ...]]:
-    """Unit vectors (n, 3), and the batch shape they came in."""
-    expected = "finite directions of shape (..., 3) that are not zero"
-    array = as_floats("directions", directions, expected)
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise InvalidArgument("directions", f"shape {array.shape}", expected)
-    rays, shape = array.reshape(-1, 3), array.shape[:-1]
-    sizes = np.abs(rays).max(axis=1, initial=0.0)  # however long, no square of them is too large to be represented
+def _lines(mechanism: Mechanism, along: ArrayLike | None, default: bool) -> Floats:
+    """Directions to go along, unit vectors (n, 3)."""
+    counts = task_of(mechanism).axes
+    if along is None:
+        chosen = np.eye(3)[list(counts)] if default else np.zeros((0, 3))
+        return np.stack([chosen, -chosen], axis=1).reshape(-1, 3)
+    lines = _directions("along", along)
+    off = np.abs(lines[:, [not each for each in counts]]).max(axis=1, initial=0.0)
+    _require_task(mechanism, "along", lines, off > TOLERANCES.alignment)
+    return lines
+
+
+def _axes(mechanism: Mechanism, solution: Solution, about: ArrayLike | None, default: bool) -> Floats:
+    """Axes to turn about, unit vectors (n, 3)."""
+    rotations = task_of(mechanism).rotations
+    if about is None:
+        chosen = np.zeros((0, 3))
+        if default and rotations:
+            chosen = np.eye(3) if rotations == 3 else solution.pose[:3, :2].T
+        return np.stack([chosen, -chosen], axis=1).reshape(-1, 3)
+    axes = _directions("about", about)
+    _require_task(mechanism, "about", axes, np.full(len(axes), rotations == 0))
+    return axes
+
+
+def _directions(name: str, given: ArrayLike) -> Floats:
+    """Unit vectors (n, 3)."""
+    expected = "finite directions of shape (n, 3) or (3,) that are not zero"
+    array = as_floats(name, given, expected)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3:
+        raise InvalidArgument(name, f"shape {array.shape}", expected)
+    vectors = array.reshape(-1, 3)
+    sizes = np.abs(vectors).max(axis=1, initial=0.0)  # however long, no square is too large to be represented
     bad = np.flatnonzero(~(np.isfinite(sizes) & (sizes > 0.0)))
     if len(bad):
-        raise InvalidArgument(
-            "directions", f"{rays[bad[0]].tolist()}", expected, rows=bad[:5].tolist() if shape else ()
-        )
-    rays = rays / sizes[:, None]
-    rays /= np.linalg.norm(rays, axis=1)[:, None]
-    free = [place for place, counts in enumerate(task_of(mechanism).axes) if not counts]
-    bad = np.flatnonzero(np.abs(rays[:, free]).max(axis=1, initial=0.0) > TOLERANCES.alignment)
-    if len(bad):
+        raise InvalidArgument(name, f"{vectors[bad[0]].tolist()}", expected, rows=bad[:5].tolist())
+    vectors = vectors / sizes[:, None]
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
+
+
+def _require_task(mechanism: Mechanism, name: str, vectors: Floats, bad: NDArray[np.bool_]) -> None:
+    rows = np.flatnonzero(bad)
+    if len(rows):
         expected = f"directions within the task, {' '.join(mechanism.task)}: what it leaves out follows by itself"
-        raise InvalidArgument(
-            "directions", f"{rays[bad[0]].tolist()}", expected, rows=bad[:5].tolist() if shape else ()
-        )
-    return rays, shape
+        raise InvalidArgument(name, f"{vectors[rows[0]].tolist()}", expected, rows=rows[:5].tolist())
 
 
-class _Rays:
-    """Rays from one pose, and the farthest configuration reached yet on each."""
+def _vector(name: str, given: ArrayLike) -> Floats:
+    vector = as_floats(name, given, "a finite point of shape (3,)")
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InvalidArgument(name, f"{np.asarray(given).tolist()}", "a finite point of shape (3,)")
+    return vector
 
-    def __init__(self, mechanism: Mechanism, origin: Floats, rays: Floats, start: Solution, options: Options) -> None:
-        self.mechanism = mechanism
-        self.origin = origin
-        self.rays = rays
-        self.options = options
-        self.flat = flat_of(mechanism)
-        self.rows = P.Rows._make(np.repeat(array, len(rays), axis=0) for array in start._rows)
-        self.coordinates = np.repeat(start._coordinates, len(rays), axis=0)
 
-    def go_on(self, which: NDArray[np.intp], distances: Floats) -> NDArray[np.bool_]:
-        """Whether poses so far out on some of the rays are reached; where they are, the next go on from them."""
-        targets = np.repeat(self.origin[None], len(which), axis=0)
-        targets[:, :3, 3] += distances[:, None] * self.rays[which]
-        if self.flat is None:
-            found, reached = reached_by_closure(self.mechanism, targets, self.coordinates[which])
-            self.coordinates[which[reached]] = found[reached]
-            return reached
-        rows = new_rows(self.mechanism, self.flat, len(which))
-        seeds = P.Seeds(self.rows.poses[which], self.rows.nodes[which], self.rows.trunks[which])
-        settings = settings_of(self.mechanism, self.options, seeded=True)._replace(max_rounds=0, any_mode=0)
-        solve_rows(self.flat, targets, seeds, settings, rows)
-        reached = rows.status == P.REACHED
-        for array, own in zip(self.rows, rows, strict=True):
-            array[which[reached]] = own[reached]
-        return np.asarray(reached)
+class _Search:
+    """All directions from one pose, and the farthest configuration reached yet on each.
+
+    Attributes
+    ----------
+    directions : unit vectors (n, 3): lines first, then axes.
+    best : the farthest configurations, (n,).
+    """
+
+    def __init__(self, solution: Solution, lines: Floats, axes: Floats, pivot: Floats, options: Options) -> None:
+        self.directions = np.concatenate([lines, axes]) + 0.0  # no negative zeros
+        self._turns = np.arange(len(self.directions)) >= len(lines)
+        self._pose, self._pivot, self._options = solution.pose, pivot, options
+        self._engine = engine_of(solution.mechanism)
+        self._length = solution.mechanism.characteristic_length
+        every = np.arange(len(self.directions))
+        start = solution._found.at(0 * every)
+        self.best = self._engine.advance(self._targets(every, np.zeros(len(every))), start, options)
+
+    def run(self) -> Floats:
+        """How far each goes, (n,) [length or rad]: ahead until something stops it, then by bisection."""
+        units = np.where(self._turns, 1.0, self._length)
+        farthest = np.where(self._turns, FULL_TURN, HORIZON * self._length)
+        near, step = np.zeros(len(units)), STEP * units
+        moving = np.arange(len(units))
+        while len(moving):
+            ahead = near[moving] + step[moving]
+            reached = self._go_on(moving, ahead)
+            moving = moving[reached]
+            near[moving] = ahead[reached]
+            distant = moving[(near[moving] > NEARBY * self._length) & ~self._turns[moving]]
+            step[distant] = np.minimum(2.0 * step[distant], LONGEST * self._length)
+            near[near > farthest] = np.inf
+            moving = moving[np.isfinite(near[moving])]
+        bounded, far = np.flatnonzero(np.isfinite(near)), near + step
+        while len(bounded):
+            middle = 0.5 * (near[bounded] + far[bounded])
+            reached = self._go_on(bounded, middle)
+            near[bounded[reached]], far[bounded[~reached]] = middle[reached], middle[~reached]
+            bounded = bounded[far[bounded] - near[bounded] > TOLERANCES.position * units[bounded]]
+        return near
+
+    def _go_on(self, which: NDArray[np.intp], distances: Floats) -> NDArray[np.bool_]:
+        """Whether poses so far out in some directions are reached; where they are, the next go on from them."""
+        found = self._engine.advance(self._targets(which, distances), self.best.at(which), self._options)
+        reached = np.asarray(found.rows.status == REACHED)
+        self.best.replace(which[reached], found, reached)
+        return reached
+
+    def _targets(self, which: NDArray[np.intp], distances: Floats) -> Floats:
+        """Poses (k, 4, 4) so far along, or turned so far about, some of the directions."""
+        steps = distances[:, None] * self.directions[which]
+        turned = from_rotvec(np.where(self._turns[which, None], steps, 0.0))
+        targets = np.repeat(self._pose[None], len(which), axis=0)
+        targets[:, :3, :3] = turned @ targets[:, :3, :3]
+        targets[:, :3, 3] = self._pivot + turned @ (self._pose[:3, 3] - self._pivot)
+        targets[:, :3, 3] += np.where(self._turns[which, None], 0.0, steps)
+        return targets

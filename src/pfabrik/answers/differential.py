@@ -24,21 +24,21 @@ def mobility(mechanism: Mechanism) -> Mobility:
     return generic_of(checked_mechanism(mechanism)).mobility
 
 
-def forward_jacobian(mechanism: Mechanism, solution: Solution) -> Floats:
+def forward_jacobian(solution: Solution) -> Floats:
     """Twist of the end effector per actuator rate, (..., 6, n_a), in the base frame.
 
     Rows: velocity of the reference point [length/s], angular velocity [rad/s]; for a joint end effector only the
-    velocity of its centre, (..., 3, n_a). Columns: actuators in the order of `mechanism.actuators` [rad/s or length/s].
+    velocity of its centre, (..., 3, n_a). Columns: `mechanism.actuator_names` [rad/s or length/s].
 
     Rates that the mechanism cannot make are replaced by the nearest it can; freedoms that no actuator controls rest as
     far as possible. At a type 2 singularity no such map exists: the direction gained is left out (see `singularity`).
     INVALID rows are NaN.
     """
-    forward: Floats = _shaped(solution, forward_map(mechanism, _coordinates(mechanism, solution)))
+    forward: Floats = _shaped(solution, forward_map(*_of(solution)))
     return forward
 
 
-def inverse_jacobian(mechanism: Mechanism, solution: Solution) -> Floats:
+def inverse_jacobian(solution: Solution) -> Floats:
     """Actuator rates per twist of the end effector, (..., n_a, 6), in the base frame.
 
     Rows and columns are the columns and rows of `forward_jacobian`; (..., n_a, 3) for a joint end effector. The two are
@@ -47,13 +47,13 @@ def inverse_jacobian(mechanism: Mechanism, solution: Solution) -> Floats:
     nearest it can, and of all actuator rates that make a twist, the smallest are given. At a type 1 singularity the
     direction lost is left out (see `singularity`). INVALID rows are NaN.
     """
-    inverse: Floats = _shaped(solution, inverse_map(mechanism, _coordinates(mechanism, solution)))
+    inverse: Floats = _shaped(solution, inverse_map(*_of(solution)))
     return inverse
 
 
-def singularity(mechanism: Mechanism, solution: Solution) -> Singularity:
+def singularity(solution: Solution) -> Singularity:
     """How near every configuration of a solution is to a singularity of each kind; INVALID rows are NaN."""
-    found = measures(mechanism, _coordinates(mechanism, solution))
+    found = measures(*_of(solution))
     return Singularity(
         serial=_shaped(solution, found.serial),
         parallel=_shaped(solution, found.parallel),
@@ -65,9 +65,9 @@ def singularity(mechanism: Mechanism, solution: Solution) -> Singularity:
     )
 
 
-def _coordinates(mechanism: Mechanism, solution: Solution) -> Floats:
-    """The solution's joint coordinates as deviations from home, (n, c), if it is one of this mechanism."""
-    return checked_solution(solution, mechanism)._coordinates
+def _of(solution: Solution) -> tuple[Mechanism, Floats]:
+    """The mechanism of a solution, and its joint coordinates as deviations from home, (n, c)."""
+    return checked_solution(solution).mechanism, solution._coordinates
 
 
 def _shaped(solution: Solution, rows: Floats) -> Any:

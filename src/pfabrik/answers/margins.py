@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..description.mechanism import Mechanism
+from ..motion.limits import coned, ranged
 from ..tolerances import TOLERANCES
-from .limits import coned, ranged
 from .solution import Solution, checked_solution
 
 Floats = NDArray[np.float64]
 
 
-def margins(mechanism: Mechanism, solution: Solution) -> Mapping[tuple[str, str], Any]:
-    """(joint, bound) -> how far every limit is from being met, (...,), for every limit of the mechanism.
+def margins(solution: Solution) -> Mapping[tuple[str, str], Any]:
+    """(joint, bound) -> how far every limit is from being met, (...,), for every limit of its mechanism.
 
     Bounds are "min", "max" and "cone", as in `ActiveLimit`. A margin is a share of the room there is: of half the
     range, or of the cone's half angle. It is 1 in the middle of a range or on the axis of a cone, 0 on the limit, and
@@ -27,9 +26,9 @@ def margins(mechanism: Mechanism, solution: Solution) -> Mapping[tuple[str, str]
 
     Raises
     ------
-    InvalidArgument : what is no mechanism, or no answer of it; its limits may be others.
+    InvalidArgument : what is no Solution.
     """
-    checked_solution(solution, mechanism)
+    mechanism = checked_solution(solution).mechanism
     found: dict[tuple[str, str], Floats] = {}
     for joint in mechanism.joints:
         for values, (low, high), unit in ranged(mechanism, joint, solution._coordinates):

@@ -6,14 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from ..description.mechanism import Mechanism
 from ..description.task import Task
-from ..motion.displacements import end_effector_pose, gaps
-from ..reaching.completion import joint_values
+from ..motion.displacements import columns, end_effector_pose, gaps, home_coordinates
 from .solution import Solution, checked_solution
 
 
-def closure_residual(mechanism: Mechanism, solution: Solution) -> Any:
+def closure_residual(solution: Solution) -> Any:
     """Largest gap of any loop of an answer, by the closure engine, (...,) [length].
 
     Bodies are posed from `solution.joints` alone, along one tree of joints. Compared are the two bodies of every other
@@ -22,18 +20,18 @@ def closure_residual(mechanism: Mechanism, solution: Solution) -> Any:
 
     Raises
     ------
-    InvalidArgument : what is no mechanism, or no answer of it; its limits may be others.
+    InvalidArgument : what is no Solution.
     """
-    checked_solution(solution, mechanism)
+    mechanism = checked_solution(solution).mechanism
     length, rows, q = mechanism.characteristic_length, solution._rows, solution._coordinates
     known = np.isfinite(q).all(axis=1)
     found = np.full(len(q), np.nan)
     compared = Task((True, True, True), 0 if mechanism.end_effector_is_joint else 3)
     position, rotation = compared.errors(end_effector_pose(mechanism, q[known]), rows.poses[known])
     found[known] = np.max([gaps(mechanism, q[known]), position, rotation * length], axis=0)
-    values = joint_values(mechanism, q[known])
-    for column, name in enumerate(mechanism.actuators):
+    for column, name in enumerate(mechanism.actuator_names):
         unit = 1.0 if mechanism.joint(name).type == "prismatic" else length
-        off = np.abs(values[name] - rows.actuators[known, column]) * unit
-        found[known] = np.maximum(found[known], off)
+        place = columns(mechanism)[name].start
+        value = q[known, place] + home_coordinates(mechanism)[place]
+        found[known] = np.maximum(found[known], np.abs(value - rows.actuators[known, column]) * unit)
     return found.item() if solution.shape == () else found.reshape(solution.shape)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
@@ -12,17 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..closure.close import closure_of
+from ..closure.configurations import Configurations
 from ..closure.descend import weighed_limits
 from ..closure.projection import ways_of
-from ..decomposition.plan import flat_of
-from ..description.mechanism import Mechanism, checked_mechanism
+from ..description.mechanism import Mechanism
 from ..description.task import task_of
+from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..kernels.reaching import plan as P
-from ..motion.displacements import centres
-from ..reaching.completion import coordinates_of, joint_values
-from ..reaching.points import joint_points
-from .limits import ActiveLimit, active_limits, holding_limits
+from ..motion.displacements import columns, home_coordinates
+from .limits import ActiveLimit, active_limits, binding_limits, holding_limits
 
 Floats = NDArray[np.float64]
 
@@ -72,11 +71,12 @@ class Solution:
     ----------
     status : a `Status`; for a batch an integer array of them, (...,).
     pose : T_base_platform achieved, (..., 4, 4) [length].
-    actuators : actuated coordinates in the order of `mechanism.actuators`, (..., n_a) [length or rad].
-    joints : joint name -> its coordinate, counted as the description counts it: (...,) for R and P, (..., 2) for U and
-        C, (..., 3) for S, whose rotation vector turns its second body against its first, from home [rad or length].
-        What a configuration leaves open (a rod's spin about itself) is nearest to the seed, or to home; angles count
-        on along a path.
+    actuators : actuated coordinates in the order of `mechanism.actuator_names`, (..., n_a) [length or rad].
+    q : all joint coordinates (..., nq) in the order of `mechanism.coordinate_names`, counted as the description counts
+        them [rad or length]: one for R and P, two for U and C, three for S, whose rotation vector turns its second body
+        against its first, from home. What a configuration leaves open (a rod's spin about itself) is nearest to the
+        start, or to home; angles count on along a path.
+    joints : joint name -> its part of `q`: (...,) for R and P, (..., 2) for U and C, (..., 3) for S.
     points : joint name -> position of its centre in the base frame, (..., 3) [length]; joints that act as one are at
         their common centre.
     position_error, rotation_error : distance of the pose from the target, (...,) [length], [rad]; 0 where actuator
@@ -94,41 +94,30 @@ class Solution:
     """
 
     def __init__(
-        self,
-        mechanism: Mechanism,
-        rows: P.Rows,
-        shape: tuple[int, ...],
-        joints_from: Callable[[], Floats] | None = None,
-        wanted: Wanted | None = None,
+        self, mechanism: Mechanism, found: Configurations, shape: tuple[int, ...], wanted: Wanted | None = None
     ) -> None:
-        """Wrap rows.
-
-        Parameters
-        ----------
-        joints_from : gives all joint coordinates where they are not those nearest to home.
-        wanted : the poses that were asked for, if any were.
-        """
+        """Wrap configurations, as many as the batch shape has; `wanted` are the poses asked for, if any were."""
         self.mechanism = mechanism
         self.shape = shape
-        self._rows = rows
-        self._joints_from = joints_from
+        self._found = found
         self._wanted = wanted
 
-    def __getstate__(self) -> tuple[Mechanism, P.Rows, tuple[int, ...], Floats | None, Wanted | None]:
+    def __getstate__(self) -> tuple[Mechanism, P.Rows, tuple[int, ...], Floats, Wanted | None]:
         """What an answer is made of; all else follows again where it is unpickled."""
-        return self.mechanism, self._rows, self.shape, self._coordinates if self._joints_from else None, self._wanted
+        return self.mechanism, self._rows, self.shape, self._coordinates, self._wanted
 
-    def __setstate__(self, state: tuple[Mechanism, P.Rows, tuple[int, ...], Floats | None, Wanted | None]) -> None:
+    def __setstate__(self, state: tuple[Mechanism, P.Rows, tuple[int, ...], Floats, Wanted | None]) -> None:
         mechanism, rows, shape, coordinates, wanted = state
-        joints_from = coordinates if coordinates is None else lambda: coordinates
-        Solution.__init__(self, mechanism, rows, shape, joints_from, wanted)
+        Solution.__init__(self, mechanism, Configurations(rows, coordinates), shape, wanted)
 
-    @cached_property
+    @property
+    def _rows(self) -> P.Rows:
+        return self._found.rows
+
+    @property
     def _coordinates(self) -> Floats:
         """All joint coordinates as deviations from home, row by row, (n, columns) [length or rad]."""
-        if self._joints_from is not None:
-            return self._joints_from()
-        return coordinates_of(self.mechanism, self._rows)
+        return self._found.coordinates
 
     def _shaped(self, array: NDArray[Any]) -> Any:
         shaped = array.reshape(self.shape + array.shape[1:])
@@ -181,19 +170,20 @@ class Solution:
         return self._shaped(self._rows.measures[:, 4])
 
     @cached_property
-    def joints(self) -> Mapping[str, Floats]:
-        values = joint_values(self.mechanism, self._coordinates)
-        return MappingProxyType(
-            {name: self._shaped(value) for name, value in values.items() if value.shape[1:] != (0,)}
-        )
+    def q(self) -> Floats:
+        return cast(Floats, self._shaped(self._coordinates + home_coordinates(self.mechanism)))
+
+    @cached_property
+    def joints(self) -> Mapping[str, Any]:
+        spans = ((name, span) for name, span in columns(self.mechanism).items() if span.stop > span.start)
+        single = {name: span.start if span.stop - span.start == 1 else span for name, span in spans}
+        return MappingProxyType({name: self.q[..., place] for name, place in single.items()})
 
     @cached_property
     def points(self) -> Mapping[str, Floats]:
-        rows = self._rows
-        flat = flat_of(self.mechanism)
-        found = centres(self.mechanism, self._coordinates) if flat is None else joint_points(flat, rows)
+        found = engine_of(self.mechanism).points(self._found)
         order = [joint.name for joint in self.mechanism.joints if joint.name in found]
-        unknown = (rows.status == Status.INVALID)[:, None]
+        unknown = (self._rows.status == Status.INVALID)[:, None]
         return MappingProxyType({name: self._shaped(np.where(unknown, np.nan, found[name])) for name in order})
 
     @cached_property
@@ -209,6 +199,16 @@ class Solution:
             for row, found in zip(projected, self._holding(self._wanted, projected), strict=True):
                 held[row] = found
         return held[0] if self.shape == () else held
+
+    @cached_property
+    def binding(self) -> NDArray[np.void]:
+        """The first of `active_limits` of every row as one array, (...,): empty names where there is none.
+
+        Fields: joint, bound (text), coordinate (int), value, limit [length or rad], multiplier (NaN where none is
+        known).
+        """
+        listed = [self.active_limits] if self.shape == () else self.active_limits
+        return binding_limits(listed).reshape(self.shape)
 
     def _holding(self, wanted: Wanted, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
         """The limits that hold projected rows back from the poses that were asked for."""
@@ -235,12 +235,10 @@ class Solution:
         """The answer at `index` of the batch axes; NumPy's rules for integers, slices and arrays."""
         if self.shape == ():
             raise TypeError("the answer to one target cannot be indexed")
-        chosen = np.arange(len(self._rows.status)).reshape(self.shape)[index]
+        chosen = np.arange(len(self._found)).reshape(self.shape)[index]
         places = np.ravel(chosen)
-        rows = P.Rows._make(np.ascontiguousarray(array[places]) for array in self._rows)
-        own = None if self._joints_from is None else lambda: self._coordinates[places]
         wanted = None if self._wanted is None else self._wanted._replace(targets=self._wanted.targets[places])
-        return Solution(self.mechanism, rows, np.shape(chosen), own, wanted)
+        return Solution(self.mechanism, self._found.at(places), np.shape(chosen), wanted)
 
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))
@@ -274,13 +272,10 @@ class Solution:
         return f"<{type(self).__name__} of '{self.mechanism.name}': {found or 'empty'}>"
 
 
-def checked_solution(solution: Any, mechanism: Mechanism) -> Solution:
-    """What was passed as an answer of a mechanism, its limits perhaps others; InvalidArgument where it is none."""
+def checked_solution(solution: Any) -> Solution:
+    """What was passed as an answer; InvalidArgument where it is none."""
     if not isinstance(solution, Solution):
         raise InvalidArgument("solution", type(solution).__name__, "a Solution, as `solve_ik` returns")
-    own = solution.mechanism
-    if own != checked_mechanism(mechanism) and own.without_limits() != mechanism.without_limits():
-        raise InvalidArgument("solution", f"an answer of another '{own.name}'", f"one of '{mechanism.name}'")
     return solution
 
 

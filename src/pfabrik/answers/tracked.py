@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..errors import InvalidArgument, UnknownName
 from ..poses import between
 from ..tolerances import TOLERANCES
-from .solution import Solution, Status, as_plain
-
-if TYPE_CHECKING:
-    from ..kernels.reaching import plan as P
-    from .solution import Wanted
+from .solution import Solution, Status, Wanted, as_plain
 
 Floats = NDArray[np.float64]
 
@@ -56,14 +53,13 @@ class Track(Solution):
     def __init__(
         self,
         mechanism: Mechanism,
-        rows: P.Rows,
-        joints_from: Callable[[], Floats],
+        found: Configurations,
         wanted: Wanted,
         follow: Callable[[Floats, Solution], Solution],
         pace: Pace | None,
     ) -> None:
-        """Wrap rows; `follow` answers another path, (k, 4, 4), from a seed, in the same way."""
-        super().__init__(mechanism, rows, (len(rows.status),), joints_from, wanted)
+        """Wrap answers; `follow` answers another path, (k, 4, 4), from a start, in the same way."""
+        super().__init__(mechanism, found, (len(found),), wanted)
         self._targets = wanted.targets
         self._follow = follow
         self._pace = pace
@@ -120,13 +116,13 @@ class Track(Solution):
         if self._pace is None or speeds is None:
             return None
         beyond = speeds > self._pace.speed_limits * (1.0 + TOLERANCES.speed)
-        names = self.mechanism.actuators
+        names = self.mechanism.actuator_names
         return [tuple(name for name, over in zip(names, row, strict=True) if over) for row in beyond]
 
 
 def pace_of(mechanism: Mechanism, sample_time: float | None, speed_limits: Any) -> Pace | None:
     """What was said of time and speeds, checked."""
-    names = mechanism.actuators
+    names = mechanism.actuator_names
     if sample_time is None:
         if speed_limits is not None:
             raise InvalidArgument("sample_time", "None beside speed limits", "the time between two targets [s]")
@@ -159,6 +155,6 @@ def _moves(mechanism: Mechanism, poses: Floats) -> Floats:
 
 def _scaled(mechanism: Mechanism, actuators: Floats) -> Floats:
     """How far each actuator moves in every step, (n, n_a) [L or rad]."""
-    slides = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuators])
+    slides = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names])
     units = np.where(slides, mechanism.characteristic_length, 1.0)
     return np.asarray(np.abs(np.diff(actuators, axis=0, prepend=actuators[:1])) / units)

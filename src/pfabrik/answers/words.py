@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..description.joint_types import KINDS
-from ..motion.first_order import are_stretched
+from ..motion.first_order import are_stretched, forward_map
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -49,8 +49,8 @@ class Readout:
 
 
 def readouts(mechanism: Mechanism) -> tuple[Readout, ...]:
-    """One readout for each actuator, in the order of ``mechanism.actuators``."""
-    return tuple(readout(mechanism.joint(name), mechanism.length_unit) for name in mechanism.actuators)
+    """One readout for each actuator, in the order of ``mechanism.actuator_names``."""
+    return tuple(readout(mechanism.joint(name), mechanism.length_unit) for name in mechanism.actuator_names)
 
 
 def readout(joint: Joint, length_unit: str) -> Readout:
@@ -59,31 +59,6 @@ def readout(joint: Joint, length_unit: str) -> Readout:
     low, high = (float(bound) for bound in joint.range or (-math.inf, math.inf))  # type: ignore[arg-type]
     limits = (math.degrees(low), math.degrees(high)) if is_angle else (low, high)
     return Readout(joint.name, is_angle, "deg" if is_angle else length_unit, limits)
-
-
-def rpy_angles(pose: Floats) -> Floats:
-    """Roll, pitch, yaw [rad] of poses, the inverse of ``pose(..., rpy=...)``: R = Rz(yaw) Ry(pitch) Rx(roll).
-
-    Parameters
-    ----------
-    pose : (..., 4, 4)
-
-    Returns
-    -------
-    (..., 3); pitch lies within a quarter turn. At a quarter turn of pitch only yaw - roll (or yaw + roll) is
-    determined, and roll is given as 0.
-    """
-    rotation = np.asarray(pose)[..., :3, :3]
-    cos_pitch = np.hypot(rotation[..., 0, 0], rotation[..., 1, 0])
-    pitch = np.arctan2(-rotation[..., 2, 0], cos_pitch)
-    locked = cos_pitch < TOLERANCES.rotation
-    roll = np.where(locked, 0.0, np.arctan2(rotation[..., 2, 1], rotation[..., 2, 2]))
-    yaw = np.where(
-        locked,
-        np.arctan2(-rotation[..., 0, 1], rotation[..., 1, 1]),
-        np.arctan2(rotation[..., 1, 0], rotation[..., 0, 0]),
-    )
-    return np.stack([roll, pitch, yaw], axis=-1)
 
 
 def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
@@ -141,16 +116,13 @@ def missed(solution: Solution) -> tuple[bool, bool]:
 
     Of a rotation that is missed, only the first is said.
     """
-    from ..ik import solve_ik
-    from .differential import forward_jacobian
-
     mechanism, wanted = solution.mechanism, solution._wanted
     if wanted is None or solution.rotation_error > TOLERANCES.rotation:
         return True, False
     axes = [axis in mechanism.task for axis in "xyz"]
     offset = (wanted.targets[0] - solution.pose)[:3, 3][axes]
-    answers = (solve_ik(mechanism, mechanism.home_pose), solution)
-    motions = np.hstack([forward_jacobian(mechanism, answer)[:3][axes] for answer in answers])
+    here = solution._coordinates
+    motions = np.hstack(list(forward_map(mechanism, np.concatenate([0.0 * here, here]))[:, :3][:, axes]))
     along = motions @ np.linalg.lstsq(motions, offset, rcond=TOLERANCES.alignment)[0]
     least = TOLERANCES.alignment * float(np.linalg.norm(offset))
     return bool(np.linalg.norm(along) > least), bool(np.linalg.norm(offset - along) > least)

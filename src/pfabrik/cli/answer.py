@@ -11,8 +11,9 @@ import click
 
 import pfabrik as pf
 
-from ..answers.words import Floats, as_sentence, by_bound, exceeded, loop_gap, readouts, rpy_angles
+from ..answers.words import Floats, as_sentence, by_bound, exceeded, loop_gap, readouts
 from ..errors import ContinuumOfSolutions
+from ..rotations import to_rpy
 from ..tolerances import TOLERANCES
 from .group import complain
 from .table import aligned
@@ -41,7 +42,7 @@ def pose_texts(solution: Solution) -> tuple[list[str], list[str]]:
     """Position [length], and roll, pitch, yaw [deg]."""
     smallest = 1e-9 * solution.mechanism.characteristic_length
     position = [plain(value, smallest) for value in solution.pose[:3, 3]]
-    return position, [plain(math.degrees(angle), 1e-7) for angle in rpy_angles(solution.pose)]
+    return position, [plain(math.degrees(angle), 1e-7) for angle in to_rpy(solution.pose[:3, :3])]
 
 
 def actuator_table(solution: Solution, asked: Floats | None) -> str:
@@ -62,7 +63,7 @@ def in_units(shown: Sequence[Readout], values: Floats) -> list[str]:
 
 def margins_of(solution: Solution) -> list[tuple[str, str, float]]:
     """Joint, bound and margin of every limit, nearest first."""
-    found = pf.margins(solution.mechanism, solution)
+    found = pf.margins(solution)
     return sorted(((joint, bound, margin) for (joint, bound), margin in found.items()), key=lambda limit: limit[2])
 
 

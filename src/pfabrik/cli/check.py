@@ -36,7 +36,7 @@ def check(mech: str) -> int:
     for note in notes(mechanism):
         click.echo(f"pfabrik: note: {note}", err=True)
     click.echo(
-        f"ok: {mechanism.name}: {len(mechanism.joints)} joints, {len(mechanism.actuators)} actuated, "
+        f"ok: {mechanism.name}: {len(mechanism.joints)} joints, {len(mechanism.actuator_names)} actuated, "
         f"{len(chains)} sub-chains, task {' '.join(mechanism.task)}"
     )
     return 0

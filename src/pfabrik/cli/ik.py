@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import TYPE_CHECKING
 
 import click
@@ -11,21 +10,18 @@ import click
 import pfabrik as pf
 
 from .answer import describe, in_units, margins_of, margins_table, pose_header, pose_texts, tell_modes
-from .finite import FINITE
 from .projecting import note_left_out, note_unused, options_projecting, projecting
+from .target import Triple, target_of, targeted
 
 if TYPE_CHECKING:
     from ..answers.solution import Solution
-    from ..answers.words import Floats
     from ..description.mechanism import Mechanism
-
-Triple = tuple[float, float, float]
+    from ..targets import Target
 
 
 @click.command()
 @click.argument("mech")
-@click.option("--position", type=FINITE, nargs=3, metavar="X Y Z", help="Of the reference point. Default: at home.")
-@click.option("--rpy", type=FINITE, nargs=3, metavar="R P Y", help="Roll, pitch, yaw [deg] from home. Default: 0 0 0.")
+@targeted
 @projecting
 @click.option("--margins", "with_margins", is_flag=True, help="List how far off every limit is, nearest first.")
 @click.option("--all", "list_all", is_flag=True, help="List every working mode, limits kept or not.")
@@ -34,6 +30,7 @@ def ik(
     mech: str,
     position: Triple | None,
     rpy: Triple | None,
+    joint: str | None,
     hold: str,
     projection: str,
     with_margins: bool,
@@ -50,11 +47,11 @@ def ik(
     """
     if list_all and with_margins:
         raise click.UsageError("--margins is of one answer: it does not go with --all")
-    if position is None and rpy is None:
-        raise click.UsageError("no target: give --position, --rpy or both")
+    if position is None and rpy is None and joint is None:
+        raise click.UsageError("no target: give --position, --rpy or both, or --joint")
     mechanism = pf.load(mech)
     note_ignored(mechanism, position, rpy)
-    target = pf.pose(position or mechanism.reference_point, rpy=[math.radians(angle) for angle in rpy or (0, 0, 0)])
+    target = target_of(mechanism, position, rpy, joint)
     if list_all:
         note_unused("--all")
         return list_modes(mechanism, target, as_json)
@@ -85,7 +82,7 @@ def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | No
     note_left_out(left_out, mechanism)
 
 
-def list_modes(mechanism: Mechanism, target: Floats, as_json: bool) -> int:
+def list_modes(mechanism: Mechanism, target: Target, as_json: bool) -> int:
     """Print all working modes, each with its actuator values, and its pose where the task leaves it open."""
     from ..answers.words import readouts
 

@@ -44,7 +44,7 @@ def summary(mechanism: Mechanism) -> str:
             mechanism.name,
             f"end effector           {kind} {mechanism.end_effector}, reference point ({point})",
             f"task                   {' '.join(mechanism.task)}",
-            f"actuators              {' '.join(mechanism.actuators)}",
+            f"actuators              {' '.join(mechanism.actuator_names)}",
             *freedom(pf.mobility(mechanism)),
             f"characteristic length  {length:.6g} {mechanism.length_unit}",
         ]

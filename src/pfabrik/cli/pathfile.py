@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 import pfabrik as pf
 
-from ..answers.words import readouts, rpy_angles, short_names
+from ..answers.words import readouts, short_names
 from ..errors import near_miss
+from ..rotations import to_rpy
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -52,9 +53,9 @@ def read_targets(path: Path) -> Floats:
     if not rows:
         raise WrongPath(path, ["no targets below the header"])
     columns = dict(zip(header, np.array([[float(cell) for cell in cells] for _, cells in rows]).T, strict=True))
-    rpy = np.radians(np.stack([columns.get(name, np.zeros(len(rows))) for name in ANGLES], axis=-1))
+    rpy = np.stack([columns.get(name, np.zeros(len(rows))) for name in ANGLES], axis=-1)
     positions = np.stack([columns[name] for name in POSITION], axis=-1)
-    return np.stack([pf.pose(xyz, rpy=angles) for xyz, angles in zip(positions, rpy, strict=True)])
+    return pf.pose(positions, rpy=rpy, degrees=True)
 
 
 def numbered(reader: Reader) -> Iterator[tuple[int, list[str]]]:
@@ -126,4 +127,4 @@ def write_track(handle: TextIO, targets: Floats, followed: Track) -> None:
 
 def coordinates(poses: Floats) -> Floats:
     """Position and roll, pitch, yaw [rad] of poses: (n, 4, 4) to (n, 6)."""
-    return np.concatenate([poses[:, :3, 3], rpy_angles(poses)], axis=-1) + 0.0  # so that no -0.0 is written
+    return np.concatenate([poses[:, :3, 3], to_rpy(poses[:, :3, :3])], axis=-1) + 0.0  # so that no -0.0 is written

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,14 @@ class Closure:
         idle[self.loops.row_columns] = False
         return idle
 
+    def actuators(self, coordinates: Floats) -> Floats:
+        """The actuated values (n, n_a) in coordinates (n, columns) [length or rad]."""
+        return np.asarray(coordinates[:, self.actuated] + self.home)
+
+    def put_actuators(self, coordinates: Floats, values: Floats) -> None:
+        """Write actuated values (n, n_a) into coordinates (n, columns)."""
+        coordinates[:, self.actuated] = values - self.home
+
     def layout(self, locked: frozenset[str]) -> K.Layout:
         """The layout in which some joints do not move."""
         return _layout(self.mechanism, locked)
@@ -66,8 +74,8 @@ def closure_of(mechanism: Mechanism) -> Closure:
     kinds = [kind for joint in mechanism.joints for kind in KINDS[joint.type].coordinates]
     turning = np.array([float(kind == "angle") for kind in kinds])
     scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
-    actuated = np.array([columns(mechanism)[name].start for name in mechanism.actuators], np.int64)
-    home = np.array([np.ravel(mechanism.home_coordinate(name))[0] for name in mechanism.actuators])
+    actuated = np.array([columns(mechanism)[name].start for name in mechanism.actuator_names], np.int64)
+    home = np.array([np.ravel(mechanism.home_coordinate(name))[0] for name in mechanism.actuator_names])
     ending = loops.columns[loops.visits[loops.paths[1:][loops.last_balls == 1] - 1, 0]]
     starts = {span.start: name for name, span in columns(mechanism).items() if span.stop > span.start}
     balls = frozenset(starts[int(first)] for first in ending)
@@ -124,6 +132,15 @@ class Closing(NamedTuple):
     def excess(self) -> Floats:
         """The largest excess over any limit of each row [L or rad]."""
         return np.asarray(self.excesses.max(axis=1, initial=0.0))
+
+    def at(self, rows: Any) -> Closing:
+        """Some of the rows."""
+        return Closing._make(array[rows] for array in self)
+
+    def take(self, places: NDArray[np.intp], found: Closing, rows: Any = slice(None)) -> None:
+        """Put rows of another search in some places of this one."""
+        for array, own in zip(self, found, strict=True):
+            array[places] = own[rows]
 
 
 def close(

@@ -129,8 +129,7 @@ def _take_nearer(
     better = distances < (1.0 - SAME) * least
     again = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)
     best.distances[rows[better]], best.holds[rows[better]] = distances[better], way.hold
-    for array, own in zip(best.closing, found, strict=True):
-        array[rows[better]] = own[better]
+    best.closing.take(rows[better], found, better)
     return np.where(better, 1, hits + again)
 
 

@@ -1,21 +1,22 @@
-"""Inverse kinematics by the closure engine alone, for mechanisms with sub-chains that positions cannot express."""
+"""Inverse kinematics on the coordinates of all joints, for every mechanism: legs closed below platforms on targets."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.limits import within_turns
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.reaching import plan as P
+from ..motion.displacements import centres
+from ..motion.limits import within_turns
 from ..options import Options
 from ..poses import are_poses, between, made_exact
-from ..reaching.completion import actuators_of
 from ..tolerances import TOLERANCES
 from .close import HELD, Closing, Closure, close, closure_of, platform_poses
+from .configurations import Configurations, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
 from .nearest import MARGIN, is_feasible
 from .parasitic import differences, follows_task, has_parasitic_motion
@@ -42,73 +43,78 @@ STEPS = 30
 """Steps each of them may take: those that arrive need fewer."""
 
 
-def answer_by_closure(
-    mechanism: Mechanism, targets: Floats, start: Floats, options: Options, keep_mode: bool, rows: P.Rows
-) -> Floats:
-    """Answer targets (n, 4, 4) from joint coordinates (n, columns) or (1, columns); fills `rows`.
+class ClosureEngine:
+    """Answers found on joint coordinates; the same questions as `ReachingEngine` answers."""
 
-    Parameters
-    ----------
-    keep_mode : stay in the working mode of the start.
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self._closure = closure_of(mechanism)
 
-    Returns
-    -------
-    Joint coordinates of the answers, deviations from home, (n, columns); NaN for rows that are no poses.
-    """
-    known, coordinates = _prepare(targets, start, rows)
-    begin = start[known] if len(start) > 1 else np.repeat(start, known.sum(), axis=0)
-    coordinates[known] = _answer(closure_of(mechanism), targets, known, begin, options, keep_mode, rows)
-    return coordinates
+    def answer(
+        self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+    ) -> Configurations:
+        """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
+        known, begin = are_poses(targets), joint_coordinates(self.mechanism, start)
+        begin = begin[known] if len(begin) > 1 else np.repeat(begin, known.sum(), axis=0)
+        return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode).among(known)
+
+    def follow(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        on_progress: Callable[[int, int], None] | None,
+    ) -> Configurations:
+        """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
+        known, begin = are_poses(targets), joint_coordinates(self.mechanism, start)
+        found = [np.zeros((0, begin.shape[1]))]
+        rows, bends = new_rows(self.mechanism, int(known.sum())), Bends(self.mechanism, options)
+        for i, target in enumerate(targets):
+            if known[i]:
+                answer = self._follow_one(made_exact(target[None]), begin, options, bends)
+                put_rows(rows, slice(len(found) - 1, len(found)), answer.rows)
+                begin = answer.coordinates
+                found.append(begin)
+            if on_progress is not None:
+                on_progress(i + 1, len(targets))
+        return Configurations(rows, np.concatenate(found)).among(known)
+
+    def _follow_one(self, target: Floats, begin: Floats, options: Options, bends: Bends) -> Configurations:
+        answer = _answer(self._closure, target, begin, options, keep_mode=True)
+        if bends.before is not None:
+            other = _answer(self._closure, target, bends.before, options, keep_mode=True)
+            answer = other if bends.prefer(target, answer.rows, other.rows) else answer
+        bends.note(int(answer.rows.status[0]), begin, answer.coordinates)
+        return answer
+
+    def advance(self, targets: Floats, start: Configurations, options: Options) -> Configurations:
+        """Go on to targets (n, 4, 4) in the working mode of as many configurations; FAILED where not reached."""
+        begin = start.coordinates
+        found = _reach(self._closure, targets, begin, platform_poses(self.mechanism, begin), keep_mode=True)
+        rows = new_rows(self.mechanism, len(targets))
+        write_closing(self._closure, found, rows)
+        rows.status[:] = np.where(is_feasible(found), P.REACHED, P.FAILED)
+        return Configurations(rows, found.coordinates)
+
+    def at(self, closing: Closing) -> Configurations:
+        """Configurations found elsewhere, as answers whose status is still to be told."""
+        rows = new_rows(self.mechanism, len(closing.poses))
+        write_closing(self._closure, closing, rows)
+        return Configurations(rows, closing.coordinates)
+
+    def points(self, found: Configurations) -> Mapping[str, Floats]:
+        """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
+        return centres(self.mechanism, found.coordinates)
+
+    def assemble(self, coordinates: Floats, poses: Floats, values: Floats) -> tuple[Floats, Floats] | None:
+        """None: legs with given actuator values are assembled around a platform by the reaching engine alone."""
+        return None
 
 
-def follow_by_closure(
-    mechanism: Mechanism,
-    targets: Floats,
-    start: Floats,
-    options: Options,
-    rows: P.Rows,
-    on_progress: Callable[[int, int], None] | None,
-) -> Floats:
-    """Answer a path from joint coordinates (1, columns): each target from the answer before it, in its working mode."""
-    known, coordinates = _prepare(targets, start, rows)
-    closure, bends, alone = closure_of(mechanism), Bends(mechanism, options), np.ones(1, bool)
-    for i in range(len(targets)):
-        if known[i]:
-            target, row = targets[i : i + 1], P.Rows._make(array[i : i + 1] for array in rows)
-            found = _answer(closure, target, alone, start, options, True, row)
-            if bends.before is not None:
-                other_row = P.Rows._make(array.copy() for array in row)
-                other = _answer(closure, target, alone, bends.before, options, True, other_row)
-                found = other if bends.settle(target, row, other_row) else found
-            bends.note(int(row.status[0]), start, found)
-            start = coordinates[i : i + 1] = found
-        if on_progress is not None:
-            on_progress(i + 1, len(targets))
-    return coordinates
-
-
-def reached_by_closure(mechanism: Mechanism, targets: Floats, start: Floats) -> tuple[Floats, Mask]:
-    """Joint coordinates at targets (n, 4, 4), in the working mode of those to start from, and which are reached."""
-    found = _reach(closure_of(mechanism), targets, start, platform_poses(mechanism, start), keep_mode=True)
-    return found.coordinates, is_feasible(found)
-
-
-def _prepare(targets: Floats, start: Floats, rows: P.Rows) -> tuple[Mask, Floats]:
-    """Which targets are poses, the others marked, and room for coordinates."""
-    known = are_poses(targets)
-    for array in (rows.poses, rows.actuators, rows.measures):
-        array[~known] = np.nan
-    rows.status[~known], rows.counters[~known] = P.INVALID, 0
-    return known, np.full((len(targets), start.shape[1]), np.nan)
-
-
-def _answer(
-    closure: Closure, targets: Floats, which: Mask, start: Floats, options: Options, keep_mode: bool, rows: P.Rows
-) -> Floats:
-    """Answer the rows `which` of the targets from (m, columns)."""
-    wanted, mechanism = made_exact(targets[which]), closure.mechanism
-    begin = platform_poses(mechanism, start)
-    found = _reach(closure, wanted, start, begin, keep_mode)
+def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, keep_mode: bool) -> Configurations:
+    """Answer poses (n, 4, 4) from joint coordinates (n, columns): reached, or projected."""
+    mechanism = closure.mechanism
+    found = _reach(closure, wanted, start, platform_poses(mechanism, start), keep_mode)
     holds = np.full(len(wanted), P.HOLD_NOTHING)
     away = np.flatnonzero(~is_feasible(found))
     if len(away):
@@ -119,11 +125,20 @@ def _answer(
             closure, sought, starts, ways_of(mechanism, options.hold, options.rotation_length), corners=not keep_mode
         )
         holds[away] = kept(mechanism, answers.holds, answers.closing.poses, wanted[away])
-        for array, own in zip(found, answers.closing, strict=True):
-            array[away] = own
-    _fill(closure, found, wanted, which, options, rows)
-    rows.counters[which, 2] = holds
-    return found.coordinates
+        found.take(away, answers.closing)
+    within_turns(mechanism, found.coordinates)
+    rows = new_rows(mechanism, len(wanted))
+    write_closing(closure, found, rows)
+    if mechanism.end_effector_is_joint:
+        rows.poses[:, :3, :3] = wanted[:, :3, :3]
+    position, rotation = task_of(mechanism).errors(rows.poses, wanted)
+    rows.measures[:, 0], rows.measures[:, 1] = position, rotation
+    rows.counters[:, 2] = holds
+    near = (position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)) & (
+        rotation <= options.rotation_tolerance
+    )
+    rows.status[:] = np.where(is_feasible(found), np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
+    return Configurations(rows, found.coordinates)
 
 
 def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_mode: bool) -> Closing:
@@ -179,9 +194,7 @@ def _assembled(closure: Closure, wanted: Floats, start: Floats, begin: Floats) -
     found = close(closure, start, wanted, platform=task.held, framed=task.is_framed)
     strange = np.flatnonzero((found.gap > TOLERANCES.position) | (differences(closure, found.poses, wanted) > STRANGE))
     if len(strange):
-        led = _led(closure, wanted[strange], start[strange], begin[strange], task.held, limits=False)
-        for array, own in zip(found, led, strict=True):
-            array[strange] = own
+        found.take(strange, _led(closure, wanted[strange], start[strange], begin[strange], task.held, limits=False))
     return found
 
 
@@ -238,31 +251,10 @@ def _take_legs(closure: Closure, found: Closing, rest: NDArray[np.intp], tried: 
 def _take_better(found: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
     """Take over the rows that are feasible, or came nearer."""
     better = np.flatnonzero(is_feasible(tried) | (_off(tried).max(axis=1) < _off(found)[rest].max(axis=1)))
-    for array, own in zip(found, tried, strict=True):
-        array[rest[better]] = own[better]
+    found.take(rest[better], tried, better)
 
 
 def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:
     """How far poses are apart in what counts, (n,): lengths relative to L, angles in rad."""
     position, rotation = task_of(closure.mechanism).errors(poses, others)
     return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, rotation))
-
-
-def _fill(closure: Closure, found: Closing, wanted: Floats, which: Mask, options: Options, rows: P.Rows) -> None:
-    """Write answers with what was measured of them."""
-    mechanism = closure.mechanism
-    length = mechanism.characteristic_length
-    within_turns(mechanism, found.coordinates)
-    poses = found.poses.copy()
-    if mechanism.end_effector_is_joint:
-        poses[:, :3, :3] = wanted[:, :3, :3]
-    position, rotation = task_of(mechanism).errors(poses, wanted)
-    near = (position <= (options.tolerance or TOLERANCES.position * length)) & (rotation <= options.rotation_tolerance)
-    rows.status[which] = np.where(is_feasible(found), np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
-    rows.counters[which] = np.stack([found.iterations, *np.zeros((2, len(poses)), np.int64)], axis=1)
-    rows.poses[which] = poses
-    rows.actuators[which] = actuators_of(mechanism, found.coordinates)
-    zero = np.zeros(len(poses))
-    rows.measures[which] = np.stack(
-        [position, rotation, found.gap * length, np.maximum(found.excess, 0.0), zero], axis=1
-    )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.displacements import columns
+from ..rotations import from_quaternion, random_quaternions, rotvec_from_quaternion
 from .close import Closure
 
 Floats = NDArray[np.float64]
@@ -17,7 +18,7 @@ def random_starts(closure: Closure, n: int, rng: np.random.Generator) -> tuple[F
     """Coordinates (n, columns) as of `random_coordinates`, platform poses (n, 4, 4) of any rotation around home."""
     mechanism = closure.mechanism
     poses = np.repeat(mechanism.home_pose[None], n, axis=0)
-    poses[:, :3, :3] = _rotations(n, rng)
+    poses[:, :3, :3] = from_quaternion(random_quaternions(n, rng))
     poses[:, :3, 3] += rng.normal(0.0, SPREAD * mechanism.characteristic_length, (n, 3))
     return random_coordinates(closure, n, rng), poses
 
@@ -35,32 +36,10 @@ def random_coordinates(closure: Closure, n: int, rng: np.random.Generator) -> Fl
     coordinates = rng.uniform(-np.pi, np.pi, (n, len(closure.scale))) * closure.turning
     for name, span in columns(closure.mechanism).items():
         if closure.mechanism.joint(name).type == "spherical":
-            coordinates[:, span] = _rotation_vectors(n, rng)
+            coordinates[:, span] = rotvec_from_quaternion(random_quaternions(n, rng))
     coordinates[:, closure.idle] = 0.0
     return np.asarray(coordinates)
 
 
 SPREAD = 0.7
 """Standard deviation of the platform's random positions about home, per coordinate [L]."""
-
-
-def _quaternions(n: int, rng: np.random.Generator) -> Floats:
-    """Unit quaternions (n, 4), scalar first, uniform over all rotations."""
-    q = rng.normal(size=(n, 4))
-    return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))
-
-
-def _rotation_vectors(n: int, rng: np.random.Generator) -> Floats:
-    q = _quaternions(n, rng)
-    sine = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
-    return np.asarray(q[:, 1:] / sine * 2.0 * np.arctan2(sine, q[:, :1]))
-
-
-def _rotations(n: int, rng: np.random.Generator) -> Floats:
-    w, x, y, z = _quaternions(n, rng).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0).copy()

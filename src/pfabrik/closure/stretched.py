@@ -42,17 +42,13 @@ class Bends:
         is_stretched = bool(are_stretched(self._mechanism, found)[0])
         self.before = (start if self.before is None else self.before) if is_stretched else None
 
-    def settle(self, target: Floats, found: P.Rows, other: P.Rows) -> bool:
-        """Put an answer to a target (1, 4, 4) that was found from `before` in the place of the one found; whether so.
+    def prefer(self, target: Floats, found: P.Rows, other: P.Rows) -> bool:
+        """Whether an answer to a target (1, 4, 4) that was found from `before` is to replace the one found.
 
         It is if it is reached or nearer, where the one found is not, or if it has the same pose, and so is bent as
         links were.
         """
-        is_taken = self._is_alike(found, other) or self._is_better(target, found, other)
-        if is_taken:
-            for array, own in zip(found, other, strict=True):
-                array[:] = own
-        return is_taken
+        return self._is_alike(found, other) or self._is_better(target, found, other)
 
     def _is_alike(self, found: P.Rows, other: P.Rows) -> bool:
         apart = differences(closure_of(self._mechanism), other.poses, found.poses)[0]

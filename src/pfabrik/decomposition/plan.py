@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.reaching import plan as P
-from .decompose import SubChain, beyond_positions, decompose, engine_of
+from .decompose import SubChain, beyond_positions, decompose
 from .forms import BranchForm, Coordinate, TrunkForm
 
 _BRANCH_KINDS = {"passes": P.PASSES, "strut": P.STRUT, "dyad": P.DYAD, "rail_rod": P.RAIL_ROD}
@@ -62,12 +62,6 @@ def flatten(mechanism: Mechanism) -> Flat:
     for chain in decompose(mechanism):
         builder.add_chain(chain)
     return builder.build()
-
-
-@lru_cache(maxsize=64)
-def flat_of(mechanism: Mechanism) -> Flat | None:
-    """The mechanism, compiled; None if it is one for the closure engine: for a chain's sake, or the task's."""
-    return flatten(mechanism) if engine_of(mechanism) == "reaching" else None
 
 
 ROOM = 1e-6
@@ -203,7 +197,7 @@ class _Builder:
             self.points += [JointPoint(name, first + k, node.shift, axis, turning) for name in node.joints]
 
     def build(self) -> Flat:
-        order = {name: number for number, name in enumerate(self.mechanism.actuators)}
+        order = {name: number for number, name in enumerate(self.mechanism.actuator_names)}
         coordinates = sorted(self.coordinates, key=lambda pair: order.get(pair[0].joint, len(order)))
         plan = P.Plan(
             nodes=_records(self.nodes, P.NODE),
@@ -228,7 +222,7 @@ class _Builder:
             tuple(self.points),
             tuple(self.trunk_points),
             home,
-            len(self.mechanism.actuators),
+            len(self.mechanism.actuator_names),
         )
 
     def _scalars(self) -> NDArray[np.float64]:

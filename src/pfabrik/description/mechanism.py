@@ -53,7 +53,7 @@ class Mechanism(Structure):
         return f"<Mechanism '{self.name}': {self._counts()}, task {' '.join(self.task)}>"
 
     def _counts(self) -> str:
-        counts = {"joint": len(self.joints), "actuator": len(self.actuators)}
+        counts = {"joint": len(self.joints), "actuator": len(self.actuator_names)}
         return ", ".join(f"{count} {noun}{'s' * (count != 1)}" for noun, count in counts.items())
 
     @classmethod
@@ -131,10 +131,10 @@ class Mechanism(Structure):
             warnings.warn(f"'{self.name}': {doubt}", MobilityWarning, stacklevel=4)
 
     def _doubts_of_freedom(self) -> Iterator[str]:
-        left = end_effector_freedom(self, frozenset(self.actuators))
+        left = end_effector_freedom(self, frozenset(self.actuator_names))
         if left > 0:
             freedoms = "1 freedom" if left == 1 else f"{left} freedoms"
-            yield f"{len(self.actuators)} actuators leave the end effector {freedoms} at home"
+            yield f"{len(self.actuator_names)} actuators leave the end effector {freedoms} at home"
         missed_by = inexactness(self)
         if missed_by > 0.0:
             yield (

@@ -59,7 +59,7 @@ class Structure:
         return {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
 
     @cached_property
-    def actuators(self) -> tuple[str, ...]:
+    def actuator_names(self) -> tuple[str, ...]:
         """Names of the actuated joints, in the order of `joints`."""
         return tuple(joint.name for joint in self.joints if joint.actuated)
 

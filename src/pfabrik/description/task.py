@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.closure.loops import LOCKED
+from ..rotations import shortest_turns
 from .mechanism import Mechanism
 
 Floats = NDArray[np.float64]
@@ -51,7 +52,7 @@ class Task:
         if self.rotations == 0:
             wanted[:, :3, :3] = begin[:, :3, :3]
         elif self.rotations == 2:
-            wanted[:, :3, :3] = _shortest_turn(begin[:, :3, 2], targets[:, :3, 2]) @ begin[:, :3, :3]
+            wanted[:, :3, :3] = shortest_turns(begin[:, :3, 2], targets[:, :3, 2]) @ begin[:, :3, :3]
         return wanted
 
     def errors(self, poses: Floats, targets: Floats) -> tuple[Floats, Floats]:
@@ -77,16 +78,3 @@ def task_of(mechanism: Mechanism) -> Task:
 def norms(vectors: Floats) -> Floats:
     """Lengths of vectors (n, 3), (n,); however long they are, no square of them is too large to be represented."""
     return np.asarray(np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2]))
-
-
-def _shortest_turn(a: Floats, b: Floats) -> Floats:
-    """Rotations (n, 3, 3) that take unit vectors a to b, (n, 3), the shortest way; half a turn for opposite ones."""
-    middle = a + b
-    opposite = norms(middle) < 1e-9
-    across = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=1)])
-    middle = np.where(opposite[:, None], across, middle)
-    middle = middle / norms(middle)[:, None]
-    half_turn = 2.0 * middle[:, :, None] * middle[:, None, :] - np.eye(3)
-    # a half turn about the middle takes a to b; one about a before it makes the two the shortest turn
-    about_a = 2.0 * a[:, :, None] * a[:, None, :] - np.eye(3)
-    return np.asarray(np.where(opposite[:, None, None], half_turn, half_turn @ about_a))

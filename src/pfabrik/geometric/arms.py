@@ -84,7 +84,7 @@ def _read_arm(mechanism: Mechanism, trunk: Sequence[Step], arm: np.void) -> None
     arm["swing_home"], arm["extension_home"] = (home_of(mechanism, step) for step in trunk)
     arm["low"], arm["high"] = np.transpose([range_of(step) for step in trunk]) + [-slack, slack]
     arm["weight"] = [1.0 / ((high - low) or 1.0) for low, high in _spans(mechanism, trunk)]
-    arm["columns"] = [mechanism.actuators.index(step.joint.name) for step in trunk]
+    arm["columns"] = [mechanism.actuator_names.index(step.joint.name) for step in trunk]
 
 
 def _spans(mechanism: Mechanism, trunk: Sequence[Step]) -> list[Interval]:

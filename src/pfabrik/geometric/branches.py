@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..decomposition.decompose import decompose
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
-from ..poses import are_poses, as_targets, what_is_wrong
+from ..poses import are_poses, as_poses, what_is_wrong
 from ..tolerances import TOLERANCES
 from .facts import Array, Unsuitable
 from .modes import Legs, are_near, legs_of, orthonormal, try_leg
@@ -26,7 +26,7 @@ class WorkingModes:
 
     Attributes
     ----------
-    actuators : actuated coordinates, (k, n_a) [length or rad], in the order of `mechanism.actuators`.
+    actuators : actuated coordinates, (k, n_a) [length or rad], in the order of `mechanism.actuator_names`.
     poses : poses of the end effector, T_base_platform, (k, 4, 4) [length]: of a target that sets but a part, completed.
     keeps_limits : whether every range and every cone is kept, (k,).
     legs : what the columns of `branches` stand for: the sub-chains, as `decompose` prints them.
@@ -77,7 +77,7 @@ def working_modes(mechanism: Mechanism, target: Any) -> WorkingModes:
         plan = legs_of(mechanism)
     except Unsuitable as unsuitable:
         raise no_closed_form(mechanism, str(unsuitable)) from None
-    targets, shape = as_targets(target)
+    targets, shape = as_poses(target)
     if shape != ():
         raise InvalidArgument("target", f"a batch of shape {shape}", "one target")
     if not are_poses(targets).all():
@@ -113,7 +113,7 @@ def _branches(plan: Legs, index: int, pose: Array) -> Iterator[_Branch]:
 def _wrapped(mechanism: Mechanism, modes: list[tuple[int, Array, tuple[_Branch, ...]]]) -> WorkingModes:
     plan = legs_of(mechanism)
     modes.sort(key=lambda mode: (mode[0], sum(branch.number for branch in mode[2])))
-    actuators = np.full((len(modes), len(mechanism.actuators)), np.nan)
+    actuators = np.full((len(modes), len(mechanism.actuator_names)), np.nan)
     for row, (_, _, branches) in enumerate(modes):
         for column, branch in zip(plan.columns, branches, strict=True):
             if column >= 0:

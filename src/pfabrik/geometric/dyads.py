@@ -79,7 +79,7 @@ def _read_dyad(mechanism: Mechanism, steps: Sequence[Step], dyad: np.void) -> No
     dyad["square"] = [_squares(*links, bend, slack) for bend in (*bends, NOWHERE, NOWHERE)[:2]]
     dyad["low"], dyad["high"] = low, high
     dyad["sense"], dyad["home"] = _sense(shoulder, normal), home_of(mechanism, shoulder)
-    dyad["column"] = mechanism.actuators.index(shoulder.joint.name)
+    dyad["column"] = mechanism.actuator_names.index(shoulder.joint.name)
 
 
 def _sense(step: Step, normal: Array) -> float:

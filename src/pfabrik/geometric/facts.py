@@ -68,7 +68,7 @@ def is_parallel(a: Array, b: Array, sine: float = TOLERANCES.alignment) -> bool:
 
 def home_values(mechanism: Mechanism) -> Array:
     """Actuated coordinates at home, (1, n_a)."""
-    return np.array([[mechanism.home_coordinate(name) for name in mechanism.actuators]], dtype=float)
+    return np.array([[mechanism.home_coordinate(name) for name in mechanism.actuator_names]], dtype=float)
 
 
 def tolerances(mechanism: Mechanism) -> tuple[float, float]:

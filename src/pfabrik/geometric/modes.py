@@ -55,11 +55,11 @@ def legs_of(mechanism: Mechanism) -> Legs:
     legs = read_legs(mechanism)
     _require_free_tip(mechanism, legs)
     known = {each.joint.name for leg in legs for each in leg.passages}
-    for name in mechanism.actuators:
+    for name in mechanism.actuator_names:
         require(name in known, f"actuated joint {name} is in no sub-chain")
     drives = tuple(drive_of(mechanism, leg) for leg in legs)
     driven = [leg.actuated for leg in legs]
-    columns = tuple(-1 if joint is None else mechanism.actuators.index(joint.name) for joint in driven)
+    columns = tuple(-1 if joint is None else mechanism.actuator_names.index(joint.name) for joint in driven)
     first = legs[0].passages[0].inner
     end = TIP if mechanism.end_effector_is_joint else _end(legs[0])
     plan = Legs(mechanism, legs, drives, completion_of(mechanism, legs), columns, (first, end), np.ones(len(legs)))
@@ -143,7 +143,7 @@ def solve_legs(plan: Legs, targets: Array, sides: Array, first: Ints) -> tuple[M
     Whether each target is reached, (n,), actuators (n, n_a) and poses (n, 4, 4), NaN where not.
     """
     n = len(targets)
-    reached, actuators = np.zeros(n, bool), np.full((n, len(plan.mechanism.actuators)), np.nan)
+    reached, actuators = np.zeros(n, bool), np.full((n, len(plan.mechanism.actuator_names)), np.nan)
     poses = np.full((n, 4, 4), np.nan)
     near = are_near(plan, targets)
     turned = orthonormal(targets)
@@ -160,7 +160,7 @@ def solve_legs(plan: Legs, targets: Array, sides: Array, first: Ints) -> tuple[M
 
 def _at_poses(plan: Legs, poses: Array, sides: Array) -> tuple[Mask, Array]:
     """Whether all legs reach poses (n, 4, 4), (n,), and the actuators (n, n_a)."""
-    values = np.full((len(poses), len(plan.mechanism.actuators)), np.nan)
+    values = np.full((len(poses), len(plan.mechanism.actuator_names)), np.nan)
     left = np.arange(len(poses))
     for index, (drive, column) in enumerate(zip(plan.drives, plan.columns, strict=True)):
         own, _, kept = try_leg(plan, index, poses[left], sides[left, index])

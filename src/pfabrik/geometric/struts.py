@@ -80,7 +80,7 @@ def read_strut(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[dict[str, A
         "head_cosine": head_cosine,
         "sign": sign,
         "offset": offset,
-        "column": mechanism.actuators.index(slide.joint.name),
+        "column": mechanism.actuator_names.index(slide.joint.name),
     }
     return fields, np.concatenate([foot, foot_axis])
 

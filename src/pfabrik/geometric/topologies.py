@@ -103,5 +103,5 @@ def no_closed_form(mechanism: Mechanism, reason: str) -> NoClosedForm:
 
 def _require_all_actuators(mechanism: Mechanism, chains: Sequence[SubChain]) -> None:
     known = {name for chain in chains for name in chain.joints}
-    for name in mechanism.actuators:
+    for name in mechanism.actuator_names:
         require(name in known, f"actuated joint {name} is in no sub-chain")

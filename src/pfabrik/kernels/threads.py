@@ -8,13 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from .reaching import plan as P
-
 T = TypeVar("T")
-Kernel = Callable[[P.Plan, NDArray[np.float64], P.Seeds, P.Settings, P.Rows], int]
 
 
 def n_cores() -> int:
@@ -29,24 +23,6 @@ def _pool() -> ThreadPoolExecutor:
 
 if hasattr(os, "register_at_fork"):  # threads do not survive a fork: the child starts its own
     os.register_at_fork(after_in_child=_pool.cache_clear)
-
-
-def run_in_blocks(
-    kernel: Kernel,
-    plan: P.Plan,
-    targets: NDArray[np.float64],
-    seeds: P.Seeds,
-    settings: P.Settings,
-    rows: P.Rows,
-    rows_a_block: int,
-) -> int:
-    """The kernel over all rows, in blocks spread over the cores; the sum of what it returns."""
-
-    def run(block: slice) -> int:
-        own = seeds if len(seeds.poses) == 1 else P.Seeds._make(array[block] for array in seeds)
-        return kernel(plan, targets[block], own, settings, P.Rows._make(array[block] for array in rows))
-
-    return sum(in_blocks(run, len(targets), rows_a_block))
 
 
 def in_blocks(run: Callable[[slice], T], n: int, rows_a_block: int) -> list[T]:

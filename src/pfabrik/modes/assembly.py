@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,8 @@ from ..closure.close import Closing, Closure, close, closure_of, platform_poses
 from ..closure.starts import random_starts
 from ..description.mechanism import Mechanism
 from ..errors import ContinuumOfSolutions, InvalidArgument
-from ..fk import answered, as_values
+from ..fk import Actuators, as_values, assembled
 from ..motion.first_order import stepped_freely
-from ..reaching.completion import set_actuators
 from ..tolerances import TOLERANCES
 from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Modes, Sightings, as_count
 
@@ -26,7 +24,7 @@ class AssemblyModes(Modes):
     """The assembly modes that were found, nearest to home first, and what that is worth: see `Modes`."""
 
 
-def assembly_modes(mechanism: Mechanism, actuators: Any, *, most_starts: int = 40_000) -> AssemblyModes:
+def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: int = 40_000) -> AssemblyModes:
     """All poses in which the mechanism can be assembled with given actuator values, limits or not.
 
     Newton's method from random configurations of all joints, undamped, until every mode has been found ten times and
@@ -37,7 +35,8 @@ def assembly_modes(mechanism: Mechanism, actuators: Any, *, most_starts: int = 4
 
     Parameters
     ----------
-    actuators : one set of actuated coordinates, (n_a,), in the order of `mechanism.actuators` [length or rad].
+    actuators : one set of actuated coordinates, (n_a,), in the order of `mechanism.actuator_names`
+        [length or rad], or joint name -> value.
 
     Raises
     ------
@@ -48,7 +47,7 @@ def assembly_modes(mechanism: Mechanism, actuators: Any, *, most_starts: int = 4
     values, shape = as_values(mechanism, actuators)
     if shape != () or not np.isfinite(values).all():
         found = f"batch shape {shape}" if shape else "a value that is not finite"
-        raise InvalidArgument("actuators", found, f"one set of {len(mechanism.actuators)} finite values")
+        raise InvalidArgument("actuators", found, f"one set of {len(mechanism.actuator_names)} finite values")
     most_starts = as_count("most_starts", most_starts, 1)
     search = _Search(closure_of(mechanism), values)
     while search.starts < most_starts and not search.is_done:
@@ -58,7 +57,7 @@ def assembly_modes(mechanism: Mechanism, actuators: Any, *, most_starts: int = 4
     for row, place in enumerate(order):
         coordinates[row] = search.found.coordinates[place]
     polished = close(search.closure, coordinates, platform_poses(mechanism, coordinates), locked=search.locked)
-    modes = answered(mechanism, polished.coordinates, np.repeat(values, len(order), axis=0))
+    modes = assembled(mechanism, polished.coordinates, np.repeat(values, len(order), axis=0))
     return AssemblyModes(tuple(modes), tuple(search.found.hits[place] for place in order), search.starts)
 
 
@@ -68,7 +67,7 @@ class _Search:
     def __init__(self, closure: Closure, values: Floats) -> None:
         self.closure = closure
         self.values = values
-        self.locked = frozenset(closure.mechanism.actuators)
+        self.locked = frozenset(closure.mechanism.actuator_names)
         self.rng = np.random.default_rng(0)
         self.starts = 0
         self.found = Sightings()
@@ -89,7 +88,7 @@ class _Search:
         if self.starts == 0:
             coordinates[0], poses[0] = 0.0, platform_poses(self.closure.mechanism, coordinates[:1] * 0.0)[0]
         self.starts += n
-        set_actuators(self.closure.mechanism, coordinates, np.repeat(self.values, n, axis=0))
+        self.closure.put_actuators(coordinates, np.repeat(self.values, n, axis=0))
         found = close(
             self.closure, coordinates, poses, locked=self.locked, plunging=True, closeness=1e-11, max_iterations=STEPS
         )

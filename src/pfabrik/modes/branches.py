@@ -13,7 +13,6 @@ from ..closure.starts import random_starts
 from ..description.task import task_of
 from ..errors import ContinuumOfWorkingModes
 from ..motion.displacements import columns
-from ..reaching.completion import actuators_of
 from ..tolerances import TOLERANCES
 from .fingerprints import Marks, close_on_target, count_from_home, shifts
 from .lists import LEAST_STARTS, STEPS, Sightings
@@ -155,11 +154,11 @@ class BranchSearch:
             self.closure,
             coordinates,
             pose,
-            lambda closing: (actuators_of(mechanism, closing.coordinates) * scale)[:, :, None],
+            lambda closing: (self.closure.actuators(closing.coordinates) * scale)[:, :, None],
         )[:, :, 0]
         if moved.any():
             freedoms = int((np.linalg.svd(moved, compute_uv=False) > FREEDOM).sum())
-            names = [mechanism.actuators[each] for each in np.flatnonzero(np.abs(moved).max(axis=0))]
+            names = [mechanism.actuator_names[each] for each in np.flatnonzero(np.abs(moved).max(axis=0))]
             raise ContinuumOfWorkingModes(mechanism.name, max(freedoms, 1), names)
 
     def _ranks(self, coordinates: Floats, poses: Floats) -> Floats:
@@ -212,7 +211,7 @@ class BranchSearch:
             for row in range(len(best)):
                 best[row, own] = branches.coordinates[min(row, len(branches.hits) - 1)][own]
         held = HELD if marks.pose_rests else self.task.held
-        locked = frozenset(self.closure.mechanism.actuators)
+        locked = frozenset(self.closure.mechanism.actuator_names)
         from_home = np.zeros_like(best)
         from_home[:, self.closure.actuated] = best[:, self.closure.actuated]
         for start, wishes in (

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.limits import within_turns
 from ..closure.close import Closing, Closure, close
 from ..description.task import task_of
 from ..motion.displacements import centres, columns
-from ..reaching.completion import actuators_of
+from ..motion.limits import within_turns
 from ..tolerances import TOLERANCES
 from .lists import ALONG
 
@@ -45,7 +44,8 @@ class Marks:
     def __init__(self, closure: Closure, coordinates: Floats, pose: Floats) -> None:
         """See what rests at a closed configuration, (columns,) and (4, 4)."""
         mechanism = self.mechanism = closure.mechanism
-        locked = frozenset(mechanism.actuators)
+        self._closure = closure
+        locked = frozenset(mechanism.actuator_names)
 
         def rests(read: Read) -> NDArray[np.bool_]:
             return np.asarray((shifts(closure, coordinates, pose, read, locked) == 0.0).all(axis=(0, 2)))
@@ -75,7 +75,7 @@ class Marks:
 
     def of_legs(self, coordinates: Floats) -> Floats:
         """Marks of the legs of closed configurations (n, columns): actuators [L, or cosine and sine], centres [L]."""
-        values = actuators_of(self.mechanism, coordinates)
+        values = self._closure.actuators(coordinates)
         first = np.where(self._turning, np.cos(values), values * self._scale)
         second = np.where(self._turning, np.sin(values), 0.0)
         points = self._centres(coordinates)

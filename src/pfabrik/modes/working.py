@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import prod
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.solution import Solution
+from ..answers.solution import Solution, Status
 from ..closure.close import close, closure_of
 from ..closure.nearest import is_feasible
-from ..decomposition.plan import flat_of
-from ..description.mechanism import Mechanism, checked_mechanism
+from ..description.mechanism import Mechanism
 from ..description.task import task_of
+from ..engine import engine_of
 from ..errors import InvalidArgument
-from ..kernels.reaching import plan as P
-from ..poses import are_poses, as_targets, made_exact, what_is_wrong
-from ..reaching.completion import actuators_of, positions_of
-from ..reaching.rows import new_rows
+from ..poses import are_poses, made_exact, what_is_wrong
+from ..targets import Target, as_targets
 from .branches import BranchSearch, Listed
 from .lists import BATCH, Modes, as_count
 
@@ -48,7 +45,7 @@ class WorkingModes(Modes):
         return sum(hits == 1 for legs in self.branches for leg in legs for hits in leg)
 
 
-def working_modes(mechanism: Mechanism, target: Any, *, most_starts: int = 40_000, most: int = 4096) -> WorkingModes:
+def working_modes(mechanism: Mechanism, target: Target, *, most_starts: int = 40_000, most: int = 4096) -> WorkingModes:
     """All configurations that have the end effector on a target in what the task counts, limits or not.
 
     Newton's method from random configurations of all joints, undamped, until every branch of every leg has been found
@@ -86,10 +83,9 @@ def working_modes(mechanism: Mechanism, target: Any, *, most_starts: int = 40_00
     return WorkingModes(tuple(_answered(mechanism, pose, listed)), listed.hits, search.starts, branches)
 
 
-def _as_pose(mechanism: Mechanism, target: Any) -> Floats:
+def _as_pose(mechanism: Mechanism, target: Target) -> Floats:
     """The one target as an exact pose (4, 4)."""
-    checked_mechanism(mechanism)
-    targets, shape = as_targets(target)
+    targets, shape = as_targets(mechanism, target)
     if shape != ():
         raise InvalidArgument("target", f"batch shape {shape}", "one target: a pose (4, 4) or a position (3,)")
     if not are_poses(targets)[0]:
@@ -100,19 +96,12 @@ def _as_pose(mechanism: Mechanism, target: Any) -> Floats:
 
 def _answered(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
     """Configurations as answers to one target: measured, not changed."""
-    coordinates, poses, n = listed.coordinates, listed.poses.copy(), len(listed.poses)
-    measured = close(closure_of(mechanism), coordinates, poses, max_iterations=0)
-    flat = flat_of(mechanism)
-    rows = new_rows(mechanism, flat, n)
+    closing = close(closure_of(mechanism), listed.coordinates, listed.poses, max_iterations=0)
+    found = engine_of(mechanism).at(closing)
+    rows, n = found.rows, len(found)
     if mechanism.end_effector_is_joint:
-        poses[:, :3, :3] = target[:3, :3]
-    rows.status[:] = np.where(is_feasible(measured), P.REACHED, P.EXCEEDED)
-    rows.counters[:] = 0
-    rows.poses[:] = poses
-    rows.actuators[:] = actuators_of(mechanism, coordinates)
-    position, rotation = task_of(mechanism).errors(poses, np.repeat(target[None], n, axis=0))
-    gap = measured.gap * mechanism.characteristic_length
-    rows.measures[:] = np.stack([position, rotation, gap, measured.excess, np.zeros(n)], axis=1)
-    if flat is not None:
-        positions_of(mechanism, flat, coordinates, rows)
-    return Solution(mechanism, rows, (n,), lambda: coordinates)
+        rows.poses[:, :3, :3] = target[:3, :3]
+    rows.status[:] = np.where(is_feasible(closing), Status.REACHED, Status.EXCEEDED)
+    position, rotation = task_of(mechanism).errors(rows.poses, np.repeat(target[None], n, axis=0))
+    rows.measures[:, 0], rows.measures[:, 1] = position, rotation
+    return Solution(mechanism, found, (n,))

@@ -32,6 +32,7 @@ from ..description.home_mobility import (
     universal_axes,
 )
 from ..description.mechanism import Joint, Mechanism
+from ..rotations import angles_and_sines, composed, from_rotvec
 
 Floats = NDArray[np.float64]
 
@@ -74,6 +75,14 @@ def columns(mechanism: Mechanism) -> Mapping[str, slice]:
     )
 
 
+@lru_cache(maxsize=64)
+def home_coordinates(mechanism: Mechanism) -> Floats:
+    """All joint coordinates at home as the description counts them, (c,) [rad or length]."""
+    home = np.concatenate([np.ravel(mechanism.home_coordinate(joint.name)) for joint in mechanism.joints])
+    home.setflags(write=False)
+    return home
+
+
 def displacements(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
     """Body -> its displacements, (n, 4, 4) [length], in base coordinates.
 
@@ -84,6 +93,20 @@ def displacements(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
     geometry = _geometry(mechanism)
     bodies = _bodies(geometry, _motions(geometry, q)[0])
     return {body: bodies[:, place] for body, place in geometry.places.items()}
+
+
+def joint_displacements(mechanism: Mechanism, name: str, values: Floats) -> Floats:
+    """Displacements (n, 4, 4) [length] of a joint's second body when only that joint moves and its first body rests.
+
+    Parameters
+    ----------
+    values : its coordinates as deviations from home, (n, own) [rad or length].
+    """
+    geometry = _geometry(mechanism)
+    span = columns(mechanism)[name]
+    q = np.zeros((len(values), len(geometry.owners)))
+    q[:, span] = values
+    return np.asarray(_motions(geometry, q)[0][:, [joint.name for joint in mechanism.joints].index(name)])
 
 
 def centres(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
@@ -131,7 +154,7 @@ def gaps(mechanism: Mechanism, q: Floats) -> Floats:
     the distance at the joint's centre (at the reference point where it has none), and the angle times L.
     """
     turns, shifts, _ = _openings(mechanism, q)
-    angles, _ = _angle_and_sines(turns)
+    angles, _ = angles_and_sines(turns)
     sizes = np.concatenate([angles * mechanism.characteristic_length, np.linalg.norm(shifts, axis=-1)], axis=-1)
     return np.asarray(np.max(sizes, axis=-1, initial=0.0))
 
@@ -143,7 +166,7 @@ def loop_errors(mechanism: Mechanism, q: Floats) -> Floats:
     coordinates put it. To first order: of a large rotation, the axis times the angle.
     """
     turns, shifts, points = _openings(mechanism, q)
-    angles, sines = _angle_and_sines(turns)
+    angles, sines = angles_and_sines(turns)
     rotations = sines / np.sinc(angles / np.pi)[..., None]
     velocity = (shifts - np.cross(rotations, points)) / mechanism.characteristic_length
     return np.concatenate([rotations, velocity], axis=-1)
@@ -165,7 +188,7 @@ def stepped(mechanism: Mechanism, q: Floats, step: Floats) -> Floats:
         if mechanism.joint(name).type == "spherical":
             first = bodies[:, geometry.firsts[geometry.owners[column.start]], :3, :3]
             turn = np.einsum("nji,nj->ni", first, step[:, column])
-            moved[:, column] = _composed(turn, q[:, column])
+            moved[:, column] = composed(turn, q[:, column])
     return moved
 
 
@@ -224,7 +247,7 @@ def _motions(geometry: _Geometry, q: Floats) -> tuple[Floats, Floats]:
     Both are in home coordinates.
     """
     shape = (len(q), *geometry.centres.shape)
-    first, second = (_rotation((q @ turn.reshape(len(turn), -1)).reshape(shape)) for turn in geometry.turns)
+    first, second = (from_rotvec((q @ turn.reshape(len(turn), -1)).reshape(shape)) for turn in geometry.turns)
     slides = (q @ geometry.slides.reshape(len(geometry.slides), -1)).reshape(shape)
     return _about(geometry.centres, first @ second, slides), first
 
@@ -236,16 +259,6 @@ def _about(centres: Floats, rotations: Floats, slides: Floats) -> Floats:
     motions[..., :3, 3] = centres - np.einsum("...ij,...j->...i", rotations, centres) + slides
     motions[..., 3, 3] = 1.0
     return motions
-
-
-def _rotation(vectors: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) [rad]."""
-    angles = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    skew = np.cross(np.eye(3), vectors[..., None, :])
-    # sinc: exact down to zero, so that there is no branch for small angles
-    return np.asarray(
-        np.eye(3) + np.sinc(angles / np.pi) * skew + 0.5 * np.sinc(0.5 * angles / np.pi) ** 2 * (skew @ skew)
-    )
 
 
 def _bodies(geometry: _Geometry, motions: Floats) -> Floats:
@@ -307,26 +320,3 @@ def _openings(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats, Floats]:
     points = _moved(put, geometry.centres[closing])
     turns = found[..., :3, :3] @ np.swapaxes(put[..., :3, :3], -1, -2)
     return turns, _moved(found, geometry.centres[closing]) - points, points
-
-
-def _angle_and_sines(rotations: Floats) -> tuple[Floats, Floats]:
-    """Angles (...,) [rad], accurate down to zero, and axes times their sines (..., 3), of matrices (..., 3, 3)."""
-    skew = rotations - np.swapaxes(rotations, -1, -2)
-    sines = 0.5 * np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
-    cosine = 0.5 * (np.trace(rotations, axis1=-2, axis2=-1) - 1.0)
-    return np.asarray(np.arctan2(np.linalg.norm(sines, axis=-1), cosine)), sines
-
-
-def _composed(after: Floats, before: Floats) -> Floats:
-    """Rotation vector of two rotations one after the other, (n, 3) [rad], at most pi long."""
-    (w, v), (w0, v0) = _quaternion(after), _quaternion(before)
-    scalar = w * w0 - np.sum(v * v0, axis=-1)
-    vector = w[..., None] * v0 + w0[..., None] * v + np.cross(v, v0)
-    half = np.arctan2(np.linalg.norm(vector, axis=-1), np.abs(scalar))
-    return np.asarray(vector * np.copysign(2.0 / np.sinc(half / np.pi), scalar)[..., None])
-
-
-def _quaternion(vectors: Floats) -> tuple[Floats, Floats]:
-    """Scalar (n,) and vector part (n, 3) of the unit quaternions of rotation vectors (n, 3) [rad]."""
-    half = 0.5 * np.linalg.norm(vectors, axis=-1)
-    return np.cos(half), 0.5 * np.sinc(half / np.pi)[..., None] * vectors

@@ -280,7 +280,7 @@ def _units(mechanism: Mechanism, motion: _Motion) -> tuple[Floats, Floats]:
 
 def _actuated(mechanism: Mechanism) -> list[int]:
     """The columns of the actuators."""
-    return [columns(mechanism)[name].start for name in mechanism.actuators]
+    return [columns(mechanism)[name].start for name in mechanism.actuator_names]
 
 
 @dataclass(frozen=True)
@@ -351,7 +351,7 @@ def generic_of(mechanism: Mechanism) -> Generic:
         platform=platform,
         internal=shown - platform,
         idle=motions.shape[-1] - shown,
-        actuators=len(mechanism.actuators),
+        actuators=len(mechanism.actuator_names),
         uncontrolled=shown - driven,
         over_constraints=closure.shape[1] - rank,
     )

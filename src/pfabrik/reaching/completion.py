@@ -7,15 +7,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.limits import within_turns
 from ..closure.close import HELD, Closing, Closure, close, closure_of
+from ..closure.configurations import new_rows, rows_at
 from ..decomposition.plan import Flat, flatten
 from ..description.mechanism import Mechanism
 from ..kernels.reaching import plan as P
 from ..motion.displacements import columns, displacements
+from ..motion.limits import within_turns
 from ..tolerances import TOLERANCES
 from .points import joint_points
-from .rows import new_rows
 
 Floats = NDArray[np.float64]
 
@@ -39,37 +39,16 @@ def coordinates_of(mechanism: Mechanism, rows: P.Rows, start: Floats | None = No
     known = np.flatnonzero(rows.status != P.INVALID)
     if not len(known):
         return found
-    rows = P.Rows._make(array[known] for array in rows)
+    rows = rows_at(rows, known)
     begin = np.zeros((len(known), len(closure.scale)))
     if start is not None:
         begin[:] = start if len(start) == 1 else start[known]
-    set_actuators(mechanism, begin, rows.actuators)
+    closure.put_actuators(begin, rows.actuators)
     centres = _centres(mechanism, flatten(mechanism), rows)
     settled = _settle(closure, begin, rows.poses, centres, chained).coordinates
     within_turns(mechanism, settled)
     found[known] = settled
     return found
-
-
-def set_actuators(mechanism: Mechanism, coordinates: Floats, actuators: Floats) -> None:
-    """Put actuated values (n, n_a) into coordinates (n, columns)."""
-    closure = closure_of(mechanism)
-    coordinates[:, closure.actuated] = actuators - closure.home
-
-
-def actuators_of(mechanism: Mechanism, coordinates: Floats) -> Floats:
-    """The actuated values (n, n_a) in coordinates (n, columns)."""
-    closure = closure_of(mechanism)
-    return np.asarray(coordinates[:, closure.actuated] + closure.home)
-
-
-def joint_values(mechanism: Mechanism, coordinates: Floats) -> dict[str, Floats]:
-    """Joint name -> values, (n,) or (n, 2 or 3), counted as the description counts them."""
-    values = {}
-    for name, span in columns(mechanism).items():
-        own = coordinates[:, span] + np.ravel(mechanism.home_coordinate(name))
-        values[name] = own[:, 0] if own.shape[1] == 1 else own
-    return values
 
 
 def positions_of(mechanism: Mechanism, flat: Flat, coordinates: Floats, rows: P.Rows) -> None:
@@ -91,7 +70,7 @@ def positions_of(mechanism: Mechanism, flat: Flat, coordinates: Floats, rows: P.
 def _told(mechanism: Mechanism) -> frozenset[str]:
     """Joints whose centres an answer in positions tells: not those merged with others into one at a common centre."""
     flat = flatten(mechanism)
-    home = new_rows(mechanism, flat, 1)._replace(**flat.home_seed._asdict())
+    home = new_rows(mechanism, 1)._replace(**flat.home_seed._asdict())
     near = TOLERANCES.position * mechanism.characteristic_length
     return frozenset(
         name
@@ -113,7 +92,7 @@ def _centres(mechanism: Mechanism, flat: Flat, rows: P.Rows) -> Floats:
 
 def _settle(closure: Closure, begin: Floats, poses: Floats, centres: Floats, chained: bool) -> Closing:
     """Close the legs below a platform and actuators at rest; rows that do not close are tried from elsewhere."""
-    locked = frozenset(closure.mechanism.actuators)
+    locked = frozenset(closure.mechanism.actuator_names)
     platform = (*HELD[:3], *((0.0,) * 3)) if closure.mechanism.end_effector_is_joint else HELD
     closing = close(closure, begin, poses, locked=locked, platform=platform, centres=centres, chained=chained)
     rng = np.random.default_rng(0)
@@ -123,13 +102,12 @@ def _settle(closure: Closure, begin: Floats, poses: Floats, centres: Floats, cha
             break
         turns = np.where(closure.idle, 0.0, rng.uniform(-np.pi, np.pi, begin.shape[1]) * closure.turning)
         elsewhere = begin[open_rows] + turns
-        set_actuators(closure.mechanism, elsewhere, actuators_of(closure.mechanism, begin[open_rows]))
+        closure.put_actuators(elsewhere, closure.actuators(begin[open_rows]))
         tried = close(
             closure, elsewhere, poses[open_rows], locked=locked, platform=platform, centres=centres[open_rows]
         )
         better = _off(tried) < _off(closing)[open_rows]
-        for array, own in zip(closing, tried, strict=True):
-            array[open_rows[better]] = own[better]
+        closing.take(open_rows[better], tried, better)
     return closing
 
 

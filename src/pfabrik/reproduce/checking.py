@@ -41,6 +41,6 @@ def feasibility(solution: Solution) -> Feasibility:
     return Feasibility(
         failed=int((np.asarray(solution.status) >= Status.FAILED).sum()),
         limit_excess=float(solution.limit_excess.max()),
-        closure=float(closure_residual(mechanism, solution).max() / mechanism.characteristic_length),
+        closure=float(closure_residual(solution).max() / mechanism.characteristic_length),
         independent=float(worst_excess(solution).max()),
     )

@@ -66,7 +66,7 @@ def follow(case: Case, targets: Floats, options: Options) -> Followed:
     """Inverse kinematics along a path, then forward kinematics of every step from the step before."""
     solution = track(case.mechanism, targets, options=options)
     start = solve_fk(case.mechanism, solution[:1].actuators)
-    rest = solve_fk(case.mechanism, solution[1:].actuators, seed=solution[:-1])
+    rest = solve_fk(case.mechanism, solution[1:].actuators, start=solution[:-1])
     poses = np.concatenate([start.pose, rest.pose])
     return Followed(
         solution=solution,

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from .. import geometric
 from ..answers.solution import Solution, Status
-from ..decomposition.plan import Flat, flat_of
+from ..closure.configurations import new_rows
+from ..decomposition.plan import Flat, flatten
 from ..description.mechanism import Mechanism
 from ..geometric.topologies import closed_form
 from ..ik import solve_ik
 from ..kernels.reaching.plan import Rows, Seeds
 from ..options import Options
 from ..poses import pose
-from ..reaching.rows import new_rows
 from ..reaching.solve import settings_of
 from .checking import Feasibility, feasibility
 from .efficacy import rms
@@ -91,12 +91,12 @@ def run(case: Case, extent: Extent, tick: Tick) -> Efficiency:
     answers = {}
     for name, options in ANY_MODE.items():
         cold = solve_ik(mechanism, targets, options=options)
-        warm = solve_ik(mechanism, targets[1:], seed=cold[:-1], options=options)
+        warm = solve_ik(mechanism, targets[1:], start=cold[:-1], options=options)
         answers[name, "cold"] = Answered(cold, feasibility(cold))
         answers[name, "warm"] = Answered(warm, feasibility(warm))
     tick()
     default = answers["default", "cold"].solution
-    redundant = len(mechanism.actuators) > 6
+    redundant = len(mechanism.actuator_names) > 6
     agreement = None if redundant else float(np.abs(default.actuators - closed.actuators).max())
     times = timed(mechanism, targets, extent.repeats)
     tick()
@@ -151,9 +151,7 @@ def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str
     "single" is one kernel call a target, made by compiled code; "batch" one call of the library for all targets.
     """
     calls: dict[tuple[str, str, str, str], Callable[[], object]] = {}
-    flat = flat_of(mechanism)
-    if flat is None:
-        raise RuntimeError(f"'{mechanism.name}' is not solved by the reaching engine")
+    flat = flatten(mechanism)
     for name, options in ANY_MODE.items():
         for start in ("cold", "warm"):
             calls["P-FABRIK", name, start, "single"] = _single(mechanism, flat, targets, options, start == "warm")
@@ -169,8 +167,9 @@ def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str
 
 def _single(mechanism: Mechanism, flat: Flat, targets: Floats, options: Options, warm: bool) -> Callable[[], object]:
     """One kernel call of P-FABRIK a target."""
-    settings = settings_of(mechanism, options, seeded=warm)
-    rows, seeds = new_rows(mechanism, flat, len(targets)), flat.home_seed
+    settings = settings_of(mechanism, options, keep_mode=False)
+    seeds = flat.home_seed
+    rows = new_rows(mechanism, len(targets), seeds.nodes.shape[1], seeds.trunks.shape[1])
     if warm:
         seeds = _answers_before(flat, solve_ik(mechanism, targets, options=options)._rows)
     return lambda: p_fabrik_one_by_one(flat.plan, targets, seeds, settings, rows)
@@ -186,7 +185,7 @@ def _single_closed(mechanism: Mechanism, targets: Floats, warm: bool) -> Callabl
     """One kernel call of the closed form a target."""
     form = closed_form(mechanism)
     loop = closed_form_one_by_one(form.kernel)
-    actuators, status = np.empty((len(targets), len(mechanism.actuators))), np.empty(len(targets), np.int8)
+    actuators, status = np.empty((len(targets), len(mechanism.actuator_names))), np.empty(len(targets), np.int8)
     seeds = np.asarray(form.home)
     if warm:
         seeds = np.concatenate([seeds, geometric.solve_ik(mechanism, targets).actuators[:-1]])

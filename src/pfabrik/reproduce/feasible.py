@@ -177,7 +177,7 @@ class Struts:
         return np.zeros(0)
 
     def variables(self, solution: Solution) -> Floats:
-        order = [self.mechanism.actuators.index(name) for name in self.names]
+        order = [self.mechanism.actuator_names.index(name) for name in self.names]
         return np.concatenate(
             [solution.pose[:, :3, 3] / self.length, solution.actuators[:, order] / self.units], axis=1
         )
@@ -276,6 +276,6 @@ class Cranks:
         return np.array(reach) / self.length
 
     def variables(self, solution: Solution) -> Floats:
-        order = [self.mechanism.actuators.index(name) for name in self.names]
+        order = [self.mechanism.actuator_names.index(name) for name in self.names]
         tips = solution.pose[:, :3, 3] @ self.axes.T / self.length
         return np.concatenate([tips, solution.actuators[:, order]], axis=1)

@@ -114,7 +114,7 @@ def run(case: Case, extent: Extent, tick: Tick) -> Robustness:
 def jumps(solution: Solution, finer: Solution) -> dict[str, dict[str, Jump]]:
     """The largest changes of the actuators of either kind, in each part of the path."""
     mechanism = solution.mechanism
-    is_length = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuators])
+    is_length = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names])
     kinds = {"lengths": is_length, "angles": ~is_length}
     return {
         kind: {part: _jump(solution, finer, chosen, part) for part in ("inside", "outside", "edge")}
@@ -160,7 +160,7 @@ def step_times(mechanism: Mechanism, targets: Floats, solution: Solution, repeat
         for row in taken:
             for i, seed in enumerate(seeds):
                 start = clock()
-                track(mechanism, targets[i : i + 1], seed=seed, options=CENTROID)
+                track(mechanism, targets[i : i + 1], start=seed, options=CENTROID)
                 row[i] = clock() - start
     return np.asarray(np.median(taken, axis=0))
 
@@ -217,7 +217,7 @@ def steps(found: Robustness) -> list[dict[str, Any]]:
             "rounds": solution.rounds[i],
             "residual": solution.residual[i],
             "limit_excess": solution.limit_excess[i],
-            **dict(zip(solution.mechanism.actuators, solution.actuators[i], strict=True)),
+            **dict(zip(solution.mechanism.actuator_names, solution.actuators[i], strict=True)),
             "active_limits": short_names(solution.active_limits[i]),
         }
         for i in range(len(found.targets))

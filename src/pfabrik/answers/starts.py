@@ -1,0 +1,66 @@
+"""Where a search starts: at an answer, or at given joint coordinates."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..closure.close import Closing, close, closure_of, platform_poses
+from ..closure.configurations import Configurations
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..engine import engine_of
+from ..errors import InvalidArgument
+from ..motion.displacements import home_coordinates
+from ..poses import as_floats
+from .solution import Solution, Status
+
+Floats = NDArray[np.float64]
+
+Start: TypeAlias = Solution | ArrayLike
+"""A Solution, or joint coordinates q (..., nq) in the order of `mechanism.coordinate_names` [rad or length]."""
+
+
+def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) -> Configurations | None:
+    """Configurations to start a batch of that shape from: one for all rows or one for each; None for home.
+
+    Raises
+    ------
+    InvalidArgument : what is neither an answer of this mechanism nor joint coordinates of it, an answer that is no
+        feasible configuration, or another batch shape.
+    """
+    if start is None:
+        return None
+    if not isinstance(start, Solution):
+        deviations, own = joint_vectors(mechanism, start, "start")
+        _require_shape(own, shape)
+        return engine_of(mechanism).at(measured(mechanism, deviations))
+    if start.mechanism != mechanism:
+        raise InvalidArgument("start", f"an answer of '{start.mechanism.name}'", f"an answer of '{mechanism.name}'")
+    if (np.asarray(start.status) >= Status.FAILED).any():
+        raise InvalidArgument("start", "an answer that is FAILED or INVALID", "a feasible configuration")
+    _require_shape(start.shape, shape)
+    return start._found
+
+
+def joint_vectors(mechanism: Mechanism, q: ArrayLike, name: str) -> tuple[Floats, tuple[int, ...]]:
+    """Joint vectors as deviations from home, (n, nq), and the batch shape they came in."""
+    home = home_coordinates(checked_mechanism(mechanism))
+    expected = f"shape (..., {len(home)}): all joint coordinates, or a Solution"
+    array = as_floats(name, q, expected)
+    if array.shape[-1:] != home.shape:
+        raise InvalidArgument(name, f"shape {array.shape}", expected)
+    if not np.isfinite(array).all():
+        raise InvalidArgument(name, "a number that is not finite", "finite joint coordinates")
+    return array.reshape(-1, len(home)) - home, array.shape[:-1]
+
+
+def measured(mechanism: Mechanism, deviations: Floats) -> Closing:
+    """Joint coordinates (n, nq), deviations from home, as they are: their loop gaps and limit excesses."""
+    return close(closure_of(mechanism), deviations, platform_poses(mechanism, deviations), max_iterations=0)
+
+
+def _require_shape(own: tuple[int, ...], shape: tuple[int, ...]) -> None:
+    if own not in ((), shape):
+        raise InvalidArgument("start", f"batch shape {own}", f"a single configuration or batch shape {shape}")

@@ -1,0 +1,115 @@
+"""Configurations found for a batch: what is told of them row by row, and the coordinates of all their joints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.mechanism import Mechanism
+from ..kernels.reaching import plan as P
+from .close import Closing, Closure, closure_of
+
+Floats = NDArray[np.float64]
+
+
+def new_rows(mechanism: Mechanism, n: int, nodes: int = 0, trunks: int = 0) -> P.Rows:
+    """Room for n answers; `nodes` and `trunks` are how many positions and trunk joints are stored of each."""
+    return P.Rows(
+        status=np.full(n, P.PENDING),
+        counters=np.zeros((n, 3), np.int64),
+        poses=np.empty((n, 4, 4)),
+        nodes=np.zeros((n, nodes, 3)),
+        trunks=np.zeros((n, trunks)),
+        actuators=np.empty((n, len(mechanism.actuator_names))),
+        measures=np.zeros((n, 5)),
+    )
+
+
+def rows_at(rows: P.Rows, places: Any) -> P.Rows:
+    """The rows at some places: an integer array (copied), a mask (copied) or a slice (shared)."""
+    return P.Rows._make(array[places] for array in rows)
+
+
+def put_rows(rows: P.Rows, places: Any, others: P.Rows) -> None:
+    """Write other rows at some places."""
+    for array, own in zip(rows, others, strict=True):
+        array[places] = own
+
+
+def write_closing(closure: Closure, closing: Closing, rows: P.Rows) -> None:
+    """Pose, actuators, loop gaps, limit excesses and iterations of closed configurations, into as many rows.
+
+    A joint end effector has no orientation: home's is written.
+    """
+    mechanism = closure.mechanism
+    rows.poses[:] = closing.poses
+    if mechanism.end_effector_is_joint:
+        rows.poses[:, :3, :3] = np.eye(3)
+    rows.actuators[:] = closure.actuators(closing.coordinates)
+    rows.counters[:] = 0
+    rows.counters[:, 0] = closing.iterations
+    rows.measures[:] = 0.0
+    rows.measures[:, 2] = closing.gap * mechanism.characteristic_length
+    rows.measures[:, 3] = np.maximum(closing.excess, 0.0)
+
+
+class Configurations:
+    """What was found for a batch.
+
+    Attributes
+    ----------
+    rows : status, pose, actuators and measures, row by row.
+    coordinates : of all joints, deviations from home, (n, columns) [length or rad].
+    were_given : whether the coordinates were what was searched for; else they follow from the rows when asked for.
+    """
+
+    def __init__(self, rows: P.Rows, coordinates: Floats | Callable[[], Floats]) -> None:
+        self.rows = rows
+        self.were_given = not callable(coordinates)
+        self._coordinates = coordinates
+
+    def __len__(self) -> int:
+        return len(self.rows.status)
+
+    @cached_property
+    def coordinates(self) -> Floats:
+        return self._coordinates() if callable(self._coordinates) else self._coordinates
+
+    def at(self, places: NDArray[np.intp]) -> Configurations:
+        """The configurations at some places, copied."""
+        rows = P.Rows._make(np.ascontiguousarray(array[places]) for array in self.rows)
+        if self.were_given:
+            return Configurations(rows, self.coordinates[places])
+        return Configurations(rows, lambda: self.coordinates[places])
+
+    def replace(self, places: NDArray[np.intp], others: Configurations, rows: NDArray[np.bool_]) -> None:
+        """Put some rows of other configurations in some places, in place."""
+        put_rows(self.rows, places, rows_at(others.rows, rows))
+        if self.were_given:
+            self.coordinates[places] = others.coordinates[rows]
+
+    def among(self, known: NDArray[np.bool_]) -> Configurations:
+        """As many rows as `known` has, with these configurations where it is true, INVALID and NaN elsewhere."""
+        if known.all():
+            return self
+        n = len(known)
+        rows = P.Rows._make(_blank(array, n) for array in self.rows)
+        rows.status[:] = P.INVALID
+        put_rows(rows, known, self.rows)
+        coordinates = _blank(self.coordinates, n)
+        coordinates[known] = self.coordinates
+        return Configurations(rows, coordinates)
+
+
+def _blank(array: NDArray[Any], n: int) -> NDArray[Any]:
+    """Room for n rows like those of an array: NaN, or 0 for integers."""
+    return np.full((n, *array.shape[1:]), np.nan if array.dtype.kind == "f" else 0, array.dtype)
+
+
+def joint_coordinates(mechanism: Mechanism, start: Configurations | None) -> Floats:
+    """Joint coordinates to start from, (n, columns) or (1, columns), as deviations from home; home's are zero."""
+    return np.zeros((1, len(closure_of(mechanism).scale))) if start is None else start.coordinates

@@ -1,0 +1,114 @@
+"""Rotations in stacks: matrices (..., 3, 3) from angles, vectors and quaternions, and back."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def from_rotvec(vectors: Floats) -> Floats:
+    """Matrices (..., 3, 3) of rotation vectors (..., 3) [rad], by Rodrigues' formula.
+
+    R = I + sinc(a) K + sinc(a / 2)^2 / 2 K^2 with K the cross product by the vector and a its length: exact down to
+    zero, so that there is no branch for small angles.
+    """
+    angles = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    K = np.cross(np.eye(3), vectors[..., None, :])
+    return np.asarray(np.eye(3) + np.sinc(angles / np.pi) * K + 0.5 * np.sinc(0.5 * angles / np.pi) ** 2 * (K @ K))
+
+
+def from_rpy(angles: Floats) -> Floats:
+    """Matrices (..., 3, 3) of roll, pitch, yaw (..., 3) [rad] about fixed x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    turns = from_rotvec(angles[..., :, None] * np.eye(3))
+    return np.asarray(turns[..., 2, :, :] @ turns[..., 1, :, :] @ turns[..., 0, :, :])
+
+
+def to_rpy(rotations: Floats) -> Floats:
+    """Roll, pitch, yaw (..., 3) [rad] of matrices (..., 3, 3), the inverse of `from_rpy`.
+
+    Pitch lies within a quarter turn. At a quarter turn only yaw - roll (or yaw + roll) is determined; roll is 0 there.
+    """
+    cos_pitch = np.hypot(rotations[..., 0, 0], rotations[..., 1, 0])
+    pitch = np.arctan2(-rotations[..., 2, 0], cos_pitch)
+    locked = cos_pitch < GIMBAL_LOCK
+    roll = np.where(locked, 0.0, np.arctan2(rotations[..., 2, 1], rotations[..., 2, 2]))
+    y, x = (
+        np.where(locked, a, b)
+        for a, b in ((-rotations[..., 0, 1], rotations[..., 1, 0]), (rotations[..., 1, 1], rotations[..., 0, 0]))
+    )
+    return np.stack([roll, pitch, np.arctan2(y, x)], axis=-1)
+
+
+GIMBAL_LOCK = 1e-9
+"""Cosine of pitch below which roll and yaw cannot be told apart: what is left of it is rounding."""
+
+
+def from_quaternion(quaternions: Floats) -> Floats:
+    """Matrices (..., 3, 3) of quaternions (..., 4) of any nonzero norm, scalar last."""
+    x, y, z, w = np.moveaxis(quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1)).copy()
+
+
+def to_quaternion(vectors: Floats) -> Floats:
+    """Unit quaternions (..., 4), scalar last, of rotation vectors (..., 3) [rad]."""
+    half = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.concatenate([0.5 * np.sinc(half / np.pi) * vectors, np.cos(half)], axis=-1)
+
+
+def rotvec_from_quaternion(quaternions: Floats) -> Floats:
+    """Rotation vectors (..., 3) [rad], at most pi long, of unit quaternions (..., 4), scalar last."""
+    vector, scalar = quaternions[..., :3], quaternions[..., 3]
+    half = np.arctan2(np.linalg.norm(vector, axis=-1), np.abs(scalar))
+    return np.asarray(vector * np.copysign(2.0 / np.sinc(half / np.pi), scalar)[..., None])
+
+
+def composed(after: Floats, before: Floats) -> Floats:
+    """Rotation vectors (..., 3) [rad], at most pi long, of two rotations one after the other."""
+    a, b = to_quaternion(after), to_quaternion(before)
+    v, w, v0, w0 = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
+    scalar = w * w0 - (v * v0).sum(axis=-1, keepdims=True)
+    return rotvec_from_quaternion(np.concatenate([w * v0 + w0 * v + np.cross(v, v0), scalar], axis=-1))
+
+
+def angles_and_sines(rotations: Floats) -> tuple[Floats, Floats]:
+    """Angles (...,) [rad], accurate down to zero, and axes times their sines (..., 3), of matrices (..., 3, 3)."""
+    skew = rotations - np.swapaxes(rotations, -1, -2)
+    sines = 0.5 * np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
+    cosine = 0.5 * (np.trace(rotations, axis1=-2, axis2=-1) - 1.0)
+    return np.asarray(np.arctan2(np.linalg.norm(sines, axis=-1), cosine)), sines
+
+
+def nearest_rotations(matrices: Floats) -> Floats:
+    """The orthogonal matrices (..., 3, 3) nearest to given ones: polar decomposition, by singular values."""
+    U, _, Vt = np.linalg.svd(matrices)
+    return np.asarray(U @ Vt)
+
+
+def shortest_turns(a: Floats, b: Floats) -> Floats:
+    """Rotations (n, 3, 3) that take unit vectors a to b, (n, 3), the shortest way; half a turn for opposite ones."""
+    middle = a + b
+    opposite = np.linalg.norm(middle, axis=1) < OPPOSITE
+    across = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=1)])
+    middle = np.where(opposite[:, None], across, middle)
+    middle = middle / np.linalg.norm(middle, axis=1)[:, None]
+    half_turn = 2.0 * middle[:, :, None] * middle[:, None, :] - np.eye(3)
+    # a half turn about the middle takes a to b; one about a before it makes the two the shortest turn
+    about_a = 2.0 * a[:, :, None] * a[:, None, :] - np.eye(3)
+    return np.asarray(np.where(opposite[:, None, None], half_turn, half_turn @ about_a))
+
+
+OPPOSITE = 1e-9
+"""Length of the sum of two unit vectors below which they are opposite, and any axis across will do."""
+
+
+def random_quaternions(n: int, rng: np.random.Generator) -> Floats:
+    """Unit quaternions (n, 4), scalar last, uniform over all rotations."""
+    q = np.roll(rng.normal(size=(n, 4)), -1, axis=1)
+    return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))

@@ -1,0 +1,69 @@
+"""Targets in: poses, positions, and joint coordinates, as poses (n, 4, 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .description.mechanism import Mechanism, checked_mechanism
+from .errors import InvalidArgument
+from .kernels.reaching.plan import INVALID
+from .motion.displacements import columns, home_coordinates, joint_displacements
+from .options import Options
+from .poses import SupportsMatrix, as_floats, as_poses, what_is_wrong
+
+Floats = NDArray[np.float64]
+
+Target: TypeAlias = ArrayLike | SupportsMatrix | Mapping[str, ArrayLike]
+"""Poses (..., 4, 4), positions (..., 3), a SciPy RigidTransform, or joint name -> coordinates."""
+
+
+def as_targets(mechanism: Mechanism, target: Target) -> tuple[Floats, tuple[int, ...]]:
+    """Targets as poses (n, 4, 4), C-contiguous, and the batch shape they came in.
+
+    Raises
+    ------
+    InvalidArgument : a wrong shape; joint coordinates of another joint than the one between base and end effector.
+    """
+    checked_mechanism(mechanism)
+    if isinstance(target, Mapping):
+        return _from_joint(mechanism, target)
+    return as_poses(target)
+
+
+def _from_joint(mechanism: Mechanism, target: Mapping[str, Any]) -> tuple[Floats, tuple[int, ...]]:
+    """Poses that have given coordinates at the one joint that connects base and end effector."""
+    between = {mechanism.base, mechanism.end_effector}
+    carrying = [j.name for j in mechanism.joints if set(j.connects) == between and j.type != "fixed"]
+    if len(carrying) != 1:
+        expected = "a pose or position: no single joint connects base and end effector here"
+        raise InvalidArgument("target", f"joint coordinates of {', '.join(target)}", expected)
+    (name,) = carrying
+    if list(target) != [name]:
+        raise InvalidArgument("target", f"coordinates of {', '.join(target) or 'no joint'}", f"those of '{name}'")
+    span = columns(mechanism)[name]
+    n = span.stop - span.start
+    expected = f"finite coordinates of shape (..., {n})" if n > 1 else "finite coordinates of shape (...)"
+    values = as_floats(f"target['{name}']", target[name], expected)
+    values = values if n > 1 else values[..., None]
+    if values.shape[-1:] != (n,) or not np.isfinite(values).all():
+        found = f"shape {values.shape}" if values.shape[-1:] != (n,) else "a number that is not finite"
+        raise InvalidArgument(f"target['{name}']", found, expected)
+    deviations = values.reshape(-1, n) - home_coordinates(mechanism)[span]
+    moved = joint_displacements(mechanism, name, deviations)
+    if mechanism.joint(name).connects[0] != mechanism.base:
+        moved = np.asarray(np.linalg.inv(moved), np.float64)
+    return np.ascontiguousarray(moved @ mechanism.home_pose), values.shape[:-1]
+
+
+def refuse_invalid(targets: Floats, shape: tuple[int, ...], status: NDArray[np.int64], options: Options) -> None:
+    """Raise for rows that are no poses, naming the first of a batch, unless they are to be marked."""
+    if (len(targets) == 1 and status[0] != INVALID) or options.on_invalid == "mark":
+        return
+    bad = np.flatnonzero(status == INVALID)
+    if len(bad):
+        found, first = what_is_wrong(targets[bad[0]]), bad[:5].tolist() if shape else ()
+        raise InvalidArgument("target", found, "finite poses whose rotation is one", rows=first)
