@@ -103,7 +103,7 @@ class TestWhatLegsStandFor:
     def test_a_file_of_legs_is_the_mechanism_that_is_written_joint_by_joint(self):
         bases, tops = round_z([[100, 20, 0], [100, -20, 0]]), round_z([[40, 40, 195], [40, -40, 195]])
         found = loads(HEXAPOD)
-        assert len(found.joints) == 18 and found.actuators == ("B1", "B2", "B3", "B4", "B5", "B6")
+        assert len(found.joints) == 18 and found.actuator_names == ("B1", "B2", "B3", "B4", "B5", "B6")
         for k, (a, c) in enumerate(zip(bases, tops, strict=True)):
             line = np.subtract(a, c) / math.dist(a, c)
             A, B, C = found.joints[3 * k : 3 * k + 3]
@@ -239,7 +239,7 @@ class TestWhatLegsStandFor:
         text += '[[joint]]\nname = "Tip"\ntype = "revolute"\nconnects = ["foreL", "foreR"]\n'
         text += "at = [0, 175, 0]\naxis = [0, 0, 1]\n"
         found = loads(text)
-        assert found.actuators == ("LA1", "RA1")
+        assert found.actuator_names == ("LA1", "RA1")
         assert [str(chain) for chain in pf.decompose(found)] == ["R*-R-R", "R*-R-R"]
 
     @pytest.mark.parametrize(("chain", "via"), [
