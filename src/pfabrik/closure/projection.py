@@ -98,7 +98,8 @@ def project(
     best = Projected(
         close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, P.HOLD_NOTHING)
     )
-    everywhere = [*starts, *(np.repeat(corner[None], n, axis=0) for corner in corners_of(closure.mechanism) if corners)]
+    elsewhere = corners_of(closure.mechanism) if corners else ()
+    everywhere = [*starts, *(np.where(closure.idle, starts[0], corner) for corner in elsewhere)]
     for way in ways:
         open_to_it, hits = np.isinf(best.distances), np.zeros(n, np.int64)
         for start in everywhere:
@@ -156,7 +157,7 @@ def corners_of(mechanism: Mechanism) -> tuple[Floats, ...]:
     Some are as far as the workspace goes from home in four directions; some are chanced upon, in parts of it to which
     no way may lead from home.
     """
-    closure = closure_of(mechanism)
+    closure = closure_of(mechanism, whole=False)
     directions = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]) / np.sqrt(3.0)
     offsets = FAR_CORNER * mechanism.characteristic_length * directions
     poses = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from ..motion.limits import within_turns
 from ..options import Options
 from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
-from .close import HELD, Closing, Closure, close, closure_of, platform_poses
+from .close import HELD, Closing, Closure, close, closure_of, measured, platform_poses
 from .configurations import Configurations, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
 from .nearest import MARGIN, is_feasible
@@ -48,13 +49,13 @@ class ClosureEngine:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        self._closure = closure_of(mechanism)
+        self._closure = closure_of(mechanism, whole=False)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        known, begin = are_poses(targets), joint_coordinates(self.mechanism, start)
+        known, begin = are_poses(targets), self._begin(start)
         begin = begin[known] if len(begin) > 1 else np.repeat(begin, known.sum(), axis=0)
         return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode).among(known)
 
@@ -66,7 +67,7 @@ class ClosureEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        known, begin = are_poses(targets), joint_coordinates(self.mechanism, start)
+        known, begin = are_poses(targets), self._begin(start)
         found = [np.zeros((0, begin.shape[1]))]
         rows, bends = new_rows(self.mechanism, int(known.sum())), Bends(self.mechanism, options)
         for i, target in enumerate(targets):
@@ -78,6 +79,18 @@ class ClosureEngine:
             if on_progress is not None:
                 on_progress(i + 1, len(targets))
         return Configurations(rows, np.concatenate(found)).among(known)
+
+    def _begin(self, start: Configurations | None) -> Floats:
+        """Joint coordinates to start from; loops beside the way to the end effector, which will rest, are closed."""
+        begin = joint_coordinates(self.mechanism, start)
+        if not _has_loops_aside(self.mechanism):
+            return begin
+        present = measured(self.mechanism, begin)
+        away = np.flatnonzero(~is_feasible(present))
+        if len(away):
+            closure, poses = closure_of(self.mechanism), present.poses[away]
+            present.take(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=MARGIN))
+        return present.coordinates
 
     def _follow_one(self, target: Floats, begin: Floats, options: Options, bends: Bends) -> Configurations:
         answer = _answer(self._closure, target, begin, options, keep_mode=True)
@@ -127,6 +140,8 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
         holds[away] = kept(mechanism, answers.holds, answers.closing.poses, wanted[away])
         found.take(away, answers.closing)
     within_turns(mechanism, found.coordinates)
+    if _has_loops_aside(mechanism):
+        found = measured(mechanism, found.coordinates)._replace(iterations=found.iterations)
     rows = new_rows(mechanism, len(wanted))
     write_closing(closure, found, rows)
     if mechanism.end_effector_is_joint:
@@ -139,6 +154,13 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
     )
     rows.status[:] = np.where(is_feasible(found), np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
     return Configurations(rows, found.coordinates)
+
+
+@lru_cache(maxsize=64)
+def _has_loops_aside(mechanism: Mechanism) -> bool:
+    """Whether there are loops beside every way from the base to the end effector."""
+    counts = [len(closure_of(mechanism, whole).loops.paths) for whole in (True, False)]
+    return counts[0] > counts[1]
 
 
 def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_mode: bool) -> Closing:
@@ -172,10 +194,8 @@ def _search(
         rest = rows[~is_feasible(found)[rows]]
         if not len(rest):
             break
-        scattered = np.repeat(random_coordinates(closure, 1, rng), len(rest), axis=0)
-        if at_rest:
-            reached = _legs_reached(closure, found, rest)
-            scattered = np.where(reached, found.coordinates[rest], scattered)
+        stays = _legs_reached(closure, found, rest) | closure.idle if at_rest else closure.idle
+        scattered = np.where(stays, found.coordinates[rest], random_coordinates(closure, 1, rng))
         tried = _close_below(closure, scattered, wanted[rest], held, STEPS)
         if at_rest:
             _take_legs(closure, found, rest, tried)
