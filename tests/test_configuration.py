@@ -15,7 +15,18 @@ from pfabrik.description.joint_types import KINDS
 from pfabrik.errors import InvalidArgument
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-NAMES = ("five_bar", "stewart", "nrpm", "rps", "delta", "ankle_ups", "ranged_stewart", "cru", "mixed", "serial_spherical")
+NAMES = (
+    "five_bar",
+    "stewart",
+    "nrpm",
+    "rps",
+    "delta",
+    "ankle_ups",
+    "ranged_stewart",
+    "cru",
+    "mixed",
+    "serial_spherical",
+)
 
 
 def machine(name: str) -> Mechanism:
