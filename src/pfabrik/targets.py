@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,7 +33,7 @@ def as_targets(mechanism: Mechanism, target: Target) -> tuple[Floats, tuple[int,
     if isinstance(target, Mapping):
         return _from_joint(mechanism, target)
     poses, shape = as_poses(target)
-    if np.shape(target) == (*shape, 3) and not any(task_of(mechanism).axes):
+    if np.shape(cast(Any, target)) == (*shape, 3) and not any(task_of(mechanism).axes):
         raise InvalidArgument("target", "positions", f"poses: the task of '{mechanism.name}' has no position")
     return poses, shape
 
