@@ -267,9 +267,19 @@ class Solution:
         return plain
 
     def __repr__(self) -> str:
-        counts = {status.name: int((self._rows.status == status).sum()) for status in Status}
-        found = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        found = ", ".join(f"{count} {name}" for name, count in self._counts().items())
         return f"<{type(self).__name__} of '{self.mechanism.name}': {found or 'empty'}>"
+
+    def _repr_html_(self) -> str:
+        """Status, errors, actuators and a small drawing, for notebooks; of a batch, how many rows have each status."""
+        from .notebook import solution_html
+
+        return solution_html(self, self._counts())
+
+    def _counts(self) -> dict[str, int]:
+        """How many rows have each status that occurs."""
+        counts = {status.name: int((self._rows.status == status).sum()) for status in Status}
+        return {name: count for name, count in counts.items() if count}
 
 
 def checked_solution(solution: Any) -> Solution:

@@ -94,7 +94,7 @@ def note_ignored(mechanism: Mechanism, targets: Floats) -> None:
 
 def speed_limits(mechanism: Mechanism, given: Sequence[str]) -> dict[str, float]:
     """Speeds by name [rad/s or length/s], from words as of ``--speed``; what is said of one counts before all."""
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     shown = {readout.name: readout for readout in readouts(mechanism)}
     said: dict[str, float] = {}
@@ -131,7 +131,7 @@ def summary(followed: Track) -> str:
 
 def hasty(followed: Track) -> list[str]:
     """The actuators that would have to be too fast, how fast, and where: one phrase each."""
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     too_fast, speeds, phrases = followed.too_fast, followed.speeds, []
     if too_fast is None or speeds is None:

@@ -6,7 +6,7 @@ from importlib.resources import files
 
 from ..errors import UnknownName
 
-_FOLDER = files(__package__) / "catalog" / "templates"
+_FOLDER = files("pfabrik") / "catalog" / "templates"
 _SUFFIX = ".toml"
 
 
