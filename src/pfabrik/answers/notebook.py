@@ -30,7 +30,7 @@ _HEADER = ("actuator", "value", "min", "max", "unit")
 
 def _facts(solution: Solution, known: bool) -> list[str]:
     if not known:
-        return [solution.status.name.lower()]
+        return [str(solution.status).lower()]
     unit, turned = solution.mechanism.length_unit, np.degrees(solution.rotation_error)
     errors = f"position error {solution.position_error:.3g} {unit}, rotation error {turned:.3g} deg"
     return [as_sentence(solution), errors, f"residual {solution.residual:.2g} {unit}"]

@@ -32,7 +32,7 @@ def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
     ----------
     asked : actuator values (n_a,) [length or rad], where these were asked for and not a pose.
     """
-    status = solution.status.name.lower()
+    status = str(solution.status).lower()
     if status == "reached":
         return "reached"
     if status == "projected" and asked is not None:
@@ -123,7 +123,7 @@ def loop_gap(solution: Solution) -> str:
 def reasons(solution: Solution) -> list[str]:
     """What holds a projected answer back, the hardest first, one phrase for those of a kind and value."""
     names: dict[tuple[str, str], list[str]] = {}
-    for limit in solution.active_limits:
+    for limit in solution._limits[0]:
         is_plain = solution.mechanism.joint(limit.joint).type != "universal"  # length or angle: the bound's unit tells
         names.setdefault(in_words(limit, solution.mechanism), []).append(limit.joint if is_plain else name_of(limit))
     return [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
@@ -168,7 +168,7 @@ def short_names(limits: Iterable[ActiveLimit]) -> str:
 
 def exceeded(solution: Solution) -> list[ActiveLimit]:
     """The limits that a failed answer exceeds, not those that it only lies on."""
-    return [limit for limit in solution.active_limits if is_exceeded(limit, solution.mechanism)]
+    return [limit for limit in solution._limits[0] if is_exceeded(limit, solution.mechanism)]
 
 
 def is_exceeded(limit: ActiveLimit, mechanism: Mechanism) -> bool:

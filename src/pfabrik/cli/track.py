@@ -17,7 +17,6 @@ from .projecting import note_left_out, options_projecting, projecting
 from .whole import whole_file
 
 if TYPE_CHECKING:
-    from ..answers.solution import Solution
     from ..answers.tracked import Track
     from ..answers.words import Floats
     from ..description.mechanism import Mechanism
@@ -150,6 +149,6 @@ def targets_named(rows: Sequence[int]) -> str:
     return f"target{'s' * (len(rows) > 1)} {', '.join(map(str, rows[:ROWS_NAMED]))}{more}"
 
 
-def count_statuses(solution: Solution) -> dict[str, int]:
+def count_statuses(solution: Track) -> dict[str, int]:
     """How many targets ended in each status, by its name in lower case."""
     return {status.name.lower(): int((solution.status == status).sum()) for status in pf.Status}
