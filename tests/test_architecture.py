@@ -30,7 +30,7 @@ MAY_NAME_MACHINES = {
 """Beginnings of paths, and why names of the catalogue may stand there."""
 VOCABULARY = ("delta", "prr", "prs", "psu", "rpr", "rps", "rrr", "ucu")
 """Machines called as their whole family is, by letters of joints, or by another word: so may prose and variables."""
-HEAVY = ("numba", "pydantic", "matplotlib", "scipy")
+HEAVY = ("numba", "matplotlib", "scipy")
 QUICK = 0.5  # seconds to start Python, import and answer
 # Runs a command line in this process, then reports what it loaded; the exit code is the command's.
 PROBE = """
@@ -91,11 +91,6 @@ def test_the_contract_of_closed_forms_names_every_kernel() -> None:
     forbidden = contracts["closed forms do not lean on what they check"]["forbidden_modules"]
     others = {f"pfabrik.kernels.{source.stem}" for source in KERNELS} - {"pfabrik.kernels._jit"}
     assert others - {"pfabrik.kernels.__init__"} <= set(forbidden)
-
-
-def test_pydantic_is_imported_for_files_only() -> None:
-    users = {source.stem for source in SOURCES if any(name.split(".")[0] == "pydantic" for name in imports(source))}
-    assert users <= {"files", "schema"}
 
 
 def test_the_library_never_imports_its_command_or_its_pictures() -> None:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pfabrik.closure.close.close import HELD, close, closure_of, platform_poses
-from pfabrik.reaching.solve.completion import actuators_of, set_actuators
 
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.answers.limits import active_limits
+from pfabrik.closure.close import HELD, close, closure_of, platform_poses
 from pfabrik.description.paths import independent_paths
 from pfabrik.motion.displacements import columns, displacements, gaps, stepped
 from pfabrik.tolerances import TOLERANCES
@@ -85,7 +84,7 @@ def test_excesses_are_those_of_the_limits_themselves(name: str) -> None:
     if any(
         mechanism.joint(each).along for each in mechanism.actuator_names
     ):  # pulled through its foot, a strut points back
-        closed &= (actuators_of(mechanism, found.coordinates) > 0.0).all(axis=1)
+        closed &= (closure_of(mechanism).actuators(found.coordinates) > 0.0).all(axis=1)
     excess = found.excess[closed]
     length = mechanism.characteristic_length
     for row, limits in zip(excess, active_limits(mechanism, found.coordinates[closed]), strict=True):
@@ -136,9 +135,10 @@ def test_a_chained_row_starts_from_the_one_before() -> None:
 def test_actuated_values_survive_the_way_into_coordinates_and_back() -> None:
     mechanism = pf.load("nrpm")
     values = np.random.default_rng(7).uniform(50, 150, (4, len(mechanism.actuator_names)))
-    q = np.zeros((4, len(closure_of(mechanism).scale)))
-    set_actuators(mechanism, q, values)
-    np.testing.assert_allclose(actuators_of(mechanism, q), values)
+    closure = closure_of(mechanism)
+    q = np.zeros((4, len(closure.scale)))
+    closure.put_actuators(q, values)
+    np.testing.assert_allclose(closure.actuators(q), values)
 
 
 def test_paths_are_as_many_as_loops_and_one() -> None:

@@ -9,13 +9,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pfabrik.reaching.solve.rows import new_rows
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from machines import MACHINES, planar, ring
 from pfabrik import Joint, Mechanism, Solution
 from pfabrik.answers.differential import Mobility, forward_jacobian, inverse_jacobian, mobility, singularity
+from pfabrik.closure.configurations import Configurations, new_rows
 from pfabrik.errors import InvalidArgument
 from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units
 from pfabrik.motion.first_order import KINDS, forward_map, generic_of, inverse_map, measures
@@ -206,7 +206,7 @@ def closed(name: str) -> tuple[Mechanism, np.ndarray]:
 
 def answer(machine: Mechanism, q: np.ndarray, shape: tuple[int, ...]) -> Solution:
     """Joint coordinates as an answer, with nothing measured of them."""
-    return Solution(machine, new_rows(machine, None, len(q)), shape, joints_from=lambda: q)
+    return Solution(machine, Configurations(new_rows(machine, len(q)), q), shape)
 
 
 def home(machine: Mechanism) -> np.ndarray:

@@ -17,7 +17,7 @@ import pfabrik as pf
 from fk_machines import PUBLISHED
 from machines import MACHINES
 from pfabrik import Status
-from pfabrik.errors import InvalidArgument
+from pfabrik.errors import InvalidArgument, UnknownName
 
 CATALOGUE = ("five_bar", "stewart", "nrpm")
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -655,8 +655,41 @@ def test_seeds_that_do_not_fit_are_refused() -> None:
     other = pf.solve_ik(machine("five_bar"), machine("five_bar").home_pose)
     pair = pf.solve_fk(mechanism, np.tile(values, (2, 1)))
     for seed in (other, pair, values):
-        with pytest.raises(InvalidArgument, match="seed"):
+        with pytest.raises(InvalidArgument, match="start"):
             pf.solve_fk(mechanism, values, start=seed)
+
+
+def test_actuators_are_given_by_name_in_any_order() -> None:
+    """One number each, or a batch; a single number goes with every row."""
+    mechanism = machine("stewart")
+    values = home_values(mechanism) + np.random.default_rng(8).uniform(-5, 5, (3, 6))
+    values[:, 0] = values[0, 0]
+    by_name = dict(zip(reversed(mechanism.actuator_names), values.T[::-1], strict=True))
+    expected = pf.solve_fk(mechanism, values)
+    np.testing.assert_array_equal(pf.solve_fk(mechanism, by_name).pose, expected.pose)
+    by_name[mechanism.actuator_names[0]] = values[0, 0]
+    np.testing.assert_array_equal(pf.solve_fk(mechanism, by_name).pose, expected.pose)
+    one = pf.solve_fk(mechanism, {name: float(np.ravel(value)[0]) for name, value in by_name.items()})
+    assert one.shape == ()
+    np.testing.assert_array_equal(one.pose, expected.pose[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "told"),
+    [
+        ({"BL1": None}, InvalidArgument, "no value of BL1; expected one for each of BL1"),
+        ({"BL7": 200.0}, UnknownName, "BL7"),
+        ({"AL1": 0.0}, UnknownName, "AL1"),
+        ({"BL1": [200.0, 201.0], "BL2": [200.0] * 3}, InvalidArgument, r"shapes \(2,\), \(3,\)"),
+        ({"BL1": "long"}, InvalidArgument, r"actuators\['BL1'\]: found str"),
+        ({"BL1": np.nan}, InvalidArgument, "not finite"),
+    ],
+)
+def test_actuators_by_a_wrong_name_or_shape_are_told(change: dict[str, object], error: type, told: str) -> None:
+    mechanism = machine("stewart")
+    values = dict(zip(mechanism.actuator_names, home_values(mechanism), strict=True)) | change
+    with pytest.raises(error, match=told):
+        pf.solve_fk(mechanism, {name: value for name, value in values.items() if value is not None})
 
 
 def test_answers_of_inverse_kinematics_carry_the_same_fields() -> None:

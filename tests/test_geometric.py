@@ -432,7 +432,7 @@ def test_a_range_is_kept_to_its_tolerance_and_no_further(name: str, joint: str) 
 
 @pytest.mark.parametrize("joint, other", [("AL1", "CL1"), ("AR2", "CR2"), ("CL3", "AL3"), ("CR1", "AR1")])
 def test_a_cone_is_kept_to_its_tolerance_and_no_further(joint: str, other: str) -> None:
-    stewart = pf.load("stewart").with_limits(dict.fromkeys(pf.load("stewart").actuators))
+    stewart = pf.load("stewart").with_limits(dict.fromkeys(pf.load("stewart").actuator_names))
     aside = [BESIDE["stewart"] @ pf.pose([0, y, 0], rpy=[0.01 * y, 0, 0]) for y in (-40, 40)]
     target = max(aside, key=lambda each: cone_angle(stewart, joint, other, each))
     angle = cone_angle(stewart, joint, other, target)
@@ -469,7 +469,7 @@ def test_cones_of_half_a_turn_and_more_limit_nothing() -> None:
 
 
 def test_a_strut_without_length_keeps_every_cone() -> None:
-    stewart = pf.load("stewart").with_limits(dict.fromkeys(pf.load("stewart").actuators))
+    stewart = pf.load("stewart").with_limits(dict.fromkeys(pf.load("stewart").actuator_names))
     head = np.array(stewart.joint("CL1").at) - stewart.reference_point
     only = {joint.name: None for joint in stewart.joints if joint.cone and joint.name not in ("AL1", "CL1")}
     foot = np.array(stewart.joint("AL1").at)
@@ -599,7 +599,7 @@ def test_blocks_on_several_cores_answer_as_one() -> None:
     answer = pf.geometric.solve_ik(mechanism, wanted)
     np.testing.assert_array_equal(answer.actuators[:1000], answer.actuators[-1000:])
     rows = pf.geometric.solve_ik(
-        mechanism, wanted, seed=SimpleNamespace(actuators=np.tile(closed_form(mechanism).home, (9000, 1)))
+        mechanism, wanted, start=SimpleNamespace(actuators=np.tile(closed_form(mechanism).home, (9000, 1)))
     )
     np.testing.assert_array_equal(rows.actuators, answer.actuators)
 

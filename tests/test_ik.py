@@ -296,7 +296,7 @@ def test_seeds_that_do_not_fit_are_refused() -> None:
     other = pf.solve_ik(pf.load("five_bar"), pf.load("five_bar").home_pose)
     pair = pf.solve_ik(mechanism, np.tile(mechanism.home_pose, (2, 1, 1)))
     for seed in (other, pair, mechanism.home_pose):
-        with pytest.raises(InvalidArgument, match="seed"):
+        with pytest.raises(InvalidArgument, match="start"):
             pf.solve_ik(mechanism, mechanism.home_pose, start=seed)
 
 

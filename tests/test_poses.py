@@ -60,6 +60,37 @@ def test_a_pose_is_position_and_rotation_and_a_last_row() -> None:
     np.testing.assert_array_equal(pf.pose((1, 2, 3))[:3, :3], np.eye(3))
 
 
+def test_poses_come_in_batches_whose_leading_axes_are_broadcast() -> None:
+    positions = np.arange(18.0).reshape(2, 3, 3)
+    turns = np.random.default_rng(5).uniform(-3, 3, (3, 3))
+    for given, rotations in (
+        ({"rotvec": turns}, Rotation.from_rotvec(turns)),
+        ({"rpy": turns}, Rotation.from_euler("xyz", turns)),
+        ({"rotation": Rotation.from_rotvec(turns)}, Rotation.from_rotvec(turns)),
+        ({"quat_xyzw": Rotation.from_rotvec(turns).as_quat()}, Rotation.from_rotvec(turns)),
+    ):
+        T = pf.pose(positions, **given)
+        assert T.shape == (2, 3, 4, 4)
+        np.testing.assert_array_equal(T[..., :3, 3], positions)
+        np.testing.assert_allclose(T[..., :3, :3], np.stack([rotations.as_matrix()] * 2), rtol=0, atol=1e-14)
+        np.testing.assert_array_equal(T[..., 3, :], np.broadcast_to((0, 0, 0, 1), (2, 3, 4)))
+    assert pf.pose(positions).shape == (2, 3, 4, 4)
+    assert pf.pose((1, 2, 3), rpy=turns).shape == (3, 4, 4)
+    assert pf.pose(np.zeros((0, 3)), rpy=(0, 0, 1)).shape == (0, 4, 4)
+    with pytest.raises(InvalidArgument, match=r"xyz: found shape \(2, 3\) beside rotations of batch shape \(3,\)"):
+        pf.pose(np.zeros((2, 3)), rpy=turns)
+
+
+def test_degrees_are_of_angles_and_of_rotation_vectors_alone() -> None:
+    angles = np.array([(10.0, -20.0, 30.0), (170.0, 80.0, -170.0)])
+    for name in ("rpy", "rotvec"):
+        expected = pf.pose((1, 2, 3), **{name: np.radians(angles)})
+        np.testing.assert_array_equal(pf.pose((1, 2, 3), **{name: angles}, degrees=True), expected)
+    quaternion = Rotation.from_rotvec(angles[0], degrees=True).as_quat()
+    expected = pf.pose((1, 2, 3), quat_xyzw=quaternion)
+    np.testing.assert_array_equal(pf.pose((1, 2, 3), quat_xyzw=quaternion, degrees=True), expected)
+
+
 def test_every_pose_is_its_own_array() -> None:
     first, second = pf.pose([0, 0, 0]), pf.pose([0, 0, 0])
     first[0, 0] = 7.0
@@ -75,7 +106,7 @@ def test_two_rotations_are_a_conflict_that_names_both() -> None:
     "argument, value",
     [
         ("xyz", [0, 0]),
-        ("xyz", [[0, 0, 0]]),
+        ("xyz", [[0, 0]]),
         ("xyz", [0, 0, np.nan]),
         ("xyz", "here"),
         ("rpy", [0, 0]),
@@ -89,7 +120,6 @@ def test_two_rotations_are_a_conflict_that_names_both() -> None:
         ("rotation", np.diag([1.0, 1.0, -1.0])),
         ("rotation", np.full((3, 3), np.nan)),
         ("rotation", 2 * np.eye(3)),
-        ("rotation", Rotation.identity(2)),
         ("rotvec", [1j, 0, 0]),
         ("rotvec", [True, False, True]),
     ],

@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines import ring
 from pfabrik import Joint, Mechanism, Options, Solution, Status
-from pfabrik.decomposition.plan import flatten
+from pfabrik.closure.configurations import Configurations
+from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels.reaching import plan as P
 
 FIELDS = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
@@ -183,13 +184,13 @@ def test_centres_along_a_trunk_move_with_the_joints_before_them() -> None:
             Joint(f"E{i}", "spherical", (f"r{i}", "platform"), at=head),
         ]
     machine = Mechanism("arm with elbow", joints, "platform", (0, 0, 150))
-    flat = flatten(machine)
+    compiled = compile_plan(machine)
     values = np.array([[0.3, 12.0, -0.5]])
     rows = P.Rows(
-        np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.eye(4)[None], flat.home_seed.nodes,
-        values, np.zeros((1, flat.n_actuators)), np.zeros((1, 5)),
+        np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.eye(4)[None], compiled.home_seed.nodes,
+        values, np.zeros((1, compiled.n_actuators)), np.zeros((1, 5)),
     )  # fmt: skip
-    points = Solution(machine, rows, ()).points
+    points = Solution(machine, Configurations(rows, np.zeros((1, 0))), ()).points
     shoulder = Rotation.from_rotvec([0, 0.3, 0])
     at = np.array((100.0, 0, 0)) + shoulder.apply((90.0 - 100, 0, 40) - 12.0 * np.array((-1, 0, 3)) / np.sqrt(10))
     np.testing.assert_allclose(points["shoulder"], (100, 0, 0), atol=1e-12)
@@ -220,7 +221,7 @@ def test_limits_are_active_up_to_the_stated_distance(
         expected = lengths[joint.name] - homeward * gap
         limit = (expected, 400.0) if bound == "min" else (1.0, expected)
     moved = stewart.with_limits({joint.name: limit})
-    found = Solution(moved, answer._rows, ()).active_limits
+    found = Solution(moved, answer._found, ()).active_limits
     hits = [(hit.bound, hit.limit) for hit in found if hit.joint == joint.name]
     assert hits == ([(bound, pytest.approx(expected))] if named else [])
 
@@ -234,6 +235,24 @@ def test_what_a_caller_does_to_targets_afterwards_changes_no_answer(stewart: Mec
     target[:], path[:] = np.eye(4), np.eye(4)
     assert answer.active_limits == expected
     assert [limit.joint for limit in followed.active_limits[0]] == [limit.joint for limit in expected]
+
+
+def test_the_binding_limit_of_every_row_is_its_first_active_one(stewart: Mechanism) -> None:
+    targets = np.tile(stewart.reference_point, (2, 3, 1)) + np.random.default_rng(4).normal(size=(2, 3, 3)) * 60
+    targets[0, 0], targets[1, 2, 0] = stewart.reference_point, np.nan
+    answer = pf.solve_ik(stewart, targets, options=pf.Options(on_invalid="mark"))
+    binding, limits = answer.binding, answer.active_limits
+    assert binding.shape == (2, 3) and (answer.status == Status.PROJECTED).sum() >= 3
+    for record, listed in zip(binding.ravel(), limits, strict=True):
+        if not listed:
+            assert (record["joint"], record["bound"]) == ("", "")
+            assert np.isnan([record["value"], record["limit"], record["multiplier"]]).all()
+            continue
+        first = listed[0]
+        for field in ("joint", "bound", "coordinate", "value", "limit", "multiplier"):
+            assert record[field] == getattr(first, field)
+    for row in np.ndindex(2, 3):
+        assert (answer[row].binding.shape, answer[row].binding.tobytes()) == ((), binding[row].tobytes())
 
 
 def test_a_status_is_written_by_its_name() -> None:

@@ -19,6 +19,7 @@ from ..tolerances import TOLERANCES
 from .close import HELD, Closing, Closure, close, closure_of, measured, platform_poses
 from .configurations import Configurations, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
+from .known import chanced_upon
 from .nearest import MARGIN, is_feasible
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .projection import kept, project, ways_of
@@ -39,6 +40,9 @@ STRANGE = 0.1
 
 STARTS = 80
 """Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
+
+NEARBY = 16
+"""Known configurations that are tried before random ones, the nearest to the target first."""
 
 STEPS = 30
 """Steps each of them may take: those that arrive need fewer."""
@@ -178,11 +182,29 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
     if len(rest):
         _take_better(found, rest, _led(closure, wanted[rest], start[rest], begin[rest], held, limits=True))
     if not keep_mode:
-        _search(closure, found, rows, wanted, held, at_rest=follows or task.is_whole_pose)
+        at_rest = follows or task.is_whole_pose
+        if not at_rest:
+            _start_nearby(closure, found, targets)
+        _search(closure, found, rows, wanted, held, at_rest=at_rest)
     if not keep_mode and follows and has_parasitic_motion(closure.mechanism):
         anywhere = task.completed(targets, begin)  # in other ways of assembly, where this one does not reach
         _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
     return found
+
+
+def _start_nearby(closure: Closure, found: Closing, targets: Floats) -> None:
+    """Look for what does not reach yet from known configurations whose end effectors are nearest to the targets."""
+    coordinates, poses = chanced_upon(closure.mechanism)
+    task, rest = task_of(closure.mechanism), np.flatnonzero(~is_feasible(found))
+    away = np.array([_distances(closure, poses, np.repeat(targets[[row]], len(poses), axis=0)) for row in rest])
+    for places in np.argsort(away, axis=1)[:, :NEARBY].T if len(rest) else ():
+        waiting = ~is_feasible(found)[rest]
+        if not waiting.any():
+            break
+        rows, places = rest[waiting], places[waiting]
+        start = np.where(closure.idle, found.coordinates[rows], coordinates[places])
+        wanted = task.completed(targets[rows], poses[places])
+        _take_better(found, rows, _close_below(closure, start, wanted, task.held, STEPS))
 
 
 def _search(

@@ -1,0 +1,72 @@
+"""Targets given as coordinates of the joint that carries the end effector on the base."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import closure_machines
+import pfabrik as pf
+from pfabrik import Options, Status
+from pfabrik.errors import InvalidArgument
+
+
+@pytest.mark.parametrize("name", ["ankle_ups", "ankle_rss"])
+def test_a_joint_takes_the_coordinates_that_were_asked_for(name: str) -> None:
+    """A pivot about y and then x: the tilt is theirs, by SciPy's angles, and the answer tells the same coordinates."""
+    mechanism = pf.load(name)
+    asked = np.array([[(0.2, -0.1), (0.0, 0.0), (-0.15, 0.2)], [(0.1, 0.1), (-0.2, -0.05), (0.05, 0.0)]])
+    found = pf.solve_ik(mechanism, {"pivot": asked})
+    assert found and found.shape == (2, 3)
+    np.testing.assert_allclose(found.joints["pivot"], asked, atol=1e-8)
+    turned = Rotation.from_euler("YX", asked.reshape(-1, 2)).as_matrix().reshape(2, 3, 3, 3)
+    np.testing.assert_allclose(found.pose[..., :3, :3], turned, atol=1e-8)
+    np.testing.assert_array_equal(pf.solve_ik(mechanism, {"pivot": [0.2, -0.1]}).actuators, found.actuators[0, 0])
+
+
+def test_coordinates_beyond_the_range_are_projected_to_it() -> None:
+    mechanism = pf.load("ankle_ups").with_limits(BL=(50.0, 160.0), BR=(50.0, 160.0))
+    found = pf.solve_ik(mechanism, {"pivot": (np.radians(45.0), 0.0)})
+    assert found.status is Status.PROJECTED
+    np.testing.assert_allclose(np.degrees(found.joints["pivot"]), (40.0, 0.0), atol=1e-4)
+    assert [(limit.joint, limit.bound) for limit in found.active_limits] == [("pivot", "max")]
+
+
+def test_one_coordinate_counts_from_where_its_joint_does() -> None:
+    """A hinge whose home is 0.3 rad, and a slide told from the platform's side, whose home is 7."""
+    hinge, slider = closure_machines.hinge(), closure_machines.slider()
+    found = pf.solve_ik(hinge, {"R": [0.5, 1.9]})
+    np.testing.assert_allclose(found.actuators[:, 0], [0.5, 1.9], atol=1e-9)
+    np.testing.assert_allclose(found.pose[0, :3, :3], Rotation.from_rotvec([0, 0, 0.2]).as_matrix(), atol=1e-9)
+    found = pf.solve_ik(slider, {"P": 20.0})
+    assert found.shape == () and found.actuators[0] == pytest.approx(20.0, abs=1e-7)
+
+
+def test_a_path_of_coordinates_is_followed() -> None:
+    mechanism = pf.load("ankle_ups")
+    path = np.linspace((0.0, 0.0), (0.3, 0.2), 8)
+    np.testing.assert_allclose(pf.track(mechanism, {"pivot": path}).joints["pivot"], path, atol=1e-8)
+    (kept,) = (mode for mode in pf.working_modes(mechanism, {"pivot": path[3]}) if mode)
+    np.testing.assert_allclose(kept.joints["pivot"], path[3], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "told"),
+    [
+        ("stewart", {"BL1": 200.0}, "found joint coordinates of BL1; expected a pose or position: no single joint"),
+        ("ankle_ups", {"pivt": (0.1, 0.0)}, "found coordinates of pivt; expected those of 'pivot'"),
+        ("ankle_ups", {"pivot": (0.1, 0.0), "BL": 100.0}, "found coordinates of pivot, BL; expected those of 'pivot'"),
+        ("ankle_ups", {}, "found coordinates of no joint"),
+        ("ankle_ups", {"pivot": 0.1}, r"target\['pivot'\]: found shape \(\); expected finite coordinates of shape"),
+        ("ankle_ups", {"pivot": (0.1, 0.0, 0.2)}, r"target\['pivot'\]: found shape \(3,\)"),
+        ("ankle_ups", {"pivot": (0.1, np.nan)}, r"target\['pivot'\]: found a number that is not finite"),
+        ("ankle_ups", {"pivot": "level"}, r"target\['pivot'\]: found str"),
+    ],
+)
+def test_coordinates_that_are_no_target_are_told(name: str, target: Any, told: str) -> None:
+    for options in (None, Options(on_invalid="mark")):
+        with pytest.raises(InvalidArgument, match=told):
+            pf.solve_ik(pf.load(name), target, options=options)
