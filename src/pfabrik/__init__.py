@@ -60,6 +60,7 @@ _HOMES = {
     "forward_jacobian": "answers.differential",
     "singularity": "answers.differential",
     "solve_fk": "fk",
+    "warm_up": "warm_up",
 }
 # Modules that are themselves public.
 _MODULES = ("errors", "geometric")
@@ -100,6 +101,7 @@ __all__ = [
     "solve_ik",
     "track",
     "travel",
+    "warm_up",
     "working_modes",
 ]
 
@@ -125,6 +127,7 @@ if TYPE_CHECKING:
     from .poses import pose
     from .track import track
     from .travel import Travel, travel
+    from .warm_up import warm_up
 
 
 def __getattr__(name: str) -> Any:
