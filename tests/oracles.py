@@ -212,7 +212,7 @@ class _Crank:
         ]
         return np.stack(values, axis=2), slack
 
-    def margins(tips: Array) -> Array:
+    def margins(self, tips: Array) -> Array:
         """Margin of either mode, ``(n, 2)``."""
         values, slack = self.solve(tips)
         ranges = (self.shoulder.range, self.elbow.range)
