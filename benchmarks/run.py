@@ -46,7 +46,7 @@ when `points` is read. Reachable targets lie within 0.2 L and 0.2 rad of home (N
 and 0.5 rad; these are projected exactly where a row does not say "centroid"; the closure engine, which answers the
 delta's partial task, has no other way. Newton's method in NumPy (benchmarks/newton.py) knows the hexapod, solves six
 equations in the pose for whole batches at a time, and looks at no passive joint and no limit; forward kinematics here
-closes all loops in all joint coordinates, and measures limits. Seeds are answers up to 0.01 L and 0.01 rad away. The
+closes all loops in all joint coordinates, and measures limits. Starts are answers up to 0.01 L and 0.01 rad away. The
 platform with 40 modes is that of Dietmaier (1998). Times of modes and of new processes are for all of it, not for a
 pose."""
 

@@ -21,7 +21,8 @@ for limit in nearest.active_limits:
 within = pf.solve_ik(mechanism, (0, 20, 200))
 (joint, bound), margin = min(pf.margins(within).items(), key=lambda item: item[1])
 print(f"{within.status.name}: {joint} is nearest to its {bound}, {margin:.0%} of the room left")
-print("reach along y:", pf.travel(mechanism, (0, 20, 200), [(0, 1, 0), (0, -1, 0)]).round(2))
+for each in pf.travel(within, along=[(0, 1, 0), (0, -1, 0)]):
+    print(f"  {each.distance:.2f} mm along {each.direction}, then {each.stopped_by[0].joint} stops it")
 
 # A path that leaves the workspace and comes back, a target every 20 ms; no strut may be faster than 200 mm/s.
 angle = np.linspace(0, 2 * np.pi, 181)

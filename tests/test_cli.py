@@ -23,10 +23,10 @@ from click.testing import CliRunner, Result
 
 import pfabrik as pf
 from pfabrik.answers.words import as_sentence
+from pfabrik.catalog import template, templates
 from pfabrik.cli import main
 from pfabrik.cli.answer import describe_modes
 from pfabrik.files import loads
-from pfabrik.files.templates import template, templates
 from pfabrik.rotations import to_rpy
 
 WITHIN_REACH = ["--position", "10", "0", "190"]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pfabrik.closure.close import HELD, close, closure_of, platform_poses
 
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.answers.limits import active_limits
+from pfabrik.closure.close import HELD, close, closure_of, platform_poses
 from pfabrik.description.paths import independent_paths
 from pfabrik.motion.displacements import columns, displacements, gaps, stepped
 from pfabrik.tolerances import TOLERANCES

@@ -15,7 +15,18 @@ from pfabrik.description.joint_types import KINDS
 from pfabrik.errors import InvalidArgument
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-NAMES = ("five_bar", "stewart", "nrpm", "rps", "delta", "ankle_ups", "ranged_stewart", "cru", "mixed", "serial_spherical")
+NAMES = (
+    "five_bar",
+    "stewart",
+    "nrpm",
+    "rps",
+    "delta",
+    "ankle_ups",
+    "ranged_stewart",
+    "cru",
+    "mixed",
+    "serial_spherical",
+)
 
 
 def machine(name: str) -> Mechanism:
@@ -122,7 +133,7 @@ def test_a_joint_vector_starts_as_the_answer_it_comes_from(name: str) -> None:
 def test_a_joint_vector_keeps_its_working_mode() -> None:
     """Each of a 5-bar's four, by the way its elbows are bent; one start for all targets, or one for each."""
     mechanism = pf.load("five_bar").without_limits()
-    modes = [mode for mode in pf.working_modes(mechanism, (0.0, 10.0, 180.0))]
+    modes = list(pf.working_modes(mechanism, (0.0, 10.0, 180.0)))
     targets = np.array([(0.0, -10.0, 170.0), (0.0, 30.0, 190.0)])
     assert len(modes) == 4
     seen = set()

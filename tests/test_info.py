@@ -12,7 +12,7 @@ from machines import MACHINES
 from pfabrik.cli import main
 from pfabrik.cli.info import chain_table, clean, vector
 from pfabrik.decomposition.decompose import beyond_positions, closure_reason, engine_of
-from pfabrik.engine import engine_of as engine_that_answers
+from pfabrik.engine import engine_of as answering_engine
 from pfabrik.reaching.solve import ReachingEngine
 
 
@@ -41,7 +41,7 @@ def test_lengths_are_cleaned_relative_to_the_machine() -> None:
 @pytest.mark.parametrize("name", pf.catalog())
 def test_the_engine_shown_is_the_one_that_answers(name: str) -> None:
     mechanism = pf.load(name)
-    expected = "reaching" if isinstance(engine_that_answers(mechanism), ReachingEngine) else "closure"
+    expected = "reaching" if isinstance(answering_engine(mechanism), ReachingEngine) else "closure"
     assert engine_of(mechanism) == expected
     lines = chain_table(mechanism).splitlines()[1:]
     assert {re.split(r" {2,}", line.strip())[2] for line in lines} == {expected}

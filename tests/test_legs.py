@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 import pfabrik as pf
 from pfabrik import Cone, Joint, Leg, Mechanism
 from pfabrik.description.chains import read_chain
+from pfabrik.description.form_faults import MOST_FAULTS
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from pfabrik.files import dumps, loads
-from pfabrik.files.schema import MOST_FAULTS, MOST_JOINTS
+from pfabrik.files.reading import MOST_JOINTS
 
 PAGE = Path(__file__).parents[1] / "docs" / "describing-a-mechanism.md"
 HEAD = 'schema = 1\nname = "m"\nend_effector = "platform"\nreference_point = [0, 0, 195]\n'
@@ -102,7 +103,7 @@ class TestWhatLegsStandFor:
     def test_a_file_of_legs_is_the_mechanism_that_is_written_joint_by_joint(self):
         bases, tops = round_z([[100, 20, 0], [100, -20, 0]]), round_z([[40, 40, 195], [40, -40, 195]])
         found = loads(HEXAPOD)
-        assert len(found.joints) == 18 and found.actuators == ("B1", "B2", "B3", "B4", "B5", "B6")
+        assert len(found.joints) == 18 and found.actuator_names == ("B1", "B2", "B3", "B4", "B5", "B6")
         for k, (a, c) in enumerate(zip(bases, tops, strict=True)):
             line = np.subtract(a, c) / math.dist(a, c)
             A, B, C = found.joints[3 * k : 3 * k + 3]
@@ -125,6 +126,12 @@ class TestWhatLegsStandFor:
         assert found.joint("B1").cone.fixed_to == "AB1"
         assert found.joint("B1").cone.axis == pytest.approx(np.array([-40, -20, 125]) / math.hypot(40, 20, 125))
         assert [str(chain) for chain in pf.decompose(found)] == ["R*-U-S"] * 6
+
+    def test_drives_say_what_they_can_do_by_their_letters(self):
+        found = loads(edited(SERVOS, ("A.range = [-80, 80]", "A.max_speed = 180")))
+        assert [found.joint(f"A{leg}").max_speed for leg in range(1, 7)] == [math.pi] * 6
+        faults = faults_of(edited(SERVOS, ("A.range = [-80, 80]", "B.max_speed = 180")))
+        assert faults["leg[0].B.max_speed"].endswith("(joint B1) -> nothing: the joint is not actuated")
 
     def test_rails_have_no_point_of_their_own(self):
         found = loads(TRIPOD)
@@ -232,7 +239,7 @@ class TestWhatLegsStandFor:
         text += '[[joint]]\nname = "Tip"\ntype = "revolute"\nconnects = ["foreL", "foreR"]\n'
         text += "at = [0, 175, 0]\naxis = [0, 0, 1]\n"
         found = loads(text)
-        assert found.actuators == ("LA1", "RA1")
+        assert found.actuator_names == ("LA1", "RA1")
         assert [str(chain) for chain in pf.decompose(found)] == ["R*-R-R", "R*-R-R"]
 
     @pytest.mark.parametrize(("chain", "via"), [
@@ -391,12 +398,12 @@ HOSTILE = [
     ),
     (edited(HEXAPOD, ("U-P*-S", "U*-P*-S")), "leg[0].chain", "an actuated universal joint (joint A1)"),
     (edited(HEXAPOD, ("base = [[100, 20, 0], [100, -20, 0]]\n", "")), "leg[0].base", "nothing -> points"),
-    (edited(HEXAPOD, ("base = [[100, 20, 0], [100, -20, 0]]", "base = []")), "leg[0].base", "() -> points"),
-    (edited(HEXAPOD, ("[100, -20, 0]", "[100, -20]")), "leg[0].base[1]", "(100.0, -20.0) -> three numbers"),
+    (edited(HEXAPOD, ("base = [[100, 20, 0], [100, -20, 0]]", "base = []")), "leg[0].base", "[] -> points"),
+    (edited(HEXAPOD, ("[100, -20, 0]", "[100, -20]")), "leg[0].base[1]", "[100, -20] -> three numbers"),
     (edited(HEXAPOD, ("[100, -20, 0]", '[100, "-20", 0]')), "leg[0].base[1]", "three numbers"),
     (edited(HEXAPOD, ("[100, -20, 0]", "[100, nan, 0]")), "leg[0].base[1]", "finite"),
     (edited(HEXAPOD, ("[100, -20, 0]", "[100, true, 0]")), "leg[0].base[1]", "three numbers"),
-    (edited(HEXAPOD, ("[100, -20, 0]", "7")), "leg[0].base[1]", "7.0 -> three numbers"),
+    (edited(HEXAPOD, ("[100, -20, 0]", "7")), "leg[0].base[1]", "7 -> three numbers"),
     (edited(HEXAPOD, (", [40, -40, 195]]", "]")), "leg[0].platform", "1 point -> 2, one for each leg"),
     (edited(HEXAPOD, ("[[40, 40, 195], [40, -40, 195]]", "[40, 40, 195]")), "leg[0].platform", "1 point -> 2"),
     (
@@ -407,7 +414,7 @@ HOSTILE = [
     (edited(SERVOS, ("via = [[95, 65, 0], [95, -65, 0]]\n", "")), "leg[0].via", "nothing -> points"),
     (edited(SERVOS, ("R*-U-S", "R*-U-R-S")), "leg[0].via", "2 lists of points, one for each joint of 'R*-U-R-S'"),
     (edited(SERVOS, ("R*-U-S", "R*-U-R-R-S")), "leg[0].via", "3 lists of points, one for each joint of 'R*-U-R-R-S'"),
-    (edited(SERVOS, ("[95, -65, 0]", "[95, -65]")), "leg[0].via[1]", "(95.0, -65.0) -> three numbers"),
+    (edited(SERVOS, ("[95, -65, 0]", "[95, -65]")), "leg[0].via[1]", "[95, -65] -> three numbers"),
     (edited(SERVOS, ('A.axis = ["x", "-x"]\n', "")), "leg[0].A.axis", "nothing, for a revolute joint -> a direction"),
     (
         edited(SERVOS, ('["x", "-x"]', '["x", "-x", "y"]')),
@@ -437,7 +444,7 @@ HOSTILE = [
         "40 to 90 (joint A1) -> a range that contains home",
     ),
     (edited(TRIPOD, ("range = [-30, 30]", "range = [30, -30]")), "leg[0].B.range", "the lowest value first"),
-    (edited(TRIPOD, ("range = [-30, 30]", "range = 30")), "leg[0].B.range", "30 -> two numbers"),
+    (edited(TRIPOD, ("range = [-30, 30]", "range = 30")), "leg[0].B.range", "30 (joint B1) -> two numbers"),
     (edited(TRIPOD, ("home = 100", "homme = 100")), "leg[0].A.homme", "did you mean 'home'?"),
     (edited(TRIPOD, ("B = {", "Z = {")), "leg[0].Z", "a joint that the chain does not have -> one of A, B, C"),
     (edited(TRIPOD, ("B = {", "b = {")), "leg[0].b", "did you mean 'B'? -> one of chain, name, connects"),
@@ -453,7 +460,7 @@ HOSTILE = [
         "leg[0].stroke",
         "a range that contains home, 205",
     ),
-    (edited(HEXAPOD, ("stroke = [155, 280]", "stroke = 5")), "leg[0].stroke", "5 -> two numbers"),
+    (edited(HEXAPOD, ("stroke = [155, 280]", "stroke = 5")), "leg[0].stroke", "5 (joint B1) -> two numbers"),
     (edited(HEXAPOD, ("stroke", "strok")), "leg[0].strok", "did you mean 'stroke'?"),
     (edited(HEXAPOD, ("stroke", "range")), "leg[0].range", "did you mean 'A.range' or 'B.range' or 'C.range'?"),
     (
@@ -474,7 +481,7 @@ HOSTILE = [
         "did you mean 'platform'? -> 'BC' or 'platform'",
     ),
     (edited(HEXAPOD, ("A.cone = {", "B.cone = {")), "leg[0].B.cone", "nothing: a prismatic joint has no cone"),
-    (edited(HEXAPOD, ("A.cone =", "A.home =")), "leg[0].A.home", "a number"),
+    (edited(HEXAPOD, ("A.cone =", "A.home =")), "leg[0].A.home", "(joint A1) -> two numbers"),
     (edited(HEXAPOD, ("count = 3", "count = 0")), "leg[0].copies.count", "0 -> a whole number"),
     (
         edited(HEXAPOD, ("copies = { count = 3, axis = [0, 0, 1] }", "copies = { count = 3, axis = [0, 0, 0] }")),
@@ -560,13 +567,13 @@ class TestFaults:
         ({"A": {"axes": [["x", "y"], ["x", "q"], ["x", "y"]]}}, "leg[0].A.axes[1][1]", "'q' -> a direction"),
         ({"A": {"axis": "x"}}, "leg[0].A.axis", "nothing: a universal joint has no axis"),
         ({"A": {"rnage": 1}}, "leg[0].A.rnage", "did you mean 'range'?"),
-        ({"A": 5}, "leg[0].A", "5.0 -> a table"),
-        ({"A": {"cone": 5}}, "leg[0].A.cone", "5.0 -> a table"),
+        ({"A": 5}, "leg[0].A", "5 -> a table"),
+        ({"A": {"cone": 5}}, "leg[0].A.cone", "5 -> a table"),
         ({"AB": {}}, "leg[0].AB", "a joint that the chain does not have"),
         ({"copies": {"count": 2.5, "axis": (0, 0, 1)}}, "leg[0].copies.count", "2.5 -> a whole number"),
         ({"copies": {"count": 2}}, "leg[0].copies.axis", "nothing -> three numbers"),
-        ({"copies": {"cuont": 2}}, "leg[0].copies", "a table: count, axis"),
-        ({"copies": 3}, "leg[0].copies", "3.0 -> a table: count, axis"),
+        ({"copies": {"cuont": 2}}, "leg[0].copies.cuont", "did you mean 'count'?"),
+        ({"copies": 3}, "leg[0].copies", "3 -> a table: count, axis"),
         ({"stroke": "long"}, "leg[0].stroke", "'long' (joint B1) -> two numbers"),
         ({"base": "here"}, "leg[0].base", "'here' -> points of three numbers"),
         ({"base_body": ""}, "base", "a text that is not empty"),

@@ -303,7 +303,7 @@ JOINT_FAULTS = [
     ({"connects": ("base", 5)}, "connects", "the names of two bodies"),
     ({"connects": ("crank1", "crank1")}, "connects", "'crank1' twice -> two different"),
     ({"at": None}, "at", "nothing -> three numbers, the centre of the revolute joint"),
-    ({"at": (1, 2)}, "at", "(1.0, 2.0) -> three numbers"),
+    ({"at": (1, 2)}, "at", "[1, 2] -> three numbers"),
     ({"at": (1, True, 2)}, "at", "three numbers"),
     ({"at": (1, 10**400, 2)}, "at", "three numbers"),
     ({"at": object()}, "at", "three numbers"),
@@ -322,11 +322,11 @@ JOINT_FAULTS = [
     ({**SQUARE, "type": "universal", "actuated": True}, "actuated", "an actuated universal joint"),
     ({"type": "cylindrical", "actuated": True}, "actuated", "an actuated cylindrical joint"),
     ({"type": "fixed", "axis": None}, "actuated", "an actuated fixed joint"),
-    ({"home": (1, 2)}, "home", "(1.0, 2.0) -> a number"),
+    ({"home": (1, 2)}, "home", "[1, 2] -> a number"),
     ({"home": math.inf}, "home", "finite"),
     ({"type": "cylindrical", "actuated": False, "home": 1}, "home", "two numbers"),
     ({"type": "spherical", "axis": None, "actuated": False, "home": 1}, "home", "nothing: it counts from home"),
-    ({"range": 3}, "range", "3.0 -> two numbers"),
+    ({"range": 3}, "range", "3 -> two numbers"),
     ({"range": ()}, "range", "two numbers"),
     ({"range": (1, -1)}, "range", "(57.29577951 deg) to -1 rad"),
     ({"range": (-math.inf, 1)}, "range", "two numbers, finite"),
@@ -348,6 +348,32 @@ JOINT_FAULTS = [
     ({**SQUARE, "type": "universal", "cone": Cone(Z, 3, "arm1")}, "cone.fixed_to", "'arm1' -> 'base' or 'crank1'"),
     ({**SQUARE, "type": "universal", "cone": Cone(Z, 1, "base")}, "cone.half_angle", "at least the angle at home"),
 ]  # fmt: skip
+
+
+class TestDrives:
+    def test_a_drive_may_say_what_it_can_do(self):
+        joint = Joint("a", "revolute", ("base", "crank1"), at=(0, 0, 0), axis=Z, actuated=True, max_speed=np.float32(2))
+        assert joint.max_speed == 2.0 and joint.max_acceleration is None
+
+    @pytest.mark.parametrize(
+        ("value", "fault"),
+        [
+            (0, "0 -> a number greater than 0"),
+            (-2.5, "-2.5 -> a number greater than 0"),
+            (math.inf, "a number, finite"),
+            ("fast", "'fast' -> a number"),
+            ((1, 2), "[1, 2] -> a number"),
+            (True, "True -> a number"),
+        ],
+    )
+    @pytest.mark.parametrize("field", ["max_speed", "max_acceleration"])
+    def test_nothing_but_a_positive_number_is_accepted(self, field, value, fault):
+        found = faults_of(changed(five_bar(), "a", **{field: value}))
+        assert list(found) == [f"joint[0].{field}"] and fault in found[f"joint[0].{field}"]
+
+    def test_joints_without_a_drive_have_no_pace(self):
+        found = faults_of(changed(five_bar(), "c", max_speed=3))
+        assert found == {"joint[2].max_speed": "3 -> nothing: the joint is not actuated"}
 
 
 class TestFaults:

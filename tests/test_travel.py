@@ -159,7 +159,9 @@ def test_a_hexapod_goes_along_and_turns_about_a_point_until_its_tightest_limit_i
         assert min(room_of_hexapod(mechanism, at(reach.distance + BESIDE * unit)).values()) < 0.0
         np.testing.assert_allclose(reach.end.pose, at(reach.distance), rtol=0, atol=1e-8 * length)
         room = room_of_hexapod(mechanism, reach.end.pose)
-        near = {limit for limit, left in room.items() if left <= TOLERANCES.active * (1.0 if "cone" in limit else length)}
+        near = {
+            limit for limit, left in room.items() if left <= TOLERANCES.active * (1.0 if "cone" in limit else length)
+        }
         assert {(limit.joint, limit.bound) for limit in reach.stopped_by} == near != set()
 
 
@@ -210,14 +212,18 @@ def test_an_ankle_tilts_from_a_tilted_pose_until_its_tightest_limit_is_met() -> 
         np.testing.assert_allclose(reach.direction, axis, atol=1e-12)
 
         def at(angle: float, axis: np.ndarray = axis) -> np.ndarray:
-            return pf.pose(start.pose[:3, 3], rotation=Rotation.from_rotvec(angle * axis).as_matrix() @ start.pose[:3, :3])
+            return pf.pose(
+                start.pose[:3, 3], rotation=Rotation.from_rotvec(angle * axis).as_matrix() @ start.pose[:3, :3]
+            )
 
         steps = (*np.linspace(0.0, reach.distance, 30, endpoint=False), reach.distance - BESIDE)
         assert min(min(room_of_ankle(machine, at(step)).values()) for step in steps) >= 0.0
         beyond = room_of_ankle(machine, at(reach.distance + BESIDE))
-        assert {(limit.joint, limit.bound) for limit in reach.stopped_by} == {
-            limit for limit, left in beyond.items() if left < 0.0
-        } != set()
+        assert (
+            {(limit.joint, limit.bound) for limit in reach.stopped_by}
+            == {limit for limit, left in beyond.items() if left < 0.0}
+            != set()
+        )
 
 
 # --- what is asked and what is told -------------------------------------------------------------------------------

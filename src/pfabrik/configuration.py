@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .answers.solution import Solution, Status
-from .answers.starts import joint_vectors, measured
+from .answers.starts import joint_vectors
+from .closure.close import measured
 from .closure.nearest import CLOSED, is_feasible
 from .description.mechanism import Mechanism
 from .engine import engine_of

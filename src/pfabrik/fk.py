@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .answers.solution import Solution, Status
-from .answers.starts import Start, measured, start_of
-from .closure.close import Closing, Closure, close, closure_of, platform_poses
+from .answers.starts import Start, start_of
+from .closure.close import Closing, Closure, close, closure_of, measured, platform_poses
 from .closure.configurations import Configurations, joint_coordinates
 from .closure.nearest import is_feasible, nearest
 from .closure.starts import same_random_starts

@@ -29,8 +29,8 @@ class Options:
     max_iterations : K, forward and backward passes a chain may take for one target; of the reaching engine alone.
     max_rounds : how often a projection may revise its target before exact steps take over, which more would bring to
         the same answer; likewise.
-    working_mode : "keep" stays in the seed's working mode (home's without a seed), "any" may change it to reach; None
-        keeps it if there is a seed.
+    working_mode : "keep" stays in the start's working mode (home's without a start), "any" may change it to reach;
+        None keeps it if there is a start.
     hold : what a projection keeps: "orientation" (the paper's choice) or "position" if any feasible pose has it, None
         nothing. `Solution.held` tells what was kept.
     projection : which feasible pose answers a target that is not reached: the "nearest" that local searches from

@@ -177,7 +177,7 @@ class Solution:
     def joints(self) -> Mapping[str, Any]:
         spans = ((name, span) for name, span in columns(self.mechanism).items() if span.stop > span.start)
         single = {name: span.start if span.stop - span.start == 1 else span for name, span in spans}
-        return MappingProxyType({name: self.q[..., place] for name, place in single.items()})
+        return MappingProxyType({name: self.q[..., place][()] for name, place in single.items()})
 
     @cached_property
     def points(self) -> Mapping[str, Floats]:

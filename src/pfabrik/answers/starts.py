@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..closure.close import Closing, close, closure_of, platform_poses
+from ..closure.close import measured
 from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..engine import engine_of
@@ -54,11 +54,6 @@ def joint_vectors(mechanism: Mechanism, q: ArrayLike, name: str) -> tuple[Floats
     if not np.isfinite(array).all():
         raise InvalidArgument(name, "a number that is not finite", "finite joint coordinates")
     return array.reshape(-1, len(home)) - home, array.shape[:-1]
-
-
-def measured(mechanism: Mechanism, deviations: Floats) -> Closing:
-    """Joint coordinates (n, nq), deviations from home, as they are: their loop gaps and limit excesses."""
-    return close(closure_of(mechanism), deviations, platform_poses(mechanism, deviations), max_iterations=0)
 
 
 def _require_shape(own: tuple[int, ...], shape: tuple[int, ...]) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ..files.templates import template, templates, title
+from ..catalog import template, templates, title
 from .table import aligned
 from .whole import whole_file
 

@@ -46,10 +46,11 @@ class Closure:
     actuated: NDArray[np.int64]
     last_balls: frozenset[str]
     home: Floats
+    whole: bool
 
     @property
     def idle(self) -> NDArray[np.bool_]:
-        """Which coordinates are on no path (a tool's hinge): nothing but their limits asks anything of them."""
+        """Which coordinates are on no path (a tool's hinge): they rest, and nothing but their limits counts."""
         idle = np.ones(len(self.scale), bool)
         idle[self.loops.row_columns] = False
         return idle
@@ -64,13 +65,19 @@ class Closure:
 
     def layout(self, locked: frozenset[str]) -> K.Layout:
         """The layout in which some joints do not move."""
-        return _layout(self.mechanism, locked)
+        return _layout(self.mechanism, self.whole, locked)
 
 
 @lru_cache(maxsize=64)
-def closure_of(mechanism: Mechanism) -> Closure:
-    """Compile a mechanism for the closure kernel."""
-    loops = loops_of(mechanism)
+def closure_of(mechanism: Mechanism, whole: bool = True) -> Closure:
+    """Compile a mechanism for the closure kernel.
+
+    Parameters
+    ----------
+    whole : with all loops; else with those alone that the pose of the end effector has to do with. The joints of the
+        others (a gripper's) are idle then.
+    """
+    loops = loops_of(mechanism, whole=whole)
     kinds = [kind for joint in mechanism.joints for kind in KINDS[joint.type].coordinates]
     turning = np.array([float(kind == "angle") for kind in kinds])
     scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
@@ -79,12 +86,12 @@ def closure_of(mechanism: Mechanism) -> Closure:
     ending = loops.columns[loops.visits[loops.paths[1:][loops.last_balls == 1] - 1, 0]]
     starts = {span.start: name for name, span in columns(mechanism).items() if span.stop > span.start}
     balls = frozenset(starts[int(first)] for first in ending)
-    return Closure(mechanism, loops, scale, turning, actuated, balls, home)
+    return Closure(mechanism, loops, scale, turning, actuated, balls, home, whole)
 
 
 @lru_cache(maxsize=256)
-def _layout(mechanism: Mechanism, locked: frozenset[str]) -> K.Layout:
-    loops = closure_of(mechanism).loops
+def _layout(mechanism: Mechanism, whole: bool, locked: frozenset[str]) -> K.Layout:
+    loops = closure_of(mechanism, whole).loops
     free = np.ones(len(loops.group_of), bool)
     for name, span in columns(mechanism).items():
         if name in locked:
@@ -209,6 +216,11 @@ def close(
     layout = closure.layout(locked | closure.last_balls if follow else locked)
     _run(closure.loops, layout, wishes, closed)
     return Closing(closed.coordinates / closure.scale, _in_lengths(closed.poses, length), *closed[2:])
+
+
+def measured(mechanism: Mechanism, coordinates: Floats) -> Closing:
+    """Joint coordinates (n, columns), deviations from home, as they are: their loop gaps and limit excesses."""
+    return close(closure_of(mechanism), coordinates, platform_poses(mechanism, coordinates), max_iterations=0)
 
 
 def _run(loops: K.Loops, layout: K.Layout, wishes: K.Wishes, closed: K.Closed) -> None:

@@ -20,10 +20,15 @@ from ..motion.displacements import columns
 Floats = NDArray[np.float64]
 
 
-def loops_of(mechanism: Mechanism) -> K.Loops:
-    """The paths of a mechanism, its limits and cones, as the closure kernel takes them: lengths in L."""
+def loops_of(mechanism: Mechanism, *, whole: bool = True) -> K.Loops:
+    """The paths of a mechanism, its limits and cones, as the closure kernel takes them: lengths in L.
+
+    Parameters
+    ----------
+    whole : all loops; else only those on a way from the base to the end effector.
+    """
     builder = _Builder(mechanism)
-    for path in independent_paths(mechanism):
+    for path in independent_paths(mechanism, detours=whole):
         builder.add_path(path)
     for joint in mechanism.joints:
         builder.add_joint(joint)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -14,24 +13,16 @@ from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
 from ..kernels.reaching import plan as P
 from ..motion.displacements import displacements
-from ..poses import pose
-from .close import Closing, Closure, close, closure_of
+from .close import Closing, Closure, close
 from .descend import approached
-from .nearest import MARGIN, is_feasible, nearest
-from .parasitic import differences, follows_task, has_parasitic_motion, strays
-from .starts import random_starts
+from .known import corners_of
+from .nearest import is_feasible, nearest
+from .parasitic import strays
 
 Floats = NDArray[np.float64]
 
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
-
-FAR_CORNER, TURNED_CORNER = 0.5, 0.5
-"""Where corners are looked for: so far from home [L], and turned so far [rad]."""
-
-
-CORNERS, CHANCES = 8, 128
-"""How many of them searches start from, and how many random configurations are closed to find some."""
 
 HITS = 7
 """How many searches must end at the nearest configuration found before no other is looked for."""
@@ -98,7 +89,8 @@ def project(
     best = Projected(
         close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, P.HOLD_NOTHING)
     )
-    everywhere = [*starts, *(np.repeat(corner[None], n, axis=0) for corner in corners_of(closure.mechanism) if corners)]
+    elsewhere = corners_of(closure.mechanism) if corners else ()
+    everywhere = [*starts, *(np.where(closure.idle, starts[0], corner) for corner in elsewhere)]
     for way in ways:
         open_to_it, hits = np.isinf(best.distances), np.zeros(n, np.int64)
         for start in everywhere:
@@ -147,42 +139,3 @@ def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Closi
         closure, start, placed, platform=way.weights, framed=task.is_framed, targets=task.completed(targets, begin)
     )
     return approached(closure, closed.coordinates, targets, platform=way.weights, framed=task.is_framed)
-
-
-@lru_cache(maxsize=64)
-def corners_of(mechanism: Mechanism) -> tuple[Floats, ...]:
-    """Feasible configurations far from home and from each other, as joint coordinates (columns,).
-
-    Some are as far as the workspace goes from home in four directions; some are chanced upon, in parts of it to which
-    no way may lead from home.
-    """
-    closure = closure_of(mechanism)
-    directions = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]) / np.sqrt(3.0)
-    offsets = FAR_CORNER * mechanism.characteristic_length * directions
-    poses = [
-        pose(mechanism.home_pose[:3, 3] + offset, rotvec=TURNED_CORNER * direction)
-        for offset, direction in zip(offsets, directions, strict=True)
-    ]
-    turning = 0.0 if mechanism.end_effector_is_joint else 1.0
-    home = np.zeros((len(directions), len(closure.scale)))
-    ends = approached(closure, home, np.array(poses), platform=(1.0, 1.0, 1.0, turning, turning, turning))
-    chanced = _chanced_upon(closure)
-    coordinates = np.concatenate([home[:1], *(found.coordinates[is_feasible(found)] for found in (ends, chanced))])
-    places = np.concatenate([mechanism.home_pose[None], *(each.poses[is_feasible(each)] for each in (ends, chanced))])
-    chosen = [0]
-    while len(chosen) <= min(CORNERS, len(places) - 1):
-        apart = [differences(closure, places, np.repeat(places[i : i + 1], len(places), axis=0)) for i in chosen]
-        chosen.append(int(np.min(apart, axis=0).argmax()))
-    return tuple(coordinates[chosen[1:]])
-
-
-def _chanced_upon(closure: Closure) -> Closing:
-    """Configurations closed within all limits from random ones, in the assembly of home as far as a task tells it."""
-    coordinates, poses = random_starts(closure, CHANCES, np.random.default_rng(0))
-    platform = [0.0] * 6
-    if follows_task(closure.mechanism) and not has_parasitic_motion(closure.mechanism):
-        task = task_of(closure.mechanism)
-        home = np.repeat(closure.mechanism.home_pose[None], CHANCES, axis=0)
-        poses = task.completed(poses, home)
-        platform = [LOCKED if weight == 0.0 else 0.0 for weight in task.held]
-    return close(closure, coordinates, poses, platform=platform, limits=True, margin=MARGIN)

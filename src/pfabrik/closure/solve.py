@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,10 @@ from ..motion.limits import within_turns
 from ..options import Options
 from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
-from .close import HELD, Closing, Closure, close, closure_of, platform_poses
+from .close import HELD, Closing, Closure, close, closure_of, measured, platform_poses
 from .configurations import Configurations, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
+from .known import chanced_upon
 from .nearest import MARGIN, is_feasible
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .projection import kept, project, ways_of
@@ -39,6 +41,9 @@ STRANGE = 0.1
 STARTS = 80
 """Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
 
+NEARBY = 16
+"""Known configurations that are tried before random ones, the nearest to the target first."""
+
 STEPS = 30
 """Steps each of them may take: those that arrive need fewer."""
 
@@ -48,13 +53,13 @@ class ClosureEngine:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        self._closure = closure_of(mechanism)
+        self._closure = closure_of(mechanism, whole=False)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        known, begin = are_poses(targets), joint_coordinates(self.mechanism, start)
+        known, begin = are_poses(targets), self._begin(start)
         begin = begin[known] if len(begin) > 1 else np.repeat(begin, known.sum(), axis=0)
         return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode).among(known)
 
@@ -66,7 +71,7 @@ class ClosureEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        known, begin = are_poses(targets), joint_coordinates(self.mechanism, start)
+        known, begin = are_poses(targets), self._begin(start)
         found = [np.zeros((0, begin.shape[1]))]
         rows, bends = new_rows(self.mechanism, int(known.sum())), Bends(self.mechanism, options)
         for i, target in enumerate(targets):
@@ -78,6 +83,18 @@ class ClosureEngine:
             if on_progress is not None:
                 on_progress(i + 1, len(targets))
         return Configurations(rows, np.concatenate(found)).among(known)
+
+    def _begin(self, start: Configurations | None) -> Floats:
+        """Joint coordinates to start from; loops beside the way to the end effector, which will rest, are closed."""
+        begin = joint_coordinates(self.mechanism, start)
+        if not _has_loops_aside(self.mechanism):
+            return begin
+        present = measured(self.mechanism, begin)
+        away = np.flatnonzero(~is_feasible(present))
+        if len(away):
+            closure, poses = closure_of(self.mechanism), present.poses[away]
+            present.take(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=MARGIN))
+        return present.coordinates
 
     def _follow_one(self, target: Floats, begin: Floats, options: Options, bends: Bends) -> Configurations:
         answer = _answer(self._closure, target, begin, options, keep_mode=True)
@@ -127,6 +144,8 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
         holds[away] = kept(mechanism, answers.holds, answers.closing.poses, wanted[away])
         found.take(away, answers.closing)
     within_turns(mechanism, found.coordinates)
+    if _has_loops_aside(mechanism):
+        found = measured(mechanism, found.coordinates)._replace(iterations=found.iterations)
     rows = new_rows(mechanism, len(wanted))
     write_closing(closure, found, rows)
     if mechanism.end_effector_is_joint:
@@ -139,6 +158,13 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
     )
     rows.status[:] = np.where(is_feasible(found), np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
     return Configurations(rows, found.coordinates)
+
+
+@lru_cache(maxsize=64)
+def _has_loops_aside(mechanism: Mechanism) -> bool:
+    """Whether there are loops beside every way from the base to the end effector."""
+    counts = [len(closure_of(mechanism, whole).loops.paths) for whole in (True, False)]
+    return counts[0] > counts[1]
 
 
 def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_mode: bool) -> Closing:
@@ -156,11 +182,29 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
     if len(rest):
         _take_better(found, rest, _led(closure, wanted[rest], start[rest], begin[rest], held, limits=True))
     if not keep_mode:
-        _search(closure, found, rows, wanted, held, at_rest=follows or task.is_whole_pose)
+        at_rest = follows or task.is_whole_pose
+        if not at_rest:
+            _start_nearby(closure, found, targets)
+        _search(closure, found, rows, wanted, held, at_rest=at_rest)
     if not keep_mode and follows and has_parasitic_motion(closure.mechanism):
         anywhere = task.completed(targets, begin)  # in other ways of assembly, where this one does not reach
         _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
     return found
+
+
+def _start_nearby(closure: Closure, found: Closing, targets: Floats) -> None:
+    """Look for what does not reach yet from known configurations whose end effectors are nearest to the targets."""
+    coordinates, poses = chanced_upon(closure.mechanism)
+    task, rest = task_of(closure.mechanism), np.flatnonzero(~is_feasible(found))
+    away = np.array([_distances(closure, poses, np.repeat(targets[[row]], len(poses), axis=0)) for row in rest])
+    for places in np.argsort(away, axis=1)[:, :NEARBY].T if len(rest) else ():
+        waiting = ~is_feasible(found)[rest]
+        if not waiting.any():
+            break
+        rows, places = rest[waiting], places[waiting]
+        start = np.where(closure.idle, found.coordinates[rows], coordinates[places])
+        wanted = task.completed(targets[rows], poses[places])
+        _take_better(found, rows, _close_below(closure, start, wanted, task.held, STEPS))
 
 
 def _search(
@@ -172,10 +216,8 @@ def _search(
         rest = rows[~is_feasible(found)[rows]]
         if not len(rest):
             break
-        scattered = np.repeat(random_coordinates(closure, 1, rng), len(rest), axis=0)
-        if at_rest:
-            reached = _legs_reached(closure, found, rest)
-            scattered = np.where(reached, found.coordinates[rest], scattered)
+        stays = _legs_reached(closure, found, rest) | closure.idle if at_rest else closure.idle
+        scattered = np.where(stays, found.coordinates[rest], random_coordinates(closure, 1, rng))
         tried = _close_below(closure, scattered, wanted[rest], held, STEPS)
         if at_rest:
             _take_legs(closure, found, rest, tried)

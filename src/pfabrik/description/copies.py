@@ -4,13 +4,32 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..errors import Fault, near_miss
-from .form_faults import is_name, is_pair_of_names, is_point
+from .coercion import numbers, unit_vector
+from .form_faults import direction_faults, is_name, is_pair_of_names, is_point, key_faults, shown
 from .joints import Cone, Joint, Vector
+
+MOST_COPIES = 100
+"""Most copies of one joint: a typing error beyond it, and a file of one line must not ask for a million joints."""
+
+
+def read_copies(place: str, copies: Any, faults: list[Fault]) -> tuple[int, Vector] | None:
+    """Number and unit axis of what is said of copies, `count` and `axis`; None with faults, added to the list."""
+    keys = ("count", "axis")
+    if not isinstance(copies, Mapping):
+        faults.append(Fault(place, shown(copies), f"a table: {', '.join(keys)}"))
+        return None
+    count, axis = numbers(copies.get("count")), unit_vector(copies.get("axis"))
+    found = list(key_faults(place, copies, keys))
+    if not isinstance(count, float) or not 1.0 <= count <= MOST_COPIES or count % 1.0 != 0.0:
+        found.append(Fault(f"{place}.count", shown(count), f"a whole number from 1 to {MOST_COPIES}"))
+    found += direction_faults(f"{place}.axis", axis)
+    faults += found
+    return None if found else (int(count), axis)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -11,13 +12,14 @@ from .form_faults import is_name, joint_faults, name_faults, number_faults, show
 from .graph_faults import graph_faults
 from .home_faults import home_faults
 from .joint_types import TASK_COORDINATES, WHOLE_TASK
+from .joints import Joint
+from .legs import LEG_KEYS
 from .structure import Structure
 
-_FIELDS = ("name", "type", "connects", "at", "axis", "axes", "along", "actuated", "home", "range", "cone")
+_FIELDS = tuple(field.name for field in dataclasses.fields(Joint))
 _FIELD = re.compile(r"joint\[\d+\]\.(\w+)")
 _JOINT = re.compile(r"joint\[(\d+)\]")
 _LEG = re.compile(r"leg\[(\d+)\](?:\.([A-Za-z]+))?")
-_LEG_FIELDS = ("chain", "name", "connects", "base", "via", "platform", "axis", "stroke", "copies")
 
 
 def find_faults(mechanism: Structure) -> list[Fault]:
@@ -57,9 +59,9 @@ def _rank(place: str) -> tuple[int, int, int, str]:
     if leg is None:
         return (0, joint_index(place), _field_rank(place), "")
     key = leg[2] or ""
-    if key in _LEG_FIELDS:
-        return (1, int(leg[1]), _LEG_FIELDS.index(key), "")
-    return (1, int(leg[1]), len(_LEG_FIELDS), key if len(key) == 1 else "~")  # joints by their letters
+    if key in LEG_KEYS:
+        return (1, int(leg[1]), LEG_KEYS.index(key), "")
+    return (1, int(leg[1]), len(LEG_KEYS), key if len(key) == 1 else "~")  # joints by their letters
 
 
 def joint_index(place: str) -> int:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import reprlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, cast
 
 from ..errors import Fault, near_miss
@@ -15,12 +16,26 @@ from .joints import Cone, Joint
 LARGEST_NUMBER = 1e12
 """Largest length or angle accepted: beyond it, squares and differences of lengths lose every digit that matters."""
 
-_SHORT = reprlib.Repr()
+MOST_FAULTS = 50
+"""Most unknown keys of one table that are listed one by one: nobody reads on, and a hostile file may have 100 000."""
+
+
+class _AsInFiles(reprlib.Repr):
+    """Values as a file writes them, whatever they have become, and cut short."""
+
+    def repr_tuple(self, value: tuple[Any, ...], level: int) -> str:
+        return self.repr_list(list(value), level)
+
+    def repr_float(self, value: float, _: int) -> str:
+        return repr(value).removesuffix(".0")
+
+
+_SHORT = _AsInFiles()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 3, 60, 60
 
 
 def shown(value: object) -> str:
-    """A value as a fault shows it, short whatever it is."""
+    """A value as a fault shows it, the way a file has it, short whatever it is."""
     if value is None:
         return "nothing"
     try:
@@ -64,6 +79,33 @@ def is_point(value: object) -> bool:
     return isinstance(value, tuple) and is_numbers(value, 3) and all(map(math.isfinite, value))
 
 
+def key_faults(
+    place: str,
+    table: Mapping[str, Any],
+    known: Sequence[str],
+    hint: Callable[[str], str] | None = None,
+    others: str = "",
+) -> Iterator[Fault]:
+    """The faults of keys that a table may not have.
+
+    Parameters
+    ----------
+    hint : what to say of an unknown key; by default the known one that is nearly the same.
+    others : what the table may hold beside the known keys.
+    """
+    unknown = [key for key in table if key not in known]
+    for key in unknown[:MOST_FAULTS]:
+        where = f"{place}.{_shown_key(key)}".removeprefix(".")
+        meant = hint(key) if hint else near_miss(key, known)
+        yield Fault(where, f"an unknown key{meant}", f"one of {', '.join(known)}{others}")
+    if len(unknown) > MOST_FAULTS:
+        yield Fault(place or "file", f"{len(unknown) - MOST_FAULTS} more faults", "none")
+
+
+def _shown_key(key: object) -> str:
+    return key if isinstance(key, str) and re.fullmatch(r"[\w-]{1,40}", key) else shown(key)
+
+
 def name_faults(place: str, value: object) -> Iterator[Fault]:
     """The fault of a value that does not name anything."""
     if not is_name(value):
@@ -105,6 +147,8 @@ def joint_faults(place: str, joint: Joint) -> Iterator[Fault]:
     yield from _home_faults(f"{place}.home", joint)
     yield from _range_faults(f"{place}.range", joint)
     yield from _cone_faults(f"{place}.cone", joint)
+    yield from _pace_faults(f"{place}.max_speed", joint, joint.max_speed)
+    yield from _pace_faults(f"{place}.max_acceleration", joint, joint.max_acceleration)
 
 
 def kind_of(joint: Joint) -> JointKind | None:
@@ -220,6 +264,18 @@ def _bounds_faults(place: str, bounds: Any, coordinate: Coordinate) -> Iterator[
     yield from faults
     if not faults and bounds[0] > bounds[1]:
         yield Fault(place, range_text(bounds, coordinate), "the lowest value first, then the highest")
+
+
+def _pace_faults(place: str, joint: Joint, value: Any) -> Iterator[Fault]:
+    """Faults of a speed or an acceleration: a positive number, and only where something drives the joint."""
+    if value is None:
+        return
+    faults = list(number_faults(place, value, 1))
+    yield from faults
+    if not faults and value <= 0.0:
+        yield Fault(place, shown(value), "a number greater than 0")
+    elif not faults and joint.actuated is False:
+        yield Fault(place, shown(value), "nothing: the joint is not actuated")
 
 
 def _cone_faults(place: str, joint: Joint) -> Iterator[Fault]:

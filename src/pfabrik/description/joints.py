@@ -41,10 +41,14 @@ class Joint:
     connects : the two bodies; coordinates move the second relative to the first.
     at : the joint's centre [length]; None only for a prismatic joint, which has no centre of its own.
     axis : the axis of R, P and C.
-    axes : the two axes of U, optional; the first is fixed in the first body.
+    axes : the two axes of U; the first is fixed in the first body. By default they are square to each other and to the
+        line to the next joint, on the second body if it leads to a single one, else on the first: so the joint keeps
+        its link from spinning about itself; x and y where there is no such line. Which two of the directions square
+        to the line they are is left open: give them where that counts, as in a leg without a spherical joint.
     along : the two joints whose distance is the coordinate of a prismatic joint.
     home : value of the coordinate in the home configuration; two values for C (angle, displacement) and U.
     range : (lo, hi) for R and P; two such pairs for C (angle, displacement) and U.
+    max_speed, max_acceleration : of an actuated joint's coordinate [rad or length, per s and per s²]; None is no limit.
     """
 
     name: str
@@ -58,6 +62,8 @@ class Joint:
     home: float | tuple[float, float] = 0.0
     range: Range | tuple[Range, Range] | None = None
     cone: Cone | None = None
+    max_speed: float | None = None
+    max_acceleration: float | None = None
 
     def __post_init__(self) -> None:
         set_fields(
@@ -72,6 +78,8 @@ class Joint:
             actuated=truth(self.actuated),
             home=home_value(self.home, self.type),
             range=numbers(self.range),
+            max_speed=numbers(self.max_speed),
+            max_acceleration=numbers(self.max_acceleration),
         )
 
 

@@ -8,12 +8,13 @@ from collections.abc import Collection, Mapping, Sequence
 
 from ..errors import Fault
 from .chains import read_chain
+from .copies import MOST_COPIES
 from .form_faults import is_pair_of_names
 from .leg_maker import LegJoint, LegMaker
 from .leg_points import count_legs
 from .legs import Leg
 
-__all__ = ["LegJoint", "at_legs", "count_joints", "legs_name", "placed_joints"]
+__all__ = ["LegJoint", "count_joints", "faults_of_legs", "legs_name", "placed_joints"]
 
 
 def placed_joints(
@@ -45,11 +46,11 @@ def placed_joints(
 def count_joints(leg: Leg) -> int:
     """How many joints legs stand for, as far as they can be read."""
     copies = leg.copies.get("count") if isinstance(leg.copies, Mapping) else 1.0
-    turns = int(copies) if isinstance(copies, float) else 1
+    turns = int(copies) if isinstance(copies, float) and 1.0 <= copies <= MOST_COPIES else 1
     return count_legs(leg.base, leg.platform) * len(read_chain(leg.chain)) * turns
 
 
-def at_legs(faults: Sequence[Fault], first: int, placed: Sequence[LegJoint]) -> list[Fault]:
+def faults_of_legs(faults: Sequence[Fault], first: int, placed: Sequence[LegJoint]) -> list[Fault]:
     """The faults of joints that stand for legs at the places of their description, each reported of one leg only.
 
     Parameters

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 from ..errors import Fault, near_miss
 from .chains import chain_faults, read_chain
-from .coercion import unit_vector
-from .copies import turned
+from .copies import read_copies, turned
 from .directions import EXPECTED, PLACEHOLDER, axis_pairs, directions
-from .form_faults import direction_faults, is_pair_of_names, shown
+from .form_faults import is_pair_of_names, key_faults, shown
 from .joints import Cone, Joint, Vector
 from .leg_points import Point, leg_points
 from .legs import CONE_KEYS, JOINT_KEYS, Leg
@@ -42,11 +41,14 @@ class LegMaker:
         self.leg, self.place, self.ends, self.faults = leg, place, ends, faults
         self.steps = read_chain(leg.chain)
         faults += chain_faults(f"{place}.chain", leg.chain)
+        if not isinstance(cast(Any, leg.name), str):
+            faults.append(Fault(f"{place}.name", shown(leg.name), "a text"))
         if leg.connects is not None and not is_pair_of_names(leg.connects):
             faults.append(Fault(f"{place}.connects", shown(leg.connects), "the names of two bodies"))
         self.points = leg_points(leg, self.steps, place, faults)
         self.legs = len(self.points[0]) if self.points else 1
-        self.turns, self.about = self._copies()
+        copies = None if leg.copies is None else read_copies(f"{place}.copies", leg.copies, faults)
+        self.turns, self.about = copies or (1, PLACEHOLDER)
         self.count = self.legs * self.turns if self.steps else 0
         self.centres = dict(zip((step.letter for step in self.steps if step.centred), self.points, strict=True))
         self.said = self._said()
@@ -64,22 +66,6 @@ class LegMaker:
                     yield dataclasses.replace(placed, joint=turned(placed.joint, self.about, turn, self.turns))
                 number += 1
 
-    def _copies(self) -> tuple[int, Vector]:
-        copies: Any = self.leg.copies
-        if copies is None:
-            return 1, PLACEHOLDER
-        place = f"{self.place}.copies"
-        if not isinstance(copies, Mapping) or not {"count", "axis"} >= set(copies):
-            self.faults.append(Fault(place, shown(copies), "a table: count, axis"))
-            return 1, PLACEHOLDER
-        count, axis = copies.get("count"), unit_vector(copies.get("axis"))
-        if not isinstance(count, float) or count < 1.0 or count % 1.0 != 0.0:
-            self.faults.append(Fault(f"{place}.count", shown(count), "a whole number, at least 1"))
-            count = 1.0
-        wrong = list(direction_faults(f"{place}.axis", axis))
-        self.faults += wrong
-        return int(count), PLACEHOLDER if wrong else axis
-
     def _said(self) -> dict[str, Mapping[str, Any]]:
         """What is said of single joints, by letter, as far as it makes sense."""
         letters = [step.letter for step in self.steps]
@@ -96,15 +82,9 @@ class LegMaker:
             elif not isinstance(values, Mapping):
                 self.faults.append(Fault(where, shown(values), f"a table: {', '.join(JOINT_KEYS)}"))
             else:
-                self._refuse_unknown(where, values, JOINT_KEYS)
+                self.faults += key_faults(where, values, JOINT_KEYS)
                 said[letter] = values
         return said
-
-    def _refuse_unknown(self, where: str, values: Mapping[str, Any], known: Sequence[str]) -> None:
-        for key in values:
-            if key not in known:
-                hint = f"an unknown key{near_miss(str(key), known)}"
-                self.faults.append(Fault(f"{where}.{key}", hint, f"one of {', '.join(known)}"))
 
     def _ranges(self) -> dict[str, tuple[Any, str]]:
         """The range of each joint that has one, and where it is said."""
@@ -150,6 +130,8 @@ class LegMaker:
                 home=said.get("home", 0.0),
                 range=limits,
                 cone=cones[leg],
+                max_speed=said.get("max_speed"),
+                max_acceleration=said.get("max_acceleration"),
                 **fields[leg],
             )
             end = self._next_place(index, leg)
@@ -218,7 +200,7 @@ class LegMaker:
         if not isinstance(cone, Mapping):
             self.faults.append(Fault(place, shown(cone), f"a table: {', '.join(CONE_KEYS)}"))
             return [None] * self.legs
-        self._refuse_unknown(place, cone, CONE_KEYS)
+        self.faults += key_faults(place, cone, CONE_KEYS)
         last = index == len(self.steps) - 1 and index > 0
         fixed_to: Any = cone.get("fixed_to")
         if fixed_to is not None and fixed_to not in bodies:

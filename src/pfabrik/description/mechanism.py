@@ -14,7 +14,7 @@ from .form_faults import joint_faults
 from .home_mobility import end_effector_freedom, inexactness
 from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
-from .leg_joints import at_legs, legs_name, placed_joints
+from .leg_joints import faults_of_legs, legs_name, placed_joints
 from .legs import Leg, as_legs
 from .structure import Structure
 
@@ -104,7 +104,7 @@ class Mechanism(Structure):
         if faults:
             sound = ((index, joint) for index, joint in enumerate(made) if isinstance(joint, Joint))
             alone = [fault for index, joint in sound for fault in joint_faults(f"joint[{index}]", joint)]
-            raise InvalidMechanism(merged(faults, at_legs(alone, len(own), placed)))
+            raise InvalidMechanism(merged(faults, faults_of_legs(alone, len(own), placed)))
         try:
             return cls(
                 name=legs_name(described, placed) if name is None else name,
@@ -117,7 +117,7 @@ class Mechanism(Structure):
                 task=cast(Any, task),
             )
         except InvalidMechanism as error:
-            raise InvalidMechanism(in_order(at_legs(error.faults, len(own), placed))) from None
+            raise InvalidMechanism(in_order(faults_of_legs(error.faults, len(own), placed))) from None
 
     def _check(self) -> None:
         faults = find_faults(self)

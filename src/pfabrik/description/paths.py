@@ -18,12 +18,16 @@ MOST_PATHS = 100_000
 Path = tuple[Step, ...]
 
 
-def independent_paths(mechanism: Structure) -> tuple[Path, ...]:
+def independent_paths(mechanism: Structure, *, detours: bool = True) -> tuple[Path, ...]:
     """Paths from the base to the end effector: enough that every loop of the graph lies between two of them.
 
     First those that pass no body twice, shortest first; then, for loops that none of them passes (a gripper's),
     detours around these. Paths count as sums of joints modulo two: those of all are spanned by as many as there are
     loops, and one.
+
+    Parameters
+    ----------
+    detours : whether loops that hang beside every path (a gripper's) are gone around too.
 
     Raises
     ------
@@ -33,7 +37,8 @@ def independent_paths(mechanism: Structure) -> tuple[Path, ...]:
     number = {joint.name: 1 << place for place, joint in enumerate(mechanism.joints)}
     chosen: list[Path] = []
     basis: list[int] = []
-    for path in chain(_simple_paths(mechanism), _detours(mechanism, chosen)):
+    around = _detours(mechanism, chosen) if detours else ()
+    for path in chain(_simple_paths(mechanism), around):
         rest = _reduce(reduce(xor, (number[step.joint.name] for step in path), 0), basis)
         if rest:
             basis.append(rest)

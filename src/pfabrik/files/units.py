@@ -6,35 +6,54 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from ..description.coercion import numbers
+from ..description.form_faults import is_numbers
 from ..description.joint_types import KINDS
 
+MEASURED = ("home", "range", "max_speed", "max_acceleration")
+"""Fields of a joint in the unit of its coordinate (per second, per second squared): their numbers may be angles."""
 
-def in_radians(value: Any, joint_type: Any, unit: str) -> Any:
-    """A joint's home or range from a file, with its angles in radians and its lengths as they are.
+
+def in_radians(field: str, value: Any, joint_type: Any, unit: str) -> Any:
+    """What a file says in a field of a joint, its angles in radians and its lengths as they are.
 
     Parameters
     ----------
-    value : a number or nested list of numbers, by coordinate where the joint has two; None stays None.
+    field : one of MEASURED; anything in another field stays as it is.
+    value : a number, or a pair of them for a range, or one for each coordinate of the joint; anything else stays too.
     unit : "deg" or "rad", the unit of the angles in `value`.
     """
-    return converted(value, joint_type, math.radians) if unit == "deg" else value
+    if field not in MEASURED or unit != "deg" or joint_type not in list(KINDS):
+        return value
+    read = numbers(value)
+    parts = read if len(KINDS[joint_type].coordinates) > 1 else (read,)
+    fits = isinstance(parts, tuple) and all(
+        is_numbers(part, 2) if field == "range" else isinstance(part, float) for part in parts
+    )
+    return converted(read, joint_type, math.radians) if fits else value
+
+
+def angle_in_radians(value: Any, unit: str) -> Any:
+    """An angle of a file in radians; what is no number stays as it is."""
+    read = numbers(value)
+    return math.radians(read) if unit == "deg" and isinstance(read, float) else value
 
 
 def converted(value: Any, joint_type: Any, convert: Callable[[float], float]) -> Any:
-    """A joint's home or range with a function applied to every angle in it."""
-    kind = KINDS.get(joint_type)
-    if kind is None or not kind.ranged:
+    """A joint's home, range, speed or acceleration with a function applied to every angle in it."""
+    kind = KINDS[joint_type]
+    if not kind.ranged:
         return value
     if len(kind.coordinates) == 1:
         return _each(value, convert) if kind.coordinates[0] == "angle" else value
-    if not isinstance(value, list | tuple) or len(value) != len(kind.coordinates):
+    if not isinstance(value, tuple) or len(value) != len(kind.coordinates):
         return value
     parts = zip(value, kind.coordinates, strict=True)
     return tuple(_each(part, convert) if coordinate == "angle" else part for part, coordinate in parts)
 
 
 def _each(value: Any, convert: Callable[[float], float]) -> Any:
-    if isinstance(value, list | tuple):
+    if isinstance(value, tuple):
         return tuple(_each(part, convert) for part in value)
     return value if value is None else convert(value)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..description.mechanism import Joint, Mechanism
-from .units import converted, exact_degrees
+from .units import MEASURED, converted, exact_degrees
 
 
 def dumps(mechanism: Mechanism) -> str:
@@ -35,9 +35,9 @@ def _head(mechanism: Mechanism, angle_unit: str) -> Iterator[str]:
 
 
 def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:
-    for field in ("name", "type", "actuated", "connects", "at", "axis", "axes", "along", "home", "range"):
+    for field in ("name", "type", "actuated", "connects", "at", "axis", "axes", "along", *MEASURED):
         value = getattr(joint, field)
-        if field in ("home", "range"):
+        if field in MEASURED:
             value = converted(value, joint.type, convert)
         left_out = value is None or value is False or (field == "home" and value in (0.0, (0.0, 0.0)))
         if not left_out:
@@ -56,8 +56,8 @@ def _angles(mechanism: Mechanism) -> Iterator[float]:
         return angle
 
     for joint in mechanism.joints:
-        converted(joint.home, joint.type, note)
-        converted(joint.range, joint.type, note)
+        for field in MEASURED:
+            converted(getattr(joint, field), joint.type, note)
         yield from found
         found.clear()
         if joint.cone is not None:

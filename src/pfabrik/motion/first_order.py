@@ -336,7 +336,7 @@ class Generic:
 
 @lru_cache(maxsize=64)
 def generic_of(mechanism: Mechanism) -> Generic:
-    closure, twist = _first_order(mechanism, _around_home(mechanism))
+    closure, twist = _first_order(mechanism, around_home(mechanism))
     values, right = _right_singular(closure)
     ranks = _rank(values)
     rank = int(ranks.max())
@@ -363,7 +363,8 @@ def _rank(values: NDArray[Any]) -> Any:
     return np.count_nonzero(values > TOLERANCES.alignment, axis=-1)
 
 
-def _around_home(mechanism: Mechanism) -> Floats:
+@lru_cache(maxsize=64)
+def around_home(mechanism: Mechanism) -> Floats:
     """Home, and closed configurations some steps from it, (n, c): the same in every call."""
     random = np.random.default_rng(0)
     q = np.zeros((SAMPLES, len(column_joints(mechanism))))

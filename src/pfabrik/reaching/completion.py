@@ -34,7 +34,7 @@ def coordinates_of(mechanism: Mechanism, rows: P.Rows, start: Floats | None = No
     start : where to start, (n, columns) or (1, columns); None for home.
     chained : each row starts from the one before, so that angles count on along a path.
     """
-    closure = closure_of(mechanism)
+    closure = closure_of(mechanism, whole=False)
     found = np.full((len(rows.status), len(closure.scale)), np.nan)
     known = np.flatnonzero(rows.status != P.INVALID)
     if not len(known):

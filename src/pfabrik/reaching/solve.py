@@ -217,7 +217,7 @@ class ReachingEngine:
         away = np.flatnonzero(rows.status == P.PROJECTED)
         if not len(away):
             return
-        mechanism, closure = self.mechanism, closure_of(self.mechanism)
+        mechanism, closure = self.mechanism, closure_of(self.mechanism, whole=False)
         wanted, projected = targets[away], rows_at(rows, away)
         begin = start()
         begin = begin[away] if len(begin) > 1 else begin.repeat(len(away), axis=0)

@@ -1,0 +1,72 @@
+"""Feasible configurations of a mechanism that searches can start from, found once."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.mechanism import Mechanism
+from ..description.task import task_of
+from ..kernels.closure.loops import LOCKED
+from ..poses import pose
+from .close import close, closure_of
+from .descend import approached
+from .nearest import MARGIN, is_feasible
+from .parasitic import differences, follows_task, has_parasitic_motion
+from .starts import random_starts
+
+Floats = NDArray[np.float64]
+
+FAR_CORNER, TURNED_CORNER = 0.5, 0.5
+"""Where corners are looked for: so far from home [L], and turned so far [rad]."""
+
+
+CORNERS, CHANCES = 8, 128
+"""How many corners searches start from, and how many random configurations are closed to find some."""
+
+
+@lru_cache(maxsize=64)
+def corners_of(mechanism: Mechanism) -> tuple[Floats, ...]:
+    """Feasible configurations far from home and from each other, as joint coordinates (columns,).
+
+    Some are as far as the workspace goes from home in four directions; some are chanced upon, in parts of it to which
+    no way may lead from home.
+    """
+    closure = closure_of(mechanism, whole=False)
+    directions = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]) / np.sqrt(3.0)
+    offsets = FAR_CORNER * mechanism.characteristic_length * directions
+    poses = [
+        pose(mechanism.home_pose[:3, 3] + offset, rotvec=TURNED_CORNER * direction)
+        for offset, direction in zip(offsets, directions, strict=True)
+    ]
+    turning = 0.0 if mechanism.end_effector_is_joint else 1.0
+    home = np.zeros((len(directions), len(closure.scale)))
+    ends = approached(closure, home, np.array(poses), platform=(1.0, 1.0, 1.0, turning, turning, turning))
+    coordinates, places = chanced_upon(mechanism)
+    kept = is_feasible(ends)
+    coordinates = np.concatenate([home[:1], ends.coordinates[kept], coordinates])
+    places = np.concatenate([mechanism.home_pose[None], ends.poses[kept], places])
+    chosen = [0]
+    while len(chosen) <= min(CORNERS, len(places) - 1):
+        apart = [differences(closure, places, np.repeat(places[i : i + 1], len(places), axis=0)) for i in chosen]
+        chosen.append(int(np.min(apart, axis=0).argmax()))
+    return tuple(coordinates[chosen[1:]])
+
+
+@lru_cache(maxsize=64)
+def chanced_upon(mechanism: Mechanism) -> tuple[Floats, Floats]:
+    """Feasible configurations closed from random ones: joint coordinates (k, columns), and poses (k, 4, 4).
+
+    They are in the assembly of home as far as a task tells it.
+    """
+    closure, task = closure_of(mechanism, whole=False), task_of(mechanism)
+    coordinates, poses = random_starts(closure, CHANCES, np.random.default_rng(0))
+    platform = [0.0] * 6
+    if follows_task(mechanism) and not has_parasitic_motion(mechanism):
+        poses = task.completed(poses, np.repeat(mechanism.home_pose[None], CHANCES, axis=0))
+        platform = [LOCKED if weight == 0.0 else 0.0 for weight in task.held]
+    found = close(closure, coordinates, poses, platform=platform, limits=True, margin=MARGIN)
+    feasible = is_feasible(found)
+    return found.coordinates[feasible], found.poses[feasible]

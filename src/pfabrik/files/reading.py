@@ -1,0 +1,227 @@
+"""A parsed mechanism file to its mechanism, or to every fault of it at its place in the file.
+
+What the tables may hold, and how many joints they may ask for, is looked at here. What the values must be is the
+description's to say: it finds the same faults in a file as in a call.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from typing import Any, cast
+
+from ..description.chains import read_chain
+from ..description.coercion import numbers
+from ..description.copies import Copy, Layout, Pattern, count_of, read_copies
+from ..description.faults import in_order, joint_index, merged
+from ..description.form_faults import is_name, joint_faults, key_faults, name_faults, number_faults, shown
+from ..description.joints import Cone, Joint
+from ..description.leg_joints import LegJoint, count_joints, faults_of_legs, placed_joints
+from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, Leg
+from ..description.mechanism import Mechanism
+from ..errors import Fault, InvalidMechanism, near_miss
+from .units import angle_in_radians, in_radians
+
+HEAD_KEYS = ("schema", "name", "units", "base", "end_effector", "reference_point", "task", "joint", "leg")
+UNIT_KEYS = ("length", "angle")
+_JOINT_FIELDS = tuple(field.name for field in dataclasses.fields(Joint))
+
+MOST_JOINTS = 1000
+"""Most joints of one mechanism, copies included: far above any machine, low enough to be checked in seconds."""
+
+Table = dict[str, Any]
+
+
+def read_mechanism(table: Table) -> Mechanism:
+    """The mechanism of a parsed file; `InvalidMechanism` with every fault. Faults of tables come before the whole's."""
+    faults = list(_head_faults(table))
+    tables = {kind: _tables(table, kind, faults) for kind in ("joint", "leg")}
+    unit = _units(table).get("angle", "deg")
+    patterns = [_pattern(each, f"joint[{index}]", unit, faults) for index, each in enumerate(tables["joint"])]
+    legs = [_leg(each, f"leg[{index}]", unit, faults) for index, each in enumerate(tables["leg"])]
+    return _expanded(table, patterns, legs, faults)
+
+
+def _head_faults(table: Table) -> Iterator[Fault]:
+    yield from key_faults("", table, HEAD_KEYS)
+    if type(table.get("schema")) is not int or table["schema"] != 1:
+        yield Fault("schema", shown(table.get("schema")), "1")
+    for key, default in (("name", None), ("base", "base"), ("end_effector", None)):
+        yield from name_faults(key, table.get(key, default))
+    if "reference_point" in table:
+        yield from number_faults("reference_point", numbers(table["reference_point"]), 3)
+    units = table.get("units", {})
+    if isinstance(units, dict):
+        yield from _unknown_keys("units", units, UNIT_KEYS)
+        if units.get("angle", "deg") not in ("deg", "rad"):
+            yield Fault("units.angle", shown(units["angle"]), "'deg' or 'rad'")
+    else:
+        yield Fault("units", shown(units), f"a table: {', '.join(UNIT_KEYS)}")
+
+
+def _unknown_keys(place: str, table: Table, known: Sequence[str]) -> Iterator[Fault]:
+    """Faults of keys; one that is the file's own was probably meant for it: TOML takes it for the last table's."""
+
+    def hint(key: str) -> str:
+        of_the_file = key in HEAD_KEYS
+        return " here: it is one of the file, above its first table" if of_the_file else near_miss(key, known)
+
+    return key_faults(place, table, known, hint)
+
+
+def _units(table: Table) -> Table:
+    return table["units"] if isinstance(table.get("units"), dict) else {}
+
+
+def _tables(table: Table, kind: str, faults: list[Fault]) -> list[Any]:
+    """The [[joint]] or [[leg]] tables of a file."""
+    tables = table.get(kind, [])
+    if not isinstance(tables, list):
+        faults.append(Fault(kind, shown(tables), f"[[{kind}]] tables"))
+        return []
+    if len(tables) > MOST_JOINTS:
+        noun = "joints" if kind == "joint" else "[[leg]] tables"
+        raise InvalidMechanism([*faults, Fault(kind, f"{len(tables)} {noun}", f"at most {MOST_JOINTS}")])
+    return tables
+
+
+def _pattern(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Pattern:
+    """The joint that a table describes, with its copies, as far as it can be read."""
+    if not isinstance(table, dict):
+        faults.append(Fault(place, shown(table), "a [[joint]] table"))
+        table = {}
+    faults += _unknown_keys(place, table, (*_JOINT_FIELDS, "copies"))
+    values: dict[str, Any] = {"name": None, "type": None, "connects": None}
+    given = {key: table[key] for key in _JOINT_FIELDS if key in table}
+    values |= {key: in_radians(key, value, given.get("type"), angle_unit) for key, value in given.items()}
+    if "cone" in values:
+        values["cone"] = _cone(values["cone"], f"{place}.cone", angle_unit, faults)
+    joint = Joint(**values)
+    copies = read_copies(f"{place}.copies", table["copies"], faults) if "copies" in table else None
+    return Pattern(joint, *(copies or ()))
+
+
+def _cone(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Cone | None:
+    if not isinstance(table, dict):
+        faults.append(Fault(place, shown(table), f"a table: {', '.join(CONE_KEYS)}"))
+        return None
+    faults += _unknown_keys(place, table, CONE_KEYS)
+    half_angle = angle_in_radians(table.get("half_angle"), angle_unit)
+    return Cone(cast(Any, table.get("axis")), half_angle, cast(Any, table.get("fixed_to")))
+
+
+def _leg(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Leg:
+    """The legs that a table describes, as far as it can be read."""
+    if not isinstance(table, dict):
+        faults.append(Fault(place, shown(table), "a [[leg]] table"))
+        return Leg("")
+    letters = sorted(key for key in table if re.fullmatch("[A-Z]", key))
+    types = {step.letter: step.type for step in read_chain(table.get("chain"))}
+    own = {key: value for key, value in table.items() if key not in letters}
+    others = ", or the letter of one of its joints: A, B, ..."
+    faults += key_faults(place, own, LEG_KEYS, lambda key: _leg_hint(key, list(types) or ["A"]), others)
+    by_letter = {letter: _said(table[letter], types.get(letter), angle_unit) for letter in letters}
+    values = {"chain": None} | {key: own[key] for key in LEG_KEYS if key in own}
+    return Leg(by_letter=by_letter, **values)
+
+
+def _leg_hint(key: str, letters: Sequence[str]) -> str:
+    """What an unknown key of a leg was probably meant to be: a joint, what is said of one, the file's, or its own."""
+    if key.upper() in letters:
+        return f"; did you mean '{key.upper()}'?"
+    if key in JOINT_KEYS:
+        meant = " or ".join(f"'{letter}.{key}'" for letter in letters)
+        return f"; did you mean {meant}?"
+    of_the_file = key in HEAD_KEYS
+    return " here: it is one of the file, above its first table" if of_the_file else near_miss(key, LEG_KEYS)
+
+
+def _said(table: Any, joint_type: Any, angle_unit: str) -> Any:
+    """What is said of one joint of a leg, angles in radians; anything but a table as it is."""
+    if not isinstance(table, dict):
+        return table
+    said = {key: in_radians(key, value, joint_type, angle_unit) for key, value in table.items()}
+    cone = said.get("cone")
+    if isinstance(cone, dict) and "half_angle" in cone:
+        said["cone"] = cone | {"half_angle": angle_in_radians(cone["half_angle"], angle_unit)}
+    return said
+
+
+def _expanded(table: Table, patterns: Sequence[Pattern], legs: Sequence[Leg], faults: list[Fault]) -> Mechanism:
+    """The mechanism of all copies and legs. When it is not clear what is copied, or where legs are, only the joints'
+    own faults are looked for."""
+    unclear = any(map(_hides_joints, faults))
+    base, end_effector = table.get("base", "base"), cast(str, table.get("end_effector"))
+    placed, found = _placed(base, end_effector, patterns, legs)
+    faults = merged(faults, found)
+    joints = (*patterns, *(Pattern(each.joint) for each in placed))
+    layout = Layout(joints, base, end_effector)
+    if not unclear and not found:
+        misfits = faults_of_legs(list(_misfits(layout)), len(patterns), placed)
+        unclear, faults = bool(misfits), [*faults, *misfits]
+    if unclear or found:
+        alone = [fault for index, each in enumerate(joints) for fault in joint_faults(f"joint[{index}]", each.joint)]
+        raise InvalidMechanism(merged(faults, faults_of_legs(alone, len(patterns), placed)))
+    return _built(table, layout, placed, faults)
+
+
+def _placed(
+    base: Any, end_effector: Any, patterns: Sequence[Pattern], legs: Sequence[Leg]
+) -> tuple[list[LegJoint], list[Fault]]:
+    """The joints of all legs, and the faults of what they are made from."""
+    count = sum(map(count_joints, legs))
+    if count > MOST_JOINTS:
+        return [], [Fault("leg", f"legs with {count} joints", f"at most {MOST_JOINTS}")]
+    base, end_effector = (
+        name if is_name(name) else other for name, other in ((base, "base"), (end_effector, "platform"))
+    )
+    return placed_joints(legs, base, end_effector, [each.joint.name for each in patterns])
+
+
+def _misfits(layout: Layout) -> Iterator[Fault]:
+    count = count_of(layout.patterns)
+    if count > MOST_JOINTS:
+        yield Fault("joint", f"{count} joints with their copies", f"at most {MOST_JOINTS}")
+    else:
+        yield from layout.faults()
+
+
+def _hides_joints(fault: Fault) -> bool:
+    """Whether a fault leaves open which joints and bodies there are, or what their numbers mean."""
+    root = fault.place.partition(".")[0]
+    return root in ("base", "end_effector", "units", "joint", "leg") or ".copies" in fault.place
+
+
+def _built(table: Table, layout: Layout, placed: Sequence[LegJoint], faults: list[Fault]) -> Mechanism:
+    copies = layout.expanded()
+    head: Table = {"name": None, "joints": tuple(copy.joint for copy in copies)}
+    head |= {key: table[key] for key in ("name", "base", "end_effector", "reference_point", "task") if key in table}
+    head |= {f"{key}_unit": _units(table)[key] for key in UNIT_KEYS if key in _units(table)}
+    try:
+        with warnings.catch_warnings():
+            if faults:
+                warnings.simplefilter("ignore")
+            mechanism = Mechanism(**head)
+    except InvalidMechanism as error:
+        own = len(layout.patterns) - len(placed)
+        faults = merged(faults, faults_of_legs(_as_written(error.faults, layout, copies), own, placed))
+    if faults:
+        raise InvalidMechanism(in_order(faults))
+    return mechanism
+
+
+def _as_written(faults: Sequence[Fault], layout: Layout, copies: Sequence[Copy]) -> list[Fault]:
+    """The faults of expanded joints at the places of their file, each place reported from one copy only."""
+    written: list[Fault] = []
+    reporter: dict[str, int] = {}
+    for fault in faults:
+        if joint_index(fault.place) < 0:
+            written.append(fault)
+            continue
+        copy = copies[joint_index(fault.place)]
+        place = f"joint[{copy.index}]{fault.place.partition(']')[2]}"
+        if reporter.setdefault(place, copy.number) == copy.number:
+            written.append(Fault(place, layout.as_written(fault.found, copy), layout.as_written(fault.expected, copy)))
+    return written
