@@ -55,10 +55,15 @@ def describe(found: Travel) -> str:
     from .answer import plain
 
     rows = [
-        (each.kind, *(plain(part, 1e-9) for part in each.direction), *distance(each, found), short_names(each.stopped_by))
+        (
+            each.kind,
+            *(plain(part, 1e-9) for part in each.direction),
+            *distance(each, found),
+            short_names(each.stopped_by),
+        )
         for each in found
     ]
-    return aligned(["", "x", "y", "z", "travel", "unit", "stopped by"], rows)
+    return aligned(["", "x", "y", "z", "travel", "unit", "stopped by"], map(cells, found))
 
 
 def distance(reach: Reach, found: Travel) -> tuple[str, str]:
