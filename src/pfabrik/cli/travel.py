@@ -63,7 +63,7 @@ def describe(found: Travel) -> str:
         )
         for each in found
     ]
-    return aligned(["", "x", "y", "z", "travel", "unit", "stopped by"], map(cells, found))
+    return aligned(["", "x", "y", "z", "travel", "unit", "stopped by"], rows)
 
 
 def distance(reach: Reach, found: Travel) -> tuple[str, str]:
