@@ -50,8 +50,8 @@ def ik(
     if position is None and rpy is None and joint is None:
         raise click.UsageError("no target: give --position, --rpy or both, or --joint")
     mechanism = pf.load(mech)
-    note_ignored(mechanism, position, rpy)
     target = target_of(mechanism, position, rpy, joint)
+    note_ignored(mechanism, position, rpy)
     if list_all:
         note_unused("--all")
         return list_modes(mechanism, target, as_json)
@@ -84,7 +84,7 @@ def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | No
 
 def list_modes(mechanism: Mechanism, target: Target, as_json: bool) -> int:
     """Print all working modes, each with its actuator values, and its pose where the task leaves it open."""
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     shown = readouts(mechanism)
     header = [f"{readout.name} [{readout.unit}]" for readout in shown]
