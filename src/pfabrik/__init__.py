@@ -1,4 +1,20 @@
-"""pfabrik: the kinematics of parallel mechanisms, from a small file to exact, honest answers."""
+"""pfabrik: the kinematics of parallel mechanisms, from a small file to exact, honest answers.
+
+    import pfabrik as pf
+
+    m = pf.load("stewart")                       # a catalogue name (see pf.catalog()) or the path of a file
+    sol = pf.solve_ik(m, [10, 0, 190])           # REACHED, or PROJECTED to the nearest feasible pose
+    fk = pf.solve_fk(m, sol.actuators)           # from actuator values to the pose
+
+Describe   load, save, catalog; Mechanism, Joint, Cone, Leg
+Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, working_modes; pose, Options
+Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
+To first order   mobility, inverse_jacobian, forward_jacobian, singularity
+Structure  decompose, SubChain; geometric (closed forms of the paper's machines); errors
+
+Lengths are in the mechanism's own unit, angles in radians; a pose is a 4x4 matrix from platform to base coordinates;
+batch axes come first.
+"""
 
 from __future__ import annotations
 

@@ -50,8 +50,8 @@ def ik(
     if position is None and rpy is None and joint is None:
         raise click.UsageError("no target: give --position, --rpy or both, or --joint")
     mechanism = pf.load(mech)
-    note_ignored(mechanism, position, rpy)
     target = target_of(mechanism, position, rpy, joint)
+    note_ignored(mechanism, position, rpy)
     if list_all:
         note_unused("--all")
         return list_modes(mechanism, target, as_json)

@@ -52,9 +52,15 @@ def travel(
 def describe(found: Travel) -> str:
     """One line a direction."""
     from ..answers.words import short_names
+    from .answer import plain
 
     rows = [
-        (each.kind, *(f"{part:.6g}" for part in each.direction), *distance(each, found), short_names(each.stopped_by))
+        (
+            each.kind,
+            *(plain(part, 1e-9) for part in each.direction),
+            *distance(each, found),
+            short_names(each.stopped_by),
+        )
         for each in found
     ]
     return aligned(["", "x", "y", "z", "travel", "unit", "stopped by"], rows)
