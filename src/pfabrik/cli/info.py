@@ -71,6 +71,8 @@ def joint_as_object(joint: Joint, mechanism: Mechanism) -> dict[str, object]:
         "actuated": joint.actuated,
         "home": mechanism.home_coordinate(joint.name),
         "range": joint.range,
+        "max_speed": joint.max_speed,
+        "max_acceleration": joint.max_acceleration,
         "cone": None if joint.cone is None else dataclasses.asdict(joint.cone),
     }
 
