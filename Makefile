@@ -22,7 +22,7 @@ test-interpreted: $(STAMP)
 check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy --strict src
+	$(BIN)/mypy --strict src tests/typing
 	$(BIN)/lint-imports
 
 bench: $(STAMP)
