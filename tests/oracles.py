@@ -89,6 +89,25 @@ def inside_targets(mechanism: Mechanism, rng: np.random.Generator, n: int, least
     return found[:n]
 
 
+def edge(margin: Callable[[Array], Array], farthest: Array) -> Array:
+    """Where margins that are positive at 0 and negative at `farthest` change sign, ``(n,)``: halving, then secants.
+
+    The last steps are false positions, halved where one end stays (the Illinois rule); ends are known to a fraction of
+    what a margin is exact to, but for kinks: whoever needs both sides asks for the margins beside it.
+    """
+    low, high = np.zeros_like(farthest), farthest
+    at_low, at_high = margin(low), margin(high)
+    for step in range(18):
+        share = 0.5 if step < 10 else at_low / (at_low - at_high)
+        middle = low + share * (high - low)
+        value = margin(middle)
+        inside = value >= 0.0
+        at_low = np.where(inside, value, at_low if step < 10 else 0.5 * at_low)
+        at_high = np.where(inside, at_high if step < 10 else 0.5 * at_high, value)
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    return np.where(np.abs(at_low) < np.abs(at_high), low, high)
+
+
 def poses(positions: Array, rotations: Array | None = None) -> Array:
     """``T_base_platform`` of positions ``(n, 3)`` and rotations ``(n, 3, 3)``, level when left out."""
     result = np.tile(np.eye(4), (len(positions), 1, 1))
