@@ -11,8 +11,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import pfabrik as pf
 
 PACKAGE = Path(pf.__file__).parent

@@ -16,7 +16,7 @@ from numba.core.caching import NullCache
 
 import pfabrik as pf
 from machines import MACHINES
-from pfabrik.decomposition.plan import flatten
+from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels import _jit
 from pfabrik.kernels.closure import close
 from pfabrik.kernels.reaching import solve
@@ -162,8 +162,8 @@ def test_inputs_are_never_written_to(name: str) -> None:
     targets = some_targets(mechanism, 4)
     targets[2:, 0, 3] += 1e4
     seed = pf.solve_ik(mechanism, targets)
-    flat = flatten(mechanism)
-    watched = [targets, *seed._rows, *flat.plan, *flat.home_seed]
+    compiled = compile_plan(mechanism)
+    watched = [targets, *seed._rows, *compiled.plan, *compiled.home_seed]
     before = [array.copy() for array in watched]
     answer = pf.solve_ik(mechanism, targets, start=seed)
     followed = pf.track(mechanism, targets, start=seed[0])

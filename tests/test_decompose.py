@@ -15,7 +15,7 @@ import pfabrik as pf
 from machines import MACHINES, planar, ring
 from pfabrik import Cone, Joint, Mechanism
 from pfabrik.cli import main
-from pfabrik.decomposition.plan import flatten
+from pfabrik.decomposition.plan import compile_plan
 from pfabrik.errors import UnsupportedMechanism
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -244,7 +244,7 @@ def test_a_tool_on_the_platform_and_a_gripper_on_the_tip_belong_to_no_chain() ->
 
 def test_a_motor_that_no_chain_contains_is_named() -> None:
     with pytest.raises(UnsupportedMechanism, match="spindle is in no sub-chain"):
-        flatten(with_spindle(driven=True))
+        compile_plan(with_spindle(driven=True))
 
 
 FOOT, KNEE, HEAD = (-50, -80, 0), (-80, -70, 70), (-30, -50, 150)
@@ -311,7 +311,7 @@ def test_a_chain_that_needs_more_than_positions_names_the_joint_and_the_reason(n
     assert chain.engine == "closure"
     assert culprit in chain.reason.replace(",", " ").split()
     with pytest.raises(UnsupportedMechanism) as caught:
-        flatten(mechanism)
+        compile_plan(mechanism)
     assert chain.reason in str(caught.value)
     assert str(chain) in str(caught.value)
     assert pf.solve_ik(mechanism, mechanism.home_pose)

@@ -20,7 +20,7 @@ import checking
 import pfabrik as pf
 from machines import MACHINES, ring
 from pfabrik import Cone, Joint, Mechanism
-from pfabrik.decomposition.plan import Flat, flatten
+from pfabrik.decomposition.plan import CompiledPlan, compile_plan
 from pfabrik.kernels import linear, vectors
 from pfabrik.kernels._jit import kernel
 from pfabrik.kernels.reaching import exact, frames, restrict, rows, search, settle
@@ -277,30 +277,30 @@ def test_damping_makes_a_singular_system_solvable() -> None:
 # --- configurations --------------------------------------------------------------------------------------------------
 
 
-def at_home(flat: Flat) -> tuple[Any, Any]:
+def at_home(compiled: CompiledPlan) -> tuple[Any, Any]:
     """A configuration at home, and scratch memory."""
-    now, work = room(flat.plan)
-    now.pose[:] = flat.home_seed.poses[0]
-    now.nodes[:] = flat.plan.nodes["home"]
-    move_carriers(flat.plan, now)
+    now, work = room(compiled.plan)
+    now.pose[:] = compiled.home_seed.poses[0]
+    now.nodes[:] = compiled.plan.nodes["home"]
+    move_carriers(compiled.plan, now)
     return now, work
 
 
-def disturb(flat: Flat, now: Any, rng: np.random.Generator, share: float, planar: bool = False) -> None:
+def disturb(compiled: CompiledPlan, now: Any, rng: np.random.Generator, share: float, planar: bool = False) -> None:
     """Move everything by up to a share of L; first and last nodes stay where carrier, rail and platform have them."""
-    length = flat.plan.scalars[P.LENGTH]
+    length = compiled.plan.scalars[P.LENGTH]
     keep = np.array([1, 1, 0]) if planar else np.ones(3)
     now.nodes[:] += share * length * rng.uniform(-1, 1, now.nodes.shape) * keep
     now.pose[:3, 3] += share * length * rng.uniform(-1, 1, 3) * keep
     now.pose[:3, :3] = Rotation.from_rotvec(share * rng.uniform(-1, 1, 3) * (1 - keep if planar else 1)).as_matrix()
-    for j, joint in enumerate(flat.plan.trunk_joints):
+    for j, joint in enumerate(compiled.plan.trunk_joints):
         now.trunks[j] += share * rng.uniform(-1, 1) * (length if joint["kind"] == P.SLIDE else 1.0)
-    for branch in flat.plan.branches:
+    for branch in compiled.plan.branches:
         if branch["rail"]:
-            home = flat.plan.nodes[branch["first"]]["home"]
+            home = compiled.plan.nodes[branch["first"]]["home"]
             now.nodes[branch["first"]] = home + share * length * rng.uniform(-3, 3) * branch["rail_axis"]
-    move_carriers(flat.plan, now)
-    place_ends(flat.plan, now)
+    move_carriers(compiled.plan, now)
+    place_ends(compiled.plan, now)
 
 
 def arm_with_elbow(leg: Callable[[str, Any, Any], list[Joint]], slide: bool = True) -> Mechanism:
@@ -379,16 +379,16 @@ def pivoted() -> Mechanism:
 
 @pytest.mark.parametrize("name", ["nrpm", "elbow"])
 def test_carriers_are_products_of_exponentials(name: str) -> None:
-    flat = flatten(pf.load("nrpm") if name == "nrpm" else arm_with_elbow(_bar_strut))
-    now, _ = at_home(flat)
+    compiled = compile_plan(pf.load("nrpm") if name == "nrpm" else arm_with_elbow(_bar_strut))
+    now, _ = at_home(compiled)
     rng = np.random.default_rng(7)
     now.trunks[:] = rng.uniform(-1, 1, now.trunks.shape)
-    move_carriers(flat.plan, now)
+    move_carriers(compiled.plan, now)
     np.testing.assert_array_equal(now.carriers[0], np.eye(4)[:3])
-    for k, trunk in enumerate(flat.plan.trunks):
+    for k, trunk in enumerate(compiled.plan.trunks):
         T = np.eye(4)
         for j in range(trunk["first"], trunk["last"]):
-            joint = flat.plan.trunk_joints[j]
+            joint = compiled.plan.trunk_joints[j]
             np.testing.assert_allclose(now.screws[j, 0], T[:3, :3] @ joint["point"] + T[:3, 3], rtol=0, atol=1e-12)
             np.testing.assert_allclose(now.screws[j, 1], T[:3, :3] @ joint["axis"], rtol=0, atol=1e-14)
             twist = np.zeros((4, 4))
@@ -404,31 +404,31 @@ def test_carriers_are_products_of_exponentials(name: str) -> None:
 # --- closed forms ----------------------------------------------------------------------------------------------------
 
 
-def two_links(inner: float, outer: float) -> Flat:
+def two_links(inner: float, outer: float) -> CompiledPlan:
     """A dyad in the plane z = 0 from the origin, with a ball-jointed outer link; bent by a right angle at home."""
     joints = [
         Joint("A", "revolute", ("base", "crank"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True),
         Joint("B", "spherical", ("crank", "rod"), at=(inner, 0, 0)),
         Joint("C", "spherical", ("rod", "tool"), at=(inner, outer, 0)),
     ]
-    return flatten(Mechanism("dyad", joints, "C"))
+    return compile_plan(Mechanism("dyad", joints, "C"))
 
 
-def reached(flat: Flat, target: Any, mode: float, slack: float = 1e-12) -> tuple[bool, float, np.ndarray]:
-    now, _ = at_home(flat)
+def reached(compiled: CompiledPlan, target: Any, mode: float, slack: float = 1e-12) -> tuple[bool, float, np.ndarray]:
+    now, _ = at_home(compiled)
     now.pose[:3, 3] = target
-    found, present_mode = reach_exact(flat.plan, 0, now, mode, slack)
+    found, present_mode = reach_exact(compiled.plan, 0, now, mode, slack)
     return found, present_mode, now.nodes.copy()
 
 
 def test_a_dyad_reaches_in_two_modes_that_are_mirror_images() -> None:
-    flat = two_links(3.0, 2.0)
-    assert flat.plan.branches[0]["kind"] == P.DYAD
+    compiled = two_links(3.0, 2.0)
+    assert compiled.plan.branches[0]["kind"] == P.DYAD
     rng = np.random.default_rng(8)
     for _ in range(100):
         radius, angle, height = rng.uniform(1.5, 4.5), rng.uniform(-4, 4), rng.uniform(-0.5, 0.5)
         target = np.array([radius * np.cos(angle), radius * np.sin(angle), height])
-        one, other = reached(flat, target, 1.0), reached(flat, target, -1.0)
+        one, other = reached(compiled, target, 1.0), reached(compiled, target, -1.0)
         for found, _mode, (base, knee, tip) in (one, other):
             assert found
             np.testing.assert_array_equal(base, 0)
@@ -473,29 +473,29 @@ def test_a_dyad_folded_onto_its_base_keeps_its_direction(outer: float, reaches: 
 
 
 def test_a_target_beside_the_dyads_plane_is_reached_as_far_as_the_outer_link_leans() -> None:
-    flat = two_links(3.0, 2.0)
-    assert reached(flat, (3, 0, 1.999), 1.0)[0]
-    assert not reached(flat, (3, 0, 2.001), 1.0)[0]
+    compiled = two_links(3.0, 2.0)
+    assert reached(compiled, (3, 0, 1.999), 1.0)[0]
+    assert not reached(compiled, (3, 0, 2.001), 1.0)[0]
 
 
-def rail_and_rod() -> Flat:
+def rail_and_rod() -> CompiledPlan:
     """A carriage on the x axis with a rod of 5, at home over x = 0 with its end at (3, 4, 0)."""
     joints = [
         Joint("P", "prismatic", ("base", "carriage"), axis=(1, 0, 0), actuated=True),
         Joint("U", "universal", ("carriage", "rod"), at=(0, 0, 0)),
         Joint("S", "spherical", ("rod", "tool"), at=(3, 4, 0)),
     ]
-    return flatten(Mechanism("rail and rod", joints, "S"))
+    return compile_plan(Mechanism("rail and rod", joints, "S"))
 
 
 def test_a_rail_and_a_rod_reach_in_two_modes_that_are_mirror_images() -> None:
-    flat = rail_and_rod()
-    assert flat.plan.branches[0]["kind"] == P.RAIL_ROD
+    compiled = rail_and_rod()
+    assert compiled.plan.branches[0]["kind"] == P.RAIL_ROD
     rng = np.random.default_rng(9)
     for _ in range(100):
         off, angle, x = rng.uniform(0, 4.9), rng.uniform(-4, 4), rng.uniform(-20, 20)
         target = np.array([x, off * np.cos(angle), off * np.sin(angle)])
-        one, other = reached(flat, target, 1.0), reached(flat, target, -1.0)
+        one, other = reached(compiled, target, 1.0), reached(compiled, target, -1.0)
         for found, _mode, (carriage, end) in (one, other):
             assert found
             np.testing.assert_array_equal(carriage[1:], 0)
@@ -530,24 +530,24 @@ PASSED = [
 ]
 
 
-def lengths_kept(flat: Flat, nodes: np.ndarray) -> bool:
-    for branch in flat.plan.branches:
+def lengths_kept(compiled: CompiledPlan, nodes: np.ndarray) -> bool:
+    for branch in compiled.plan.branches:
         for k in range(branch["first"] + 1, branch["last"] + 1):
             length = np.linalg.norm(nodes[k] - nodes[k - 1])
-            slack = 1e-13 * flat.plan.scalars[P.LENGTH]
-            if not flat.plan.nodes[k]["lo"] - slack <= length <= flat.plan.nodes[k]["hi"] + slack:
+            slack = 1e-13 * compiled.plan.scalars[P.LENGTH]
+            if not compiled.plan.nodes[k]["lo"] - slack <= length <= compiled.plan.nodes[k]["hi"] + slack:
                 return False
     return True
 
 
-def off_plane(flat: Flat, nodes: np.ndarray) -> float:
+def off_plane(compiled: CompiledPlan, nodes: np.ndarray) -> float:
     """Largest distance of a node that hinges on the base carry from the plane of its branch."""
     gaps = [0.0]
-    for branch in flat.plan.branches:
+    for branch in compiled.plan.branches:
         last = branch["first"] + min(branch["planar"], branch["last"] - branch["first"])
         for k in range(branch["first"], last + 1):
-            gaps.append(abs(branch["normal"] @ (nodes[k] - flat.plan.nodes[branch["first"]]["home"])))
-    return max(gaps) if not len(flat.plan.trunks) else 0.0
+            gaps.append(abs(branch["normal"] @ (nodes[k] - compiled.plan.nodes[branch["first"]]["home"])))
+    return max(gaps) if not len(compiled.plan.trunks) else 0.0
 
 
 @pytest.mark.parametrize("name", PASSED)
@@ -555,41 +555,41 @@ def test_a_pass_outward_starts_at_the_base_and_keeps_lengths_planes_rails_and_ra
     machine = MACHINES[name]() if name in MACHINES else pf.load(name)
     if name == "tripod_rps":  # a platform's cone may contradict the hinge's plane
         machine = machine.with_limits(S1=None, S2=None, S3=None)
-    flat = flatten(machine)
+    compiled = compile_plan(machine)
     rng = np.random.default_rng(10)
-    length = flat.plan.scalars[P.LENGTH]
+    length = compiled.plan.scalars[P.LENGTH]
     for share in (0.05, 0.5, 3.0):
-        now, _ = at_home(flat)
-        disturb(flat, now, rng, share)
-        for b, branch in enumerate(flat.plan.branches):
-            pass_once(flat.plan, b, now, False)
+        now, _ = at_home(compiled)
+        disturb(compiled, now, rng, share)
+        for b, branch in enumerate(compiled.plan.branches):
+            pass_once(compiled.plan, b, now, False)
             first = branch["first"]
             carrier = now.carriers[branch["carrier"]]
-            base = carrier[:, :3] @ flat.plan.nodes[first]["home"] + carrier[:, 3]
+            base = carrier[:, :3] @ compiled.plan.nodes[first]["home"] + carrier[:, 3]
             slide = branch["rail_axis"] @ (now.nodes[first] - base)
             np.testing.assert_allclose(now.nodes[first], base + slide * branch["rail_axis"], atol=1e-12 * length)
             if branch["rail"]:
                 assert branch["rail_lo"] - 1e-12 * length <= slide <= branch["rail_hi"] + 1e-12 * length
             else:
                 assert slide == 0
-        assert lengths_kept(flat, now.nodes)
-        assert off_plane(flat, now.nodes) <= 1e-12 * length
+        assert lengths_kept(compiled, now.nodes)
+        assert off_plane(compiled, now.nodes) <= 1e-12 * length
 
 
 @pytest.mark.parametrize("name", PASSED)
 def test_a_pass_inward_starts_at_the_target_and_keeps_lengths_and_planes(name: str) -> None:
-    flat = flatten(MACHINES[name]() if name in MACHINES else pf.load(name))
+    compiled = compile_plan(MACHINES[name]() if name in MACHINES else pf.load(name))
     rng = np.random.default_rng(11)
-    length = flat.plan.scalars[P.LENGTH]
+    length = compiled.plan.scalars[P.LENGTH]
     for share in (0.05, 0.5, 3.0):
-        now, _ = at_home(flat)
-        disturb(flat, now, rng, share, planar=name.startswith("planar"))
-        for b, branch in enumerate(flat.plan.branches):
-            pass_once(flat.plan, b, now, True)
+        now, _ = at_home(compiled)
+        disturb(compiled, now, rng, share, planar=name.startswith("planar"))
+        for b, branch in enumerate(compiled.plan.branches):
+            pass_once(compiled.plan, b, now, True)
             target = now.pose[:3, :3] @ branch["end"] + now.pose[:3, 3]
             np.testing.assert_allclose(now.nodes[branch["last"]], target, atol=1e-12 * length)
         if name.startswith(("stewart", "nrpm", "hexa", "planar", "serial_spherical")) and name != "hexapod_rus":
-            assert lengths_kept(flat, now.nodes)
+            assert lengths_kept(compiled, now.nodes)
 
 
 def bend(a: np.ndarray, b: np.ndarray) -> float:
@@ -599,14 +599,14 @@ def bend(a: np.ndarray, b: np.ndarray) -> float:
 
 def test_a_pass_outward_keeps_the_ranges_of_hinges() -> None:
     """Every joint of the planar arm stays within 1.4 of the bend that home has there."""
-    flat = flatten(MACHINES["serial_planar"]())
+    compiled = compile_plan(MACHINES["serial_planar"]())
     rng = np.random.default_rng(12)
-    home = flat.plan.nodes["home"]
+    home = compiled.plan.nodes["home"]
     limited = 0
     for _ in range(50):
-        now, _ = at_home(flat)
-        disturb(flat, now, rng, 2.0)
-        pass_once(flat.plan, 0, now, False)
+        now, _ = at_home(compiled)
+        disturb(compiled, now, rng, 2.0)
+        pass_once(compiled.plan, 0, now, False)
         links, homes = np.diff(now.nodes, axis=0), np.diff(home, axis=0)
         turns = [bend(homes[0], links[0])]
         turns += [bend(links[k - 1], links[k]) - bend(homes[k - 1], homes[k]) for k in range(1, 4)]
@@ -617,13 +617,13 @@ def test_a_pass_outward_keeps_the_ranges_of_hinges() -> None:
 
 
 def test_a_pass_outward_keeps_cones_about_base_and_links() -> None:
-    flat = flatten(MACHINES["serial_spherical"]())
+    compiled = compile_plan(MACHINES["serial_spherical"]())
     rng = np.random.default_rng(13)
     limited = 0
     for _ in range(50):
-        now, _ = at_home(flat)
-        disturb(flat, now, rng, 2.0)
-        pass_once(flat.plan, 0, now, False)
+        now, _ = at_home(compiled)
+        disturb(compiled, now, rng, 2.0)
+        pass_once(compiled.plan, 0, now, False)
         links = np.vstack([[0, 0, 1], np.diff(now.nodes, axis=0)])
         angles = [np.arccos(unit(a) @ unit(b)) for a, b in pairwise(links)]
         assert max(angles) <= 0.9 + 1e-9
@@ -633,13 +633,13 @@ def test_a_pass_outward_keeps_cones_about_base_and_links() -> None:
 
 def test_a_pass_inward_keeps_the_cones_of_the_platform() -> None:
     machine = MACHINES["hexapod_ups"]()
-    flat = flatten(machine)
+    compiled = compile_plan(machine)
     rng = np.random.default_rng(14)
     for _ in range(10):
-        now, _ = at_home(flat)
-        disturb(flat, now, rng, 1.0)
-        for b, branch in enumerate(flat.plan.branches):
-            pass_once(flat.plan, b, now, True)
+        now, _ = at_home(compiled)
+        disturb(compiled, now, rng, 1.0)
+        for b, branch in enumerate(compiled.plan.branches):
+            pass_once(compiled.plan, b, now, True)
             axis = now.pose[:3, :3] @ np.array(machine.joint(f"C{b + 1}").cone.axis)
             line = now.nodes[branch["first"]] - now.nodes[branch["last"]]
             assert np.arccos(axis @ unit(line)) <= 0.7 + 1e-9
@@ -658,65 +658,65 @@ SETTLED: dict[str, Callable[[], Mechanism]] = {
 }
 
 
-def gradient(flat: Flat, now: Any, work: Any, free: int) -> tuple[np.ndarray, np.ndarray]:
+def gradient(compiled: CompiledPlan, now: Any, work: Any, free: int) -> tuple[np.ndarray, np.ndarray]:
     """Gradient of half the sum of squared violations: as assembled, and by central differences."""
-    n = right_hand_side(flat.plan, free, now, work)
+    n = right_hand_side(compiled.plan, free, now, work)
     assembled = -work.normal[:n, n].copy()
-    step = 3e-6 * flat.plan.scalars[P.LENGTH]
+    step = 3e-6 * compiled.plan.scalars[P.LENGTH]
     found = np.zeros(n)
     for i in range(n):
         costs = []
         for signed in (step, -step):
             work.system[:, n] = 0
             work.system[i, n] = signed
-            costs.append(cost_beside(flat.plan, free, now, work, n))
+            costs.append(cost_beside(compiled.plan, free, now, work, n))
         found[i] = (costs[0] - costs[1]) / (2 * step)
     return assembled, found
 
 
-def assert_gradients_agree(flat: Flat, now: Any, work: Any) -> None:
+def assert_gradients_agree(compiled: CompiledPlan, now: Any, work: Any) -> None:
     """For every way the platform may be free; the step leaves an error of some 1e-8."""
     for free in (NEITHER, TRANSLATE, TURN, BOTH):
-        assembled, found = gradient(flat, now, work, free)
-        largest = max(np.abs(found).max(initial=0.0), 1e-3 * flat.plan.scalars[P.LENGTH])
+        assembled, found = gradient(compiled, now, work, free)
+        largest = max(np.abs(found).max(initial=0.0), 1e-3 * compiled.plan.scalars[P.LENGTH])
         np.testing.assert_allclose(assembled, found, rtol=0, atol=3e-6 * largest)
 
 
 @pytest.mark.parametrize("name", SETTLED)
 def test_the_gradient_of_loops_and_planes_agrees_with_finite_differences(name: str) -> None:
-    flat = flatten(SETTLED[name]().without_limits())
+    compiled = compile_plan(SETTLED[name]().without_limits())
     rng = np.random.default_rng(15)
     for share in (0.02, 0.3):
-        now, work = at_home(flat)
-        disturb(flat, now, rng, share)
-        assert_gradients_agree(flat, now, work)
+        now, work = at_home(compiled)
+        disturb(compiled, now, rng, share)
+        assert_gradients_agree(compiled, now, work)
 
 
 @pytest.mark.parametrize("name", SETTLED)
 def test_the_gradient_of_limits_agrees_with_finite_differences(name: str) -> None:
     """Angles of hinges, and at cones fixed to hinged links, are gradients where the links lie in their planes."""
-    flat = flatten(SETTLED[name]())
+    compiled = compile_plan(SETTLED[name]())
     rng = np.random.default_rng(16)
     noted = 0
     for share in (0.02, 0.3, 0.6):
-        now, work = at_home(flat)
-        disturb(flat, now, rng, share)
-        put_into_planes(flat, now)
-        assert_gradients_agree(flat, now, work)
+        now, work = at_home(compiled)
+        disturb(compiled, now, rng, share)
+        put_into_planes(compiled, now)
+        assert_gradients_agree(compiled, now, work)
         noted += int(work.totals[2])
     assert noted > 0
 
 
-def put_into_planes(flat: Flat, now: Any) -> None:
+def put_into_planes(compiled: CompiledPlan, now: Any) -> None:
     """Put every hinged link into its plane; the platform too, where all its links share one."""
-    branches = flat.plan.branches
-    if branches["align"].any() or flat.plan.scalars[P.POINT_END] == 1.0:
+    branches = compiled.plan.branches
+    if branches["align"].any() or compiled.plan.scalars[P.POINT_END] == 1.0:
         normal = now.carriers[branches[0]["carrier"]][:, :3] @ branches[0]["normal"]
         turn = normal @ Rotation.from_matrix(now.pose[:3, :3]).as_rotvec()
         now.pose[:3, :3] = Rotation.from_rotvec(turn * normal).as_matrix()
         if branches[0]["planar"]:
-            now.pose[:3, 3] -= normal * (normal @ (now.pose[:3, 3] - flat.home_seed.poses[0, :3, 3]))
-        place_ends(flat.plan, now)
+            now.pose[:3, 3] -= normal * (normal @ (now.pose[:3, 3] - compiled.home_seed.poses[0, :3, 3]))
+        place_ends(compiled.plan, now)
     for branch in branches:
         nodes = now.nodes[branch["first"] : branch["last"] + 1]
         normal = now.carriers[branch["carrier"]][:, :3] @ branch["normal"]
@@ -725,13 +725,13 @@ def put_into_planes(flat: Flat, now: Any) -> None:
         if branch["end_plane"]:
             end_normal = now.pose[:3, :3] @ branch["end_normal"]
             nodes[:-1] -= np.outer((nodes[:-1] - nodes[-1]) @ end_normal, end_normal) * (len(nodes) > 2)
-    place_ends(flat.plan, now)
+    place_ends(compiled.plan, now)
 
 
-def as_answer(flat: Flat, now: Any) -> SimpleNamespace:
+def as_answer(compiled: CompiledPlan, now: Any) -> SimpleNamespace:
     """What the independent check reads of a configuration: pose and joint centres."""
-    points = {joint: now.screws[j, 0] for joint, j in flat.trunk_points}
-    for point in flat.points:
+    points = {joint: now.screws[j, 0] for joint, j in compiled.trunk_points}
+    for point in compiled.points:
         frame = now.pose if point.carrier < 0 else now.carriers[point.carrier]
         points[point.joint] = now.nodes[point.node] + frame[:3, :3] @ (point.shift * point.axis)
     return SimpleNamespace(pose=now.pose, points=points)
@@ -741,34 +741,34 @@ def as_answer(flat: Flat, now: Any) -> SimpleNamespace:
 def test_settling_closes_the_loops(name: str) -> None:
     """From a configuration disturbed by a twentieth of L, to a trillionth, checked on the description."""
     mechanism = SETTLED[name]()
-    flat = flatten(mechanism)
+    compiled = compile_plan(mechanism)
     rng = np.random.default_rng(16)
     for _ in range(2 if INTERPRETED else 10):
-        now, work = at_home(flat)
-        disturb(flat, now, rng, 0.05)
-        if flat.plan.scalars[P.POINT_END] == 1.0:
+        now, work = at_home(compiled)
+        disturb(compiled, now, rng, 0.05)
+        if compiled.plan.scalars[P.POINT_END] == 1.0:
             now.pose[:3, :3] = np.eye(3)
-        free = TRANSLATE if flat.plan.scalars[P.POINT_END] == 1.0 else BOTH
-        assert settle_all(flat.plan, free, now, work)
-        assert checking.worst_gap(mechanism, as_answer(flat, now))[0] <= 1e-12
+        free = TRANSLATE if compiled.plan.scalars[P.POINT_END] == 1.0 else BOTH
+        assert settle_all(compiled.plan, free, now, work)
+        assert checking.worst_gap(mechanism, as_answer(compiled, now))[0] <= 1e-12
         np.testing.assert_allclose(now.pose[:3, :3].T @ now.pose[:3, :3], np.eye(3), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", SETTLED)
 def test_settling_says_when_the_loops_cannot_be_closed(name: str) -> None:
     """The platform is held ten L away."""
-    flat = flatten(SETTLED[name]())
-    now, work = at_home(flat)
-    now.pose[:3, 3] += (0, 0, 10 * flat.plan.scalars[P.LENGTH])
-    place_ends(flat.plan, now)
-    assert not settle_all(flat.plan, NEITHER, now, work)
+    compiled = compile_plan(SETTLED[name]())
+    now, work = at_home(compiled)
+    now.pose[:3, 3] += (0, 0, 10 * compiled.plan.scalars[P.LENGTH])
+    place_ends(compiled.plan, now)
+    assert not settle_all(compiled.plan, NEITHER, now, work)
     assert np.isfinite(now.nodes).all()
 
 
 def test_settling_leaves_a_settled_configuration_alone() -> None:
     for name, make in SETTLED.items():
-        flat = flatten(make())
-        now, work = at_home(flat)
+        compiled = compile_plan(make())
+        now, work = at_home(compiled)
         before = now.nodes.copy()
-        assert settle_all(flat.plan, BOTH, now, work), name
+        assert settle_all(compiled.plan, BOTH, now, work), name
         np.testing.assert_allclose(now.nodes, before, rtol=0, atol=1e-11)

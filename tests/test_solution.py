@@ -12,7 +12,7 @@ import pfabrik as pf
 from machines import ring
 from pfabrik import Joint, Mechanism, Options, Solution, Status
 from pfabrik.closure.configurations import Configurations
-from pfabrik.decomposition.plan import flatten
+from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels.reaching import plan as P
 
 FIELDS = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
@@ -184,11 +184,11 @@ def test_centres_along_a_trunk_move_with_the_joints_before_them() -> None:
             Joint(f"E{i}", "spherical", (f"r{i}", "platform"), at=head),
         ]
     machine = Mechanism("arm with elbow", joints, "platform", (0, 0, 150))
-    flat = flatten(machine)
+    compiled = compile_plan(machine)
     values = np.array([[0.3, 12.0, -0.5]])
     rows = P.Rows(
-        np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.eye(4)[None], flat.home_seed.nodes,
-        values, np.zeros((1, flat.n_actuators)), np.zeros((1, 5)),
+        np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.eye(4)[None], compiled.home_seed.nodes,
+        values, np.zeros((1, compiled.n_actuators)), np.zeros((1, 5)),
     )  # fmt: skip
     points = Solution(machine, Configurations(rows, np.zeros((1, 0))), ()).points
     shoulder = Rotation.from_rotvec([0, 0.3, 0])

@@ -25,6 +25,13 @@ class Tolerances:
     alignment : sine of the angle up to which two axes of a description count as parallel, and offset [L] up to which
         points count as aligned: descriptions are often typed with four to six digits. For the same reason the
         singular value [L and rad] up to which a condition of the loops counts as following from the others.
+    nearly_implied : singular value [L and rad] below which a condition of the loops at home is hardly one of its own:
+        in machines that move, such conditions have 0.02 and more; directions written with three digits leave up to
+        1e-3 of what should follow from others.
+    implied : singular value [L and rad] up to which a condition of the loops at home follows from the others exactly:
+        rounding leaves 1e-15. From 1e-11 on, searches for nearest poses take conditions that miss each other for ones
+        to keep, and stop early.
+    room : range that leaves a joint room to move [L or rad]: what has less is as good as rigid, and no strut.
     speed : share by which an actuator may be faster than its limit: a path that just keeps it must not be refused for
         the rounding of its answers.
     rank : sine or singular value [L and rad] up to which a direction of motion counts as lost at a configuration: its
@@ -43,6 +50,9 @@ class Tolerances:
     holding: float = 1e-6
     rotation_matrix: float = 1e-6
     alignment: float = 1e-6
+    nearly_implied: float = 1e-3
+    implied: float = 1e-12
+    room: float = 1e-6
     same_mode: float = 1e-5
     speed: float = 1e-6
     rank: float = 1e-9

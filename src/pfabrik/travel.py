@@ -127,7 +127,7 @@ def travel(
     """
     mechanism, options = checked_solution(solution).mechanism, checked_options(options)
     if solution.shape != () or solution.status > Status.PROJECTED:
-        found = f"batch shape {solution.shape}" if solution.shape else f"an answer that is {solution.status.name}"
+        found = f"batch shape {solution.shape}" if solution.shape else f"an answer that is {solution.status}"
         raise InvalidArgument("solution", found, "one feasible configuration")
     default = along is None and about is None
     lines = _lines(mechanism, along, default)

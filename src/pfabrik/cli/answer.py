@@ -11,7 +11,9 @@ import click
 
 import pfabrik as pf
 
-from ..answers.words import Floats, as_sentence, by_bound, exceeded, loop_gap, readouts
+from ..answers.words import Floats, as_sentence, by_bound, exceeded, loop_gap
+from ..description.notebook import bound_text
+from ..description.readouts import readouts
 from ..errors import ContinuumOfSolutions
 from ..rotations import to_rpy
 from ..tolerances import TOLERANCES
@@ -20,8 +22,8 @@ from .table import aligned
 
 if TYPE_CHECKING:
     from ..answers.solution import Solution
-    from ..answers.words import Readout
     from ..description.mechanism import Mechanism
+    from ..description.readouts import Readout
     from ..modes.lists import Modes
 
 
@@ -126,11 +128,6 @@ def describe_modes(found: Modes, kind: str, header: Sequence[str], cells: Callab
 def pose_header(mechanism: Mechanism) -> list[str]:
     """The columns of `pose_texts`."""
     return [*(f"{name} [{mechanism.length_unit}]" for name in "xyz"), "roll [deg]", "pitch [deg]", "yaw [deg]"]
-
-
-def bound_text(bound: float) -> str:
-    """A limit; ``-`` where there is none."""
-    return f"{bound:.6g}" if math.isfinite(bound) else "-"
 
 
 def plain(value: float, smallest: float) -> str:

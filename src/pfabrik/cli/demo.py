@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..answers.solution import Solution
     from ..answers.tracked import Track
     from ..reproduce.study import Case
 
@@ -109,7 +108,7 @@ def row(run: Run) -> tuple[str, ...]:
     )
 
 
-def holds(solution: Solution) -> bool:
+def holds(solution: Track) -> bool:
     """Whether every step has an answer with its loops closed and its limits kept."""
     from ..tolerances import TOLERANCES
 

@@ -54,7 +54,7 @@ def coordinates(mechanism: Mechanism, values: tuple[float, ...]) -> Floats:
     """The values as coordinates (n_a,) [length or rad]; a usage error for too few or too many."""
     import numpy as np
 
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     shown = readouts(mechanism)
     if len(values) != len(shown):

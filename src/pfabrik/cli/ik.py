@@ -84,7 +84,7 @@ def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | No
 
 def list_modes(mechanism: Mechanism, target: Target, as_json: bool) -> int:
     """Print all working modes, each with its actuator values, and its pose where the task leaves it open."""
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     shown = readouts(mechanism)
     header = [f"{readout.name} [{readout.unit}]" for readout in shown]

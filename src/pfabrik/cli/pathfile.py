@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 import pfabrik as pf
 
-from ..answers.words import readouts, short_names
+from ..answers.words import short_names
+from ..description.readouts import readouts
 from ..errors import near_miss
 from ..rotations import to_rpy
 

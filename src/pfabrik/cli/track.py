@@ -17,7 +17,6 @@ from .projecting import note_left_out, options_projecting, projecting
 from .whole import whole_file
 
 if TYPE_CHECKING:
-    from ..answers.solution import Solution
     from ..answers.tracked import Track
     from ..answers.words import Floats
     from ..description.mechanism import Mechanism
@@ -94,7 +93,7 @@ def note_ignored(mechanism: Mechanism, targets: Floats) -> None:
 
 def speed_limits(mechanism: Mechanism, given: Sequence[str]) -> dict[str, float]:
     """Speeds by name [rad/s or length/s], from words as of ``--speed``; what is said of one counts before all."""
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     shown = {readout.name: readout for readout in readouts(mechanism)}
     said: dict[str, float] = {}
@@ -131,7 +130,7 @@ def summary(followed: Track) -> str:
 
 def hasty(followed: Track) -> list[str]:
     """The actuators that would have to be too fast, how fast, and where: one phrase each."""
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     too_fast, speeds, phrases = followed.too_fast, followed.speeds, []
     if too_fast is None or speeds is None:
@@ -150,6 +149,6 @@ def targets_named(rows: Sequence[int]) -> str:
     return f"target{'s' * (len(rows) > 1)} {', '.join(map(str, rows[:ROWS_NAMED]))}{more}"
 
 
-def count_statuses(solution: Solution) -> dict[str, int]:
+def count_statuses(solution: Track) -> dict[str, int]:
     """How many targets ended in each status, by its name in lower case."""
     return {status.name.lower(): int((solution.status == status).sum()) for status in pf.Status}

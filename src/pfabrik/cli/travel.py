@@ -43,7 +43,7 @@ def travel(
     mechanism = pf.load(mech)
     start = pf.solve_ik(mechanism, target_of(mechanism, position, rpy, joint))
     if not start:
-        raise click.ClickException(f"cannot start there: {start.status.name.lower()}; see `pfabrik ik`")
+        raise click.ClickException(f"cannot start there: {str(start.status).lower()}; see `pfabrik ik`")
     found = pf.travel(start, along=along or None, about=about or None, pivot=pivot)
     click.echo(json.dumps(found.to_dict(), allow_nan=False) if as_json else describe(found))
     return 0
@@ -55,7 +55,12 @@ def describe(found: Travel) -> str:
     from .answer import plain
 
     rows = [
-        (each.kind, *(plain(part, 1e-9) for part in each.direction), *distance(each, found), short_names(each.stopped_by))
+        (
+            each.kind,
+            *(plain(part, 1e-9) for part in each.direction),
+            *distance(each, found),
+            short_names(each.stopped_by),
+        )
         for each in found
     ]
     return aligned(["", "x", "y", "z", "travel", "unit", "stopped by"], rows)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.reaching import plan as P
+from ..tolerances import TOLERANCES
 from .decompose import SubChain, beyond_positions, decompose
 from .forms import BranchForm, Coordinate, TrunkForm
 
@@ -32,7 +33,7 @@ class JointPoint:
 
 
 @dataclass(frozen=True)
-class Flat:
+class CompiledPlan:
     """A mechanism as arrays, and the names that go with them.
 
     Attributes
@@ -53,7 +54,7 @@ class Flat:
 
 
 @lru_cache(maxsize=64)
-def flatten(mechanism: Mechanism) -> Flat:
+def compile_plan(mechanism: Mechanism) -> CompiledPlan:
     """Compile a mechanism; `UnsupportedMechanism` names every sub-chain that positions cannot express."""
     reasons = beyond_positions(mechanism)
     if reasons:
@@ -62,10 +63,6 @@ def flatten(mechanism: Mechanism) -> Flat:
     for chain in decompose(mechanism):
         builder.add_chain(chain)
     return builder.build()
-
-
-ROOM = 1e-6
-"""Range that leaves room to move [L or rad]: what is rigid is no strut."""
 
 
 class _Builder:
@@ -196,7 +193,7 @@ class _Builder:
             turning = -1 if at_end else carrier
             self.points += [JointPoint(name, first + k, node.shift, axis, turning) for name in node.joints]
 
-    def build(self) -> Flat:
+    def build(self) -> CompiledPlan:
         order = {name: number for number, name in enumerate(self.mechanism.actuator_names)}
         coordinates = sorted(self.coordinates, key=lambda pair: order.get(pair[0].joint, len(order)))
         plan = P.Plan(
@@ -215,7 +212,7 @@ class _Builder:
             plan.nodes["home"][plan.nodes["stored"] >= 0][None],
             np.zeros((1, len(self.trunk_joints))),
         )
-        return Flat(
+        return CompiledPlan(
             plan,
             names,
             tuple(self.cone_names),
@@ -236,7 +233,7 @@ class _Builder:
 
     def _is_on_struts(self) -> bool:
         """Whether every branch is a strut, and every range leaves room to move."""
-        least = ROOM * self.mechanism.characteristic_length
+        least = TOLERANCES.room * self.mechanism.characteristic_length
         struts = all(
             branch["kind"] == P.STRUT
             and branch["last"] > branch["first"]
@@ -244,7 +241,7 @@ class _Builder:
             and self.nodes[branch["last"]]["hi"] - self.nodes[branch["last"]]["lo"] > least
             for branch in self.branches
         )
-        room = all(j["hi"] - j["lo"] > (ROOM if j["kind"] == P.TURN else least) for j in self.trunk_joints)
+        room = all(j["hi"] - j["lo"] > (TOLERANCES.room if j["kind"] == P.TURN else least) for j in self.trunk_joints)
         return struts and room and all(cone["kind"] != P.LINK_CONE for cone in self.cones)
 
 

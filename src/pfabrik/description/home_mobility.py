@@ -18,16 +18,6 @@ from .joint_types import KINDS
 from .joints import Joint
 from .structure import Structure
 
-NEARLY_IMPLIED = 1e-3
-"""Singular value [L and rad] below which a condition of the loops is hardly one of its own: in machines that move, such
-conditions have 0.02 and more; directions written with three digits leave up to 1e-3 of what should follow from others.
-"""
-
-ROUNDING = 1e-12
-"""Singular value [L and rad] up to which a condition follows from the others exactly: rounding leaves 1e-15. From 1e-11
-on, searches for nearest poses take conditions that miss each other for ones to keep, and stop early.
-"""
-
 
 def body_twist(path: NDArray[np.float64], screws: NDArray[np.float64]) -> NDArray[np.float64]:
     """Twist of a body per rate, shape (..., 6, c).
@@ -82,7 +72,7 @@ def inexactness(mechanism: Structure) -> float:
     """
     _, closure = _home_motion(mechanism, frozenset())
     values = np.linalg.svd(closure, compute_uv=False) if closure.size else np.zeros(0)
-    unclear = values[(values > ROUNDING) & (values < NEARLY_IMPLIED)]
+    unclear = values[(values > TOLERANCES.implied) & (values < TOLERANCES.nearly_implied)]
     return float(unclear.max(initial=0.0))
 
 

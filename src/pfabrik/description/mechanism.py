@@ -16,6 +16,7 @@ from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import faults_of_legs, legs_name, placed_joints
 from .legs import Leg, as_legs
+from .notebook import mechanism_html
 from .structure import Structure
 
 __all__ = ["JOINT_TYPES", "Cone", "Joint", "JointType", "Limit", "Mechanism", "Range", "Vector", "checked_mechanism"]
@@ -51,6 +52,10 @@ class Mechanism(Structure):
 
     def __repr__(self) -> str:
         return f"<Mechanism '{self.name}': {self._counts()}, task {' '.join(self.task)}>"
+
+    def _repr_html_(self) -> str:
+        """Name, counts, task, actuators with their limits, and a small drawing of home, for notebooks."""
+        return mechanism_html(self, f"{self._counts()}; task {' '.join(self.task)}")
 
     def _counts(self) -> str:
         counts = {"joint": len(self.joints), "actuator": len(self.actuator_names)}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..closure.close import HELD, Closing, Closure, close, closure_of
 from ..closure.configurations import new_rows, rows_at
-from ..decomposition.plan import Flat, flatten
+from ..decomposition.plan import CompiledPlan, compile_plan
 from ..description.mechanism import Mechanism
 from ..kernels.reaching import plan as P
 from ..motion.displacements import columns, displacements
@@ -44,48 +44,48 @@ def coordinates_of(mechanism: Mechanism, rows: P.Rows, start: Floats | None = No
     if start is not None:
         begin[:] = start if len(start) == 1 else start[known]
     closure.put_actuators(begin, rows.actuators)
-    centres = _centres(mechanism, flatten(mechanism), rows)
+    centres = _centres(mechanism, compile_plan(mechanism), rows)
     settled = _settle(closure, begin, rows.poses, centres, chained).coordinates
     within_turns(mechanism, settled)
     found[known] = settled
     return found
 
 
-def positions_of(mechanism: Mechanism, flat: Flat, coordinates: Floats, rows: P.Rows) -> None:
+def positions_of(mechanism: Mechanism, compiled: CompiledPlan, coordinates: Floats, rows: P.Rows) -> None:
     """Fill the nodes and trunks of answers from joint coordinates (n, columns)."""
     if rows.nodes.shape[1]:
         bodies = displacements(mechanism, coordinates)
-        for point in flat.points:
-            node = flat.plan.nodes[point.node]
+        for point in compiled.points:
+            node = compiled.plan.nodes[point.node]
             if node["stored"] >= 0:
                 T = bodies[mechanism.joint(point.joint).connects[0]]
                 rows.nodes[:, node["stored"]] = T[:, :3, :3] @ node["home"] + T[:, :3, 3]
-    for name, record in zip(flat.coordinates, flat.plan.coordinates, strict=True):
+    for name, record in zip(compiled.coordinates, compiled.plan.coordinates, strict=True):
         if record["kind"] == P.TRUNK:
             value = coordinates[:, columns(mechanism)[name].start] + mechanism.home_coordinate(name)
             rows.trunks[:, record["index"]] = record["sign"] * (value - record["offset"])
 
 
 @lru_cache(maxsize=64)
-def _told(mechanism: Mechanism) -> frozenset[str]:
+def _readable_centres(mechanism: Mechanism) -> frozenset[str]:
     """Joints whose centres an answer in positions tells: not those merged with others into one at a common centre."""
-    flat = flatten(mechanism)
-    home = new_rows(mechanism, 1)._replace(**flat.home_seed._asdict())
+    compiled = compile_plan(mechanism)
+    home = new_rows(mechanism, 1)._replace(**compiled.home_seed._asdict())
     near = TOLERANCES.position * mechanism.characteristic_length
     return frozenset(
         name
-        for name, point in joint_points(flat, home).items()
+        for name, point in joint_points(compiled, home).items()
         if np.abs(point[0] - np.asarray(mechanism.joint(name).at)).max() <= near
     )
 
 
-def _centres(mechanism: Mechanism, flat: Flat, rows: P.Rows) -> Floats:
-    """Joint centres as the closure kernel wishes for them, (n, joints, 3); NaN for those not told."""
-    told = _told(mechanism)
+def _centres(mechanism: Mechanism, compiled: CompiledPlan, rows: P.Rows) -> Floats:
+    """Joint centres as the closure kernel wishes for them, (n, joints, 3); NaN for those that cannot be read."""
+    readable = _readable_centres(mechanism)
     wished = np.full((len(rows.poses), len(mechanism.joints), 3), np.nan)
-    points = joint_points(flat, rows)
+    points = joint_points(compiled, rows)
     for place, joint in enumerate(mechanism.joints):
-        if joint.name in told:
+        if joint.name in readable:
             wished[:, place] = points[joint.name]
     return wished
 

@@ -7,19 +7,19 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decomposition.plan import Flat
+from ..decomposition.plan import CompiledPlan
 from ..kernels.reaching import plan as P
 
 Floats = NDArray[np.float64]
 
 
-def joint_points(flat: Flat, rows: P.Rows) -> dict[str, Floats]:
+def joint_points(compiled: CompiledPlan, rows: P.Rows) -> dict[str, Floats]:
     """Joint name -> position of its centre in the base frame, (n, 3); joints that act as one share a centre."""
-    carriers, screw_points = _carriers(flat.plan, rows.trunks)
-    found = {name: screw_points[joint] for name, joint in flat.trunk_points}
-    for point in flat.points:
+    carriers, screw_points = _carriers(compiled.plan, rows.trunks)
+    found = {name: screw_points[joint] for name, joint in compiled.trunk_points}
+    for point in compiled.points:
         turning = rows.poses[:, :3, :3] if point.carrier < 0 else carriers[point.carrier][:, :3, :3]
-        found[point.joint] = _node(flat.plan, rows, point.node, carriers) + turning @ (point.shift * point.axis)
+        found[point.joint] = _node(compiled.plan, rows, point.node, carriers) + turning @ (point.shift * point.axis)
     return found
 
 

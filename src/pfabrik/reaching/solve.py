@@ -13,7 +13,7 @@ from ..closure.configurations import Configurations, joint_coordinates, new_rows
 from ..closure.descend import within_sight
 from ..closure.projection import SAME, kept, project, ways_of
 from ..closure.stretched import Bends
-from ..decomposition.plan import flatten
+from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.reaching import plan as P
@@ -41,7 +41,7 @@ class ReachingEngine:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        self._flat = flatten(mechanism)
+        self._compiled = compile_plan(mechanism)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -76,7 +76,7 @@ class ReachingEngine:
         while done < len(targets):
             block = slice(done, done + piece)
             own = rows_at(rows, block)
-            solve_by_iteration(self._flat.plan, targets[block], self._seeds(before), settings, own)
+            solve_by_iteration(self._compiled.plan, targets[block], self._seeds(before), settings, own)
             away = np.flatnonzero(own.status == P.PROJECTED)[:1] if self._leaves_projections(settings) else ()
             for row in away:
                 before = self._last_answer(own, row) or before
@@ -113,12 +113,12 @@ class ReachingEngine:
         """Configurations found on joint coordinates, as answers whose status is still to be told."""
         rows = self._new_rows(len(closing.poses))
         write_closing(closure_of(self.mechanism), closing, rows)
-        positions_of(self.mechanism, self._flat, closing.coordinates, rows)
+        positions_of(self.mechanism, self._compiled, closing.coordinates, rows)
         return Configurations(rows, closing.coordinates)
 
     def points(self, found: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]; merged joints share a centre."""
-        return joint_points(self._flat, found.rows)
+        return joint_points(self._compiled, found.rows)
 
     def assemble(self, coordinates: Floats, poses: Floats, values: Floats) -> tuple[Floats, Floats] | None:
         """Legs whose actuators have given values (n, n_a), assembled in positions around platforms (n, 4, 4).
@@ -132,24 +132,24 @@ class ReachingEngine:
         from ..kernels.reaching.solve import solve_by_iteration
 
         rows, start = self._new_rows(len(values)), self._new_rows(len(values))
-        positions_of(self.mechanism, self._flat, coordinates, start)
+        positions_of(self.mechanism, self._compiled, coordinates, start)
         settings = settings_of(self.mechanism, ASSEMBLING, keep_mode=False)
         for i in range(len(values)):
             row = slice(i, i + 1)
             seeds = P.Seeds(poses[row].copy(), start.nodes[row], start.trunks[row])
-            plan = with_locked_actuators(self._flat.plan, values[i])
+            plan = with_locked_actuators(self._compiled.plan, values[i])
             solve_by_iteration(plan, poses[row].copy(), seeds, settings, rows_at(rows, row))
         found = coordinates_of(self.mechanism, rows)
         return found, platform_poses(self.mechanism, found) if self.mechanism.end_effector_is_joint else rows.poses
 
     def _new_rows(self, n: int) -> P.Rows:
-        home = self._flat.home_seed
+        home = self._compiled.home_seed
         return new_rows(self.mechanism, n, home.nodes.shape[1], home.trunks.shape[1])
 
     def _seeds(self, start: Configurations | None) -> P.Seeds:
         """Where rows start, in positions."""
         if start is None:
-            return self._flat.home_seed
+            return self._compiled.home_seed
         return P.Seeds(start.rows.poses, start.rows.nodes, start.rows.trunks)
 
     def _found(self, rows: P.Rows, start: Configurations | None, chained: bool = False) -> Configurations:
@@ -180,7 +180,7 @@ class ReachingEngine:
         """Answer independent rows: directly where closed forms reach, by iteration where not."""
         from ..kernels.reaching.solve import solve_by_iteration, solve_directly
 
-        plan = self._flat.plan
+        plan = self._compiled.plan
         if len(targets) == 1:
             if solve_directly(plan, targets, seeds, settings, rows):
                 solve_by_iteration(plan, targets, seeds, settings, rows)
@@ -195,7 +195,7 @@ class ReachingEngine:
 
     def _leaves_projections(self, settings: P.Settings) -> bool:
         """Whether kernels leave projections to be drawn near: only platforms on struts they bring there themselves."""
-        return settings.nearest == 1 and self._flat.plan.scalars[P.ON_STRUTS] == 0.0
+        return settings.nearest == 1 and self._compiled.plan.scalars[P.ON_STRUTS] == 0.0
 
     def _draw_near(
         self,
@@ -247,8 +247,10 @@ class ReachingEngine:
 
         begin, found = self._new_rows(1), self._new_rows(1)
         begin.poses[:] = platform_poses(self.mechanism, start)
-        positions_of(self.mechanism, self._flat, start, begin)
-        solve_by_iteration(self._flat.plan, target, P.Seeds(begin.poses, begin.nodes, begin.trunks), settings, found)
+        positions_of(self.mechanism, self._compiled, start, begin)
+        solve_by_iteration(
+            self._compiled.plan, target, P.Seeds(begin.poses, begin.nodes, begin.trunks), settings, found
+        )
         if self._leaves_projections(settings):
             self._draw_near(target, lambda: start, settings, options, found)
         return found
@@ -256,8 +258,8 @@ class ReachingEngine:
     def _count_turns(self, rows: P.Rows) -> None:
         """Make the angles of revolute actuators that may turn more than once continuous along a path."""
         known = rows.status != P.INVALID
-        for j in range(self._flat.n_actuators):
-            coordinate = self._flat.plan.coordinates[j]
+        for j in range(self._compiled.n_actuators):
+            coordinate = self._compiled.plan.coordinates[j]
             lo, hi = coordinate["lo"], coordinate["hi"]
             if coordinate["kind"] in (P.HINGE, P.END_HINGE) and hi - lo > 2 * np.pi:
                 counted = np.unwrap(rows.actuators[known, j])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import geometric
 from ..answers.solution import Solution, Status
 from ..closure.configurations import new_rows
-from ..decomposition.plan import Flat, flatten
+from ..decomposition.plan import CompiledPlan, compile_plan
 from ..description.mechanism import Mechanism
 from ..geometric.topologies import closed_form
 from ..ik import solve_ik
@@ -46,17 +46,21 @@ class Answered:
 
     @property
     def reached(self) -> int:
-        return int((self.solution.status == Status.REACHED).sum())
+        return int(np.count_nonzero(self._are_reached))
 
     @property
     def position_rms(self) -> float:
         """Of the errors of the targets that are reached [length]."""
-        return rms(self.solution.position_error[self.solution.status == Status.REACHED])
+        return rms(np.asarray(self.solution.position_error)[self._are_reached])
 
     @property
     def iterations(self) -> float:
         """Passes, on average over the targets that are reached."""
-        return float(np.mean(self.solution.iterations[self.solution.status == Status.REACHED]))
+        return float(np.mean(np.asarray(self.solution.iterations)[self._are_reached]))
+
+    @property
+    def _are_reached(self) -> NDArray[np.bool_]:
+        return np.asarray(self.solution.status == Status.REACHED)
 
 
 @dataclass(frozen=True)
@@ -151,10 +155,10 @@ def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str
     "single" is one kernel call a target, made by compiled code; "batch" one call of the library for all targets.
     """
     calls: dict[tuple[str, str, str, str], Callable[[], object]] = {}
-    flat = flatten(mechanism)
+    compiled = compile_plan(mechanism)
     for name, options in ANY_MODE.items():
         for start in ("cold", "warm"):
-            calls["P-FABRIK", name, start, "single"] = _single(mechanism, flat, targets, options, start == "warm")
+            calls["P-FABRIK", name, start, "single"] = _single(mechanism, compiled, targets, options, start == "warm")
     for start in ("cold", "warm"):
         calls["geometric", "", start, "single"] = _single_closed(mechanism, targets, start == "warm")
     many = np.tile(targets, (COPIES, 1, 1))
@@ -165,19 +169,21 @@ def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str
     return {key: seconds[key] / (len(many) if key[-1] == "batch" else len(targets)) for key in calls}
 
 
-def _single(mechanism: Mechanism, flat: Flat, targets: Floats, options: Options, warm: bool) -> Callable[[], object]:
+def _single(
+    mechanism: Mechanism, compiled: CompiledPlan, targets: Floats, options: Options, warm: bool
+) -> Callable[[], object]:
     """One kernel call of P-FABRIK a target."""
     settings = settings_of(mechanism, options, keep_mode=False)
-    seeds = flat.home_seed
+    seeds = compiled.home_seed
     rows = new_rows(mechanism, len(targets), seeds.nodes.shape[1], seeds.trunks.shape[1])
     if warm:
-        seeds = _answers_before(flat, solve_ik(mechanism, targets, options=options)._rows)
-    return lambda: p_fabrik_one_by_one(flat.plan, targets, seeds, settings, rows)
+        seeds = _answers_before(compiled, solve_ik(mechanism, targets, options=options)._rows)
+    return lambda: p_fabrik_one_by_one(compiled.plan, targets, seeds, settings, rows)
 
 
-def _answers_before(flat: Flat, rows: Rows) -> Seeds:
+def _answers_before(compiled: CompiledPlan, rows: Rows) -> Seeds:
     """For each target the answer to the one before it; home for the first."""
-    pairs = zip(flat.home_seed, (rows.poses, rows.nodes, rows.trunks), strict=True)
+    pairs = zip(compiled.home_seed, (rows.poses, rows.nodes, rows.trunks), strict=True)
     return Seeds(*(np.concatenate([home, own[:-1]]) for home, own in pairs))
 
 
@@ -203,7 +209,7 @@ def summary(found: Efficiency) -> list[dict[str, Any]]:
             "reached": answered.reached,
             "position_rms": answered.position_rms,
             "iterations": answered.iterations,
-            "iterations_most": int(answered.solution.iterations.max()),
+            "iterations_most": int(np.max(answered.solution.iterations)),
             "agreement": found.agreement if (options, start) == ("default", "cold") else None,
             **answered.feasibility._asdict(),
         }

@@ -10,6 +10,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from numpy.typing import NDArray
 
 from ..description.joint_types import KINDS
+from ..description.places import Places, joint_places, joints_on, middle
 from ..errors import InvalidArgument
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
 
 Floats = NDArray[np.float64]
-Places = dict[str, Floats]
 
 # Lightness tells base, platform and links apart, and actuated from passive joints, without any colour.
 BASE, PLATFORM, LINK, EDGE, ACTUATED, PASSIVE = "#c8c8c8", "#79b4d9", "#4d4d4d", "#1a1a1a", "#d55e00", "#ffffff"
@@ -54,7 +54,7 @@ def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = Non
     check(mechanism, solution)
     axes = Figure(figsize=(6, 5), dpi=120).add_subplot(projection="3d") if axes is None else axes
     reference = mechanism.home_pose[:3, 3] if solution is None else solution.pose[:3, 3]
-    places = joint_places(mechanism, solution, reference)
+    places = joint_places(mechanism, None if solution is None else solution.points, reference)
     rails = {joint.name: rail for joint in mechanism.joints if (rail := rail_of(mechanism, joint, places, solution))}
     for body in mechanism.bodies:
         draw_body(axes, mechanism, body, body_points(mechanism, body, places, rails))
@@ -75,41 +75,6 @@ def check(mechanism: Mechanism, solution: Solution | None) -> None:
         raise InvalidArgument("solution", f"a solution of '{solution.mechanism.name}'", f"one of '{mechanism.name}'")
     if solution.shape != ():
         raise InvalidArgument("solution", f"a batch of shape {solution.shape}", "one answer, such as solution[0]")
-
-
-def joint_places(mechanism: Mechanism, solution: Solution | None, reference: Floats) -> Places:
-    """Joint name -> where it is drawn [length]: its centre or, for a prismatic joint without one, a place near by."""
-    if solution is None:
-        places = {joint.name: np.array(joint.at) for joint in mechanism.joints if joint.at is not None}
-    else:
-        places = {name: np.asarray(point) for name, point in solution.points.items()}
-    waiting = [joint for joint in mechanism.joints if joint.name not in places]
-    while waiting:
-        found = {joint.name: slider_place(mechanism, joint, places) for joint in waiting}
-        placed = {name: place for name, place in found.items() if place is not None}
-        places |= placed or dict.fromkeys(found, reference)  # a gantry of slides has no centre at all
-        waiting = [joint for joint in waiting if joint.name not in places]
-    return {joint.name: places[joint.name] for joint in mechanism.joints}
-
-
-def slider_place(mechanism: Mechanism, joint: Joint, places: Places) -> Floats | None:
-    """Where a prismatic joint is drawn: amid the joints of its larger moving body, or between two of equal size."""
-    if joint.along is not None:
-        return middle([places[name] for name in joint.along])
-    moving = [body for body in joint.connects if body != mechanism.base]
-    sides = [[places[name] for name in joints_on(mechanism, body) if name in places] for body in moving]
-    most = max(map(len, sides))
-    return middle([middle(side) for side in sides if len(side) == most]) if most else None
-
-
-def joints_on(mechanism: Mechanism, body: str) -> list[str]:
-    """Names of the joints of a body."""
-    return [joint.name for joint in mechanism.joints if body in joint.connects]
-
-
-def middle(points: list[Floats]) -> Floats:
-    """The mean of some points."""
-    return np.asarray(np.mean(points, axis=0))
 
 
 def rail_of(

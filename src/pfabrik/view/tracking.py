@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ..answers.words import Readout, readouts
+from ..description.readouts import Readout, readouts
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
