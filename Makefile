@@ -9,8 +9,12 @@ export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 demo: $(STAMP)
 	@$(BIN)/pfabrik demo
 
-# In parallel: the kernels are compiled first, once, and every worker loads them.
+# In parallel: the kernels are compiled first, once, and every worker loads them. The routines that kernels are made of
+# are tested as plain Python: compiled alone, each would take longer than its tests.
+ROUTINES := tests/test_kernels.py tests/test_quadratic.py
+
 test: $(STAMP)
+	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest $(ROUTINES)
 	@$(BIN)/python -m pytest -n auto --dist worksteal
 
 test-fast: $(STAMP)

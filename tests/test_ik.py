@@ -66,7 +66,8 @@ def test_status_is_right_on_both_sides_of_the_boundary(machine: pf.Mechanism, co
     def targets(distance: np.ndarray) -> np.ndarray:
         return oracles.poses(home + distance[:, None] * outward)
 
-    edge = oracles.edge(lambda distance: oracles.margin(machine, targets(distance)), np.full(count, 10 * length))
+    farthest, width = np.full(count, 10 * length), 1e-7 * length
+    edge = oracles.edge(lambda distance: oracles.margin(machine, targets(distance)), farthest, width)
     inner, outer = targets(edge - 1e-6 * length), targets(edge + 1e-6 * length)
     assert (oracles.margin(machine, inner) >= 0).all() and (oracles.margin(machine, outer) < 0).all()
     within, beyond = pf.solve_ik(machine, inner), pf.solve_ik(machine, outer)

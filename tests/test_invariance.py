@@ -229,7 +229,10 @@ def test_other_names_order_and_viewpoints_give_the_same_answer(name: str, seed: 
     targets = some_targets(original, seed)
     expected, answer = pf.solve_ik(original, targets), pf.solve_ik(other, targets)
     places = [
-        original.actuator_names.index(back) for mate in other.actuator_names for back, new in names.items() if new == mate
+        original.actuator_names.index(back)
+        for mate in other.actuator_names
+        for back, new in names.items()
+        if new == mate
     ]
     actuators = (expected.actuators * signs(original, other, names))[:, places]
     assert_same_answers(name, answer, expected, expected.pose, actuators)
