@@ -140,7 +140,7 @@ def assert_feasible(mechanism: Mechanism, solution: Solution) -> None:
 # Any target: half of the rows anywhere, half where a feasible configuration puts the end effector
 
 FEW, MANY = (2 if INTERPRETED else 100), 2000
-COUNTS = [FEW, pytest.param(MANY, marks=pytest.mark.slow)]
+COUNTS = [FEW, pytest.param(MANY, marks=pytest.mark.campaign)]
 SEARCHED = {FEW: 2, MANY: 20}
 """How many of the targets called out of reach are searched for, where no closed form tells of all."""
 
