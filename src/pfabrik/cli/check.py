@@ -17,6 +17,7 @@ from ..description.task import task_of
 from ..errors import InvalidMechanism
 from ..motion.first_order import generic_of
 from ..tolerances import TOLERANCES
+from .mech import MECH, load
 
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
@@ -28,7 +29,7 @@ FULL_TURN = 2.0 * math.pi
 
 
 @click.command()
-@click.argument("mech")
+@click.argument("mech", type=MECH)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout: faults, or what there is, and notes.")
 def check(mech: str, as_json: bool) -> int:
     """Check a mechanism file.
@@ -36,7 +37,7 @@ def check(mech: str, as_json: bool) -> int:
     Says "ok", or names every fault, one a line. What is sound but may not be what was meant is noted on stderr.
     """
     try:
-        mechanism = pf.load(mech)
+        mechanism = load(mech)
     except InvalidMechanism as error:
         if as_json:
             click.echo(json.dumps({"ok": False, "faults": [dataclasses.asdict(fault) for fault in error.faults]}))
