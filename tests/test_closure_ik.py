@@ -133,13 +133,17 @@ def test_any_finite_target_has_an_honest_answer(name: str) -> None:
     assert_honest(mechanism, targets, pf.solve_ik(mechanism, targets))
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    "count", [pytest.param(6, marks=pytest.mark.slow), pytest.param(64, marks=pytest.mark.campaign)]
+)
 @pytest.mark.parametrize("hold", ["orientation", "position", None])
 @pytest.mark.parametrize("name", MACHINES)
-def test_any_finite_target_has_an_honest_answer_whatever_a_projection_holds(name: str, hold: str | None) -> None:
+def test_any_finite_target_has_an_honest_answer_whatever_a_projection_holds(
+    name: str, hold: str | None, count: int
+) -> None:
     mechanism = machine(name)
     home = pf.solve_ik(mechanism, mechanism.home_pose)
-    targets = random_targets(mechanism, 64, seed=1)
+    targets = random_targets(mechanism, count, seed=1)
     for seed in (None, home):
         answer = pf.solve_ik(mechanism, targets, start=seed, options=Options(hold=hold))
         assert_honest(mechanism, targets, answer)
@@ -395,7 +399,7 @@ def test_universal_and_revolute_joints_may_turn_further_than_half_way() -> None:
 
 
 @compiled
-@pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.campaign)])
 def test_every_pose_of_an_arm_within_its_ranges_is_reached(count: int) -> None:
     """The poses come from random joint angles, so that each is in reach, in whatever working mode."""
     mechanism, rng = machine("arm"), np.random.default_rng(4)

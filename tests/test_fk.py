@@ -312,7 +312,7 @@ def test_forward_after_inverse_returns_the_pose(name: str) -> None:
     assert_round_trip(mechanism, targets, least=0.99)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_forward_after_inverse_returns_10000_poses(name: str) -> None:
     mechanism = machine(name)
@@ -334,10 +334,10 @@ def tilted_targets(mechanism: pf.Mechanism, rng: np.random.Generator, n: int, ti
     return found[:n]
 
 
-@pytest.mark.slow
-def test_a_hexapod_tilted_up_to_30_degrees_is_found_from_home_without_a_seed() -> None:
+@pytest.mark.parametrize("count", [20 if INTERPRETED else 1000, pytest.param(10_000, marks=pytest.mark.campaign)])
+def test_a_hexapod_tilted_up_to_30_degrees_is_found_from_home_without_a_start(count: int) -> None:
     mechanism = machine("stewart")
-    targets = tilted_targets(mechanism, np.random.default_rng(8), 10_000, np.radians(30.0))
+    targets = tilted_targets(mechanism, np.random.default_rng(8), count, np.radians(30.0))
     lengths = oracles.actuators(mechanism, targets)
     answer = pf.solve_fk(mechanism, lengths)
     assert_feasible(mechanism, lengths, answer)
@@ -615,7 +615,7 @@ def test_a_row_alone_is_answered_as_in_a_batch(name: str) -> None:
     rng = np.random.default_rng(12)
     slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuator_names])
     scale = np.where(slides, 0.3 * mechanism.characteristic_length, 0.5)
-    asked = home_values(mechanism) + scale * rng.uniform(-1, 1, (4 if INTERPRETED else 60, len(scale)))
+    asked = home_values(mechanism) + scale * rng.uniform(-1, 1, (4 if INTERPRETED else 20, len(scale)))
     batch = pf.solve_fk(mechanism, asked)
     for i, row in enumerate(asked):
         alone = pf.solve_fk(mechanism, row)
@@ -628,12 +628,12 @@ def test_a_row_alone_is_answered_as_in_a_batch(name: str) -> None:
         assert named[0] == named[1]
 
 
+@pytest.mark.parametrize("n", [4 if INTERPRETED else 20, pytest.param(200, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-def test_limits_are_kept_and_loops_closed_for_any_finite_values(name: str) -> None:
+def test_limits_are_kept_and_loops_closed_for_any_finite_values(name: str, n: int) -> None:
     mechanism = machine(name)
     rng = np.random.default_rng(13)
-    n = 4 if INTERPRETED else 60
     slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuator_names])
     size = rng.choice([0.1, 1.0, 10.0, 1e4], n)[:, None] * np.where(slides, mechanism.characteristic_length, 1.0)
     asked = home_values(mechanism) + size * rng.uniform(-1, 1, (n, len(slides)))

@@ -1,6 +1,7 @@
 """The routines that kernels are made of, one by one, against NumPy, SciPy, brute force and finite differences.
 
-Routines are only callable from compiled code: each is called through a kernel of its own here.
+Routines are only callable from compiled code: each is called through a kernel of its own here. To compile these takes
+longer than all else, so `make test` runs them as plain Python, and a campaign compiled.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ from pfabrik.kernels.reaching import passes as reach
 from pfabrik.kernels.reaching import plan as P
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),
+    *([] if INTERPRETED else [pytest.mark.campaign]),
+]
 
 TURN, TRANSLATE, BOTH, NEITHER = settle.TURNS, settle.TRANSLATES, settle.TURNS | settle.TRANSLATES, 0
 

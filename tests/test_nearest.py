@@ -89,7 +89,7 @@ def test_limits_are_kept_and_loops_closed_however_far_the_target(name: str, hold
     check_anywhere(name, hold, few(name))
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "hold"), CASES)
 def test_limits_are_kept_and_loops_closed_however_far_any_target(name: str, hold: str | None) -> None:
     check_anywhere(name, hold, 300)
@@ -114,7 +114,7 @@ def test_no_feasible_pose_is_nearer(name: str, hold: str | None) -> None:
     assert gains(*projections(name, hold, few(name)), starts=1).max() <= SAME
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "hold"), CASES)
 def test_hardly_any_feasible_pose_is_nearer_and_none_by_much(name: str, hold: str | None) -> None:
     farther = gains(*projections(name, hold, 100, seed=1), starts=6)
@@ -353,7 +353,7 @@ def test_answers_come_nearer_as_their_limits_give_way(name: str, hold: str | Non
     check_multipliers(name, hold, 1 if INTERPRETED else 3, seed=4)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "hold"), CASES)
 def test_answers_come_nearer_as_any_of_their_limits_give_way(name: str, hold: str | None) -> None:
     check_multipliers(name, hold, 25, seed=5)
