@@ -1,7 +1,7 @@
 """Whether an answer is feasible, from the description alone: closed-form loops and limits in plain NumPy.
 
 Two kinds of machine are covered, told apart by their joints: struts (U-P-S) whose feet are on the base or on arms that
-hinges and slides carry, and cranks with forearms that meet in one plane. No code of the solver is used.
+hinges and slides carry, and cranks with forearms that meet in one plane. Nothing of the engines is used.
 """
 
 from __future__ import annotations
