@@ -6,7 +6,7 @@ import dataclasses
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
@@ -46,6 +46,20 @@ class Mechanism(Structure):
     task : what a target sets, of "x", "y", "z", "rotation" and "tilt" (the direction of the platform's z axis); by
         default everything. What it leaves out follows from the mechanism.
     """
+
+    if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
+
+        def __init__(
+            self,
+            name: str,
+            joints: Iterable[Joint],
+            end_effector: str,
+            reference_point: ArrayLike | None = None,
+            base: str = "base",
+            length_unit: str = "mm",
+            angle_unit: Literal["deg", "rad"] = "deg",
+            task: Sequence[str] | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -117,11 +131,11 @@ class Mechanism(Structure):
                 name=legs_name(described, placed) if name is None else name,
                 joints=made,
                 end_effector=end_effector,
-                reference_point=cast(Any, reference_point),
+                reference_point=reference_point,
                 base=base_body,
                 length_unit=length_unit,
                 angle_unit=angle_unit,
-                task=cast(Any, task),
+                task=task,
             )
         except InvalidMechanism as error:
             raise InvalidMechanism(in_order(faults_of_legs(error.faults, len(own), placed))) from None
