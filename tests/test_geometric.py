@@ -20,7 +20,6 @@ from scipy.spatial.transform import RigidTransform, Rotation
 import oracles
 import oracles_by_leg as by_leg
 import pfabrik as pf
-from machines import hexapod_ups
 from pfabrik import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument, NoClosedForm
 from pfabrik.geometric import arms, facts, targets
@@ -99,15 +98,6 @@ def test_reached_exactly_where_the_oracle_says(name: str) -> None:
     assert 0.2 < answer.reached.mean() < 0.8
     expected = oracles.actuators(mechanism, wanted)[answer.reached]
     np.testing.assert_allclose(answer.actuators[answer.reached], expected, rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize("mechanism", [pf.load("five_bar"), pf.load("stewart"), hexapod_ups()], ids=lambda m: m.name)
-def test_the_solver_reaches_exactly_what_the_closed_form_reaches(mechanism: Mechanism) -> None:
-    wanted = some_targets(mechanism)
-    answer, solution = pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
-    np.testing.assert_array_equal(answer.reached, solution.status == pf.Status.REACHED)
-    assert 0 < answer.reached.sum() < len(wanted)
-    np.testing.assert_allclose(answer.actuators[answer.reached], solution.actuators[answer.reached], rtol=0, atol=1e-9)
 
 
 def test_the_solver_reaches_every_redundant_target_that_the_closed_form_reaches() -> None:
@@ -650,11 +640,10 @@ def test_an_edit_beside_a_closed_form_or_in_the_kernels_makes_its_cache_stale(
     caller = tmp_path / "closed" / "caller.py"
     caller.write_text("def double(x):\n    return 2.0 * x\n")
     monkeypatch.setenv("NUMBA_CACHE_DIR", "")
-    hits = []
+    kernels = []  # all kept: a module that cannot be imported by name is found only while one of them lives
     for _ in range(2):
         for _again in range(2):
-            double = load(tmp_path / "kernels" / "_jit.py").kernel(load(caller).double)
-            assert double(2.0) == 4.0
-            hits.append(sum(double.stats.cache_hits.values()))
+            kernels.append(load(tmp_path / "kernels" / "_jit.py").kernel(load(caller).double))
+            assert kernels[-1](2.0) == 4.0
         (tmp_path / edited).write_text("# edited\n")
-    assert hits == [0, 1, 0, 1]
+    assert [sum(double.stats.cache_hits.values()) for double in kernels] == [0, 1, 0, 1]

@@ -261,6 +261,7 @@ class Solution:
         names = (
             "pose",
             "actuators",
+            "q",
             "position_error",
             "rotation_error",
             "residual",

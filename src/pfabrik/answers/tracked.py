@@ -144,7 +144,9 @@ class Track(Solution):
         return [tuple(name for name, over in zip(names, row, strict=True) if over) for row in beyond]
 
 
-def pace_of(mechanism: Mechanism, sample_time: float | None, speed_limits: Any) -> Pace | None:
+def pace_of(
+    mechanism: Mechanism, sample_time: float | None, speed_limits: float | Mapping[str, float] | None
+) -> Pace | None:
     """What was said of time and speeds, checked."""
     names = mechanism.actuator_names
     if sample_time is None:

@@ -66,7 +66,8 @@ def in_units(shown: Sequence[Readout], values: Floats) -> list[str]:
 def margins_of(solution: Solution) -> list[tuple[str, str, float]]:
     """Joint, bound and margin of every limit, nearest first."""
     found = pf.margins(solution)
-    return sorted(((joint, bound, margin) for (joint, bound), margin in found.items()), key=lambda limit: limit[2])
+    named = ((joint, bound, float(margin)) for (joint, bound), margin in found.items())
+    return sorted(named, key=lambda limit: limit[2])
 
 
 def margins_table(solution: Solution) -> str:

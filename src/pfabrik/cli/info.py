@@ -13,7 +13,6 @@ import click
 
 import pfabrik as pf
 
-from ..answers.solution import as_plain
 from ..decomposition.decompose import closure_reason, engine_of
 from ..description.joint_types import KINDS
 from .table import aligned
@@ -42,7 +41,7 @@ def info(mech: str, as_json: bool) -> int:
 
 
 def as_object(mechanism: Mechanism) -> dict[str, object]:
-    """The same as plain numbers, lists and dicts, coordinates in radians; a limit that is not there is None."""
+    """The same as plain numbers, lists and dicts, angles in radians; a limit that is not there is None."""
     counted = pf.mobility(mechanism)
     return {
         "name": mechanism.name,
@@ -64,14 +63,16 @@ def as_object(mechanism: Mechanism) -> dict[str, object]:
 
 
 def joint_as_object(joint: Joint, mechanism: Mechanism) -> dict[str, object]:
-    """One joint: between what it is, where its coordinate is at home, and its limits."""
+    """One joint: what it connects, its coordinate at home, and its limits."""
     return {
         "name": joint.name,
         "type": joint.type,
         "connects": joint.connects,
         "actuated": joint.actuated,
         "home": mechanism.home_coordinate(joint.name),
-        "range": None if joint.range is None else as_plain(joint.range),
+        "range": joint.range,
+        "max_speed": joint.max_speed,
+        "max_acceleration": joint.max_acceleration,
         "cone": None if joint.cone is None else dataclasses.asdict(joint.cone),
     }
 

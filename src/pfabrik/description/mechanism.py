@@ -8,6 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, cast
 
+from numpy.typing import ArrayLike
+
 from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from .faults import find_faults, in_order, merged
 from .form_faults import joint_faults
@@ -67,21 +69,21 @@ class Mechanism(Structure):
         legs: str | Leg | Sequence[Leg],
         /,
         *,
-        base: Any = None,
-        platform: Any = None,
-        via: Any = None,
-        axis: Any = None,
+        base: ArrayLike | None = None,
+        platform: ArrayLike | None = None,
+        via: ArrayLike | None = None,
+        axis: ArrayLike | None = None,
         stroke: Range | None = None,
-        copies: Mapping[str, Any] | None = None,
+        copies: Mapping[str, int | ArrayLike] | None = None,
         name: str | None = None,
         end_effector: str = "platform",
-        reference_point: Any = None,
+        reference_point: ArrayLike | None = None,
         task: Sequence[str] | None = None,
         base_body: str = "base",
         joints: Iterable[Joint] = (),
         length_unit: str = "mm",
         angle_unit: Literal["deg", "rad"] = "deg",
-        **by_letter: Mapping[str, Any],
+        **by_letter: Mapping[str, object],
     ) -> Mechanism:
         """A mechanism of legs: chains from its base to its end effector, one for each pair of points.
 
@@ -115,7 +117,7 @@ class Mechanism(Structure):
                 name=legs_name(described, placed) if name is None else name,
                 joints=made,
                 end_effector=end_effector,
-                reference_point=reference_point,
+                reference_point=cast(Any, reference_point),
                 base=base_body,
                 length_unit=length_unit,
                 angle_unit=angle_unit,

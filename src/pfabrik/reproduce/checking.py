@@ -41,6 +41,6 @@ def feasibility(solution: Solution) -> Feasibility:
     return Feasibility(
         failed=int((np.asarray(solution.status) >= Status.FAILED).sum()),
         limit_excess=float(np.max(solution.limit_excess)),
-        closure=float(closure_residual(solution).max() / mechanism.characteristic_length),
+        closure=float(np.max(closure_residual(solution)) / mechanism.characteristic_length),
         independent=float(worst_excess(solution).max()),
     )

@@ -31,7 +31,7 @@ ZOOM = 0.92  # leaves room for the labels of tall machines
 TICKS = 5  # at most, on the longest axis
 
 
-def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = None) -> Any:
+def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = None, beside: Floats | None = None) -> Any:
     """Draw a mechanism in space; a planar one along the normal of its plane.
 
     Joints are markers by type, actuated ones filled; links are lines, and bodies with three or more joints polygons.
@@ -42,6 +42,7 @@ def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = Non
     ----------
     solution : one answer of this mechanism; home by default.
     axes : three-dimensional matplotlib axes to draw on; by default those of a new figure, which is `axes.figure`.
+    beside : points (n, 3) in the base frame that are to lie within the picture too.
 
     Returns
     -------
@@ -63,7 +64,8 @@ def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = Non
     draw_reference(axes, mechanism, places, reference)
     draw_joints(axes, mechanism, places)
     axes.set(**{f"{name}label": f"{name} [{mechanism.length_unit}]" for name in "xyz"})
-    set_view(axes, np.array([*places.values(), reference, *(end for rail in rails.values() for end in rail)]))
+    ends = [end for rail in rails.values() for end in rail]
+    set_view(axes, np.array([*places.values(), reference, *ends, *([] if beside is None else beside)]))
     return axes
 
 
