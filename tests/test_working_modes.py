@@ -16,6 +16,7 @@ import machines
 import oracles_by_leg as by_leg
 import pfabrik as pf
 from machines import closure
+from oracles import assembly
 from pfabrik import Status
 from pfabrik.errors import ContinuumOfSolutions, InvalidArgument, PfabrikError
 
