@@ -122,9 +122,7 @@ def test_help_and_wrong_input_load_nothing_heavy() -> None:
 
 
 def test_a_mechanism_is_shown_and_checked_and_a_wrong_name_told_without_the_kernels() -> None:
-    lines = [
-        ["info", "stewart"], ["check", "stewart"], ["fk", "stewart", "1", "2"], ["ik", "stewrt", "--rpy", "0", "0", "1"],
-    ]  # fmt: skip
-    told, said = loaded_by("numba", lines)
+    wrong = [["fk", "stewart", "1", "2"], ["ik", "stewrt", "--rpy", "0", "0", "1"]]
+    told, said = loaded_by("numba", [["info", "stewart"], ["check", "stewart"], *wrong])
     assert told == [(None, []), (0, []), (0, []), (2, []), (2, [])]
     assert "did you mean 'stewart'" in said

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from contextlib import suppress
 from functools import cache
@@ -12,14 +11,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-import joint_checking
-import joint_search
+import checks
 import oracles_by_leg as by_leg
 import pfabrik as pf
-from fk_machines import PUBLISHED, moved_from_home
+from machines.published import PUBLISHED, moved_from_home
+from oracles import search
 from pfabrik import Mechanism, Solution, Status
 from pfabrik.catalog import catalog_file, description
-from pfabrik.description.home_mobility import universal_axes
 from pfabrik.errors import NoClosedForm
 
 Array = NDArray[np.float64]
@@ -118,23 +116,13 @@ def pose_errors(mechanism: Mechanism, poses: Array, targets: Array) -> Array:
     return np.max([off[:, 0], *(np.linalg.norm(counted[name], axis=1) for name in mechanism.task)], axis=0)
 
 
-def with_axes(mechanism: Mechanism) -> Mechanism:
-    """The same machine, with the axes of its universal joints written out where the library chooses them."""
-    joints = [
-        dataclasses.replace(joint, axes=universal_axes(mechanism, joint)) if joint.type == "universal" else joint
-        for joint in mechanism.joints
-    ]
-    return dataclasses.replace(mechanism, joints=tuple(joints))
-
-
 def assert_feasible(mechanism: Mechanism, solution: Solution) -> None:
     assert np.isfinite(solution.pose).all()
     assert np.isfinite(solution.actuators).all()
     assert (solution.status <= Status.PROJECTED).all()
     assert pf.closure_residual(solution).max() <= KEPT * mechanism.characteristic_length
-    explicit = with_axes(mechanism)
-    assert joint_checking.worst_opening(explicit, solution).max() <= 2 * KEPT
-    assert joint_checking.worst_excess(explicit, solution).max() <= 2 * KEPT
+    assert checks.gap_of_joints(mechanism, solution).max() <= 2 * KEPT
+    assert checks.excess_of_joints(mechanism, solution).max() <= 2 * KEPT
 
 
 # Any target: half of the rows anywhere, half where a feasible configuration puts the end effector
@@ -220,20 +208,20 @@ def in_turn(rows: NDArray[np.intp], errors: Array, count: int) -> list[int]:
 
 def search_reaches(mechanism: Mechanism, target: Array, answer: Solution) -> bool:
     """Whether blind search finds a configuration, from the answer's, home's and two drawn around it."""
-    explicit = with_axes(mechanism)
-    moved = joint_checking.deviations(explicit, answer)
-    own = np.concatenate([moved[joint.name][0] for joint in explicit.joints]) / joint_search.units(explicit)
+    explicit = checks.with_axes(mechanism)
+    moved = checks.deviations(explicit, answer)
+    own = np.concatenate([moved[joint.name][0] for joint in explicit.joints]) / search.units(explicit)
     drawn = np.random.default_rng(0).normal(0, 0.3, (2, len(own)))
-    return joint_search.can_reach(explicit, target, [own, np.zeros(len(own)), *drawn])
+    return search.can_reach(explicit, target, [own, np.zeros(len(own)), *drawn])
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_blind_search_finds_what_is_within_reach(name: str) -> None:
     """From home alone: so that it means something if it finds nothing."""
-    explicit = with_axes(machine(name))
+    explicit = checks.with_axes(machine(name))
     poses = inside(name, FEW)[0][:3]
-    start = np.zeros(joint_search.columns(explicit))
-    assert [joint_search.can_reach(explicit, pose, [start]) for pose in poses].count(True) >= len(poses) - 1
+    start = np.zeros(search.columns(explicit))
+    assert [search.can_reach(explicit, pose, [start]) for pose in poses].count(True) >= len(poses) - 1
 
 
 @pytest.mark.parametrize("count", COUNTS)

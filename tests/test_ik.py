@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import checking
+import checks
 import oracles
 import pfabrik as pf
 from machines import MACHINES
@@ -33,8 +33,8 @@ def assert_feasible(mechanism: pf.Mechanism, answer: pf.Solution) -> None:
     assert np.max(answer.status) <= pf.Status.PROJECTED
     assert np.max(answer.residual) <= 1e-9 * mechanism.characteristic_length
     assert np.max(answer.limit_excess) <= 1e-9
-    assert np.max(checking.worst_gap(mechanism, answer)) <= 1e-9
-    assert np.max(checking.worst_excess(mechanism, answer)) <= 1e-9
+    assert np.max(checks.gap_of_points(mechanism, answer)) <= 1e-9
+    assert np.max(checks.excess_of_points(mechanism, answer)) <= 1e-9
 
 
 def assert_same_as_closed_form(machine: pf.Mechanism, targets: np.ndarray, answer: pf.Solution) -> None:

@@ -17,7 +17,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-import checking
+import checks
 import pfabrik as pf
 from machines import MACHINES, ring
 from pfabrik import Cone, Joint, Mechanism
@@ -754,7 +754,7 @@ def test_settling_closes_the_loops(name: str) -> None:
             now.pose[:3, :3] = np.eye(3)
         free = TRANSLATE if compiled.plan.scalars[P.POINT_END] == 1.0 else BOTH
         assert settle_all(compiled.plan, free, now, work)
-        assert checking.worst_gap(mechanism, as_answer(compiled, now))[0] <= 1e-12
+        assert checks.gap_of_points(mechanism, as_answer(compiled, now))[0] <= 1e-12
         np.testing.assert_allclose(now.pose[:3, :3].T @ now.pose[:3, :3], np.eye(3), rtol=0, atol=1e-14)
 
 

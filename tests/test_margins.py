@@ -120,7 +120,7 @@ def test_margins_are_of_a_solution_and_of_its_own_mechanism() -> None:
     machine = pf.load("five_bar")
     home = pf.solve_ik(machine, machine.reference_point)
     for wrong in (home.pose, None, machine):
-        with pytest.raises(InvalidArgument, match="solution: .*expected a Solution"):
+        with pytest.raises(InvalidArgument, match=r"solution: .*expected a Solution"):
             pf.margins(wrong)  # type: ignore[arg-type]
     off = home.actuators[0] + 0.3
     wider = machine.with_limits(p1=(off - 0.3 - 1.5, off + 1.5))

@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from checking import worst_excess, worst_gap
-from nearest_oracles import Problem, drawn_targets, nearest
+from checks import excess_of_points, gap_of_points
+from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -65,8 +65,8 @@ def check_feasible(mechanism: Mechanism, targets: np.ndarray, answers: Solution)
     """Closed, within all limits, and finite: measured from the description alone, and by the closure engine."""
     assert np.isin(answers.status, (Status.REACHED, Status.PROJECTED)).all()
     assert all(np.isfinite(array).all() for array in (answers.pose, answers.actuators, *answers.joints.values()))
-    assert worst_gap(mechanism, answers).max() <= FEASIBLE
-    assert worst_excess(mechanism, answers).max() <= FEASIBLE
+    assert gap_of_points(mechanism, answers).max() <= FEASIBLE
+    assert excess_of_points(mechanism, answers).max() <= FEASIBLE
     assert pf.closure_residual(answers).max() <= FEASIBLE * mechanism.characteristic_length
     problems = [Problem(mechanism, target, None, answer) for target, answer in zip(targets, answers, strict=True)]
     assert max(problem.excess(problem.answer) for problem in problems) <= FEASIBLE
