@@ -216,7 +216,7 @@ def close(
         iterations=np.zeros(n, np.int64),
     )
     none = np.zeros((n, 0, 3))
-    wishes = K.Wishes(
+    problem = K.ClosureProblem(
         weights=np.zeros(len(closure.scale)) if weights is None else weights,
         anchors=none[:, :, 0] if anchors is None else anchors * closure.scale,
         platform=np.array(platform, dtype=float),
@@ -232,7 +232,7 @@ def close(
         max_iterations=max_iterations,
     )
     layout = closure.layout(locked | closure.last_balls if follow else locked)
-    _run(closure.loops, layout, wishes, closed)
+    _run(closure.loops, layout, problem, closed)
     return Closing(closed.coordinates / closure.scale, _in_lengths(closed.poses, length), *closed[2:])
 
 
@@ -241,18 +241,18 @@ def measured(mechanism: Mechanism, coordinates: Floats) -> Closing:
     return close(closure_of(mechanism), coordinates, platform_poses(mechanism, coordinates), max_iterations=0)
 
 
-def _run(loops: K.Loops, layout: K.Layout, wishes: K.Wishes, closed: K.Closed) -> None:
+def _run(loops: K.Loops, layout: K.Layout, problem: K.ClosureProblem, closed: K.Closed) -> None:
     """The kernel over all rows, on all cores."""
     from ..kernels.closure.close import close as close_rows
 
     def run(block: slice) -> None:
-        own = wishes._replace(
-            anchors=wishes.anchors[block], targets=wishes.targets[block], centres=wishes.centres[block]
+        own = problem._replace(
+            anchors=problem.anchors[block], targets=problem.targets[block], centres=problem.centres[block]
         )
         close_rows(loops, layout, own, K.Closed._make(array[block] for array in closed))
 
     n = len(closed.poses)
-    in_blocks(run, n, rows_a_block=max(n, 1) if wishes.chained else 64)
+    in_blocks(run, n, rows_a_block=max(n, 1) if problem.chained else 64)
 
 
 def _in_lengths(poses: Floats, scale: float) -> Floats:

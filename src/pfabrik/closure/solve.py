@@ -151,8 +151,8 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
     if mechanism.end_effector_is_joint:
         rows.poses[:, :3, :3] = wanted[:, :3, :3]
     position, rotation = task_of(mechanism).errors(rows.poses, wanted)
-    rows.measures[:, 0], rows.measures[:, 1] = position, rotation
-    rows.counters[:, 2] = holds
+    rows.measures[:, P.POSITION_ERROR], rows.measures[:, P.ROTATION_ERROR] = position, rotation
+    rows.counters[:, P.HELD] = holds
     near = (position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)) & (
         rotation <= options.rotation_tolerance
     )

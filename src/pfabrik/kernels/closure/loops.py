@@ -43,7 +43,7 @@ class Loops(NamedTuple):
     cone_slides: Ints  # (cones, 2): first and last of the slides that move the line
     slides: Ints  # coordinate of each such slide
     slide_axes: Floats  # (slides, 3): how it moves the line
-    marks: Ints  # (marks, 2): visit before which a joint's centre is posed, and the joint's place in Wishes.centres
+    marks: Ints  # (marks, 2): visit before which a joint's centre is posed, and the place in ClosureProblem.centres
     path_marks: Ints  # (paths + 1,): first mark of each path
 
 
@@ -54,7 +54,7 @@ class Layout(NamedTuple):
     sizes: Ints  # (groups,): free coordinates of each group
 
 
-class Wishes(NamedTuple):
+class ClosureProblem(NamedTuple):
     """What is asked beyond closed loops. Weights multiply squares; lengths in L, angles in radians."""
 
     weights: Floats  # (columns,): of the distance of each free coordinate from its anchor

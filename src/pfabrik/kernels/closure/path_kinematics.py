@@ -43,13 +43,13 @@ class Equations(NamedTuple):
 
 @allocator
 def new_state(loops: Loops) -> State:
-    """Room for a configuration."""
+    """Memory for a configuration."""
     return State(np.zeros(len(loops.lo)), np.zeros((len(loops.kinds), 4)), np.zeros((3, 4)))
 
 
 @allocator
 def new_equations(loops: Loops, layout: Layout) -> Equations:
-    """Room for the equations of one thread."""
+    """Memory for the equations of one thread."""
     groups, m, rows = len(loops.groups) - 1, max(1, layout.sizes.max()), len(loops.row_columns)
     return Equations(
         np.zeros((rows, 6)),

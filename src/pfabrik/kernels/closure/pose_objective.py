@@ -1,4 +1,4 @@
-"""What a search brings near: an end effector to its target, in what counts of a pose, with some of it held."""
+"""The objective of a search: squares of the distance of an end effector from its target, with some of it held."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ALIGNED = 1e-9
 """Sine below which two directions have no axis across them."""
 
 
-class Aim(NamedTuple):
+class PoseObjective(NamedTuple):
     """What is to come near: lengths in L."""
 
     targets: Floats  # (n, 4, 4)
@@ -25,8 +25,8 @@ class Aim(NamedTuple):
     max_iterations: int
 
 
-class Pull(NamedTuple):
-    """What an aim asks of the end effector where it is."""
+class PoseGradient(NamedTuple):
+    """The gradient of the objective in the twist of the end effector, and the components of the twist that are held."""
 
     force: Floats  # (6,): gradient of the objective in its twist
     holds: Floats  # (6, 6): what of its twist is held, one a row
@@ -36,40 +36,40 @@ class Pull(NamedTuple):
 
 
 @routine
-def look_at_aim(want: Aim, target: Floats, X: Floats, pull: Pull) -> tuple[float, int]:
+def pose_gradient(objective: PoseObjective, target: Floats, X: Floats, gradient: PoseGradient) -> tuple[float, int]:
     """The objective, and how many components of the twist are held."""
-    w, force, unit = pull.turn, pull.force, pull.unit[0]
+    w, force, unit = gradient.turn, gradient.force, gradient.unit[0]
     difference(X, target, w[3:])
     value, held = 0.0, 0
     for i in range(6):
         force[i] = 0.0
         if i < 3:
             w[i] = X[i, 3] - target[i, 3]
-        elif want.framed == 1:
+        elif objective.framed == 1:
             continue
-        if want.platform[i] == LOCKED:
-            held = hold(pull, held, i, w[i])
+        if objective.platform[i] == LOCKED:
+            held = hold(gradient, held, i, w[i])
         else:
-            value += 0.5 * unit * want.platform[i] * w[i] * w[i]
-            force[i] = unit * want.platform[i] * w[i]
-    if want.framed == 1 and want.platform[3] == LOCKED:
-        held = hold_tilt(target, X, pull, held)
-    elif want.framed == 1 and want.platform[3] > 0.0:
-        value += tilt(target, unit * want.platform[3], X, force)
+            value += 0.5 * unit * objective.platform[i] * w[i] * w[i]
+            force[i] = unit * objective.platform[i] * w[i]
+    if objective.framed == 1 and objective.platform[3] == LOCKED:
+        held = hold_tilt(target, X, gradient, held)
+    elif objective.framed == 1 and objective.platform[3] > 0.0:
+        value += tilt(target, unit * objective.platform[3], X, force)
     return value, held
 
 
 @routine
-def hold(pull: Pull, held: int, component: int, error: float) -> int:
+def hold(gradient: PoseGradient, held: int, component: int, error: float) -> int:
     """Note one more component of the twist that is held."""
-    pull.errors[held] = error
+    gradient.errors[held] = error
     for i in range(6):
-        pull.holds[held, i] = 1.0 if i == component else 0.0
+        gradient.holds[held, i] = 1.0 if i == component else 0.0
     return held + 1
 
 
 @routine
-def hold_tilt(target: Floats, X: Floats, pull: Pull, held: int) -> int:
+def hold_tilt(target: Floats, X: Floats, gradient: PoseGradient, held: int) -> int:
     """The z axis keeps the target's direction: it has no part along the target's x and y axes.
 
     The opposite direction has none either. So a z axis that is farther away than a right angle is asked to turn by the
@@ -77,21 +77,21 @@ def hold_tilt(target: Floats, X: Floats, pull: Pull, held: int) -> int:
     """
     axis, angle = turn_of_tilt(target, X)
     if angle > 0.5 * math.pi:
-        held = hold(pull, held, 3, angle)
-        held = hold(pull, held, 3, 0.0)
+        held = hold(gradient, held, 3, angle)
+        held = hold(gradient, held, 3, 0.0)
         sway = cross(axis, (X[0, 2], X[1, 2], X[2, 2]))
         for i in range(3):
-            pull.holds[held - 2, 3 + i] = -axis[i]
-            pull.holds[held - 1, 3 + i] = sway[i]
+            gradient.holds[held - 2, 3 + i] = -axis[i]
+            gradient.holds[held - 1, 3 + i] = sway[i]
         return held
     for k in range(2):
         off = 0.0
         for i in range(3):
             off += target[i, k] * X[i, 2]
-        held = hold(pull, held, 3, off)
+        held = hold(gradient, held, 3, off)
         for i in range(3):
             a, b = (i + 1) % 3, (i + 2) % 3
-            pull.holds[held - 1, 3 + i] = X[a, 2] * target[b, k] - X[b, 2] * target[a, k]
+            gradient.holds[held - 1, 3 + i] = X[a, 2] * target[b, k] - X[b, 2] * target[a, k]
     return held
 
 
