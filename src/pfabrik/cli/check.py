@@ -13,6 +13,7 @@ import numpy as np
 
 import pfabrik as pf
 
+from ..description.joint_types import TASK_TURNS
 from ..description.task import task_of
 from ..errors import InvalidMechanism
 from ..motion.first_order import generic_of
@@ -21,7 +22,7 @@ from ..tolerances import TOLERANCES
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
 
-COUNTS = {"x": 1, "y": 1, "z": 1, "tilt": 2, "rotation": 3}
+COUNTS = {"x": 1, "y": 1, "z": 1, **TASK_TURNS}
 """Freedoms that each part of a task asks for."""
 
 FULL_TURN = 2.0 * math.pi
@@ -65,7 +66,8 @@ def notes(mechanism: Mechanism) -> Iterator[str]:
     asked, there = sum(COUNTS[part] for part in mechanism.task), pf.mobility(mechanism).platform
     task = task_of(mechanism)
     directions = generic_of(mechanism).directions
-    counts = [*task.axes, *[task.rotations > 0] * 3][: len(directions)]  # of a joint end effector, three
+    turns = [task.rotations > 1, task.rotations > 1, task.rotations > 0]
+    counts = [*task.axes, *turns][: len(directions)]  # of a joint end effector, three
     twists = directions[counts]
     if asked > there < np.linalg.matrix_rank(twists, TOLERANCES.alignment):  # not always the same, as in a plane
         yield (

@@ -86,8 +86,10 @@ def note_ignored(mechanism: Mechanism, targets: Floats) -> None:
     task, home = set(mechanism.task), mechanism.home_pose
     moved = (targets[:, :3, 3] != home[:3, 3]).any(axis=0)
     columns = [axis for axis, moves in zip("xyz", moved, strict=True) if moves and axis not in task]
-    if not task & {"rotation", "tilt"} and (targets[:, :3, :3] != home[:3, :3]).any():
+    if not task & {"rotation", "tilt", "yaw"} and (targets[:, :3, :3] != home[:3, :3]).any():
         columns += ["roll", "pitch", "yaw"]
+    elif "yaw" in task and (targets[:, :3, 2] != home[:3, 2]).any():
+        columns += ["roll", "pitch"]
     note_left_out((f"column {name}" for name in columns), mechanism)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.closure.loops import Closed
+from ..kernels.closure.loops import BASE_AXES, Closed
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure
@@ -28,7 +28,7 @@ MOST_STEPS = 200
 
 
 def approached(
-    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
 ) -> Closing:
     """Feasible configurations nearest to targets, (n, 4, 4): local minima of the distance, from given coordinates.
 
@@ -37,26 +37,26 @@ def approached(
     coordinates : where to start, (n, columns): closed within all limits, or not far from it.
     platform : what counts of the distance from the targets: weights of the squares of position [L] and rotation [rad];
         LOCKED for what is to be as the target has it.
-    framed : of the rotation, only the direction of the platform's z axis counts.
+    frame : of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY.
 
     Returns
     -------
     Closing : judge by `is_feasible`. Gaps and excesses are those of the whole, the same for every group.
     """
-    found = _run(closure, coordinates, _aim(closure, targets, platform, framed, MOST_STEPS))[0]
+    found = _run(closure, coordinates, _aim(closure, targets, platform, frame, MOST_STEPS))[0]
     found.poses[:, :3, 3] *= closure.mechanism.characteristic_length
     return Closing(found.coordinates / closure.scale, *found[1:])
 
 
 def weighed_limits(
-    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
 ) -> Floats:
     """How hard every limit holds configurations back from their targets: multipliers, (n, 2 columns + cones).
 
     First the low and high bounds of the coordinates in turn, then the cones: by how much of L the target comes nearer,
     per unit [L or rad] by which a limit gives way; 0 for limits that do not matter.
     """
-    return _run(closure, coordinates, _aim(closure, within_sight(closure.mechanism, targets), platform, framed, 0))[1]
+    return _run(closure, coordinates, _aim(closure, within_sight(closure.mechanism, targets), platform, frame, 0))[1]
 
 
 def within_sight(mechanism: Mechanism, targets: Floats) -> Floats:
@@ -82,12 +82,12 @@ def _run(closure: Closure, coordinates: Floats, aim: Aim) -> tuple[Closed, Float
     return closed, weights
 
 
-def _aim(closure: Closure, targets: Floats, platform: Sequence[float], framed: bool, steps: int) -> Aim:
+def _aim(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> Aim:
     from ..kernels.closure.pose_objective import Aim
 
     wanted = targets.copy()
     wanted[:, :3, 3] /= closure.mechanism.characteristic_length
-    return Aim(wanted, np.array(platform, dtype=float), int(framed), MARGIN, TOLERANCES.active, steps)
+    return Aim(wanted, np.array(platform, dtype=float), frame, MARGIN, TOLERANCES.active, steps)
 
 
 def _closed(closure: Closure, coordinates: Floats) -> Closed:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.closure.loops import LOCKED
+from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, Closing, Closure, close
 
@@ -30,7 +30,7 @@ def nearest(
     poses: Floats,
     *,
     platform: Sequence[float] = EVERYTHING_FREE,
-    framed: bool = False,
+    frame: int = BASE_AXES,
     targets: Floats | None = None,
     weights: Floats | None = None,
     anchors: Floats | None = None,
@@ -43,7 +43,7 @@ def nearest(
     coordinates, poses : where to start; need not be closed, nor within limits.
     platform : what counts of the platform's distance from `targets`: six weights relative to each other; LOCKED keeps
         a part where it starts.
-    framed : the weights of the rotation are about the axes of the targets, not of the base.
+    frame : what the weights of the rotation are about, as of `close`.
     weights, anchors : what counts of the coordinates' distances from anchors, (columns,), (n, columns).
     gently : open the loops less on the way, so that the search stays in its working mode, and may end less near.
 
@@ -59,7 +59,7 @@ def nearest(
             coordinates,
             poses,
             platform=np.where(held, LOCKED, weight * wished).tolist(),
-            framed=framed,
+            frame=frame,
             targets=targets,
             weights=weight * own,
             anchors=anchors,
@@ -74,7 +74,7 @@ def nearest(
         coordinates,
         poses,
         platform=np.where(held, LOCKED, 0.0).tolist(),
-        framed=framed,
+        frame=frame,
         targets=targets,
         limits=True,
         margin=MARGIN,

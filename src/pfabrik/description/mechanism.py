@@ -41,8 +41,8 @@ class Mechanism(Structure):
     reference_point : the point of the end-effector body that targets place, at home [length]; the centre of the joint
         when the end effector is a joint, and then left out.
     length_unit, angle_unit : labels for people and files; nothing is ever converted by them.
-    task : what a target sets, of "x", "y", "z", "rotation" and "tilt" (the direction of the platform's z axis); by
-        default everything. What it leaves out follows from the mechanism.
+    task : what a target sets: of "x", "y", "z", and one of "rotation", "tilt" (where the platform's z axis points) and
+        "yaw" (the twist about z); by default everything. What it leaves out follows from the mechanism.
     """
 
     def __post_init__(self) -> None:
