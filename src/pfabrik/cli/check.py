@@ -13,6 +13,7 @@ import numpy as np
 
 import pfabrik as pf
 
+from ..description.graph_faults import leaves
 from ..description.joint_types import TASK_TURNS
 from ..description.task import task_of
 from ..errors import InvalidMechanism
@@ -74,6 +75,8 @@ def notes(mechanism: Mechanism) -> Iterator[str]:
             f"the task {' '.join(mechanism.task)} asks for {asked} freedoms, and the end effector has {there}, from "
             "which the others follow: hardly any target can be reached; `task` says which count"
         )
+    for _, joint, body in leaves(mechanism):
+        yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
     widths = [width for joint in mechanism.joints for width in angular_widths(joint)]
     if widths and mechanism.angle_unit == "rad" and max(widths) > 4 * FULL_TURN:
         yield f"a range of {max(widths):.4g} rad is {max(widths) / FULL_TURN:.3g} turns; were degrees meant?"

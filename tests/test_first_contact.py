@@ -1,0 +1,91 @@
+"""What people try first: bodies that lead nowhere, driven joints of two freedoms, odd numbers, odd homes."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import closure_machines
+import pfabrik as pf
+from pfabrik import Joint, Mechanism, Status
+from pfabrik.errors import InvalidMechanism
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def with_fingers(left: str = "finger_l", right: str = "finger_r") -> Mechanism:
+    """A SCARA whose tool has two fingers, one of them driven, that nothing else connects."""
+    joints = [
+        *closure_machines.scara().joints,
+        Joint("G", "revolute", ("tool", left), at=(340, 50, 0), axis=Y, actuated=True, range=(-0.5, 0.6)),
+        Joint("H", "prismatic", (right, "tool"), axis=X, range=(-5, 8)),
+    ]
+    return Mechanism("SCARA with a gripper", joints, "tool", (350, 50, 0), task=("x", "y", "z", "yaw"))
+
+
+def faults_of(mechanism: object) -> dict[str, str]:
+    with pytest.raises(InvalidMechanism) as raised:
+        mechanism()  # type: ignore[operator]
+    return {fault.place: fault.found for fault in raised.value.faults}
+
+
+@pytest.mark.parametrize("names", [("finger_l", "finger_r"), ("finger1", "finger2"), ("thumb", "index")])
+def test_a_finger_rests_where_the_start_has_it_and_goes_where_it_is_driven(names: tuple[str, str]) -> None:
+    mechanism = with_fingers(*names)
+    plain = closure_machines.scara()
+    targets = pf.solve_fk(plain, np.random.default_rng(0).uniform(0, 1, (20, 4)) * [2, 2, 40, 2]).pose
+    start = np.zeros(6)
+    start[4:] = 0.3, -2.0
+    answer = pf.solve_ik(mechanism, targets, start=start)
+    assert answer
+    np.testing.assert_array_equal(answer.joints["G"], 0.3)
+    np.testing.assert_array_equal(answer.joints["H"], -2.0)
+    away = pf.solve_ik(mechanism, targets + 500.0 * np.eye(4)[:, 3] * np.array([[0.0], [0.0], [1.0], [0.0]]), start=start)
+    assert (away.status == Status.PROJECTED).all()
+    np.testing.assert_array_equal(away.joints["G"], 0.3)
+    driven = pf.solve_fk(mechanism, [*answer.actuators[0][:4], -0.4])
+    assert driven.status is Status.REACHED
+    assert float(driven.joints["G"]) == pytest.approx(-0.4, abs=1e-12)
+    np.testing.assert_allclose(driven.pose, targets[0], rtol=0, atol=1e-6)
+    beyond = pf.configuration(mechanism, [0, 0, 0, 0, 0.7, 0])
+    assert [limit.joint for limit in beyond.active_limits] == ["G"]
+
+
+def test_a_body_that_is_nearly_another_is_taken_for_a_slip() -> None:
+    joints = list(closure_machines.scara().joints)
+
+    def with_tip(name: str, hangs_on: str = "1.1") -> Mechanism:
+        tip = Joint("T", "revolute", (hangs_on, name), at=(0, 0, 9), axis=Z)
+        return Mechanism("SCARA", [*joints, tip], "tool", (350, 50, 0))
+
+    renamed = [
+        Joint("A", "revolute", ("base", "forearm"), at=(0, 0, 0), axis=Z, actuated=True),
+        Joint("B", "revolute", ("forearm", "platform"), at=(100, 0, 0), axis=Z, actuated=True),
+    ]
+
+    def with_rod(name: str) -> Mechanism:
+        rod = [
+            Joint("C", "revolute", ("base", "rod"), at=(0, 50, 0), axis=Z),
+            Joint("D", "revolute", ("rod", name), at=(100, 50, 0), axis=Z),
+        ]
+        return Mechanism("loop", [*renamed, *rod], "platform", (100, 0, 0))
+
+    for slip in ("platfrom", "platfom", "plattform", "Platform", "paltform"):
+        found = faults_of(lambda slip=slip: with_rod(slip))
+        assert found == {"joint[3].connects": f"'{slip}', which no other joint connects; did you mean 'platform'?"}
+    for leaf in ("finger", "flag", "plate", "tip", "coupler"):
+        assert with_rod(leaf).bodies[-1] == leaf
+        assert with_tip(leaf).bodies[-1] == leaf
+
+
+def test_a_leaf_is_noted_by_check(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    from click.testing import CliRunner
+
+    from pfabrik.cli import main
+
+    pf.save(with_fingers(), tmp_path / "gripper.toml")
+    result = CliRunner().invoke(main, ["check", str(tmp_path / "gripper.toml")])
+    assert result.exit_code == 0
+    assert "note: nothing but joint 'G' connects 'finger_l'" in result.stderr
