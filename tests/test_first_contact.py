@@ -42,7 +42,9 @@ def test_a_finger_rests_where_the_start_has_it_and_goes_where_it_is_driven(names
     assert answer
     np.testing.assert_array_equal(answer.joints["G"], 0.3)
     np.testing.assert_array_equal(answer.joints["H"], -2.0)
-    away = pf.solve_ik(mechanism, targets + 500.0 * np.eye(4)[:, 3] * np.array([[0.0], [0.0], [1.0], [0.0]]), start=start)
+    away = pf.solve_ik(
+        mechanism, targets + 500.0 * np.eye(4)[:, 3] * np.array([[0.0], [0.0], [1.0], [0.0]]), start=start
+    )
     assert (away.status == Status.PROJECTED).all()
     np.testing.assert_array_equal(away.joints["G"], 0.3)
     driven = pf.solve_fk(mechanism, [*answer.actuators[0][:4], -0.4])
@@ -89,3 +91,43 @@ def test_a_leaf_is_noted_by_check(tmp_path) -> None:  # type: ignore[no-untyped-
     result = CliRunner().invoke(main, ["check", str(tmp_path / "gripper.toml")])
     assert result.exit_code == 0
     assert "note: nothing but joint 'G' connects 'finger_l'" in result.stderr
+
+
+def five_bar_at(tip: tuple[float, float], elbows: tuple[tuple[float, float], tuple[float, float]]) -> Mechanism:
+    (a, b), (x, y) = elbows, tip
+    joints = [
+        Joint("A", "revolute", ("base", "a1"), at=(0, 0, 0), axis=Z, actuated=True),
+        Joint("B", "revolute", ("base", "b1"), at=(100, 0, 0), axis=Z, actuated=True),
+        Joint("E", "revolute", ("a1", "a2"), at=(*a, 0), axis=Z),
+        Joint("F", "revolute", ("b1", "b2"), at=(*b, 0), axis=Z),
+        Joint("T", "revolute", ("a2", "b2"), at=(x, y, 0), axis=Z),
+    ]
+    return Mechanism("5-bar", joints, "T")
+
+
+@pytest.mark.parametrize("elbows", [((25, 40), (75, 40)), ((20, 32), (75, 40))])
+def test_a_five_bar_stretched_out_at_home_is_not_said_to_be_stuck(elbows) -> None:  # type: ignore[no-untyped-def]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mechanism = five_bar_at((50, 80), elbows)
+    assert pf.mobility(mechanism).platform == 2
+    assert pf.solve_ik(mechanism, [50, 70, 0])
+
+
+@pytest.mark.parametrize("spins", [False, True])
+def test_what_cannot_move_is_said_to_be_stuck(spins: bool) -> None:
+    ball = "spherical" if spins else "revolute"
+    axis = {} if spins else {"axis": Z}
+    turns = np.radians([0, 20, 120, 140, 240, 260] if spins else [0, 120, 240])
+    heads = np.radians([310, 70, 70, 190, 190, 310] if spins else [20, 130, 260])
+    joints = []
+    for k, (foot, head) in enumerate(zip(turns, heads, strict=True)):
+        at, to = (100 * np.cos(foot), 100 * np.sin(foot), 0), (60 * np.cos(head), 60 * np.sin(head), 80 * spins)
+        joints += [
+            Joint(f"A{k}", ball, ("base", f"rod{k}"), at=at, actuated=not spins, **axis),
+            Joint(f"B{k}", ball, (f"rod{k}", "plate"), at=to, **axis),
+        ]
+    if spins:
+        joints.append(Joint("D", "revolute", ("plate", "tool"), at=(0, 0, 90), axis=Z, actuated=True))
+    with pytest.warns(pf.errors.MobilityWarning, match="it cannot move"):
+        Mechanism("frame", joints, "plate", (0, 0, 80))

@@ -61,6 +61,64 @@ def end_effector_freedom(mechanism: Structure, locked: frozenset[str]) -> int:
     return _rank((twist[3:] + np.cross(twist[:3], centre, axisa=0, axisc=0)) @ motions)
 
 
+def is_held(mechanism: Structure) -> bool:
+    """Whether the loops hold the end effector at home, to second order too.
+
+    To first order they also do where links are stretched out so that the end effector is at the end of what it reaches:
+    it moves as these bend, with the square of what they bend by. On a chain of screws s with rates u the acceleration is
+    the sum of s u' and, over pairs in their order, of [s_i, s_j] u_i u_j; the u' close the loops. Where no u' does, home
+    is a singularity that the second order does not settle, and the end effector is not said to be held.
+    """
+    if end_effector_freedom(mechanism, frozenset()) > 0:
+        return False
+    screws = np.vstack([joint_screws(mechanism, joint) for joint in mechanism.joints])
+    owners, tree = column_joints(mechanism), tree_of(mechanism)
+    twist = body_twist(tree.paths[mechanism.end_effector_body][owners], screws)
+    closure = loop_conditions(tree.loops[:, owners], screws)
+    rates = _null_space(closure)
+    rates = rates @ np.random.default_rng(0).standard_normal((rates.shape[1], SAMPLED_RATES))
+    bent = np.zeros((0, rates.shape[1]))
+    for index in tree.closing:
+        first, second = mechanism.joints[index].connects
+        around = [*tree.way(second), (index, False), *_backward(tree.way(first))]
+        bent = np.concatenate([bent, _bracketed(around, screws, owners, rates)])
+    accelerations = -np.linalg.pinv(closure, TOLERANCES.alignment) @ bent if bent.size else np.zeros(rates.shape)
+    moved = twist @ accelerations + _bracketed(tree.way(mechanism.end_effector_body), screws, owners, rates)
+    if mechanism.end_effector_is_joint:
+        centre = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
+        moved = moved[3:] + np.cross(moved[:3], centre, axisa=0, axisc=0)
+    left_open = closure @ accelerations + bent
+    return bool(max(np.abs(moved).max(initial=0.0), np.abs(left_open).max(initial=0.0)) <= TOLERANCES.alignment)
+
+
+SAMPLED_RATES = 4
+"""Joint motions that are looked at to second order: what one of them does not show by chance, the others do."""
+
+
+def _backward(way: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
+    """A way from its end to its begin."""
+    return [(index, not forward) for index, forward in reversed(way)]
+
+
+def _bracketed(
+    way: list[tuple[int, bool]],
+    screws: NDArray[np.float64],
+    owners: NDArray[np.intp],
+    rates: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The sum of [s_i, s_j] u_i u_j over the pairs of a way in their order, (6, k), at rates u (c, k)."""
+    twist, total = np.zeros((6, rates.shape[1])), np.zeros((6, rates.shape[1]))
+    for index, forward in way:
+        places = np.flatnonzero(owners == index)
+        for place in places if forward else places[::-1]:
+            own = screws[place][:, None] * rates[place] * (1.0 if forward else -1.0)
+            angular = np.cross(twist[:3], own[:3], axis=0)
+            velocity = np.cross(twist[:3], own[3:], axis=0) - np.cross(own[:3], twist[3:], axis=0)
+            total += np.concatenate([angular, velocity])
+            twist = twist + own
+    return total
+
+
 def inexactness(mechanism: Structure) -> float:
     """By how much conditions of the loops at home fail to follow from the others, and yet hardly are their own.
 

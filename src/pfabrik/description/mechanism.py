@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias, cast
 from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from .faults import find_faults, in_order, merged
 from .form_faults import joint_faults
-from .home_mobility import end_effector_freedom, inexactness
+from .home_mobility import end_effector_freedom, inexactness, is_held
 from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import faults_of_legs, legs_name, placed_joints
@@ -146,7 +146,7 @@ class Mechanism(Structure):
                 f"the loops all but lock at home, by {missed_by:.0e}: axes that should be parallel, or meet, need more "
                 "digits, or home is next to a singularity"
             )
-        elif left == 0 and end_effector_freedom(self, frozenset()) == 0:
+        elif left == 0 and is_held(self):
             yield "the loops hold the end effector at home: it cannot move"
 
     def with_limits(self, limits: Mapping[str, Limit] | None = None, /, **by_name: Limit) -> Mechanism:
