@@ -131,3 +131,55 @@ def test_what_cannot_move_is_said_to_be_stuck(spins: bool) -> None:
         joints.append(Joint("D", "revolute", ("plate", "tool"), at=(0, 0, 90), axis=Z, actuated=True))
     with pytest.warns(pf.errors.MobilityWarning, match="it cannot move"):
         Mechanism("frame", joints, "plate", (0, 0, 80))
+
+
+def two_links(offset: float, size: float = 100.0, **more: object) -> Mechanism:
+    at = np.array([offset, -offset, 0.0])
+    joints = [
+        Joint("A", "revolute", ("base", "a"), at=at, axis=Z, actuated=True, **more),  # type: ignore[arg-type]
+        Joint("B", "revolute", ("a", "b"), at=at + [size, 0, 0], axis=Z, actuated=True),
+    ]
+    return Mechanism("2R", joints, "b", at + [1.5 * size, 0.5 * size, 0])
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e3, 1e5, 3e7])
+def test_a_machine_far_from_the_origin_is_exact_and_no_motion_of_it_is_doubted(offset: float) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mechanism = two_links(offset)
+        five = pf.load("five_bar")
+        shift = np.array([offset, offset, 0.0])
+        joints = [pf.Joint(**(vars(each) | {"at": np.array(each.at) + shift})) for each in five.joints]  # type: ignore[arg-type]
+        moved = Mechanism("5-bar", joints, five.end_effector)
+    answer = pf.solve_ik(mechanism, pf.solve_fk(mechanism, [0.3, 0.5]).pose)
+    assert answer.status is Status.REACHED
+    there = pf.solve_ik(moved, np.add(five.reference_point, shift) + [0, 5, 9])
+    assert there.status is Status.REACHED
+    here = pf.solve_ik(five, np.add(five.reference_point, [0, 5, 9]))
+    np.testing.assert_allclose(there.actuators, here.actuators, rtol=0, atol=1e-8 if offset > 1e6 else 1e-9)
+
+
+@pytest.mark.parametrize("offset", [1e8, 1e9, 5e11])
+def test_a_machine_too_far_from_the_origin_to_be_exact_is_refused_and_told_why(offset: float) -> None:
+    found = faults_of(lambda: two_links(offset))
+    assert len(found) == 1
+    assert "times the size of the machine from the origin" in next(iter(found.values()))
+    two_links(offset, size=offset)
+
+
+def test_a_range_of_one_value_locks_its_joint() -> None:
+    mechanism = two_links(0.0, range=(0, 0))
+    answer = pf.solve_ik(mechanism, [150, 60, 0])
+    assert answer.status is Status.PROJECTED
+    assert float(answer.joints["A"]) == pytest.approx(0.0, abs=1e-9)
+    assert "joint[0].range" in faults_of(lambda: two_links(0.0, range=(0, -1e-3)))
+
+
+@pytest.mark.parametrize("length", [1e-300, 1e-9, 1.0, 1e13, 1e300])
+def test_a_direction_may_have_any_length(length: float) -> None:
+    axis = (0.6 * length, 0.0, 0.8 * length)
+    hinge = Joint("A", "revolute", ("base", "a"), at=(0, 0, 0), axis=axis, actuated=True)
+    np.testing.assert_allclose(hinge.axis, (0.6, 0, 0.8), rtol=0, atol=1e-15)
+    assert Mechanism("hinge", [hinge], "a", (1, 0, 0)).home_axis("A") == hinge.axis
+    infinite = Joint("A", "revolute", ("base", "a"), at=(0, 0, 0), axis=(0, 0, np.inf), actuated=True)
+    assert list(faults_of(lambda: Mechanism("hinge", [infinite], "a", (1, 0, 0)))) == ["joint[0].axis"]

@@ -81,8 +81,8 @@ def _tip_faults(joint: Joint) -> Iterator[Fault]:
 
 
 MISSPELT = 0.8
-"""Likeness from which the name of a body that one joint alone connects is taken for another one, misspelt: that of names
-of five letters which differ in one."""
+"""Likeness from which the name of a body that one joint alone connects is taken for another one, misspelt: that of two
+names of five letters which differ in one."""
 
 
 def leaves(mechanism: Structure) -> Iterator[tuple[int, Joint, str]]:
