@@ -23,6 +23,9 @@ TASKS = (
 )
 COUNTS = {"x": 1, "y": 1, "z": 1, "rotation": 3, "tilt": 2, "yaw": 1}
 
+TURN, SLIDE = 1.2, 60.0
+"""How far drives go from home [rad or length]."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -43,16 +46,22 @@ class _Maker:
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng, self.joints = rng, []
         self.planar = bool(rng.random() < 0.4)
-        self.normal = _unit(rng.normal(size=3)) if rng.random() < 0.5 else np.eye(3)[rng.integers(3)]
+        self.square = bool(rng.random() < 0.4)  # axes and links along x, y and z: home is often singular
+        self.normal = self.direction()
         self.body, self.at, self.aside = "base", np.zeros(3), []
 
+    def direction(self) -> np.ndarray:
+        return np.eye(3)[self.rng.integers(3)] if self.square else _unit(self.rng.normal(size=3))
+
     def axis(self) -> np.ndarray:
-        return self.normal if self.planar else _unit(self.rng.normal(size=3))
+        return self.normal if self.planar else self.direction()
 
     def shift(self, length: float) -> np.ndarray:
-        step = self.rng.normal(size=3)
+        step = self.direction()
         if self.planar:
-            step -= step @ self.normal * self.normal
+            while np.linalg.norm(np.cross(step, self.normal)) < 0.1:
+                step = self.direction()
+            step = step - step @ self.normal * self.normal
         return length * self.rng.uniform(0.6, 1.4) * _unit(step)
 
     def add(self, type_: str, body: str, at: np.ndarray, axis: np.ndarray, **more: object) -> str:
@@ -64,11 +73,14 @@ class _Maker:
     def serial(self) -> None:
         """One driven joint."""
         body = f"b{len(self.joints)}"
+        limited = self.rng.random() < 0.3
         if self.rng.random() < 0.7:
-            self.add("revolute", body, self.at, self.axis(), actuated=True)
+            limits = {"range": (-TURN - 0.1, TURN + 0.3)} if limited else {}
+            self.add("revolute", body, self.at, self.axis(), actuated=True, **limits)
         else:
             along = self.shift(1.0) if self.planar else self.axis()
-            self.add("prismatic", body, self.at, along, actuated=True)
+            limits = {"range": (-SLIDE, 1.5 * SLIDE)} if limited else {}
+            self.add("prismatic", body, self.at, along, actuated=True, **limits)
         self.body, self.at = body, self.at + self.shift(100.0)
 
     def loop(self, *, hanging: bool) -> None:
@@ -124,7 +136,7 @@ def random_case(seed: int, samples: int) -> Case | None:
     home = np.zeros(len(mechanism.actuator_names))
     kinds = [mechanism.joint(name).type for name in mechanism.actuator_names]
     moves = np.array([name not in maker.aside for name in mechanism.actuator_names])
-    room = np.where(np.array(kinds) == "revolute", 0.6, 40.0) * moves
+    room = np.where(np.array(kinds) == "revolute", TURN, SLIDE) * moves
     return Case(mechanism, home + room * rng.uniform(-1, 1, (samples, len(home))), tuple(maker.aside))
 
 
