@@ -234,7 +234,7 @@ class Solution:
         for way in ways:
             rows = projected[holds == way.hold]
             q = self._coordinates[rows]
-            weights = weighed_limits(closure, q, wanted.targets[rows], platform=way.weights, framed=task.is_framed)
+            weights = weighed_limits(closure, q, wanted.targets[rows], platform=way.weights, frame=task.frame)
             found.update(zip(rows.tolist(), holding_limits(self.mechanism, q, weights), strict=True))
         return [found[row] for row in projected.tolist()]
 

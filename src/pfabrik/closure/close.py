@@ -175,7 +175,7 @@ def close(
     *,
     locked: frozenset[str] = frozenset(),
     platform: Sequence[float] = EVERYTHING_FREE,
-    framed: bool = False,
+    frame: int = K.BASE_AXES,
     targets: Floats | None = None,
     weights: Floats | None = None,
     anchors: Floats | None = None,
@@ -195,7 +195,8 @@ def close(
     locked : joints that keep their coordinates.
     platform : weights of the squares of the platform's distance from `targets` (default: `poses`), position [L], then
         rotation [rad]; `LOCKED` holds that part where it starts.
-    framed : the weights of the rotation are about the axes of the targets, not of the base.
+    frame : what the weights of the rotation are about: the axes of the base, those of the targets (of which the first
+        two tilt), or axes of which the third yaws; one of `K.BASE_AXES`, `K.TARGET_AXES`, `K.HALF_WAY`.
     weights, anchors : weights of the squares of the coordinates' distances from anchors, (columns,), (n, columns).
     centres : wished joint centres, (n, joints, 3); NaN for none.
     limits : keep all limits too, by `margin` inside.
@@ -220,7 +221,7 @@ def close(
         weights=np.zeros(len(closure.scale)) if weights is None else weights,
         anchors=none[:, :, 0] if anchors is None else anchors * closure.scale,
         platform=np.array(platform, dtype=float),
-        framed=int(framed),
+        frame=frame,
         targets=closed.poses.copy() if targets is None else _in_lengths(targets, 1.0 / length),
         centres=none if centres is None else centres / length,
         limits=int(limits),

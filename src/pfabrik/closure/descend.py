@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.closure.loops import Closed
+from ..kernels.closure.loops import BASE_AXES, Closed
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .close import MARGIN, Closing, Closure
@@ -27,7 +27,7 @@ MOST_STEPS = 200
 
 
 def approached(
-    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
 ) -> Closing:
     """Feasible configurations nearest to targets, (n, 4, 4): local minima of the distance, from given coordinates.
 
@@ -36,19 +36,19 @@ def approached(
     coordinates : where to start, (n, columns): closed within all limits, or not far from it.
     platform : what counts of the distance from the targets: weights of the squares of position [L] and rotation [rad];
         LOCKED for what is to be as the target has it.
-    framed : of the rotation, only the direction of the platform's z axis counts.
+    frame : of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY.
 
     Returns
     -------
     Closing : judge by `feasible`. Gaps and excesses are those of the whole, the same for every group.
     """
-    found = _run(closure, coordinates, _objective(closure, targets, platform, framed, MOST_STEPS))[0]
+    found = _run(closure, coordinates, _objective(closure, targets, platform, frame, MOST_STEPS))[0]
     found.poses[:, :3, 3] *= closure.mechanism.characteristic_length
     return Closing(found.coordinates / closure.scale, *found[1:])
 
 
 def weighed_limits(
-    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
 ) -> Floats:
     """How hard every limit holds configurations back from their targets: multipliers, (n, 2 columns + cones).
 
@@ -56,7 +56,7 @@ def weighed_limits(
     per unit [L or rad] by which a limit gives way; 0 for limits that do not matter.
     """
     return _run(
-        closure, coordinates, _objective(closure, within_sight(closure.mechanism, targets), platform, framed, 0)
+        closure, coordinates, _objective(closure, within_sight(closure.mechanism, targets), platform, frame, 0)
     )[1]
 
 
@@ -83,12 +83,12 @@ def _run(closure: Closure, coordinates: Floats, objective: PoseObjective) -> tup
     return closed, weights
 
 
-def _objective(closure: Closure, targets: Floats, platform: Sequence[float], framed: bool, steps: int) -> PoseObjective:
+def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> PoseObjective:
     from ..kernels.closure.pose_objective import PoseObjective
 
     wanted = targets.copy()
     wanted[:, :3, 3] /= closure.mechanism.characteristic_length
-    return PoseObjective(wanted, np.array(platform, dtype=float), int(framed), MARGIN, TOLERANCES.active, steps)
+    return PoseObjective(wanted, np.array(platform, dtype=float), frame, MARGIN, TOLERANCES.active, steps)
 
 
 def _closed(closure: Closure, coordinates: Floats) -> Closed:

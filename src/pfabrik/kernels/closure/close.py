@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from .._jit import inlined, kernel
-from ..rotations import exponential, turn_ball
+from ..rotations import exponential, turn_about_z, turn_ball, yaw_of
 from .equations import (
     add_anchors,
     add_cones,
@@ -20,9 +20,10 @@ from .equations import (
     clear,
     follow_platform,
     out_of_frame,
+    pose_frame,
     turn_equations,
 )
-from .loops import BALL, LOCKED, SLIDE, Closed, ClosureProblem, Floats, Layout, Loops
+from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Floats, Layout, Loops
 from .path_kinematics import Equations, State, copy_state, load_row, new_equations, new_state, store_row
 
 LONGEST_STEP = 0.5
@@ -179,7 +180,7 @@ def close(loops: Loops, layout: Layout, problem: ClosureProblem, closed: Closed)
     """
     best, trial = new_state(loops), new_state(loops)
     eq = new_equations(loops, layout)
-    plunging = problem.plunging == 1
+    plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
     for row in range(len(closed.coordinates)):
         load_row(loops, layout, problem.chained == 1 and row > 0, row, closed, trial)
         copy_state(trial, best)
@@ -198,8 +199,9 @@ def close(loops: Loops, layout: Layout, problem: ClosureProblem, closed: Closed)
                     closed.excesses[row, group] = eq.excesses[group]
                 break
             found += add_anchors(loops, layout.slots, row, trial, problem, eq)
-            if problem.framed == 1:
-                turn_equations(problem.targets[row], layout, eq)
+            if problem.frame != BASE_AXES:
+                pose_frame(row, trial, problem, eq)
+                turn_equations(eq.frame, layout, eq)
             found += add_platform(row, trial, problem, eq)
             if turn == TRY:
                 if found < cost or plunging:
@@ -220,9 +222,12 @@ def close(loops: Loops, layout: Layout, problem: ClosureProblem, closed: Closed)
                 turn = MEASURE
             if turn == TRY:
                 solve(layout, damping, eq)
-                if problem.framed == 1:
-                    out_of_frame(problem.targets[row], eq.twist)
+                if problem.frame != BASE_AXES:
+                    out_of_frame(eq.frame, eq.twist)
+                yaw = yaw_of(trial.X) if keeps_yaw else 0.0
                 step = move(loops, layout, eq, trial)
+                if keeps_yaw:
+                    turn_about_z(trial.X, yaw - yaw_of(trial.X))  # what it yawed to second order
                 iterations += 1
             elif turn == MEASURE:
                 if problem.balls_follow == 1:

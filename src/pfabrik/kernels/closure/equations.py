@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 
 from .._jit import inlined, routine
-from ..rotations import difference, exponential
-from .loops import BALL, LOCKED, SLIDE, ClosureProblem, Floats, Ints, Layout, Loops
+from ..rotations import UPSIDE_DOWN, difference, exponential, yaw_difference
+from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, TARGET_AXES, ClosureProblem, Floats, Ints, Layout, Loops
 from .path_kinematics import Equations, State, compare_end, end_path, pose_cone, walk_path
 
 
@@ -227,20 +227,44 @@ def add_cones(loops: Loops, slots: Ints, state: State, margin: float, eq: Equati
 @inlined
 def add_platform(row: int, state: State, problem: ClosureProblem, eq: Equations) -> float:
     """The platform's distance from its target, in its own equations; the weighted square."""
-    square = 0.0
+    square, slope = 0.0, 1.0
     difference(state.X, problem.targets[row], eq.e[3:])
-    if problem.framed == 1:
-        into_frame(problem.targets[row], eq.e[3:])
+    if problem.frame != BASE_AXES:
+        into_frame(eq.frame, eq.e[3:])
+    if problem.frame == HALF_WAY:
+        eq.e[5] = yaw_difference(state.X, problem.targets[row])
+        slope = 1.0 / max(eq.frame[2, 2], UPSIDE_DOWN)
     for i in range(6):
         weight = problem.platform[i]
         if weight == LOCKED:
             eq.G[i, i] += weight
         elif weight > 0.0:
             off = state.X[i, 3] - problem.targets[row, i, 3] if i < 3 else eq.e[i]
+            rate = slope if i == 5 else 1.0
             square += weight * off * off
-            eq.G[i, i] += weight
-            eq.G[i, 6] -= weight * off
+            eq.G[i, i] += weight * rate * rate
+            eq.G[i, 6] -= weight * rate * off
     return square
+
+
+@inlined
+def pose_frame(row: int, state: State, problem: ClosureProblem, eq: Equations) -> None:
+    """The axes that the weights of the platform's rotation are about, into `frame`."""
+    F = eq.frame
+    if problem.frame == TARGET_AXES:
+        for i in range(3):
+            for j in range(3):
+                F[i, j] = problem.targets[row, i, j]
+        return
+    x, y, z = state.X[0, 2], state.X[1, 2], state.X[2, 2] + 1.0
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < UPSIDE_DOWN:
+        x, y, z, length = 0.0, 0.0, 1.0, 1.0
+    a, b, c = x / length, y / length, z / length
+    # the shortest turn of the z axis to half way
+    F[0, 0], F[0, 1], F[0, 2] = 1.0 - a * a / (1.0 + c), -a * b / (1.0 + c), a
+    F[1, 0], F[1, 1], F[1, 2] = -a * b / (1.0 + c), 1.0 - b * b / (1.0 + c), b
+    F[2, 0], F[2, 1], F[2, 2] = -a, -b, c
 
 
 @inlined

@@ -14,6 +14,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# What weights of a rotation are about: the axes of the base; those of the target, of which the first two turn its z
+# axis (the tilt); or axes of which the third is half way between the z axes of base and platform, about which the
+# platform yaws: the twist about z has its gradient there.
+BASE_AXES, TARGET_AXES, HALF_WAY = 0, 1, 2
+
 # Unit motions: about an axis, along an axis, about a point.
 TURN, SLIDE, BALL = 0, 1, 2
 
@@ -60,7 +65,7 @@ class ClosureProblem(NamedTuple):
     weights: Floats  # (columns,): of the distance of each free coordinate from its anchor
     anchors: Floats  # (n, columns)
     platform: Floats  # (6,): weights of the pose's distance from its target, position then rotation; LOCKED holds it
-    framed: int  # 1: the weights of the rotation are about the target's own axes, not the base's
+    frame: int  # what the weights of the rotation are about: BASE_AXES, TARGET_AXES or HALF_WAY
     targets: Floats  # (n, 4, 4)
     centres: Floats  # (n, joints, 3): where joint centres are wished to be; NaN where they are not
     limits: int  # 1: limits are to be kept

@@ -36,6 +36,7 @@ class Equations(NamedTuple):
     G: Floats  # (6, 7): the platform's equations, right-hand side last
     S: Floats  # (6, 7): the same, being solved
     twist: Floats  # (6,)
+    frame: Floats  # (3, 3): axes that the platform turns about, one a column
     gaps: Floats  # (groups,)
     excesses: Floats
     misses: Floats
@@ -65,6 +66,7 @@ def new_equations(loops: Loops, layout: Layout) -> Equations:
         np.zeros((6, 7)),
         np.zeros((6, 7)),
         np.zeros(6),
+        np.zeros((3, 3)),
         np.zeros(groups),
         np.zeros(groups),
         np.zeros(groups),

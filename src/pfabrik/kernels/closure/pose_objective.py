@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 from .._jit import routine
-from ..rotations import difference
+from ..rotations import UPSIDE_DOWN, difference, yaw_difference
 from ..vectors import Vec, cross, dot, norm, scale
-from .loops import LOCKED, Floats
+from .loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, Floats
 
 ALIGNED = 1e-9
 """Sine below which two directions have no axis across them."""
@@ -19,7 +19,7 @@ class PoseObjective(NamedTuple):
 
     targets: Floats  # (n, 4, 4)
     platform: Floats  # (6,): weights of the squares of position and rotation; 0 for what does not count; LOCKED holds
-    framed: int  # 1: of the rotation only the direction of the platform's z axis counts
+    frame: int  # of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY
     margin: float  # by how much inside their limits coordinates stay
     near: float  # limits farther away are not looked at when multipliers are asked for
     max_iterations: int
@@ -45,17 +45,26 @@ def pose_gradient(objective: PoseObjective, target: Floats, X: Floats, gradient:
         force[i] = 0.0
         if i < 3:
             w[i] = X[i, 3] - target[i, 3]
-        elif objective.framed == 1:
+        elif objective.frame != BASE_AXES:
             continue
         if objective.platform[i] == LOCKED:
             held = hold(gradient, held, i, w[i])
         else:
             value += 0.5 * unit * objective.platform[i] * w[i] * w[i]
             force[i] = unit * objective.platform[i] * w[i]
-    if objective.framed == 1 and objective.platform[3] == LOCKED:
+    if objective.frame == TARGET_AXES and objective.platform[3] == LOCKED:
         held = hold_tilt(target, X, gradient, held)
-    elif objective.framed == 1 and objective.platform[3] > 0.0:
+    elif objective.frame == TARGET_AXES and objective.platform[3] > 0.0:
         value += tilt(target, unit * objective.platform[3], X, force)
+    elif objective.frame == HALF_WAY and objective.platform[5] == LOCKED:
+        held = hold(gradient, held, 5, yaw_difference(X, target))
+        for i in range(3):
+            gradient.holds[held - 1, 3 + i] = yaw_gradient(X, i)
+    elif objective.frame == HALF_WAY and objective.platform[5] > 0.0:
+        off, weight = yaw_difference(X, target), unit * objective.platform[5]
+        value += 0.5 * weight * off * off
+        for i in range(3):
+            force[3 + i] += weight * off * yaw_gradient(X, i)
     return value, held
 
 
@@ -93,6 +102,12 @@ def hold_tilt(target: Floats, X: Floats, gradient: PoseGradient, held: int) -> i
             a, b = (i + 1) % 3, (i + 2) % 3
             gradient.holds[held - 1, 3 + i] = X[a, 2] * target[b, k] - X[b, 2] * target[a, k]
     return held
+
+
+@routine
+def yaw_gradient(X: Floats, axis: int) -> float:
+    """How fast the platform yaws as it turns about an axis of the base: (z + z') / (1 + z z'), of both z axes."""
+    return (X[axis, 2] + (1.0 if axis == 2 else 0.0)) / max(1.0 + X[2, 2], UPSIDE_DOWN)
 
 
 @routine
