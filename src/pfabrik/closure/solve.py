@@ -188,8 +188,10 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
             _start_nearby(closure, found, targets)
         _search(closure, found, rows, wanted, held, at_rest=at_rest)
     if not keep_mode and follows and has_parasitic_motion(closure.mechanism):
-        anywhere = task.completed(targets, begin)  # in other ways of assembly, where this one does not reach
-        _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
+        _start_nearby(closure, found, targets)  # in other ways of assembly, where this one does not reach
+        if len(chanced_upon(closure.mechanism)[0]) < NEARBY:
+            anywhere = task.completed(targets, begin)
+            _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
     return found
 
 
