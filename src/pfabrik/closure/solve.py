@@ -22,12 +22,7 @@ from .close import HELD, MARGIN, Closing, Closure, close, closure_of, measured, 
 from .configurations import Configurations, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
 from .known import chanced_upon
-<<<<<<< HEAD
-from .parasitic import differences, follows_task, has_parasitic_motion
-=======
-from .nearest import MARGIN, is_feasible
 from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
->>>>>>> ac2556029d6a8019b04033bba94fdf7e85de9f15
 from .projection import kept, project, ways_of
 from .starts import random_coordinates
 from .stretched import Bends
@@ -51,7 +46,7 @@ HITS, SAME = 16, 1e-3
 """How many of them must end at the least gap or excess found before a leg is given up, and the share by which two may
 differ and still be the same. A branch that is met half as often was by then met too, but for one time in 600."""
 
-NEARBY = 16
+NEARBY = 64
 """Known configurations that are tried before random ones, the nearest to the target first."""
 
 STEPS = 30
@@ -229,18 +224,14 @@ def _search(
     rng = np.random.default_rng(0)
     hits = np.zeros(found.gaps.shape, np.int64)
     for _ in range(STARTS):
-<<<<<<< HEAD
-        rest = rows[~found.feasible[rows]]
-=======
-        rest = rows[~is_feasible(found)[rows] & (hits[rows].max(axis=1) < HITS)]
->>>>>>> ac2556029d6a8019b04033bba94fdf7e85de9f15
+        rest = rows[~found.feasible[rows] & (hits[rows].max(axis=1) < HITS)]
         if not len(rest):
             break
         stays = _legs_reached(closure, found, rest) | closure.idle if at_rest else closure.idle
         scattered = np.where(stays, found.coordinates[rest], random_coordinates(closure, 1, rng))
         tried = _close_below(closure, scattered, wanted[rest], held, STEPS)
         if at_rest:
-            hits[rest] = _hits(_off(found)[rest], _off(tried), hits[rest])
+            hits[rest] = _hits(found.off[rest], tried.off, hits[rest])
             _take_legs(closure, found, rest, tried)
         else:
             found.improve(rest, tried)
