@@ -8,25 +8,16 @@ from functools import partial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from . import geometric
 from .answers.solution import Solution
 from .description.mechanism import Mechanism, checked_mechanism
-from .files import load
 from .fk import solve_fk
 from .ik import solve_ik
-from .options import Options
+from .kernels.ahead import compile_all
 from .poses import pose
 from .track import track
 
 Step: TypeAlias = tuple[str, Callable[[], object]]
-
-EVERY_KIND = ("stewart", "five_bar", "nrpm", "delta")
-"""Machines whose questions need every kernel: struts, planar dyads, trunks with branches, and a partial task."""
-
-WITH_CLOSED_FORM = ("stewart", "five_bar", "nrpm")
-"""Machines whose closed forms are compiled."""
 
 FAR = 3.0
 """How far away from home a target is out of reach of any machine [L or rad]."""
@@ -41,42 +32,30 @@ def warm_up(mechanism: Mechanism | None = None, *, on_step: Callable[[str, float
     Parameters
     ----------
     mechanism : the machine to be asked: inverse and forward kinematics within and out of reach, paths, and all joints.
-        Default: everything that any machine needs.
+        What it does not need is not compiled. Default: everything that any machine needs.
     on_step : called after each step with its name and how long it took [s].
     """
-    for name, step in _everything() if mechanism is None else _questions(checked_mechanism(mechanism)):
+    if mechanism is None:
+        compile_all(on_step)
+        return
+    for name, step in _questions(checked_mechanism(mechanism)):
         start = time.perf_counter()
         step()
         if on_step is not None:
             on_step(name, time.perf_counter() - start)
 
 
-def _everything() -> Iterator[Step]:
-    for name in EVERY_KIND:
-        mechanism = load(name)
-        for what, step in _questions(mechanism):
-            yield f"{mechanism.name}: {what}", step
-        if name in WITH_CLOSED_FORM:
-            yield f"{mechanism.name}: closed form", partial(geometric.solve_ik, mechanism, mechanism.home_pose)
-
-
 def _questions(mechanism: Mechanism) -> Iterator[Step]:
     """Questions to one machine, so chosen that whatever answers them is compiled."""
-    home, far = mechanism.home_pose, _far(mechanism)
+    home, shift = mechanism.home_pose, FAR * mechanism.characteristic_length
+    far = pose(home[:3, 3] + shift, rotvec=(FAR, 0.0, 0.0))
 
     def forward(change: float) -> Solution:
         return solve_fk(mechanism, solve_ik(mechanism, home).actuators + change)
 
     yield "targets within reach", partial(solve_ik, mechanism, home)
     yield "targets out of reach", partial(solve_ik, mechanism, far)
-    yield "the paper's projection", partial(solve_ik, mechanism, far, options=Options(projection="centroid"))
     yield "paths", partial(track, mechanism, np.stack([home, far]))
     yield "coordinates of all joints", lambda: solve_ik(mechanism, np.stack([home, far])).q
     yield "forward kinematics", partial(forward, 0.0)
-    yield "actuator values out of reach", partial(forward, FAR * mechanism.characteristic_length)
-
-
-def _far(mechanism: Mechanism) -> NDArray[np.float64]:
-    """A pose (4, 4) that no machine reaches: shifted and turned."""
-    shift = FAR * mechanism.characteristic_length * np.ones(3)
-    return pose(np.asarray(mechanism.reference_point) + shift, rotvec=(FAR, 0.0, 0.0))
+    yield "actuator values out of reach", partial(forward, shift)

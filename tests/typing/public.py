@@ -65,8 +65,14 @@ def of_descriptions() -> pf.Mechanism:
     """Legs in short, with points as lists, tuples and arrays."""
     angles = np.radians([0, 120, 240])
     ring = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
-    joints = pf.Joint("A", "revolute", ("base", "link"), at=(0, 0, 0), axis=(0, 0, 1), range=(-1, 1)).connects
-    assert_type(joints, tuple[str, str])
+    cone = pf.Cone(np.array([0, 0, 1.0]), 0.5, fixed_to="link")
+    slide = pf.Joint("P", "prismatic", ["base", "link"], axis=ring[0], actuated=True, range=[0, 10], max_speed=5)
+    wrist = pf.Joint("S", "spherical", ["link", "tool"], at=[50, 0, 0])
+    assert_type(pf.Joint("S", "spherical", ("base", "rod"), at=(0, 0, 0), cone=cone).cone, pf.Cone | None)
+    assert_type(slide.connects, tuple[str, str])
+    slider = pf.Mechanism("slider", [slide, wrist], end_effector="S", task=["x"])
+    assert_type(slider.reference_point, tuple[float, float, float])
+    assert_type(slider.with_limits(P=(0, 5)).actuator_names, tuple[str, ...])
     return pf.Mechanism.from_legs(
         "R-P*-S",
         base=100 * ring,

@@ -13,7 +13,7 @@ import pfabrik as pf
 def compile() -> int:
     """Compile all kernels ahead.
 
-    Each step is printed with the seconds it took. What is compiled stays in a cache, so that this is needed once per
+    Each kernel is printed with the seconds it took. What is compiled stays in a cache, so that this is needed once per
     version; where all is there already it takes a second.
     """
     start = time.perf_counter()

@@ -78,11 +78,11 @@ def follow(case: Case, steps: int) -> Run:
 def write(run: Run, folder: Path) -> None:
     """The picture and the CSV file of one run."""
     from ..view.tracking import draw_tracking
-    from .pathfile import write_track
+    from .pathfile import PathFile, write_track
 
     draw_tracking(run.targets, run.solution, folder / f"{run.key}.png")
     with (folder / f"{run.key}.csv").open("w", newline="", encoding="utf-8") as handle:
-        write_track(handle, run.targets, run.solution)
+        write_track(handle, PathFile(run.targets), run.solution)
 
 
 def table(runs: list[Run]) -> str:

@@ -10,6 +10,7 @@ import click
 import pfabrik as pf
 
 from .answer import describe, in_units, margins_of, margins_table, pose_header, pose_texts, tell_modes
+from .mech import MECH, load
 from .projecting import note_left_out, note_unused, options_projecting, projecting
 from .target import Triple, target_of, targeted
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("mech")
+@click.argument("mech", type=MECH)
 @targeted
 @projecting
 @click.option("--margins", "with_margins", is_flag=True, help="List how far off every limit is, nearest first.")
@@ -49,7 +50,7 @@ def ik(
         raise click.UsageError("--margins is of one answer: it does not go with --all")
     if position is None and rpy is None and joint is None:
         raise click.UsageError("no target: give --position, --rpy or both, or --joint")
-    mechanism = pf.load(mech)
+    mechanism = load(mech)
     target = target_of(mechanism, position, rpy, joint)
     note_ignored(mechanism, position, rpy)
     if list_all:
@@ -75,8 +76,10 @@ def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | No
     elif position:
         off = zip("xyz", position, mechanism.reference_point, strict=True)
         left_out += [f"{axis} of --position" for axis, asked, home in off if axis not in task and asked != home]
-    if rpy and not task & {"rotation", "tilt"}:
+    if rpy and not task & {"rotation", "tilt", "yaw"}:
         left_out.append("--rpy")
+    elif rpy and "yaw" in task and any(rpy[:2]):
+        left_out.append("the tilt in --rpy")
     elif rpy and "tilt" in task and any(rpy) and not any(rpy[:2]):
         left_out.append("the yaw of --rpy")
     note_left_out(left_out, mechanism)

@@ -15,6 +15,7 @@ import pfabrik as pf
 
 from ..decomposition.decompose import closure_reason, engine_of
 from ..description.joint_types import KINDS
+from .mech import MECH, load
 from .table import aligned
 
 if TYPE_CHECKING:
@@ -24,14 +25,14 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("mech")
+@click.argument("mech", type=MECH)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
 def info(mech: str, as_json: bool) -> int:
     """Show what a mechanism is made of.
 
     Its joints, limits, actuators, mobility and task, and its sub-chains with the engine that answers, and why.
     """
-    mechanism = pf.load(mech)
+    mechanism = load(mech)
     if as_json:
         click.echo(json.dumps(as_object(mechanism), allow_nan=False))
         return 0

@@ -11,6 +11,7 @@ import click
 import pfabrik as pf
 
 from .finite import FINITE
+from .mech import MECH, load
 from .table import aligned
 from .target import Triple, target_of, targeted
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("mech")
+@click.argument("mech", type=MECH)
 @targeted
 @click.option("--along", type=FINITE, nargs=3, multiple=True, metavar="X Y Z", help="A direction. May be repeated.")
 @click.option("--about", type=FINITE, nargs=3, multiple=True, metavar="X Y Z", help="An axis to turn about. Likewise.")
@@ -40,7 +41,7 @@ def travel(
     It starts at a pose within reach (default: home) and stays in its working mode; a limit, or the length of the links,
     stops it. By default it goes both ways along and about each axis of the task.
     """
-    mechanism = pf.load(mech)
+    mechanism = load(mech)
     start = pf.solve_ik(mechanism, target_of(mechanism, position, rpy, joint))
     if not start:
         raise click.ClickException(f"cannot start there: {str(start.status).lower()}; see `pfabrik ik`")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
+from ..kernels.closure.loops import BASE_AXES
 from ..kernels.reaching import plan as P
 from ..motion.displacements import centres
 from ..motion.limits import within_turns
@@ -151,8 +152,8 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
     if mechanism.end_effector_is_joint:
         rows.poses[:, :3, :3] = wanted[:, :3, :3]
     position, rotation = task_of(mechanism).errors(rows.poses, wanted)
-    rows.measures[:, 0], rows.measures[:, 1] = position, rotation
-    rows.counters[:, 2] = holds
+    rows.measures[:, P.POSITION_ERROR], rows.measures[:, P.ROTATION_ERROR] = position, rotation
+    rows.counters[:, P.HELD] = holds
     near = (position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)) & (
         rotation <= options.rotation_tolerance
     )
@@ -233,7 +234,7 @@ def _assembled(closure: Closure, wanted: Floats, start: Floats, begin: Floats) -
     task = task_of(closure.mechanism)
     if not has_parasitic_motion(closure.mechanism):
         return close(closure, start, wanted, platform=HELD)
-    found = close(closure, start, wanted, platform=task.held, framed=task.is_framed)
+    found = close(closure, start, wanted, platform=task.held, frame=task.frame)
     strange = np.flatnonzero((found.gap > TOLERANCES.position) | (differences(closure, found.poses, wanted) > STRANGE))
     if len(strange):
         found.take(strange, _led(closure, wanted[strange], start[strange], begin[strange], task.held, limits=False))
@@ -249,7 +250,7 @@ def _close_below(
         start,
         wanted,
         platform=held,
-        framed=task_of(closure.mechanism).is_framed and held != HELD,
+        frame=BASE_AXES if held == HELD else task_of(closure.mechanism).frame,
         limits=limits,
         margin=MARGIN,
         max_iterations=max_iterations,

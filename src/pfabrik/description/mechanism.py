@@ -6,14 +6,14 @@ import dataclasses
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
 from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from .faults import find_faults, in_order, merged
 from .form_faults import joint_faults
-from .home_mobility import end_effector_freedom, inexactness
+from .home_mobility import end_effector_freedom, inexactness, is_held
 from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import faults_of_legs, legs_name, placed_joints
@@ -43,9 +43,23 @@ class Mechanism(Structure):
     reference_point : the point of the end-effector body that targets place, at home [length]; the centre of the joint
         when the end effector is a joint, and then left out.
     length_unit, angle_unit : labels for people and files; nothing is ever converted by them.
-    task : what a target sets, of "x", "y", "z", "rotation" and "tilt" (the direction of the platform's z axis); by
-        default everything. What it leaves out follows from the mechanism.
+    task : what a target sets: of "x", "y", "z", and one of "rotation", "tilt" (where the platform's z axis points) and
+        "yaw" (the twist about z); by default everything. What it leaves out follows from the mechanism.
     """
+
+    if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
+
+        def __init__(
+            self,
+            name: str,
+            joints: Iterable[Joint],
+            end_effector: str,
+            reference_point: ArrayLike | None = None,
+            base: str = "base",
+            length_unit: str = "mm",
+            angle_unit: Literal["deg", "rad"] = "deg",
+            task: Sequence[str] | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -117,11 +131,11 @@ class Mechanism(Structure):
                 name=legs_name(described, placed) if name is None else name,
                 joints=made,
                 end_effector=end_effector,
-                reference_point=cast(Any, reference_point),
+                reference_point=reference_point,
                 base=base_body,
                 length_unit=length_unit,
                 angle_unit=angle_unit,
-                task=cast(Any, task),
+                task=task,
             )
         except InvalidMechanism as error:
             raise InvalidMechanism(in_order(faults_of_legs(error.faults, len(own), placed))) from None
@@ -148,7 +162,7 @@ class Mechanism(Structure):
                 f"the loops all but lock at home, by {missed_by:.0e}: axes that should be parallel, or meet, need more "
                 "digits, or home is next to a singularity"
             )
-        elif left == 0 and end_effector_freedom(self, frozenset()) == 0:
+        elif left == 0 and is_held(self):
             yield "the loops hold the end effector at home: it cannot move"
 
     def with_limits(self, limits: Mapping[str, Limit] | None = None, /, **by_name: Limit) -> Mechanism:

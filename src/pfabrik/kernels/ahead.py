@@ -12,8 +12,8 @@ import numpy as np
 from ._jit import _config, _name_of
 from .closure.close import close
 from .closure.descend import approach
-from .closure.loops import Closed, Layout, Loops, Wishes
-from .closure.pose_objective import Aim
+from .closure.loops import Closed, ClosureProblem, Layout, Loops
+from .closure.pose_objective import PoseObjective
 from .reaching import plan as P
 from .reaching.solve import solve_by_iteration, solve_directly
 
@@ -42,9 +42,9 @@ _ROWS = (
 
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (solve_directly, _ROWS),
-    (close, (_LOOPS, _LAYOUT, Wishes(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
+    (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
     (solve_by_iteration, _ROWS),
-    (approach, (_LOOPS, _LAYOUT, Aim(*_values("f3 f1 i f f i")), _CLOSED, np.zeros((0, 0)))),
+    (approach, (_LOOPS, _LAYOUT, PoseObjective(*_values("f3 f1 i f f i")), _CLOSED, np.zeros((0, 0)))),
 )
 """Every kernel with arguments of the types it takes, what most questions need first."""
 
