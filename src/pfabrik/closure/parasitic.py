@@ -7,13 +7,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..motion.first_order import around_home, generic_of
 from ..tolerances import TOLERANCES
 from .close import Closure, closure_of, platform_poses
-
-Floats = NDArray[np.float64]
 
 
 @lru_cache(maxsize=64)

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import BASE_AXES
@@ -26,9 +27,6 @@ from .parasitic import asks_too_much, differences, follows_task, has_parasitic_m
 from .projection import kept, project, ways_of
 from .starts import random_coordinates
 from .stretched import Bends
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 STRIDES = 8
 """Steps in which the platform is taken from the seed's pose to the target where one step strays."""
