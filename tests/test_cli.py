@@ -1040,6 +1040,8 @@ def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
     except subprocess.TimeoutExpired:  # a signal that arrives in a callback of the compiler's C++ code is lost
         process.send_signal(signal.SIGINT)
         said = process.communicate(timeout=90)[1]
+    finally:
+        process.kill()  # where it has ended, nothing happens
     assert "Traceback" not in said
     # a shell calls both 130; Python sends itself the signal again if it arrived in code that it was just generating
     assert process.returncode in (130, -signal.SIGINT)
