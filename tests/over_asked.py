@@ -18,7 +18,6 @@ TASKS = (
     ("x", "y", "z", "yaw"),
     ("z", "tilt"),
     ("tilt",),
-    ("x", "y", "z", "rotation"),
     ("rotation",),
 )
 COUNTS = {"x": 1, "y": 1, "z": 1, "rotation": 3, "tilt": 2, "yaw": 1}
@@ -114,8 +113,8 @@ class _Maker:
         self.aside.append(self.add("revolute", f"tool{len(self.joints)}", self.at + 7.0, self.axis()))
 
 
-def random_case(seed: int, samples: int) -> Case | None:
-    """A machine of 1 to 4 freedoms with a task of more coordinates; None where chance makes none."""
+def random_case(seed: int, samples: int) -> Case:
+    """A machine of 1 to 4 freedoms with a task of more coordinates."""
     rng = np.random.default_rng(seed)
     maker = _Maker(rng)
     freedoms = int(rng.integers(1, 5))

@@ -2,7 +2,7 @@
 
     import pfabrik as pf
 
-    m = pf.load("stewart")                       # a catalogue name (see pf.catalog()) or the path of a file
+    m = pf.load("my_machine.toml")               # the path of a file, or one of pf.catalog()
     sol = pf.solve_ik(m, [10, 0, 190])           # REACHED, or PROJECTED to the nearest feasible pose
     fk = pf.solve_fk(m, sol.actuators)           # from actuator values to the pose
 

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .answers.solution import Solution, Status
 from .answers.starts import Start, start_of
+from .arrays import Floats
 from .closure.assemble import actuator_errors
 from .closure.close import Closing, closure_of, measured
 from .closure.configurations import Configurations, joint_coordinates
@@ -20,8 +21,6 @@ from .kernels.reaching.plan import ACTUATOR_ERROR
 from .options import Options, checked_options
 from .poses import as_floats
 from .tolerances import TOLERANCES
-
-Floats = NDArray[np.float64]
 
 Actuators: TypeAlias = ArrayLike | Mapping[str, ArrayLike]
 """Actuated coordinates (..., n_a) in the order of `mechanism.actuator_names`, or joint name -> values (...,)."""

@@ -8,11 +8,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import Floats
 from .errors import InvalidArgument
 from .rotations import from_quaternion, from_rotvec, from_rpy, nearest_rotations
 from .tolerances import TOLERANCES
-
-Floats = NDArray[np.float64]
 
 
 @runtime_checkable

@@ -8,6 +8,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import Floats
 from .description.mechanism import Mechanism, checked_mechanism
 from .description.task import task_of
 from .errors import InvalidArgument
@@ -15,8 +16,6 @@ from .kernels.reaching.plan import INVALID
 from .motion.displacements import columns, home_coordinates, joint_displacements
 from .options import Options
 from .poses import SupportsMatrix, as_floats, as_poses, what_is_wrong
-
-Floats = NDArray[np.float64]
 
 Target: TypeAlias = ArrayLike | SupportsMatrix | Mapping[str, ArrayLike]
 """Poses (..., 4, 4), positions (..., 3), a SciPy RigidTransform, or joint name -> coordinates."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .answers.limits import ActiveLimit, active_limits
 from .answers.solution import Solution, Status, checked_solution
+from .arrays import Floats
 from .description.mechanism import Mechanism
 from .description.task import task_of
 from .engine import engine_of
@@ -20,8 +21,6 @@ from .options import Options, checked_options
 from .poses import as_floats
 from .rotations import from_rotvec
 from .tolerances import TOLERANCES
-
-Floats = NDArray[np.float64]
 
 STEP = 1.0 / 32.0
 """How far one look ahead goes at first [L or rad]: what is narrower may be stepped over."""

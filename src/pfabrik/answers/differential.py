@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..motion.first_order import Mobility, Singularity, forward_map, generic_of, inverse_map, measures
 from .solution import Solution, checked_solution
 
 __all__ = ["Mobility", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]
-
-Floats = NDArray[np.float64]
 
 
 def mobility(mechanism: Mechanism) -> Mobility:

@@ -9,12 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.joint_types import KINDS
 from ..description.mechanism import Mechanism
 from ..motion.limits import coned, ranged
 from ..tolerances import TOLERANCES
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..motion.limits import coned, ranged
 from ..tolerances import TOLERANCES
 from .solution import Solution, checked_solution
-
-Floats = NDArray[np.float64]
 
 
 def margins(solution: Solution) -> Mapping[tuple[str, str], float | Floats]:

@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..closure.close import closure_of
 from ..closure.configurations import Configurations
 from ..closure.descend import weighed_limits
@@ -23,7 +24,6 @@ from ..kernels.reaching import plan as P
 from ..motion.displacements import columns, home_coordinates
 from .limits import ActiveLimit, active_limits, binding_limits, holding_limits
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 Held: TypeAlias = Literal["orientation", "position"] | None

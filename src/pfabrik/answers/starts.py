@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats
 from ..closure.close import measured
 from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism, checked_mechanism
@@ -15,8 +16,6 @@ from ..errors import InvalidArgument
 from ..motion.displacements import home_coordinates
 from ..poses import as_floats
 from .solution import Solution, Status
-
-Floats = NDArray[np.float64]
 
 Start: TypeAlias = Solution | ArrayLike
 """A Solution, or joint coordinates q (..., nq) in the order of `mechanism.coordinate_names` [rad or length]."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
@@ -17,8 +18,6 @@ from ..poses import between
 from ..tolerances import TOLERANCES
 from .limits import ActiveLimit
 from .solution import Integers, Solution, Status, Wanted, as_plain
-
-Floats = NDArray[np.float64]
 
 SUSPICIOUS, LEAST = 4.0, 1e-6
 """An answer that moves so many times as far as its target, and farther than the least [L or rad], may have leapt."""

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.joint_types import KINDS
 from ..description.readouts import readouts
 from ..motion.first_order import are_stretched, forward_map
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
     from .limits import ActiveLimit
     from .solution import Solution
-
-Floats = NDArray[np.float64]
 
 
 def as_sentence(solution: Solution, asked: Floats | None = None) -> str:

@@ -11,7 +11,8 @@ import click
 
 import pfabrik as pf
 
-from ..answers.words import Floats, as_sentence, by_bound, exceeded, loop_gap
+from ..answers.words import as_sentence, by_bound, exceeded, loop_gap
+from ..arrays import Floats
 from ..description.notebook import bound_text
 from ..description.readouts import readouts
 from ..errors import ContinuumOfSolutions

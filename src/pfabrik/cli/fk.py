@@ -14,7 +14,7 @@ from .mech import MECH, load
 
 if TYPE_CHECKING:
     from ..answers.solution import Solution
-    from ..answers.words import Floats
+    from ..arrays import Floats
     from ..description.mechanism import Mechanism
 
 

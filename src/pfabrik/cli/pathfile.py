@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 import numpy as np
-from numpy.typing import NDArray
 
 import pfabrik as pf
 
 from ..answers.words import short_names
+from ..arrays import Floats
 from ..description.readouts import readouts
 from ..description.task import task_of
 from ..errors import near_miss
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from ..answers.tracked import Track
     from ..description.mechanism import Mechanism
 
-Floats = NDArray[np.float64]
 POSITION = ("x", "y", "z")
 ANGLES = ("roll", "pitch", "yaw")
 UNITS = ("deg", "rad")

@@ -21,7 +21,7 @@ from .whole import whole_file
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
-    from ..answers.words import Floats
+    from ..arrays import Floats
     from ..description.mechanism import Mechanism
 
 ROWS_NAMED = 5

@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..motion.first_order import generic_of
 from ..tolerances import TOLERANCES
@@ -16,7 +17,6 @@ from .close import Closing, Closure, close, closure_of, platform_poses
 from .nearest import nearest
 from .starts import same_random_starts
 
-Floats = NDArray[np.float64]
 ByPositions: TypeAlias = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
 
 STRIDES = 8

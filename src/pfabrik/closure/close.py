@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.joint_types import KINDS
 from ..description.mechanism import Mechanism
 from ..kernels.closure import loops as K
@@ -21,8 +22,6 @@ from ..kernels.threads import in_blocks
 from ..motion.displacements import columns, displacements
 from ..tolerances import TOLERANCES
 from .loops import loops_of
-
-Floats = NDArray[np.float64]
 
 EVERYTHING_FREE = (0.0,) * 6
 HELD = (K.LOCKED,) * 6

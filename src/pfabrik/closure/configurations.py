@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..kernels.reaching import plan as P
 from .close import Closing, Closure, closure_of
-
-Floats = NDArray[np.float64]
 
 
 def new_rows(mechanism: Mechanism, n: int, nodes: int = 0, trunks: int = 0) -> P.Rows:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..kernels.closure.loops import BASE_AXES, Closed
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
     from ..kernels.closure.pose_objective import PoseObjective
 
-Floats = NDArray[np.float64]
 
 SIGHT = 1e6
 """How far off targets are looked for [L]: farther ones in the same direction have the same nearest pose."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import LOCKED
@@ -15,8 +15,6 @@ from .close import MARGIN, close, closure_of
 from .descend import approached
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .starts import random_starts
-
-Floats = NDArray[np.float64]
 
 FAR_CORNER, TURNED_CORNER = 0.5, 0.5
 """Where corners are looked for: so far from home [L], and turned so far [rad]."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.graph import cone_line, opposite
 from ..description.home_mobility import universal_axes
 from ..description.joint_types import KINDS
@@ -16,8 +17,6 @@ from ..description.mechanism import Joint, Mechanism
 from ..description.paths import Path, independent_paths
 from ..kernels.closure import loops as K
 from ..motion.displacements import columns
-
-Floats = NDArray[np.float64]
 
 
 def loops_of(mechanism: Mechanism, *, whole: bool = True) -> K.Loops:

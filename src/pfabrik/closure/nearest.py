@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..kernels.closure.loops import BASE_AXES, LOCKED
 from .close import EVERYTHING_FREE, MARGIN, Closing, Closure, close
-
-Floats = NDArray[np.float64]
 
 WISHES = (1e-2, 1e-4, 1e-6, 1e-8)
 """Weights of what is wished against what must hold: each starts from the answer to the one before, and the last leaves

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
@@ -18,8 +19,6 @@ from .descend import approached
 from .known import corners_of
 from .nearest import nearest
 from .parasitic import strays
-
-Floats = NDArray[np.float64]
 
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""

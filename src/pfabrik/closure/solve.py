@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import BASE_AXES
@@ -22,13 +23,10 @@ from .close import HELD, MARGIN, Closing, Closure, close, closure_of, measured, 
 from .configurations import Configurations, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
 from .known import chanced_upon
-from .parasitic import differences, follows_task, has_parasitic_motion
+from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
 from .projection import kept, project, ways_of
 from .starts import random_coordinates
 from .stretched import Bends
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 STRIDES = 8
 """Steps in which the platform is taken from the seed's pose to the target where one step strays."""
@@ -42,7 +40,11 @@ STRANGE = 0.1
 STARTS = 80
 """Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
 
-NEARBY = 16
+HITS, SAME = 16, 1e-3
+"""How many of them must end at the least gap or excess found before a leg is given up, and the share by which two may
+differ and still be the same. A branch that is met half as often was by then met too, but for one time in 600."""
+
+NEARBY = 64
 """Known configurations that are tried before random ones, the nearest to the target first."""
 
 STEPS = 30
@@ -188,8 +190,10 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
             _start_nearby(closure, found, targets)
         _search(closure, found, rows, wanted, held, at_rest=at_rest)
     if not keep_mode and follows and has_parasitic_motion(closure.mechanism):
-        anywhere = task.completed(targets, begin)  # in other ways of assembly, where this one does not reach
-        _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
+        _start_nearby(closure, found, targets)  # in other ways of assembly, where this one does not reach
+        if asks_too_much(closure.mechanism) or len(chanced_upon(closure.mechanism)[0]) < NEARBY:
+            anywhere = task.completed(targets, begin)
+            _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
     return found
 
 
@@ -211,19 +215,31 @@ def _start_nearby(closure: Closure, found: Closing, targets: Floats) -> None:
 def _search(
     closure: Closure, found: Closing, rows: NDArray[np.intp], wanted: Floats, held: Weights, *, at_rest: bool
 ) -> None:
-    """Look for the legs that do not reach yet from random configurations; with the platform `at_rest`, one by one."""
+    """Look for the legs that do not reach yet from random configurations; with the platform `at_rest`, one by one.
+
+    A row whose platform rests is given up where one of its legs keeps ending where it came nearest.
+    """
     rng = np.random.default_rng(0)
+    hits = np.zeros(found.gaps.shape, np.int64)
     for _ in range(STARTS):
-        rest = rows[~found.feasible[rows]]
+        rest = rows[~found.feasible[rows] & (hits[rows].max(axis=1) < HITS)]
         if not len(rest):
             break
         stays = _legs_reached(closure, found, rest) | closure.idle if at_rest else closure.idle
         scattered = np.where(stays, found.coordinates[rest], random_coordinates(closure, 1, rng))
         tried = _close_below(closure, scattered, wanted[rest], held, STEPS)
         if at_rest:
+            hits[rest] = _hits(found.off[rest], tried.off, hits[rest])
             _take_legs(closure, found, rest, tried)
         else:
             found.improve(rest, tried)
+
+
+def _hits(best: Floats, tried: Floats, hits: NDArray[np.int64]) -> NDArray[np.int64]:
+    """How often each leg has ended where it came nearest, (n, groups); 0 for those that reached."""
+    nearer, again = tried < (1.0 - SAME) * best, np.abs(tried - best) <= SAME * best
+    counted = np.where(nearer, 1, hits + again)
+    return np.where(np.minimum(best, tried) <= TOLERANCES.limit, 0, counted)
 
 
 def _assembled(closure: Closure, wanted: Floats, start: Floats, begin: Floats) -> Closing:

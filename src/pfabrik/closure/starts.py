@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..motion.displacements import columns
 from ..rotations import from_quaternion, random_quaternions, rotvec_from_quaternion
 from .close import Closure
-
-Floats = NDArray[np.float64]
 
 
 def random_starts(closure: Closure, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:

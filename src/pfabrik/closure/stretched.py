@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..kernels.reaching import plan as P
 from ..motion.first_order import are_stretched
@@ -12,8 +10,6 @@ from ..options import Options
 from .close import closure_of
 from .parasitic import differences
 from .projection import SAME, ways_of
-
-Floats = NDArray[np.float64]
 
 SAME_POSE = 1e-7
 """Largest difference of poses that are the same to a search for the nearest [L and entries of rotations]."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from .joints import Joint
 from .structure import Structure
 
-Floats = NDArray[np.float64]
 Places = dict[str, Floats]
 
 

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from .joints import Joint
 from .structure import Structure
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

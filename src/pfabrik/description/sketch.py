@@ -7,13 +7,11 @@ from collections.abc import Mapping
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from .joints import Joint
 from .places import Places, joint_places, joints_on
 from .structure import Structure
-
-Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT, MARGIN = 260.0, 200.0, 14.0
 """Size of the picture, and room around what is drawn [pixels]."""

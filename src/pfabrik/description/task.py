@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..kernels.closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES
 from ..rotations import from_rotvec, shortest_turns, yaws
 from .joint_types import TASK_TURNS
 from .mechanism import Mechanism
 
-Floats = NDArray[np.float64]
 Weights = tuple[float, ...]
 
 

@@ -7,10 +7,10 @@ from typing import TypeAlias
 
 import numpy as np
 
+from ..arrays import Floats
 from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
-from .targets import Floats
 
 Interval: TypeAlias = tuple[float, float]
 

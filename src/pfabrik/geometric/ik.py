@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..kernels.threads import in_blocks
 from ..poses import as_floats, as_poses, what_is_wrong
-from .targets import INVALID, REACHED, Floats
+from .targets import INVALID, REACHED
 from .topologies import closed_form
 
 ROWS_A_BLOCK = 4096

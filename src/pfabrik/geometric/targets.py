@@ -8,9 +8,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..kernels._jit import inlined, routine
 
-Floats: TypeAlias = NDArray[np.float64]
 Records: TypeAlias = NDArray[np.void]
 Statuses: TypeAlias = NDArray[np.int8]
 

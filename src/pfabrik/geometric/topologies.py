@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Floats
 from ..decomposition.decompose import SubChain, decompose
 from ..description.mechanism import Mechanism
 from ..errors import NoClosedForm
@@ -16,7 +17,7 @@ from .arms import plan_arms, solve_arms
 from .dyads import plan_dyads, solve_dyads
 from .facts import Unsuitable, require
 from .struts import plan_struts, solve_struts
-from .targets import Floats, Statuses
+from .targets import Statuses
 
 Kernel = Callable[[Any, Floats, Floats, bool, Floats, Statuses], int]
 """Takes plan, targets (n, 4, 4), starts (1 or n, n_a) and whether these are home; fills actuators (n, n_a) and status

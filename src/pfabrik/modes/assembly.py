@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..closure.close import Closing, Closure, close, closure_of, platform_poses
 from ..closure.starts import random_starts
 from ..description.mechanism import Mechanism
@@ -15,8 +15,6 @@ from ..fk import Actuators, as_values, assembled
 from ..motion.first_order import stepped_freely
 from ..tolerances import TOLERANCES
 from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes, as_count
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Mask
 from ..closure.close import HELD, MARGIN, Closing, Closure, close, platform_poses
 from ..closure.starts import random_starts
 from ..description.task import task_of
@@ -16,9 +17,7 @@ from ..tolerances import TOLERANCES
 from .fingerprints import Fingerprints, close_on_target, count_from_home, shifts
 from .lists import LEAST_STARTS, STEPS, Clusters
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 LEAST_STARTS_OF_LEGS = 1024
 """Starts before a search may end where the target sets all of the platform: each is one of every leg, and a leg has a

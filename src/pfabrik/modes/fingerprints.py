@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..closure.close import Closing, Closure, close
 from ..description.task import task_of
 from ..motion.displacements import centres, columns
@@ -15,7 +16,6 @@ from ..motion.limits import within_turns
 from ..tolerances import TOLERANCES
 from .lists import ALONG
 
-Floats = NDArray[np.float64]
 Read = Callable[[Closing], Floats]
 
 SHAKES = 16

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.solution import Solution
+from ..arrays import Floats
 from ..description.form_faults import shown
 from ..errors import InvalidArgument
 from ..tolerances import TOLERANCES
-
-Floats = NDArray[np.float64]
 
 BATCH = 512
 """Starts between two looks at what was found."""

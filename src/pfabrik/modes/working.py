@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from math import prod
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..answers.solution import Solution, Status
+from ..arrays import Floats
 from ..closure.close import close, closure_of
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
@@ -19,8 +19,6 @@ from ..poses import are_poses, made_exact, what_is_wrong
 from ..targets import Target, as_targets
 from .branches import BranchSearch, Listed
 from .lists import BATCH, Modes, as_count
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.graph import Tree, tree_of
 from ..description.home_mobility import (
     column_joints,
@@ -33,8 +34,6 @@ from ..description.home_mobility import (
 )
 from ..description.mechanism import Joint, Mechanism
 from ..rotations import angles_and_sines, composed, from_rotvec
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

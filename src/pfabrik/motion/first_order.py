@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.graph import tree_of
 from ..description.home_mobility import (
     body_twist,
@@ -30,8 +31,6 @@ from ..description.home_mobility import (
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .displacements import columns, end_effector_pose, gaps, loop_errors, rate_units, screws, stepped
-
-Floats = NDArray[np.float64]
 
 KINDS = ("serial", "parallel", "constraint", "passive")
 SAMPLES, STEPS, STEP = 8, 3, 0.1

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.graph import cone_line
 from ..description.joint_types import KINDS
 from ..description.mechanism import Joint, Mechanism
 from ..tolerances import TOLERANCES
 from .displacements import centres, columns, displacements
-
-Floats = NDArray[np.float64]
 
 
 def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:

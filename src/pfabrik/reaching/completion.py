@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..closure.close import HELD, Closing, Closure, close, closure_of
 from ..closure.configurations import new_rows, rows_at
 from ..decomposition.plan import CompiledPlan, compile_plan
@@ -16,8 +16,6 @@ from ..motion.displacements import columns, displacements
 from ..motion.limits import within_turns
 from ..tolerances import TOLERANCES
 from .points import joint_points
-
-Floats = NDArray[np.float64]
 
 RESTARTS = 24
 """Random starts for an answer whose loops do not close from where it began: each finds most legs' turns."""

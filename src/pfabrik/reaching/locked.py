@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..arrays import Floats
 from ..kernels.reaching import plan as P
-
-Floats = NDArray[np.float64]
 
 
 def with_locked_actuators(plan: P.Plan, values: Floats) -> P.Plan:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..decomposition.plan import CompiledPlan
 from ..kernels.reaching import plan as P
-
-Floats = NDArray[np.float64]
 
 
 def joint_points(compiled: CompiledPlan, rows: P.Rows) -> dict[str, Floats]:

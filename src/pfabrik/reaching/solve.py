@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..closure.assemble import assemble
 from ..closure.close import Closing, closure_of, platform_poses
 from ..closure.configurations import Configurations, joint_coordinates, new_rows, put_rows, rows_at, write_closing
@@ -25,7 +25,6 @@ from .completion import coordinates_of, positions_of
 from .locked import with_locked_actuators
 from .points import joint_points
 
-Floats = NDArray[np.float64]
 Kernel = Callable[[P.Plan, Floats, P.Seeds, P.Settings, P.Rows], int]
 
 STEPS_A_REPORT = 16

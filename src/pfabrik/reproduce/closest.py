@@ -7,16 +7,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from ..answers.solution import Solution, Status
 from ..answers.tracked import Track
+from ..arrays import Floats
 from ..tolerances import TOLERANCES
 from .feasible import Model, model_of
 from .study import Tick
-
-Floats = NDArray[np.float64]
 
 FEASIBLE = 1e-8
 """How far the optimiser may exceed a limit or open a loop and still count [L or rad]."""

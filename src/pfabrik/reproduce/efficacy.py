@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..answers.solution import Solution, Status
+from ..arrays import Floats
 from ..fk import solve_fk
 from ..options import Options
 from ..track import track
 from .checking import Feasibility, feasibility
 from .study import SETTINGS, Case, Extent, Tick
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

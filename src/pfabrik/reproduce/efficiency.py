@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .. import geometric
 from ..answers.solution import Solution, Status
+from ..arrays import Floats
 from ..closure.configurations import new_rows
 from ..decomposition.plan import CompiledPlan, compile_plan
 from ..description.mechanism import Mechanism
@@ -25,8 +26,6 @@ from .efficacy import rms
 from .one_by_one import closed_form_one_by_one, p_fabrik_one_by_one
 from .study import CENTROID, SETTINGS, Case, Extent, Tick
 from .timing import median_times, one_core
-
-Floats = NDArray[np.float64]
 
 DRAWN_AT_ONCE = 4096
 MOST_DRAWN = 2_000_000

@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..answers.solution import Solution
+from ..arrays import Floats
 from ..decomposition.decompose import decompose
 from ..description.graph import Step
 from ..description.mechanism import Cone, Joint, Mechanism
 from ..rotations import from_rotvec
-
-Floats = NDArray[np.float64]
 
 ROOM = 4.0
 """How far from home positions are looked for, along each axis [L]."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from ..answers.solution import Status
 from ..description.readouts import Readout, readout
@@ -21,7 +20,6 @@ from .robustness import Robustness
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 
 DPI = 130
 OUTSIDE = "#f3f3f3"

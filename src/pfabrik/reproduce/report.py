@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import InvalidArgument
 from .checking import Feasibility
 from .efficacy import Efficacy, is_point
@@ -17,8 +17,6 @@ from .everything import Findings
 from .robustness import Jump, Robustness
 from .tables import markdown, number, tiny
 from .timing import machine
-
-Floats = NDArray[np.float64]
 
 Cells = dict[str, tuple[str, str]]
 """What the paper printed and what we found, by the name of the row."""

@@ -12,6 +12,7 @@ from .. import geometric
 from ..answers.solution import Status
 from ..answers.tracked import Track
 from ..answers.words import short_names
+from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..ik import solve_ik
 from ..track import track
@@ -19,8 +20,6 @@ from .checking import Feasibility, feasibility
 from .closest import Comparison, compare
 from .study import CENTROID, NEAREST, Case, Circle, Extent, Tick
 from .timing import clock, one_core
-
-Floats = NDArray[np.float64]
 
 MARGIN = 0.6
 """How far the drawn part of the workspace goes beyond the circle, in radii."""

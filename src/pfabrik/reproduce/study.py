@@ -10,14 +10,13 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..files import load
 from ..options import Options
 from ..poses import pose
 
-Floats = NDArray[np.float64]
 Tick = Callable[[], None]
 
 CENTROID = Options(projection="centroid")

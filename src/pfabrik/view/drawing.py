@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.joint_types import KINDS
 from ..description.places import Places, joint_places, joints_on, middle
 from ..errors import InvalidArgument
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ..answers.solution import Solution
     from ..description.mechanism import Joint, Mechanism
 
-Floats = NDArray[np.float64]
 
 # Lightness tells base, platform and links apart, and actuated from passive joints, without any colour.
 BASE, PLATFORM, LINK, EDGE, ACTUATED, PASSIVE = "#c8c8c8", "#79b4d9", "#4d4d4d", "#1a1a1a", "#d55e00", "#ffffff"

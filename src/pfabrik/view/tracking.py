@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.readouts import Readout, readouts
 from .drawing import draw
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
     from ..answers.solution import Solution
 
-Floats = NDArray[np.float64]
 
 REACHED = 0
 # Neighbours differ in dashes, and lines with the same dashes in lightness: they stay apart without any colour.
