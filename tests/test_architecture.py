@@ -17,6 +17,7 @@ PACKAGE = Path(pf.__file__).parent
 SOURCES = sorted(path for path in PACKAGE.rglob("*.py") if path.stem != "__main__")
 FILES = {path.relative_to(PACKAGE).as_posix(): path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".toml")}
 MAY_NAME_MACHINES = {
+    "__init__.py": "the first lines of a session, for who reads the package's help",
     "catalog/": "the machines themselves",
     "reproduce/paper.toml": "the machines of the paper's experiments, with what it printed of them",
     "geometric/": "closed forms, which speak of the machines that are known for theirs",

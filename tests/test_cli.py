@@ -92,7 +92,110 @@ def hexagons(path: Path) -> Path:
     return path
 
 
-# What it says
+# What is said, wording and all; more than this is told by what follows
+
+STRUTS_OUT = "struts BL1, BL2, BL3, BR1, BR2, BR3 at their maximum 280 mm"
+NO_LIMIT = "mm from the target; no limit is active: "
+NO_EFFECT = "has no effect: the task is"
+SAID: dict[str, tuple[int, str, str]] = {
+    # of six struts that hold alike, rounding decides which holds hardest, and not what is printed
+    "ik stewart --position 0 0 300": (1, f"; {STRUTS_OUT}\n", ""),
+    "ik free.toml --position 0 0 400": (1, f"{NO_LIMIT}the links are stretched out or folded\n", ""),
+    "ik free.toml --position 30 10 180": (1, f"{NO_LIMIT}the mechanism has no freedom that way\n", ""),
+    "ik free.toml --position 30 0 400": (
+        1, f"{NO_LIMIT}the links are stretched out or folded, and the mechanism has no freedom that way\n", "",
+    ),
+    "ik free.toml --position 0 10 180 --margins": (0, "\n\nno limits\n", ""),
+    "ik plotter.toml --position 0 0 60": (1, "joint C at its maximum 5 mm\n", ""),
+    "ik plotter.toml --rpy 0 0 -40 --hold position": (1, "joint C at its minimum -28.6479 deg\n", ""),
+    "ik five_bar --rpy 10 0 0": (0, "reached\n", "pfabrik: note: --rpy has no effect: the task is x y z\n"),
+    "ik rps --position 5 0 203.835 --rpy 0 0 4": (
+        0, "reached\n", f"note: x of --position {NO_EFFECT} z tilt\npfabrik: note: the yaw of --rpy {NO_EFFECT} z tilt",
+    ),
+    "ik rps --position 0 0 203.835 --rpy 3 0 4": (0, "reached\n", ""),
+    "ik stewart --position 0 0 300 --all": (1, "1 working mode, none within all limits\n", ""),
+    "ik five_bar --position 0 0 900 --all --hold none": (
+        1, "no working mode found\n", "pfabrik: note: --hold has no effect with --all: nothing is projected\n",
+    ),
+    "ik nrpm --rpy 0 0 0 --all": (
+        1, "", "still moves with its end effector on the target (6 freedoms of the actuators A1",
+    ),
+    "fk stewart 300 300 300 300 300 300": (
+        1, f"projected: actuators up to 20 mm from the values asked for; {STRUTS_OUT}\n", "",
+    ),
+    # the elbows are 320 apart, the forearms reach 290
+    "fk free.toml 53 -53": (1, "no limit is active: no configuration with these values was found\n", ""),
+    "fk stewart 20 20 20 20 20 20 --all": (1, "no assembly mode found\n", ""),
+    "fk stewart 300 300 300 300 300 300 --all": (1, ", none within all limits\n", ""),
+    "fk stewart 280 280 280 280 280 280 --all": (0, "  nothing\n", ""),  # on its limit, not beyond it
+    "fk stewart 280.001 280 280 280 280 280 --all": (1, "max of BL1;", ""),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.parametrize("line", [pytest.param(line, marks=[pytest.mark.slow] * ("--all" in line)) for line in SAID])
+def test_the_command_says_it_in_these_words(run: Callable[..., Result], tmp_path: Path, line: str) -> None:
+    pf.save(pf.load("five_bar").without_limits(), tmp_path / "free.toml")
+    joints = [
+        pf.Joint("X", "prismatic", ("base", "cart"), axis=(1, 0, 0), actuated=True, range=(-50, 50)),
+        pf.Joint("C", "cylindrical", ("cart", "tool"), at=(0, 0, 9), axis=(0, 0, 1), range=((-0.5, 0.5), (-5, 5))),
+    ]
+    pf.save(pf.Mechanism("plotter", joints, "tool", (0, 0, 30)), tmp_path / "plotter.toml")
+    result = run(*line.split())
+    code, stdout, stderr = SAID[line]
+    assert result.exit_code == code
+    assert stdout in result.stdout and bool(stdout) == bool(result.stdout)
+    assert stderr in result.stderr and bool(stderr) == bool(result.stderr)
+
+
+PAGE = re.findall(
+    r"^```\n\$ pfabrik ((?:ik|fk|travel) [^\n]*)\n(.*?)^```$", CLI_PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("line", "expected"), PAGE, ids=[line for line, _ in PAGE])
+def test_the_page_of_the_command_line_shows_what_it_prints(
+    run: Callable[..., Result], line: str, expected: str
+) -> None:
+    assert {shown.split()[0] for shown, _ in PAGE} == {"ik", "fk", "travel"}
+    assert without_chance(run(*shlex.split(line)).stdout) == without_chance(expected)
+
+
+def without_chance(text: str) -> list[str]:
+    """The lines without what differs between processors, rounding errors and the luck of random starts."""
+    lucky = re.compile(r"^loops closed to.*|^\d+ starts;.*|\s+\d+(?=\s+(nothing|min of|max of|cone of))")
+    return [lucky.sub("", line) for line in text.splitlines()]
+
+
+@pytest.mark.slow
+def test_json_is_one_object_that_says_what_the_library_does(run: Callable[..., Result]) -> None:
+    stewart, bar = pf.load("stewart"), pf.load("five_bar")
+    answers = {
+        "ik stewart --position 10 0 190 --rpy 0 5 0": pf.solve_ik(
+            stewart, pf.pose([10, 0, 190], rpy=[0, 5, 0], degrees=True)
+        ),
+        f"fk stewart {' '.join(map(str, STRUTS))}": pf.solve_fk(stewart, STRUTS),
+    }
+    for line, solution in answers.items():
+        result = run(*line.split(), "--json")
+        assert json.loads(result.stdout) == json.loads(json.dumps(solution.to_dict()))
+        assert result.stdout.count("\n") == 1
+        assert [np.shape(solution.to_dict()["joints"][name]) for name in ("AL1", "BL1", "CL1")] == [(2,), (), (3,)]
+    lists = {
+        "ik five_bar --position 0 10 180 --all": pf.working_modes(bar, (0, 10, 180)),
+        "fk five_bar -20 20 --all": pf.assembly_modes(bar, np.radians([-20, 20])),
+    }
+    for line, found in lists.items():
+        result = run(*line.split(), "--json")
+        answer = json.loads(result.stdout)
+        assert answer["modes"] == json.loads(json.dumps([mode.to_dict() for mode in found]))
+        assert (answer["hits"], answer["starts"], answer["unseen"]) == (list(found.hits), found.starts, found.unseen)
+        assert answer.get("total") == getattr(found, "total", None)
+        assert result.stdout.count("\n") == 1
+
+
+# What it tells
 
 
 def test_catalog_lists_every_machine(run: Callable[..., Result]) -> None:
@@ -234,12 +337,6 @@ def test_the_limits_that_hold_an_answer_back_are_named_the_hardest_first(run: Ca
     assert hardest == sorted(hardest, reverse=True)
 
 
-def test_limits_that_hold_alike_are_named_as_the_description_lists_them(run: Callable[..., Result]) -> None:
-    """Rounding decides which of six struts holds hardest right above the base; it does not decide what is printed."""
-    first_line = run("ik", "stewart", *BEYOND_REACH).stdout.splitlines()[0]
-    assert first_line.endswith("; struts BL1, BL2, BL3, BR1, BR2, BR3 at their maximum 280 mm")
-
-
 def test_what_was_to_be_held_and_is_not_is_said(run: Callable[..., Result]) -> None:
     line = ["ik", "stewart", "--rpy", 70, 0, 0]
     fell_back, free, turned = (
@@ -250,22 +347,6 @@ def test_what_was_to_be_held_and_is_not_is_said(run: Callable[..., Result]) -> N
     assert fell_back.replace(f"{said}; ", "") == free
     assert "give way" not in turned and " mm" not in turned.split(";")[0]
     assert run("ik", "five_bar", "--position", 0, 0, 300).stdout.count("give way") == 0
-
-
-@pytest.mark.parametrize(
-    ("position", "why"),
-    [
-        ((0, 0, 400), "the links are stretched out or folded"),
-        ((30, 10, 180), "the mechanism has no freedom that way"),
-        ((30, 0, 400), "the links are stretched out or folded, and the mechanism has no freedom that way"),
-    ],
-)
-def test_where_no_limit_holds_it_back_it_is_said_what_does(
-    run: Callable[..., Result], tmp_path: Path, position: tuple[float, ...], why: str
-) -> None:
-    pf.save(pf.load("five_bar").without_limits(), tmp_path / "free.toml")
-    first_line = run("ik", "free.toml", "--position", *position).stdout.splitlines()[0]
-    assert first_line.endswith(f"mm from the target; no limit is active: {why}")
 
 
 def test_the_nearest_pose_is_no_farther_than_the_centroid(run: Callable[..., Result]) -> None:
@@ -289,12 +370,6 @@ def test_margins_are_listed_the_nearest_limit_first(run: Callable[..., Result]) 
     assert [limit["joint"] for limit in listed[6:]] == [joint for joint, *_ in rows[6:]]
     assert [limit["margin"] for limit in listed] == pytest.approx([margin for *_, margin in rows], rel=1e-5, abs=1e-7)
     assert len(rows) == 24  # of six strokes, both ends, and twelve cones
-
-
-def test_a_machine_without_limits_has_no_margins(run: Callable[..., Result], tmp_path: Path) -> None:
-    pf.save(pf.load("five_bar").without_limits(), tmp_path / "free.toml")
-    result = run("ik", "free.toml", "--position", 0, 10, 180, "--margins")
-    assert (result.exit_code, result.stdout.splitlines()[-1]) == (0, "no limits")
 
 
 # Travel
@@ -337,32 +412,10 @@ def test_ik_takes_the_coordinates_of_the_joint_that_carries_the_end_effector(run
     assert (result.exit_code, json.loads(result.stdout)) == (0, json.loads(json.dumps(expected.to_dict())))
 
 
-def test_json_is_one_object_that_says_what_the_solution_says(run: Callable[..., Result]) -> None:
-    result = run("ik", "stewart", *WITHIN_REACH, "--rpy", 0, 5, 0, "--json")
-    solution = pf.solve_ik(pf.load("stewart"), pf.pose([10, 0, 190], rpy=[0, math.radians(5), 0]))
-    answer = json.loads(result.stdout)
-    assert answer == json.loads(json.dumps(solution.to_dict()))
-    assert result.stdout.count("\n") == 1
-    assert set(answer["joints"]) == {joint.name for joint in solution.mechanism.joints}
-    assert [len(np.ravel(answer["joints"][name])) for name in ("AL1", "BL1", "CL1")] == [2, 1, 3]
-
-
 def test_angles_are_degrees_for_people(run: Callable[..., Result]) -> None:
     solution = pf.solve_ik(pf.load("five_bar"), pf.pose([0, 10, 200]))
     text = run("ik", "five_bar", "--position", 0, 10, 200).stdout
     assert all(f"{math.degrees(angle):.6g}" in text for angle in solution.actuators)
-
-
-def test_a_rotation_that_the_task_leaves_out_is_not_dropped_silently(run: Callable[..., Result]) -> None:
-    assert "--rpy has no effect" in run("ik", "five_bar", "--rpy", 10, 0, 0).stderr
-
-
-def test_coordinates_that_the_task_leaves_out_are_not_dropped_silently(run: Callable[..., Result]) -> None:
-    height = pf.load("rps").reference_point[2]
-    said = run("ik", "rps", "--position", 5, 0, height, "--rpy", 0, 0, 4).stderr
-    task = "has no effect: the task is z tilt"
-    assert said == f"pfabrik: note: x of --position {task}\npfabrik: note: the yaw of --rpy {task}\n"
-    assert run("ik", "rps", "--position", 0, 0, height, "--rpy", 3, 0, 4).stderr == ""
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "1e999"])
@@ -419,24 +472,6 @@ def test_fk_takes_negative_numbers_for_numbers(run: Callable[..., Result]) -> No
     assert (p1, p5) == pytest.approx((math.radians(-20), math.radians(-0.3)), abs=1e-12)
 
 
-def test_fk_json_is_one_object_that_says_what_the_solution_says(run: Callable[..., Result]) -> None:
-    result = run("fk", "stewart", *STRUTS, "--json")
-    solution = pf.solve_fk(pf.load("stewart"), STRUTS)
-    assert json.loads(result.stdout) == json.loads(json.dumps(solution.to_dict()))
-    assert result.stdout.count("\n") == 1
-
-
-def test_fk_tells_how_far_the_actuators_are_and_what_holds_them(run: Callable[..., Result]) -> None:
-    result = run("fk", "stewart", *[300] * 6)
-    assert result.exit_code == 1
-    first_line, *_ = result.stdout.splitlines()
-    expected = (
-        "projected: actuators up to 20 mm from the values asked for; struts BL1, BL2, BL3, BR1, BR2, BR3 at their"
-    )
-    assert first_line == f"{expected} maximum 280 mm"
-    assert re.search(r"^BL1 +280 +300 +155 +280 +mm$", result.stdout, re.MULTILINE)
-
-
 @pytest.mark.slow
 def test_fk_tells_lengths_and_angles_apart(run: Callable[..., Result]) -> None:
     first_line = run("fk", "nrpm", *[0] * 12).stdout.splitlines()[0]
@@ -444,13 +479,6 @@ def test_fk_tells_lengths_and_angles_apart(run: Callable[..., Result]) -> None:
     turned, moved = math.degrees(abs(solution.actuators[:3]).max()), abs(solution.actuators[3:]).max()
     assert f"actuators up to {turned:.3g} deg and {moved:.3g} mm from the values asked for; " in first_line
     assert all(limit.joint in first_line for limit in solution.active_limits)
-
-
-def test_fk_without_limits_says_that_nothing_has_these_values(run: Callable[..., Result], tmp_path: Path) -> None:
-    pf.save(pf.load("five_bar").without_limits(), tmp_path / "free.toml")
-    result = run("fk", "free.toml", 53, -53)  # the elbows are 320 apart, the forearms reach 290
-    assert result.exit_code == 1
-    assert "no limit is active: no configuration with these values was found" in result.stdout
 
 
 @pytest.mark.slow
@@ -481,48 +509,11 @@ def test_fk_lists_every_assembly_mode_and_the_limits_it_exceeds(run: Callable[..
     assert searched.endswith(f" {found.unseen:.2%}")
 
 
-@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-def test_a_cylindrical_joint_is_held_by_a_length_or_an_angle(run: Callable[..., Result], tmp_path: Path) -> None:
-    joints = [
-        pf.Joint("X", "prismatic", ("base", "cart"), axis=(1, 0, 0), actuated=True, range=(-50, 50)),
-        pf.Joint("C", "cylindrical", ("cart", "tool"), at=(0, 0, 9), axis=(0, 0, 1), range=((-0.5, 0.5), (-5, 5))),
-    ]
-    pf.save(pf.Mechanism("plotter", joints, "tool", (0, 0, 30)), tmp_path / "plotter.toml")
-    assert "joint C at its maximum 5 mm" in run("ik", "plotter.toml", "--position", 0, 0, 60).stdout
-    turned = run("ik", "plotter.toml", "--rpy", 0, 0, -40, "--hold", "position").stdout
-    assert f"joint C at its minimum {math.degrees(-0.5):.6g} deg" in turned
-
-
 @pytest.mark.slow
 def test_a_mode_beyond_limits_says_which() -> None:
     _, below = pf.assembly_modes(pf.load("five_bar"), np.radians([-20, 20]))
     expected = "exceeded: assembled, but beyond limits: min of p2; max of p4"
     assert as_sentence(below) == expected
-
-
-@pytest.mark.slow
-def test_fk_all_as_json_has_the_modes_and_what_they_are_worth(run: Callable[..., Result]) -> None:
-    result = run("fk", "five_bar", -20, 20, "--all", "--json")
-    found = pf.assembly_modes(pf.load("five_bar"), np.radians([-20, 20]))
-    answer = json.loads(result.stdout)
-    assert answer["modes"] == json.loads(json.dumps([mode.to_dict() for mode in found]))
-    assert (answer["hits"], answer["starts"], answer["unseen"]) == (list(found.hits), found.starts, found.unseen)
-    assert result.stdout.count("\n") == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("values", [[20] * 6, [300] * 6])
-def test_fk_all_is_not_reached_where_no_mode_keeps_all_limits(run: Callable[..., Result], values: list[int]) -> None:
-    result = run("fk", "stewart", *values, "--all")
-    assert result.exit_code == 1
-    no_mode, first_line = values[0] == 20, result.stdout.splitlines()[0]
-    assert first_line == "no assembly mode found" if no_mode else first_line.endswith("none within all limits")
-
-
-@pytest.mark.slow
-def test_a_mode_on_its_limit_does_not_exceed_it(run: Callable[..., Result]) -> None:
-    assert "max of" not in run("fk", "stewart", *[280] * 6, "--all").stdout
-    assert "max of BL1;" in run("fk", "stewart", 280.001, *[280] * 5, "--all").stdout
 
 
 @pytest.mark.slow
@@ -569,84 +560,11 @@ def test_ik_all_shows_the_pose_that_a_task_leaves_open(run: Callable[..., Result
         assert column in header
 
 
-@pytest.mark.slow
-def test_ik_all_as_json_has_the_modes_and_what_they_are_worth(run: Callable[..., Result]) -> None:
-    result = run("ik", "five_bar", "--position", 0, 10, 180, "--all", "--json")
-    found = pf.working_modes(pf.load("five_bar"), (0, 10, 180))
-    answer = json.loads(result.stdout)
-    assert answer["modes"] == json.loads(json.dumps([mode.to_dict() for mode in found]))
-    assert [answer[key] for key in ("total", "hits", "starts", "unseen")] == [
-        found.total,
-        list(found.hits),
-        found.starts,
-        found.unseen,
-    ]
-
-
 def test_a_list_that_was_cut_says_so() -> None:
     found = pf.working_modes(pf.load("serial_arm"), pf.load("serial_arm").home_pose, most_starts=512)
     cut = dataclasses.replace(found, modes=found.modes[:1], hits=found.hits[:1])
     text = describe_modes(cut, "working", [], lambda mode: [])
     assert text.startswith("2 working modes, of the 1 nearest to home 1 within all limits\n")
-
-
-@pytest.mark.slow
-def test_ik_all_is_not_reached_where_no_mode_keeps_all_limits(run: Callable[..., Result]) -> None:
-    beyond = run("ik", "stewart", *BEYOND_REACH, "--all")
-    assert beyond.exit_code == 1
-    assert beyond.stdout.startswith("1 working mode, none within all limits")
-    nowhere = run("ik", "five_bar", "--position", 0, 0, 900, "--all", "--hold", "none")
-    assert nowhere.exit_code == 1
-    assert nowhere.stdout.startswith("no working mode found\n")
-    assert nowhere.stderr == "pfabrik: note: --hold has no effect with --all: nothing is projected\n"
-
-
-@pytest.mark.slow
-def test_a_target_on_which_actuators_still_move_is_told_in_one_line(run: Callable[..., Result]) -> None:
-    result = run("ik", "nrpm", "--rpy", 0, 0, 0, "--all")
-    assert (result.exit_code, result.stdout) == (1, "")
-    assert "still moves with its end effector on the target (6 freedoms of the actuators A1" in result.stderr
-    assert result.stderr.count("\n") == 1
-
-
-@pytest.mark.slow
-def test_the_page_of_the_command_line_shows_what_ik_all_prints(run: Callable[..., Result]) -> None:
-    shown = re.findall(
-        r"^```\n\$ pfabrik (ik [^\n]* --all)\n(.*?)^```$", CLI_PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE
-    )
-    assert shown
-    for line, expected in shown:
-        found, told = (without_chance(text) for text in (run(*shlex.split(line)).stdout, expected))
-        assert found == told, line
-
-
-def test_the_page_of_the_command_line_shows_what_is_out_of_reach(run: Callable[..., Result]) -> None:
-    shown = re.findall(
-        r"^```\n\$ pfabrik ((?:ik|travel) (?:(?!--all)[^\n])*)\n(.*?)^```$",
-        CLI_PAGE.read_text("utf-8"),
-        re.DOTALL | re.MULTILINE,
-    )
-    assert [line.split()[0] for line, _ in shown] == ["ik", "travel"]
-    for line, expected in shown:
-        found, told = (without_chance(text) for text in (run(*shlex.split(line)).stdout, expected))
-        assert found == told, line
-
-
-@pytest.mark.slow
-def test_the_page_of_the_command_line_shows_what_fk_prints(run: Callable[..., Result]) -> None:
-    shown = re.findall(
-        r"^```\n\$ pfabrik (fk [^\n]*)\n(.*?)^```$", CLI_PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE
-    )
-    assert len(shown) == 3
-    for line, expected in shown:
-        found, told = (without_chance(text) for text in (run(*shlex.split(line)).stdout, expected))
-        assert found == told, line
-
-
-def without_chance(text: str) -> list[str]:
-    """The lines without what differs between processors, rounding errors and the luck of random starts."""
-    lucky = re.compile(r"^loops closed to.*|^\d+ starts;.*|\s+\d+(?=\s+(nothing|min of|max of|cone of))")
-    return [lucky.sub("", line) for line in text.splitlines()]
 
 
 # A file to start from
@@ -717,7 +635,7 @@ def test_a_file_that_exists_is_kept_unless_forced(run: Callable[..., Result], tm
     [
         (["6-UPX"], "no template named '6-UPX'; did you mean '6-UPS'? (known: 3-PRS, "),
         (["dleta", "-o", "my.toml"], "did you mean 'delta'?"),
-        ([], "no KIND: give one of 3-PRS, "),
+        ([], "one KIND of 3-PRS, "),
         (["delta", "-o", "no/such/my.toml"], "no/such/my.toml: No such file or directory"),
     ],
 )
@@ -747,18 +665,20 @@ def test_track_answers_every_target(run: Callable[..., Result], tmp_path: Path) 
     assert result.stdout.splitlines() == [result.stdout.strip()]
     rows = rows_of(tmp_path / "answers.csv")
     assert [row["status"] for row in rows] == ["REACHED", "REACHED", "PROJECTED"]
-    assert float(rows[1]["target_pitch_rad"]) == pytest.approx(math.radians(5), abs=1e-12)
-    assert float(rows[1]["pitch_rad"]) == pytest.approx(math.radians(5), abs=1e-9)
+    assert float(rows[1]["target_pitch_deg"]) == pytest.approx(5, abs=1e-12)
+    assert float(rows[1]["pitch_deg"]) == pytest.approx(5, abs=1e-7)
     assert "max" in rows[2]["active_limits"]
     assert set(os.listdir(tmp_path)) == {"answers.csv", "path.csv"}
 
 
-def test_track_writes_angles_in_radians(run: Callable[..., Result], tmp_path: Path) -> None:
-    (tmp_path / "path.csv").write_text("\ufeffx, y, z\r\n0, 10, 200\r\n", encoding="utf-8")
-    assert run("track", "five_bar", "path.csv", "-o", "answers.csv").exit_code == 0
+def test_track_writes_angles_in_the_unit_they_came_in(run: Callable[..., Result], tmp_path: Path) -> None:
+    (tmp_path / "deg.csv").write_text("\ufeffx, y, z\r\n0, 10, 200\r\n", encoding="utf-8")
+    (tmp_path / "rad.csv").write_text("x,y,z,roll_rad,pitch_rad,yaw_rad\n0,10,200,0,0,0\n")
     answer = pf.track(pf.load("five_bar"), np.array([[0.0, 10.0, 200.0]]))
-    row = rows_of(tmp_path / "answers.csv")[0]
-    assert [float(row[f"actuator_{name}_rad"]) for name in ("p1", "p5")] == answer.actuators[0].tolist()
+    for unit, expected in (("deg", np.degrees(answer.actuators[0])), ("rad", answer.actuators[0])):
+        assert run("track", "five_bar", f"{unit}.csv", "-o", "answers.csv").exit_code == 0
+        row = rows_of(tmp_path / "answers.csv")[0]
+        np.testing.assert_allclose([float(row[f"actuator_{name}_{unit}"]) for name in ("p1", "p5")], expected, 1e-15)
 
 
 def quick_path(folder: Path) -> Path:
@@ -830,7 +750,7 @@ def test_a_tilt_that_a_yaw_leaves_out_is_not_dropped_silently(run: Callable[...,
 
 def test_columns_that_the_task_leaves_out_are_not_dropped_silently(run: Callable[..., Result], tmp_path: Path) -> None:
     height = pf.load("rps").reference_point[2]
-    (tmp_path / "path.csv").write_text(f"x,y,z\n0,0,{height}\n0,3,{height}\n")
+    (tmp_path / "path.csv").write_text(f"x,y,z\n0,0,{height}\n0,3,{height + 1}\n")
     said = run("track", "rps", "path.csv", "-o", "answers.csv").stderr
     assert "pfabrik: note: column y has no effect: the task is z tilt\n" in said
     (tmp_path / "path.csv").write_text("x,y,z,roll,pitch,yaw\n0,0,190,0,0,5\n")
@@ -872,14 +792,12 @@ def test_wrong_speeds_are_told_in_a_line(
         ("\n\n", "empty"),
         ("x,y,z\n", "no targets"),
         ("x,y\n1,2\n", "no column z"),
-        ("x,y,z,rol\n1,2,3,4\n", "line 1: unknown column 'rol'; did you mean 'roll'?"),
-        ("x,y,z,roll\n1,2,3,4\n", "no column pitch, yaw"),
         ("x,y,z,x\n1,2,3,4\n", "'x' appears twice"),
         ("x,y,z\n1,2,3\n1,b,3\n", "line 3: column 'y': found 'b'"),
         ("x,y,z\n1,2,nan\n", "line 2: column 'z': found 'nan'"),
         ("x,y,z\n1,2,1e999\n", "found '1e999'"),
         ("x,y,z\n1,2\n", "line 2: found 2 cells; expected 3"),
-        ("1,2,3\n", "unknown column '1'"),
+        ("1,2,3\n", "line 1: no column y, z"),
         ('x,y,z\n1,2,"' + "9" * 200_000 + '"\n', "not a CSV text file"),
     ],
 )
