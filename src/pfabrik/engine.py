@@ -24,4 +24,4 @@ def engine_of(mechanism: Mechanism) -> Engine:
     """
     inner = ReachingEngine(mechanism) if engine_for(mechanism) == "reaching" else ClosureEngine(mechanism)
     table = leg_table(mechanism)
-    return inner if isinstance(table, str) else LegsEngine(table, inner)
+    return inner if isinstance(table, str) or isinstance(inner, ReachingEngine) else LegsEngine(table, inner)

@@ -29,7 +29,7 @@ _ENDINGS = {"": K.WELD, "R": K.HINGE, "RR": K.CROSS, "RRR": K.TRIPLE, "S": K.BAL
 _CARRIERS = {"R": K.CRANK, "P": K.CARRIAGE}
 _NO_BOUNDS = (-math.inf, math.inf)
 
-COMPLETED_WITHIN = 0.5
+COMPLETED_WITHIN = 2.0
 """How far what a task leaves open may go from where it began [L or rad]: farther off there may be other completions."""
 
 
@@ -88,6 +88,7 @@ def _table(mechanism: Mechanism) -> LegTable:
         except NoLeg as reason:
             raise NoLeg(f"sub-chain {chain}: {reason}") from None
     legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
+    legs["first_row"] = [0, *accumulate(_row_counts(legs))][:-1]
     places = [dict(_places(form)) for form in forms]
     coordinates = [
         (leg, item, place) for leg, (form, own) in enumerate(zip(forms, places, strict=True)) for item, place in own.items()
@@ -98,7 +99,9 @@ def _table(mechanism: Mechanism) -> LegTable:
     first = {joint.name: int(start) for joint, start in zip(mechanism.joints, starts, strict=True)}
     for leg, item, place in coordinates:
         seen.add((item.joint.name, item.place))
-        record = _coordinate(mechanism, leg, item, place)
+        # the angles at a head are those of the rod as seen from the body beyond
+        is_beyond = isinstance(forms[leg], Rod) and place >= K.HEAD
+        record = _coordinate(mechanism, leg, item.back if is_beyond else item, place)
         known.append((*record[:2], first[item.joint.name] + item.place, *record[3:]))
         if item.joint.range is not None:
             limited.append(record)
@@ -293,14 +296,13 @@ def _cone(mechanism: Mechanism, forms: Sequence[LegForm], joint: Joint) -> tuple
 
 def _task(mechanism: Mechanism, legs: Records) -> Records:
     task, asked = np.zeros(1, K.TASK), task_of(mechanism)
-    rows = _row_counts(legs)
     task["length"] = mechanism.characteristic_length
     task["reference"] = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
     task["axes"], task["rotations"] = asked.axes, asked.rotations
     task["unset"] = 0 if mechanism.end_effector_is_joint else 6 - sum(asked.axes) - asked.rotations
     if mechanism.end_effector_is_joint:
         task["rotations"] = 3
-    task["rows"], task["farthest"] = sum(rows), COMPLETED_WITHIN
+    task["rows"], task["farthest"] = sum(_row_counts(legs)), COMPLETED_WITHIN
     return task
 
 

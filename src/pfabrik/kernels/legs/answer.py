@@ -11,9 +11,9 @@ from .._jit import kernel, routine
 from ..linear import solve_spd
 from ..vectors import Vec, add, cross, dot, norm, scale, vec, wrap_into
 from .endings import SURE, turned
-from .pivots import pivot_rows, place_pivot
+from .pivots import pivot_rows, pivot_slopes, place_pivot
 from .records import N_VALUES, PIVOT, SHARED, Floats, Records
-from .rods import place_rod, rod_rows
+from .rods import place_rod, rod_rows, rod_slopes
 
 # Status of a row; REACHED is the public one's number.
 REACHED, PENDING = 0, 9
@@ -22,7 +22,7 @@ REACHED, PENDING = 0, 9
 CLOSED, CLOSE = 1e-13, 1e-10
 # Newton steps that complete a pose: they take one to five.
 MOST_STEPS = 8
-# Largest step [L or rad]: a longer one leaves the assembly it starts in.
+# Longest step [L or rad]: beyond, derivatives tell little.
 LONGEST_STEP = 0.5
 # Deviation from an orthonormal matrix up to which a target is a pose, and from which on it is not made one.
 NOT_A_ROTATION, ROUNDED = 1e-6, 1e-15
@@ -63,69 +63,87 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
 
 
 @routine
-def put_rows(
-    legs: Records, frames: Floats, values: Floats, lines: Floats, follow: Floats, rows: Floats, slopes: Floats
-) -> float:
-    """Fill the constraints of all legs and their derivatives; the largest of them."""
-    n, main = 0, 0
+def put_rows(legs: Records, frames: Floats, values: Floats, lines: Floats, rows: Floats) -> float:
+    """Fill the constraints of all legs; the largest of them, infinite where one is not a number."""
+    main = 0
     for k in range(legs.shape[0]):
         leg = legs[k]
-        frame = frames[leg["reversed"]]
         if leg["kind"] == PIVOT:
-            n = pivot_rows(leg, frame, rows, slopes, n)
+            pivot_rows(leg, frames[leg["reversed"]], rows)
         else:
             main = main if leg["carrier"] == SHARED else k
-            n = rod_rows(
-                leg, legs[main], frame, values[main], values[k], lines[k], follow[main], rows, slopes, n
-            )
+            rod_rows(leg, legs[main], frames[leg["reversed"]], values[main], values[k], lines[k], rows)
     worst = 0.0
-    for i in range(n):
-        worst = max(worst, abs(rows[i]))
+    for i in range(rows.shape[0]):
+        if not abs(rows[i]) <= worst:
+            worst = abs(rows[i])
     return worst if worst == worst else math.inf
 
 
 @routine
-def unset_motion(task: Records, pose: Floats, place: int) -> tuple[Vec, Vec]:
-    """Velocity and angular velocity of one of the coordinates of the pose that are not set."""
-    for i in range(3):
-        if task["axes"][i] == 0:
-            if place == 0:
-                return (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0), (0.0, 0.0, 0.0)
-            place -= 1
-    if task["rotations"] == 2:
-        return (0.0, 0.0, 0.0), (pose[0, 2], pose[1, 2], pose[2, 2])
-    spin = (1.0 if place == 0 else 0.0, 1.0 if place == 1 else 0.0, 1.0 if place == 2 else 0.0)
-    return (0.0, 0.0, 0.0), spin
+def put_slopes(
+    legs: Records, frames: Floats, values: Floats, lines: Floats, follow: Floats, slopes: Floats
+) -> None:
+    """Fill the derivatives of the constraints of all legs."""
+    main = 0
+    for k in range(legs.shape[0]):
+        leg = legs[k]
+        frame = frames[leg["reversed"]]
+        if leg["kind"] == PIVOT:
+            pivot_slopes(leg, frame, slopes)
+        else:
+            main = main if leg["carrier"] == SHARED else k
+            rod_slopes(leg, legs[main], frame, values[main], values[k], lines[k], follow[main], slopes)
 
 
 @routine
-def newton_step(task: Records, pose: Floats, rows: Floats, slopes: Floats, normal: Floats) -> float:
+def put_motions(task: Records, pose: Floats, motions: Floats) -> None:
+    """Fill the twists (velocity, angular velocity) of the coordinates of the pose that the task does not set."""
+    for i in range(task["unset"]):
+        for j in range(6):
+            motions[i, j] = 0.0
+    place = 0
+    for i in range(3):
+        if task["axes"][i] == 0:
+            motions[place, i] = 1.0
+            place += 1
+    for i in range(3):
+        if task["rotations"] == 0:
+            motions[place + i, 3 + i] = 1.0
+        elif task["rotations"] == 2:
+            motions[place, 3 + i] = pose[i, 2]
+
+
+@routine
+def newton_step(task: Records, pose: Floats, rows: Floats, slopes: Floats, motions: Floats, normal: Floats) -> float:
     """Move what is not set so that the constraints vanish, by least squares; how far, infinite where it cannot be."""
     n = task["unset"]
+    put_motions(task, pose, motions)
     for i in range(n):
         for j in range(n + 1):
             normal[i, j] = 0.0
-    for k in range(task["rows"]):
+    for k in range(rows.shape[0]):
         for i in range(n):
-            v, w = unset_motion(task, pose, i)
-            normal[n, i] = dot(v, vec(slopes[k, :3])) + dot(w, vec(slopes[k, 3:]))
-        for i in range(n):
-            for j in range(n):
-                normal[i, j] += normal[n, i] * normal[n, j]
-            normal[i, n] -= normal[n, i] * rows[k]
+            slope = 0.0
+            for c in range(6):
+                slope += slopes[k, c] * motions[i, c]
+            normal[n, i] = slope
+            for j in range(i + 1):
+                normal[i, j] += slope * normal[n, j]
+            normal[i, n] -= slope * rows[k]
     if not solve_spd(normal, n, 0.0):
         return math.inf
-    shift, spin = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for i in range(n):
-        v, w = unset_motion(task, pose, i)
-        shift, spin = add(shift, scale(normal[i, n], v)), add(spin, scale(normal[i, n], w))
-    step = max(norm(shift), norm(spin))
-    if not step <= LONGEST_STEP:
-        return math.inf
+    twist = motions[6]
+    for c in range(6):
+        twist[c] = 0.0
+        for i in range(n):
+            twist[c] += normal[i, n] * motions[i, c]
+    step = max(norm(vec(twist[:3])), norm(vec(twist[3:])))
+    share = min(1.0, LONGEST_STEP / step)
     for i in range(3):
-        pose[i, 3] += shift[i]
-    turn_pose(pose, spin)
-    return step
+        pose[i, 3] += share * twist[i]
+    turn_pose(pose, scale(share, vec(twist[3:])))
+    return share * step
 
 
 @routine
@@ -169,31 +187,40 @@ def load(target: Floats, begin: Floats, task: Records, pose: Floats) -> bool:
 
 @routine
 def is_pose(target: Floats) -> bool:
-    worst = abs(target[3, 0]) + abs(target[3, 1]) + abs(target[3, 2]) + abs(target[3, 3] - 1.0)
+    worst, finite = abs(target[3, 3] - 1.0), 0.0
     for i in range(3):
+        worst += abs(target[3, i])
+        finite += target[i, 3]
         for j in range(i, 3):
-            product = target[0, i] * target[0, j] + target[1, i] * target[1, j] + target[2, i] * target[2, j]
-            worst += abs(product - (1.0 if i == j else 0.0))
-    x, y = (target[0, 0], target[1, 0], target[2, 0]), (target[0, 1], target[1, 1], target[2, 1])
-    determinant = dot(cross(x, y), (target[0, 2], target[1, 2], target[2, 2]))
-    place = abs(target[0, 3]) + abs(target[1, 3]) + abs(target[2, 3])
-    return worst <= NOT_A_ROTATION and determinant > 0.0 and place < math.inf
+            worst += abs(gram(target, i, j))
+    x, y, z = column(target, 0), column(target, 1), column(target, 2)
+    return worst <= NOT_A_ROTATION and dot(cross(x, y), z) > 0.0 and abs(finite) < math.inf
+
+
+@routine
+def column(T: Floats, i: int) -> Vec:
+    return T[0, i], T[1, i], T[2, i]
+
+
+@routine
+def gram(T: Floats, i: int, j: int) -> float:
+    """An entry of R^T R - 1."""
+    return T[0, i] * T[0, j] + T[1, i] * T[1, j] + T[2, i] * T[2, j] - (1.0 if i == j else 0.0)
 
 
 @routine
 def make_exact(pose: Floats) -> None:
     """Make the rotation of a pose the nearest that is orthonormal."""
     for _ in range(2):
-        x, y = (pose[0, 0], pose[1, 0], pose[2, 0]), (pose[0, 1], pose[1, 1], pose[2, 1])
-        z = (pose[0, 2], pose[1, 2], pose[2, 2])
-        xx, yy, zz = dot(x, x) - 1.0, dot(y, y) - 1.0, dot(z, z) - 1.0
-        xy, yz, zx = dot(x, y), dot(y, z), dot(z, x)
+        xx, yy, zz = gram(pose, 0, 0), gram(pose, 1, 1), gram(pose, 2, 2)
+        xy, yz, zx = gram(pose, 0, 1), gram(pose, 1, 2), gram(pose, 2, 0)
         if abs(xx) + abs(yy) + abs(zz) + abs(xy) + abs(yz) + abs(zx) <= ROUNDED:
             return
         for i in range(3):
-            pose[i, 0] = x[i] - 0.5 * (x[i] * xx + y[i] * xy + z[i] * zx)
-            pose[i, 1] = y[i] - 0.5 * (x[i] * xy + y[i] * yy + z[i] * yz)
-            pose[i, 2] = z[i] - 0.5 * (x[i] * zx + y[i] * yz + z[i] * zz)
+            row = vec(pose[i])
+            pose[i, 0] -= 0.5 * dot(row, (xx, xy, zx))
+            pose[i, 1] -= 0.5 * dot(row, (xy, yy, yz))
+            pose[i, 2] -= 0.5 * dot(row, (zx, yz, zz))
 
 
 @routine
@@ -253,14 +280,14 @@ def answer(
     n_legs, n_rows = legs.shape[0], task[0]["rows"]
     frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
     follow, rows, slopes = np.zeros((n_legs, 6)), np.zeros(n_rows), np.zeros((n_rows, 6))
-    pose, normal, left = np.zeros((4, 4)), np.zeros((7, 8)), 0
+    pose, motions, normal, left = np.zeros((4, 4)), np.zeros((7, 6)), np.zeros((7, 8)), 0
     for row in range(targets.shape[0]):
         status[row] = PENDING
         begin = begins[row if begins.shape[0] > 1 else 0]
         side = sides[row if sides.shape[0] > 1 else 0]
         own = task[0]
         if load(targets[row], begin, own, pose) and complete(
-            legs, own, side, frames, values, lines, follow, rows, slopes, normal, pose
+            legs, own, side, frames, values, lines, follow, rows, slopes, motions, normal, pose
         ):
             excess = excess_of(limited, cones, values)
             if excess <= KEPT:
@@ -299,6 +326,7 @@ def complete(
     follow: Floats,
     rows: Floats,
     slopes: Floats,
+    motions: Floats,
     normal: Floats,
     pose: Floats,
 ) -> bool:
@@ -308,11 +336,12 @@ def complete(
         set_frames(pose, task, frames)
         if not place_legs(legs, frames, sides, values, lines) > SURE * SURE:
             return False
-        if task["rows"] == 0 or put_rows(legs, frames, values, lines, follow, rows, slopes) <= enough:
+        if put_rows(legs, frames, values, lines, rows) <= enough:
             return True
         if task["unset"] == 0:
             return False
-        gone += newton_step(task, pose, rows, slopes, normal)
+        put_slopes(legs, frames, values, lines, follow, slopes)
+        gone += newton_step(task, pose, rows, slopes, motions, normal)
         if gone > task["farthest"]:
             return False
     return False
@@ -352,4 +381,5 @@ def measure_rows(
                 pose[i, j] = poses[row, i, j]
         set_frames(pose, task[0], frames)
         place_legs(legs, frames, sides[row if sides.shape[0] > 1 else 0], values, lines)
-        put_rows(legs, frames, values, lines, follow, rows[row], slopes[row])
+        put_rows(legs, frames, values, lines, rows[row])
+        put_slopes(legs, frames, values, lines, follow, slopes[row])

@@ -59,21 +59,27 @@ def any_across(v: Vec) -> Vec:
 
 
 @routine
-def pivot_rows(pivot: Records, frame: Floats, rows: Floats, slopes: Floats, n: int) -> int:
-    """Append a pivot's constraints to `rows`, their derivatives to `slopes`, from place n on; the next place."""
+def pivot_rows(pivot: Records, frame: Floats, rows: Floats) -> None:
+    """Fill a pivot's constraints."""
+    n, n_fixed = pivot["first_row"], 3 - pivot["slides"]
     offset = sub(move(frame, vec(pivot["head_point"])), vec(pivot["foot_point"]))
-    for i in range(3 - pivot["slides"]):
-        direction = vec(pivot["fixed_rows"][i])
-        rows[n] = dot(direction, offset)
-        put_pose_slope(pivot, frame, direction, NOWHERE, slopes[n])
-        n += 1
+    for i in range(n_fixed):
+        rows[n + i] = dot(vec(pivot["fixed_rows"][i]), offset)
     over = 0.0
     for i in range(pivot["upright"]):
         axis = vec(pivot["foot_axes"][i])
         over = TURNED_OVER if dot(axis, turn(frame, axis)) < 0.0 else over
     for i in range(pivot["axis_rows"]):
         kept, moved = vec(pivot["kept"][i]), turn(frame, vec(pivot["moved"][i]))
-        rows[n] = dot(kept, moved) - pivot["value"][i] + over
-        put_pose_slope(pivot, frame, NOWHERE, cross(moved, kept), slopes[n])
-        n += 1
-    return n
+        rows[n + n_fixed + i] = dot(kept, moved) - pivot["value"][i] + over
+
+
+@routine
+def pivot_slopes(pivot: Records, frame: Floats, slopes: Floats) -> None:
+    """Fill the derivatives of a pivot's constraints."""
+    n, n_fixed = pivot["first_row"], 3 - pivot["slides"]
+    for i in range(n_fixed):
+        put_pose_slope(pivot, frame, vec(pivot["fixed_rows"][i]), NOWHERE, slopes[n + i])
+    for i in range(pivot["axis_rows"]):
+        kept, moved = vec(pivot["kept"][i]), turn(frame, vec(pivot["moved"][i]))
+        put_pose_slope(pivot, frame, NOWHERE, cross(moved, kept), slopes[n + n_fixed + i])

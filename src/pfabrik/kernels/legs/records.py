@@ -56,6 +56,7 @@ LEG = np.dtype(
         ("kept", "f8", (3, 3)),
         ("moved", "f8", (3, 3)),
         ("value", *_vector),
+        ("first_row", "i8"),  # place of its first constraint among all
         ("upright", "i8"),  # of a pivot: how many of its `foot_axes` R must not turn over
     ]
 )

@@ -23,7 +23,6 @@ from .records import (
     CARRIER,
     COSINE,
     CRANK,
-    CROSS,
     FOOT,
     FOOT_LINE,
     HEAD,
@@ -151,18 +150,17 @@ def spin_rate(ending: int, first: Vec, last: Vec, u: Vec) -> tuple[Vec, Vec]:
 
 
 @routine
-def twist_of(
+def twist_rate(
     rod: Records, carrier: Records, frame: Floats, lead: Floats, own: Floats, u: Vec
-) -> tuple[float, Vec, Vec, Vec]:
-    """The twist of a rod, less home's, and its derivative by du, W and w."""
+) -> tuple[Vec, Vec, Vec]:
+    """Derivative of the twist of a rod by du, W and w."""
     foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
     head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
     first_foot = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
     first_head = turn(frame, vec(rod["head_axes"][0]))
     foot_line, foot_body = spin_rate(rod["foot"], first_foot, foot, u)
     head_line, head_body = spin_rate(rod["head"], first_head, head, u)
-    angle = wrap(angle_to(u, foot, head) - rod["twist"], 0.0)
-    return angle, sub(head_line, foot_line), scale(-1.0, foot_body), head_body
+    return sub(head_line, foot_line), scale(-1.0, foot_body), head_body
 
 
 @routine
@@ -195,9 +193,7 @@ def carrier_rate(rod: Records, carrier: Records, lead: Floats, a: Vec, b: Vec) -
 @routine
 def put_follow(rod: Records, frame: Floats, own: Floats, u: Vec, follow: Floats) -> None:
     """Derivative (6,) of the coordinate of a carrier that keeps the rod's length."""
-    for i in range(6):
-        follow[i] = 0.0
-    put_slope(rod, rod, frame, own, follow, u, NOWHERE, NOWHERE, follow)
+    put_pose_slope(rod, frame, u, NOWHERE, follow)
     rate = carrier_rate(rod, rod, own, u, NOWHERE)
     for i in range(6):
         follow[i] /= -rate
@@ -205,6 +201,27 @@ def put_follow(rod: Records, frame: Floats, own: Floats, u: Vec, follow: Floats)
 
 @routine
 def rod_rows(
+    rod: Records, carrier: Records, frame: Floats, lead: Floats, own: Floats, line: Floats, rows: Floats
+) -> None:
+    """Fill a rod's constraints."""
+    n, l = rod["first_row"], vec(line)
+    if rod["slides"] == 0 and (rod["carrier"] == NO_CARRIER or rod["carrier"] == SHARED):
+        rows[n] = own[SLIDE]
+        n += 1
+    if rod["foot"] == HINGE:
+        rows[n] = norm(l) * dot(vec(rod["foot_axes"][0]), vec(own[FOOT_LINE:HEAD_LINE]))
+        n += 1
+    if rod["head"] == HINGE:
+        rows[n] = norm(l) * dot(vec(rod["head_axes"][0]), vec(own[HEAD_LINE:COSINE]))
+        n += 1
+    if rod["twists"] == 1:
+        foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
+        head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
+        rows[n] = wrap(angle_to(scale(1.0 / norm(l), l), foot, head) - rod["twist"], 0.0)
+
+
+@routine
+def rod_slopes(
     rod: Records,
     carrier: Records,
     frame: Floats,
@@ -212,32 +229,25 @@ def rod_rows(
     own: Floats,
     line: Floats,
     follow: Floats,
-    rows: Floats,
     slopes: Floats,
-    n: int,
-) -> int:
-    """Append a rod's constraints to `rows`, their derivatives to `slopes`, from place n on; the next place."""
-    l = vec(line)
+) -> None:
+    """Fill the derivatives of a rod's constraints, and of its carrier's coordinate (`follow`)."""
+    n, l = rod["first_row"], vec(line)
     u = scale(1.0 / norm(l), l)
     if rod["carrier"] == CRANK or rod["carrier"] == CARRIAGE:
         put_follow(rod, frame, own, u, follow)
     elif rod["slides"] == 0:
-        rows[n] = own[SLIDE]
         put_slope(rod, carrier, frame, lead, follow, u, NOWHERE, NOWHERE, slopes[n])
         n += 1
     if rod["foot"] == HINGE:
         axis = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
-        rows[n] = dot(axis, l)
         put_slope(rod, carrier, frame, lead, follow, axis, cross(axis, l), NOWHERE, slopes[n])
         n += 1
     if rod["head"] == HINGE:
         axis = turn(frame, vec(rod["head_axes"][0]))
-        rows[n] = dot(axis, l)
         put_slope(rod, carrier, frame, lead, follow, axis, NOWHERE, cross(axis, l), slopes[n])
         n += 1
     if rod["twists"] == 1:
-        rows[n], by_line, b, c = twist_of(rod, carrier, frame, lead, own, u)
+        by_line, b, c = twist_rate(rod, carrier, frame, lead, own, u)
         by_line = scale(1.0 / norm(l), along(by_line, -dot(by_line, u), u))
         put_slope(rod, carrier, frame, lead, follow, by_line, b, c, slopes[n])
-        n += 1
-    return n
