@@ -4,25 +4,34 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 
-.PHONY: demo test test-fast test-interpreted check bench clean
+.PHONY: demo test test-fast test-interpreted campaign check bench clean
 
 demo: $(STAMP)
 	@$(BIN)/pfabrik demo
 
+# In parallel: the kernels are compiled first, once, and every worker loads them. The routines that kernels are made of
+# are tested as plain Python: compiled alone, each would take longer than its tests.
+ROUTINES := tests/test_kernels.py tests/test_quadratic.py
+
 test: $(STAMP)
-	@$(BIN)/python -m pytest
+	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest $(ROUTINES)
+	@$(BIN)/python -m pytest -n auto --dist worksteal
 
 test-fast: $(STAMP)
-	@$(BIN)/python -m pytest -m "not slow"
+	@$(BIN)/python -m pytest -m "not slow and not campaign"
 
 # The same tests with the kernels as plain Python: this run sees every line, so it measures coverage.
 test-interpreted: $(STAMP)
-	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not slow" --cov --cov-report=term
+	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not slow and not campaign" --cov --cov-report=term
+
+# Before a release, and where kernels have changed: the long random runs, and every property on many more examples.
+campaign: $(STAMP)
+	@PFABRIK_HYPOTHESIS=explore $(BIN)/python -m pytest -n auto --dist worksteal -m "campaign or hypothesis"
 
 check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy --strict src
+	$(BIN)/mypy --strict src tests/typing
 	$(BIN)/lint-imports
 
 bench: $(STAMP)

@@ -23,8 +23,8 @@ from table import machine
 from timing import best_times
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
-from checking import worst_gap
-from nearest_oracles import Problem, drawn_targets, nearest
+from checks import gap_of_points
+from oracles.nearest import Problem, drawn_targets, nearest
 
 Array = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ def judged(mechanism: pf.Mechanism, target: Array, answer: pf.Solution, hold: st
     """An answer next to the nearest pose found that holds as much; wrong is to give up what some pose could hold."""
     fell_back = hold != answer.held
     problem = Problem(mechanism, target, answer.held, answer)
-    excess = max(problem.excess(problem.answer), float(worst_gap(mechanism, answer)[0]))
+    excess = max(problem.excess(problem.answer), float(gap_of_points(mechanism, answer)[0]))
     if fell_back and nearest(Problem(mechanism, target, hold, answer)) is not None:
         return Judged(np.inf, np.inf, True, True, excess)
     found = nearest(problem)

@@ -10,13 +10,13 @@ stewart = pf.load("stewart")
 target = pf.pose([10, -5, 200], rpy=[0.05, 0.1, 0])
 lengths = pf.solve_ik(stewart, target).actuators
 back = pf.solve_fk(stewart, lengths)
-print(f"{back.status.name}: {np.abs(back.pose - target).max():.0e} {stewart.length_unit} from where it began")
+print(f"{back.status}: {np.abs(back.pose - target).max():.0e} {stewart.length_unit} from where it began")
 print(f"  joint AL1 turned by {np.degrees(back.joints['AL1']).round(2)} deg about its two axes")
 
 # One strut longer than its neighbours allow. The answer is a machine that exists, its struts as near as they come.
 asked = [205, 205, 205, 205, 205, 260]
 near = pf.solve_fk(stewart, asked)
-print(f"{near.status.name}: struts up to {np.abs(near.actuators - asked).max():.1f} mm from what was asked")
+print(f"{near.status}: struts up to {np.abs(near.actuators - asked).max():.1f} mm from what was asked")
 for limit in near.active_limits:
     print(f"  held by joint {limit.joint}, its {limit.bound} at {np.degrees(limit.limit):.0f} deg")
 

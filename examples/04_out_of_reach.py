@@ -10,7 +10,7 @@ target = pf.pose([0, 150, 120], rpy=np.radians([8, -5, 0]))
 # Of all poses that keep every limit, the nearest one that has the target's orientation; and, farther away, the paper's.
 nearest = pf.solve_ik(mechanism, target)
 centroid = pf.solve_ik(mechanism, target, options=pf.Options(projection="centroid"))
-print(f"{nearest.status.name}, {nearest.held} held: {nearest.position_error:.2f} mm from the target")
+print(f"{nearest.status}, {nearest.held} held: {nearest.position_error:.2f} mm from the target")
 print(f"where the chains' ends agree: {centroid.position_error:.2f} mm and {centroid.rotation_error:.2f} rad")
 
 # The limits that hold it back, the hardest first: a cone that was wider by a radian would bring it so many mm nearer.
@@ -20,7 +20,7 @@ for limit in nearest.active_limits:
 # How much room there is to the limits within reach, and how far the platform can go from there.
 within = pf.solve_ik(mechanism, (0, 20, 200))
 (joint, bound), margin = min(pf.margins(within).items(), key=lambda item: item[1])
-print(f"{within.status.name}: {joint} is nearest to its {bound}, {margin:.0%} of the room left")
+print(f"{within.status}: {joint} is nearest to its {bound}, {margin:.0%} of the room left")
 for each in pf.travel(within, along=[(0, 1, 0), (0, -1, 0)]):
     print(f"  {each.distance:.2f} mm along {each.direction}, then {each.stopped_by[0].joint} stops it")
 

@@ -9,17 +9,16 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-import checking
-import fk_machines
-import fk_oracles
+import checks
 import oracles
 import pfabrik as pf
-from fk_machines import PUBLISHED
-from machines import planar
+from machines import planar, published
+from machines.published import PUBLISHED
+from oracles import assembly
 from pfabrik.errors import InvalidArgument, MobilityWarning, PfabrikError
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-SAUER = fk_oracles.Planar3RPR(**PUBLISHED["sauer_p2_5"]["geometry"])
+SAUER = assembly.Planar3RPR(**PUBLISHED["sauer_p2_5"]["geometry"])
 
 
 def assert_modes(mechanism: pf.Mechanism, actuators: Sequence[float], modes: Sequence[pf.Solution]) -> None:
@@ -29,8 +28,8 @@ def assert_modes(mechanism: pf.Mechanism, actuators: Sequence[float], modes: Seq
         assert mode.pose.shape == (4, 4)
         assert mode.residual <= 1e-9 * length
         assert pf.closure_residual(mode) <= 1e-9 * length
-        assert checking.worst_gap(mechanism, mode).max() <= 1e-9
-        assert fk_oracles.joint_gap(mechanism, mode) <= 1e-8
+        assert checks.gap_of_points(mechanism, mode).max() <= 1e-9
+        assert checks.gap_of_joints(mechanism, mode).max() <= 1e-8
         slides = [mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names]
         np.testing.assert_allclose(
             np.subtract(mode.actuators, actuators) / np.where(slides, length, 1.0), 0.0, rtol=0, atol=1e-9
@@ -55,11 +54,11 @@ def assert_same_poses(modes: Sequence[pf.Solution], expected: Sequence[np.ndarra
 
 @pytest.mark.parametrize("case", ["sauer_fig1_15", "sauer_p2_5"])
 def test_planar_3rpr_has_the_published_poses(case: str) -> None:
-    geometry, p = fk_oracles.Planar3RPR(**PUBLISHED[case]["geometry"]), PUBLISHED[case]["p"]
-    mechanism, home = fk_machines.planar_3rpr(geometry, p)
+    geometry, p = assembly.Planar3RPR(**PUBLISHED[case]["geometry"]), PUBLISHED[case]["p"]
+    mechanism, home = published.planar_3rpr(geometry, p)
     modes = pf.assembly_modes(mechanism, p)
     assert_modes(mechanism, p, modes)
-    expected = [fk_machines.planar_pose(each, home) for each in PUBLISHED[case]["poses_theta_x_y"]]
+    expected = [published.planar_pose(each, home) for each in PUBLISHED[case]["poses_theta_x_y"]]
     assert_same_poses(modes, expected, atol=1e-9)
 
 
@@ -67,21 +66,21 @@ def test_planar_3rpr_has_the_published_poses(case: str) -> None:
 def test_planar_3rpr_gains_and_loses_modes_at_the_published_strut_lengths(
     transition: float, below: int, above: int
 ) -> None:
-    mechanism, home = fk_machines.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
+    mechanism, home = published.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
     for p2, count in ((transition - 1e-3, below), (transition + 1e-3, above)):
         p = [5.0, p2, 3.0]
         modes = pf.assembly_modes(mechanism, p)
         assert len(modes) == count
         assert_modes(mechanism, p, modes)
-        assert_same_poses(modes, [fk_machines.planar_pose(each, home) for each in SAUER.solutions(p)], atol=1e-7)
+        assert_same_poses(modes, [published.planar_pose(each, home) for each in SAUER.solutions(p)], atol=1e-7)
 
 
 def test_planar_3rpr_has_the_modes_of_its_sextic_whatever_its_lengths() -> None:
-    mechanism, home = fk_machines.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
+    mechanism, home = published.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
     rng = np.random.default_rng(1)
     for _ in range(2 if INTERPRETED else 25):
         p = SAUER.lengths(*rng.uniform([-3, -2, -2], [3, 5, 5]))
-        expected = [fk_machines.planar_pose(each, home) for each in SAUER.solutions(p)]
+        expected = [published.planar_pose(each, home) for each in SAUER.solutions(p)]
         assert_same_poses(pf.assembly_modes(mechanism, p), expected, atol=1e-7)
 
 
@@ -91,7 +90,7 @@ def test_five_bar_has_two_tips_of_which_its_limits_leave_one() -> None:
     turns = oracles.actuators(mechanism, target)[0]
     modes = pf.assembly_modes(mechanism, turns)
     assert_modes(mechanism, turns, modes)
-    tips = fk_oracles.five_bar_tips(mechanism, turns)
+    tips = assembly.five_bar_tips(mechanism, turns)
     assert len(modes) == len(tips) == 2
     for tip in tips:
         assert min(np.linalg.norm(mode.pose[:3, 3] - tip) for mode in modes) <= 1e-7
@@ -107,35 +106,35 @@ def test_forearms_that_do_not_meet_have_no_mode() -> None:
 
 
 def test_a_serial_arm_has_one_mode() -> None:
-    mechanism = fk_machines.planar_arm()
+    mechanism = published.planar_arm()
     angles = [0.4, -0.8, 1.7]
     modes = pf.assembly_modes(mechanism, angles)
     assert_modes(mechanism, angles, modes)
-    tip, heading = fk_oracles.planar_arm(fk_machines.ARM_LINKS, angles)
-    assert_same_poses(modes, [pf.pose([*tip, 0.0], rotvec=[0, 0, heading - fk_machines.ARM_HOME.sum()])], atol=1e-6)
+    tip, heading = assembly.planar_arm(published.ARM_LINKS, angles)
+    assert_same_poses(modes, [pf.pose([*tip, 0.0], rotvec=[0, 0, heading - published.ARM_HOME.sum()])], atol=1e-6)
 
 
 # --- in space --------------------------------------------------------------------------------------------------------
 
 
 def test_three_struts_to_a_point_have_two_points_in_two_postures() -> None:
-    mechanism = fk_machines.tripod()
-    lengths = np.linalg.norm(fk_machines.TRIPOD_FEET - fk_machines.TRIPOD_TIP, axis=1)
+    mechanism = published.tripod()
+    lengths = np.linalg.norm(published.TRIPOD_FEET - published.TRIPOD_TIP, axis=1)
     modes = pf.assembly_modes(mechanism, lengths)
     assert_modes(mechanism, lengths, modes)
     assert len(modes) == 4
-    for point in fk_oracles.spheres_meet(fk_machines.TRIPOD_FEET, lengths):
+    for point in assembly.spheres_meet(published.TRIPOD_FEET, lengths):
         assert sum(np.linalg.norm(mode.pose[:3, 3] - point) <= 1e-6 for mode in modes) == 2
 
 
 def test_3rps_has_all_poses_of_its_three_swinging_struts() -> None:
     geometry = PUBLISHED["rps_leeshah"]["geometry"]
-    mechanism = fk_machines.rps(geometry["base_radius"], geometry["platform_radius"], 200.0)
+    mechanism = published.rps(geometry["base_radius"], geometry["platform_radius"], 200.0)
     lengths = PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"][0][5:]
     modes = pf.assembly_modes(mechanism, lengths)
     assert_modes(mechanism, lengths, modes)
     side = np.sqrt(3.0) * geometry["platform_radius"]
-    expected = fk_oracles.rps_tops(geometry["base_radius"], side, lengths)
+    expected = assembly.rps_tops(geometry["base_radius"], side, lengths)
     assert len(modes) == len(expected)
     for tops in expected:
         gaps = [max(np.abs(mode.points[f"S{i + 1}"] - tops[i]).max() for i in range(3)) for mode in modes]
@@ -144,38 +143,38 @@ def test_3rps_has_all_poses_of_its_three_swinging_struts() -> None:
 
 def test_a_published_hexapod_has_the_modes_found_for_it() -> None:
     case = PUBLISHED["gsp_mathworks_home"]
-    mechanism = fk_machines.published_gough("gsp_mathworks_home", [0.0, 0.0, 2.0])
+    mechanism = published.published_gough("gsp_mathworks_home", [0.0, 0.0, 2.0])
     modes = pf.assembly_modes(mechanism, case["L"])
     assert_modes(mechanism, case["L"], modes)
     found = np.array([mode.pose for mode in modes])
     for p, quat in case["solutions_p_quat_xyzw"]:
         assert np.abs(found - pf.pose(p, quat_xyzw=quat)).max(axis=(1, 2)).min() <= 1e-7
-    expected, _ = fk_oracles.gough_modes(case["geometry"]["base"], case["geometry"]["platform"], case["L"])
+    expected, _ = assembly.gough_modes(case["geometry"]["base"], case["geometry"]["platform"], case["L"])
     assert_same_poses(modes, expected, atol=1e-7)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("p, rpy, lengths", PUBLISHED["gsp_conroy"]["rows_p_rpy_L"][1:4])
 def test_a_hexapod_has_the_modes_of_an_independent_search(p: list, rpy: list, lengths: list) -> None:
-    mechanism = fk_machines.published_gough("gsp_conroy", [0.0, 0.0, 3.0])
+    mechanism = published.published_gough("gsp_conroy", [0.0, 0.0, 3.0])
     geometry = PUBLISHED["gsp_conroy"]["geometry"]
     modes = pf.assembly_modes(mechanism, lengths)
     assert_modes(mechanism, lengths, modes)
-    expected, _ = fk_oracles.gough_modes(geometry["base"], geometry["platform"], lengths)
+    expected, _ = assembly.gough_modes(geometry["base"], geometry["platform"], lengths)
     assert_same_poses(modes, expected, atol=1e-6)
     assert min(np.abs(mode.pose - pf.pose(p, rpy=rpy)).max() for mode in modes) <= 1e-4
 
 
 @pytest.mark.slow
 def test_dietmaiers_platform_has_40_modes() -> None:
-    mechanism, home = fk_machines.dietmaier()
-    modes = pf.assembly_modes(mechanism, fk_machines.DIETMAIER_LENGTHS)
-    assert_modes(mechanism, fk_machines.DIETMAIER_LENGTHS, modes)
-    expected, _ = fk_oracles.gough_modes(
-        fk_machines.DIETMAIER_BASE, fk_machines.DIETMAIER_PLATFORM, fk_machines.DIETMAIER_LENGTHS, starts=8000
+    mechanism, home = published.dietmaier()
+    modes = pf.assembly_modes(mechanism, published.DIETMAIER_LENGTHS)
+    assert_modes(mechanism, published.DIETMAIER_LENGTHS, modes)
+    expected, _ = assembly.gough_modes(
+        published.DIETMAIER_BASE, published.DIETMAIER_PLATFORM, published.DIETMAIER_LENGTHS, starts=8000
     )
     assert len(modes) == len(expected) == 40
-    assert_same_poses(modes, fk_machines.moved_from_home(expected, home), atol=1e-6)
+    assert_same_poses(modes, published.moved_from_home(expected, home), atol=1e-6)
 
 
 def test_a_catalogue_hexapod_is_within_its_limits_in_the_pose_asked_for() -> None:
@@ -208,7 +207,7 @@ def test_a_redundant_machine_has_a_mode_for_values_that_agree_and_none_for_other
 
 
 def test_a_list_of_modes_says_how_it_was_found_and_what_it_may_have_missed() -> None:
-    mechanism, _ = fk_machines.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
+    mechanism, _ = published.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
     modes = pf.assembly_modes(mechanism, PUBLISHED["sauer_p2_5"]["p"])
     assert modes.starts >= len(modes)
     assert 0.0 <= modes.unseen < 0.1
@@ -219,7 +218,7 @@ def test_a_list_of_modes_says_how_it_was_found_and_what_it_may_have_missed() -> 
 
 
 def test_modes_are_the_same_in_every_call() -> None:
-    mechanism, _ = fk_machines.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
+    mechanism, _ = published.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
     first, second = (pf.assembly_modes(mechanism, [5.0, 7.0, 3.0]) for _ in range(2))
     assert len(first) == len(second) == 6
     for one, other in zip(first, second, strict=True):
@@ -236,7 +235,7 @@ def assert_continuum(mechanism: pf.Mechanism) -> None:
 
 def test_similar_hexagons_have_a_continuum_of_modes() -> None:
     with pytest.warns(MobilityWarning):
-        mechanism = fk_machines.similar_hexagons()
+        mechanism = published.similar_hexagons()
     assert_continuum(mechanism)
 
 
@@ -264,7 +263,7 @@ def test_modes_merge_and_vanish_where_the_forearms_are_stretched() -> None:
     for half_span, count in ((145.0 - 1e-3, 2), (145.0 + 1e-3, 0)):
         turns = five_bar_turns(half_span)
         modes = pf.assembly_modes(mechanism, turns)
-        assert len(modes) == len(fk_oracles.five_bar_tips(mechanism, turns)) == count
+        assert len(modes) == len(assembly.five_bar_tips(mechanism, turns)) == count
         assert_modes(mechanism, turns, modes)
 
 
@@ -279,6 +278,6 @@ def test_a_singular_but_isolated_configuration_is_no_continuum() -> None:
 
 @pytest.mark.parametrize("actuators", [[5.0, 5.0], [5.0] * 4, [5.0, 5.0, np.nan], ["a", "b", "c"], None, [[5.0] * 3]])
 def test_what_is_no_single_set_of_actuator_values_is_refused(actuators: object) -> None:
-    mechanism, _ = fk_machines.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
+    mechanism, _ = published.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
     with pytest.raises(InvalidArgument, match="actuators"):
         pf.assembly_modes(mechanism, actuators)

@@ -296,60 +296,44 @@ def test_a_machine_without_limits_has_no_margins(run: Callable[..., Result], tmp
     assert (result.exit_code, result.stdout.splitlines()[-1]) == (0, "no limits")
 
 
-# Reach
+# Travel
 
 
-def test_reach_tells_the_distances_that_the_library_does(run: Callable[..., Result]) -> None:
-    machine = pf.load("stewart")
-    result = run("reach", "stewart")
-    header, *rows = [line.split() for line in result.stdout.splitlines()]
-    assert (result.exit_code, header) == (0, ["x", "y", "z", "reach", "[mm]"])
-    axes = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
-    assert [[float(cell) for cell in row[:3]] for row in rows] == axes
-    expected = pf.travel(machine, machine.home_pose, axes)
-    assert [float(row[3]) for row in rows] == pytest.approx(expected, rel=1e-5)
+def test_travel_tells_what_the_library_does_in_degrees_and_the_unit_of_length(run: Callable[..., Result]) -> None:
+    result = run("travel", "stewart")
+    header, *rows = [re.split(r" {2,}", line) for line in result.stdout.splitlines()]
+    assert (result.exit_code, header[1:]) == (0, ["x", "y", "z", "travel", "unit", "stopped by"])
+    home = pf.solve_ik(pf.load("stewart"), pf.load("stewart").home_pose)
+    for row, reach in zip(rows, pf.travel(home), strict=True):
+        assert (row[0], [float(part) for part in row[1:4]]) == (reach.kind, list(reach.direction))
+        unit, size = ("mm", 1.0) if reach.kind == "along" else ("deg", math.degrees(1.0))
+        assert (float(row[4]), row[5]) == (pytest.approx(size * reach.distance, rel=1e-5), unit)
+        assert all(limit.joint in row[6] and limit.bound in row[6] for limit in reach.stopped_by)
 
 
-def test_reach_starts_where_it_is_told(run: Callable[..., Result]) -> None:
-    line = [
-        "reach",
-        "stewart",
-        "--from",
-        10,
-        0,
-        200,
-        "--rpy",
-        0,
-        5,
-        0,
-        "--direction",
-        0,
-        -1,
-        -1,
-        "--direction",
-        1,
-        0,
-        0,
-    ]
-    answer = json.loads(run(*line, "--json").stdout)
-    origin, rays = pf.pose([10, 0, 200], rpy=np.radians([0, 5, 0])), [[0, -1, -1], [1, 0, 0]]
-    assert answer["reach"] == pf.travel(pf.load("stewart"), origin, rays).tolist()
-    assert (answer["from"], answer["directions"]) == (origin.tolist(), rays)
+def test_travel_starts_where_it_is_told_and_goes_where_it_is_told(run: Callable[..., Result]) -> None:
+    line = "travel stewart --position 10 0 200 --rpy 0 5 0 --along 0 -1 -1 --along 1 0 0 --about 0 0 1 --pivot 5 5 0"
+    start = pf.solve_ik(pf.load("stewart"), pf.pose([10, 0, 200], rpy=[0, 5, 0], degrees=True))
+    expected = pf.travel(start, along=[[0, -1, -1], [1, 0, 0]], about=[0, 0, 1], pivot=[5, 5, 0])
+    assert json.loads(run(*line.split(), "--json").stdout) == expected.to_dict()
+    ankle = pf.solve_ik(pf.load("ankle_ups"), {"pivot": np.radians([5, 10])})
+    found = json.loads(run("travel", "ankle_ups", "--joint", "pivot=5,10", "--json").stdout)
+    assert found == pf.travel(ankle).to_dict()
+    assert "e-" not in run("travel", "ankle_ups", "--joint", "pivot=5,10").stdout  # directions without dust
 
 
-def test_reach_without_end_is_unlimited(run: Callable[..., Result], tmp_path: Path) -> None:
+def test_travel_without_end_is_unlimited_and_without_freedom_0(run: Callable[..., Result], tmp_path: Path) -> None:
     pf.save(pf.load("stewart").without_limits(), tmp_path / "free.toml")
-    assert run("reach", "free.toml", "--direction", 0, 0, 1).stdout.splitlines()[1].split() == [
-        "0",
-        "0",
-        "1",
-        "unlimited",
-    ]
-    assert json.loads(run("reach", "free.toml", "--direction", 0, 0, 1, "--json").stdout)["reach"] == [None]
+    line = ("travel", "free.toml", "--along", 0, 0, 1)
+    assert run(*line).stdout.splitlines()[1].split() == ["along", "0", "0", "1", "unlimited", "mm"]
+    assert json.loads(run(*line, "--json").stdout)["travel"][0]["distance"] is None
+    assert run("travel", "five_bar", "--along", 1, 0, 0).stdout.splitlines()[1].split()[4] == "0"
 
 
-def test_no_freedom_is_a_reach_of_0(run: Callable[..., Result]) -> None:
-    assert run("reach", "five_bar", "--direction", 1, 0, 0).stdout.splitlines()[1].split()[3] == "0"
+def test_ik_takes_the_coordinates_of_the_joint_that_carries_the_end_effector(run: Callable[..., Result]) -> None:
+    result = run("ik", "ankle_ups", "--joint", "pivot=5,10", "--json")
+    expected = pf.solve_ik(pf.load("ankle_ups"), {"pivot": np.radians([5, 10])})
+    assert (result.exit_code, json.loads(result.stdout)) == (0, json.loads(json.dumps(expected.to_dict())))
 
 
 def test_json_is_one_object_that_says_what_the_solution_says(run: Callable[..., Result]) -> None:
@@ -382,7 +366,7 @@ def test_coordinates_that_the_task_leaves_out_are_not_dropped_silently(run: Call
 
 @pytest.mark.parametrize("number", ["nan", "inf", "1e999"])
 def test_a_number_that_is_not_finite_is_told_with_its_option(run: Callable[..., Result], number: str) -> None:
-    for line in (("ik", "stewart", "--position"), ("ik", "stewart", "--rpy"), ("reach", "stewart", "--from")):
+    for line in (("ik", "stewart", "--position"), ("ik", "stewart", "--rpy"), ("travel", "stewart", "--along")):
         result = run(*line, 0, number, 0)
         assert result.exit_code == 2
         assert f"'{line[-1]}': found '{number}'; expected a finite number" in result.stderr
@@ -637,11 +621,11 @@ def test_the_page_of_the_command_line_shows_what_ik_all_prints(run: Callable[...
 
 def test_the_page_of_the_command_line_shows_what_is_out_of_reach(run: Callable[..., Result]) -> None:
     shown = re.findall(
-        r"^```\n\$ pfabrik ((?:ik|reach) (?:(?!--all)[^\n])*)\n(.*?)^```$",
+        r"^```\n\$ pfabrik ((?:ik|travel) (?:(?!--all)[^\n])*)\n(.*?)^```$",
         CLI_PAGE.read_text("utf-8"),
         re.DOTALL | re.MULTILINE,
     )
-    assert [line.split()[0] for line, _ in shown] == ["ik", "reach"]
+    assert [line.split()[0] for line, _ in shown] == ["ik", "travel"]
     for line, expected in shown:
         found, told = (without_chance(text) for text in (run(*shlex.split(line)).stdout, expected))
         assert found == told, line
@@ -964,10 +948,17 @@ def test_an_output_that_is_a_link_or_a_device_stays_one(run: Callable[..., Resul
         (["ik", "stewart", *WITHIN_REACH, "--hold", "both"], "orientation"),
         (["ik", "stewart", *WITHIN_REACH, "--projection", "best"], "centroid"),
         (["ik", "stewart", *WITHIN_REACH, "--all", "--margins"], "--margins is of one answer"),
-        (["reach", "stewart", "--from", "0", "0", "900"], "origin: found a pose that is PROJECTED"),
-        (["reach", "stewart", "--direction", "0", "0", "0"], "directions"),
-        (["reach", "stewart", "--direction", "0", "nan", "0"], "--direction"),
-        (["reach", "agile_eye"], "task"),
+        (["ik", "ankle_ups", "--joint", "pivot"], "found 'pivot'; expected NAME=VALUE"),
+        (["ik", "ankle_ups", "--joint", "pivot=5,nan"], "expected NAME=VALUE[,VALUE...] with finite numbers"),
+        (["ik", "ankle_ups", "--joint", "pivot=5"], "found 1 values; expected 2"),
+        (["ik", "ankle_ups", "--joint", "pivt=5,10"], "did you mean 'pivot'"),
+        (["ik", "ankle_ups", "--joint", "BL=100"], "expected those of 'pivot'"),
+        (["ik", "ankle_ups", "--joint", "pivot=5,10", "--rpy", "0", "0", "0"], "--joint says it all"),
+        (["travel", "stewart", "--position", "0", "0", "900"], "cannot start there: projected"),
+        (["travel", "stewart", "--along", "0", "0", "0"], "along"),
+        (["travel", "stewart", "--about", "0", "nan", "0"], "--about"),
+        (["travel", "stewart", "--pivot", "0", "0"], "--pivot"),
+        (["travel", "agile_eye", "--along", "0", "0", "1"], "within the task"),
         (["fk"], "MECH"),
         (["fk", "stewrt", "1"], "did you mean 'stewart'"),
         (["fk", "nowhere/machine.toml", "1"], "machine.toml"),

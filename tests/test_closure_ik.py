@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import closure_machines
-import joint_checking
+import checks
 import pfabrik as pf
-from closure_machines import MACHINES, X, Z, chain, joint
+from machines import closure
+from machines.closure import MACHINES, X, Z, chain, joint
 from pfabrik import Mechanism, Options, Solution, Status
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -78,9 +78,9 @@ def errors(mechanism: Mechanism, poses: np.ndarray, targets: np.ndarray) -> np.n
 def assert_feasible(mechanism: Mechanism, answer: Solution) -> None:
     """Every row is an assembled configuration within all limits, by its own `joints`."""
     assert np.max(answer.status) <= Status.PROJECTED
-    assert np.max(joint_checking.worst_opening(mechanism, answer)) <= 2e-9
+    assert np.max(checks.gap_of_joints(mechanism, answer)) <= 2e-9
     assert np.max(pf.closure_residual(answer)) <= 1e-9 * mechanism.characteristic_length
-    assert np.max(joint_checking.worst_excess(mechanism, answer)) <= 1.0001e-9
+    assert np.max(checks.excess_of_joints(mechanism, answer)) <= 1.0001e-9
 
 
 def assert_honest(mechanism: Mechanism, targets: np.ndarray, answer: Solution) -> None:
@@ -133,13 +133,17 @@ def test_any_finite_target_has_an_honest_answer(name: str) -> None:
     assert_honest(mechanism, targets, pf.solve_ik(mechanism, targets))
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    "count", [pytest.param(6, marks=pytest.mark.slow), pytest.param(64, marks=pytest.mark.campaign)]
+)
 @pytest.mark.parametrize("hold", ["orientation", "position", None])
 @pytest.mark.parametrize("name", MACHINES)
-def test_any_finite_target_has_an_honest_answer_whatever_a_projection_holds(name: str, hold: str | None) -> None:
+def test_any_finite_target_has_an_honest_answer_whatever_a_projection_holds(
+    name: str, hold: str | None, count: int
+) -> None:
     mechanism = machine(name)
     home = pf.solve_ik(mechanism, mechanism.home_pose)
-    targets = random_targets(mechanism, 64, seed=1)
+    targets = random_targets(mechanism, count, seed=1)
     for seed in (None, home):
         answer = pf.solve_ik(mechanism, targets, start=seed, options=Options(hold=hold))
         assert_honest(mechanism, targets, answer)
@@ -200,8 +204,8 @@ def test_rows_that_are_no_poses_are_marked_and_spoil_nothing(name: str) -> None:
 def test_how_a_machine_is_described_does_not_change_what_it_reaches(name: str, change: str) -> None:
     mechanism = machine(name)
     factor = {"smaller": 1e-3, "larger": 1e6}.get(change, 1.0)
-    other = {"reversed": closure_machines.reversed_joints, "shuffled": closure_machines.shuffled}.get(
-        change, lambda each: closure_machines.scaled(each, factor)
+    other = {"reversed": closure.reversed_joints, "shuffled": closure.shuffled}.get(
+        change, lambda each: closure.scaled(each, factor)
     )(mechanism)
     reached = pf.solve_fk(mechanism, random_values(mechanism, 2, 0.4)).pose
     targets = np.concatenate([reached, random_targets(mechanism, 3, seed=3)])
@@ -295,7 +299,7 @@ def test_a_seed_far_away_keeps_its_working_mode_as_a_path_does() -> None:
 def arm_with_tool(tip: str) -> Mechanism:
     """An arm placed by the hinge of a tool that hangs on it alone."""
     joints = [
-        *chain(1, *closure_machines._ARM, end="hand"),
+        *chain(1, *closure._ARM, end="hand"),
         joint(tip, "tip", ("hand", "tool"), (300, 0, 340), Z, range=(-0.5, 0.5)),
     ]
     return Mechanism("arm with a tool", joints, "tip")
@@ -388,14 +392,14 @@ def test_universal_and_revolute_joints_may_turn_further_than_half_way() -> None:
         "u": rng.uniform((-4, -0.1), (4, 3.5), (50, 2)),
         "w": rng.uniform(-1, 6, (50, 1)),
     }
-    targets = joint_checking.placed_bodies(mechanism, moved)[0]["platform"] @ mechanism.home_pose
+    targets = checks.placed_bodies(mechanism, moved)[0]["platform"] @ mechanism.home_pose
     answer = pf.solve_ik(mechanism, targets)
     assert np.all(answer.status == Status.REACHED)
     assert_honest(mechanism, targets, answer)
 
 
 @compiled
-@pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.campaign)])
 def test_every_pose_of_an_arm_within_its_ranges_is_reached(count: int) -> None:
     """The poses come from random joint angles, so that each is in reach, in whatever working mode."""
     mechanism, rng = machine("arm"), np.random.default_rng(4)
@@ -403,7 +407,7 @@ def test_every_pose_of_an_arm_within_its_ranges_is_reached(count: int) -> None:
     for each in mechanism.joints:
         low, high = each.range or (-7.0, 7.0)
         moved[each.name] = rng.uniform(low - each.home, high - each.home, (count, 1))
-    targets = joint_checking.placed_bodies(mechanism, moved)[0]["platform"] @ mechanism.home_pose
+    targets = checks.placed_bodies(mechanism, moved)[0]["platform"] @ mechanism.home_pose
     answer = pf.solve_ik(mechanism, targets)
     assert np.all(answer.status == Status.REACHED)
     assert_honest(mechanism, targets, answer)
@@ -416,4 +420,4 @@ def test_the_agile_eye_has_eight_assembly_modes() -> None:
     modes = pf.assembly_modes(mechanism, [0.2, -0.3, 0.4])
     assert len(modes) == 8
     for mode in modes:
-        assert joint_checking.worst_opening(mechanism, mode)[0] <= 2e-9
+        assert checks.gap_of_joints(mechanism, mode)[0] <= 2e-9

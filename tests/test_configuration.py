@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from closure_machines import MACHINES as CLOSURE_MACHINES
 from machines import MACHINES as REACHING_MACHINES
+from machines.closure import MACHINES as CLOSURE_MACHINES
 from pfabrik import Mechanism, Solution, Status
 from pfabrik.description.joint_types import KINDS
 from pfabrik.errors import InvalidArgument

@@ -144,7 +144,7 @@ def crossing(**changes: object) -> list[Joint]:
     foot, head = (-50, -80, 0), (-30, -50, 150)
     leg = [
         Joint("Ra", "revolute", ("base", "gimbal"), at=foot, axis=(1, 0, 0)),
-        Joint("Rb", "revolute", ("gimbal", "c"), at=foot, axis=(0, 1, 0)),
+        Joint("Rb", "revolute", ("gimbal", "c"), at=foot, axis=(0, 150, -30)),  # square to the strut
         Joint("P", "prismatic", ("c", "r"), axis=np.subtract(head, foot), actuated=True, home=100),
         Joint("Rc", "revolute", ("r", "yoke"), at=head, axis=(1, 0, 0)),
         Joint("Rd", "revolute", ("yoke", "ring"), at=head, axis=(0, 1, 0)),
@@ -174,12 +174,49 @@ def test_joints_that_share_a_centre_each_have_their_point() -> None:
 
 
 def test_joints_described_off_the_crossing_of_their_axes_are_reported_at_it() -> None:
-    aside = with_leg(*crossing(Ra={"at": (-70, -80, 0)}, Rb={"at": (-50, -60, 0)}))
+    aside = with_leg(*crossing(Ra={"at": (-70, -80, 0)}, Rb={"at": (-50, -50, -6)}))
     assert pf.decompose(aside)[-1].branch_forms[0].nodes[0].at == pytest.approx([-50, -80, 0], abs=1e-12)
     answer = pf.solve_ik(aside, aside.home_pose)
     assert answer
     for name in ("Ra", "Rb"):
         np.testing.assert_allclose(answer.points[name], (-50, -80, 0), atol=1e-9)
+
+
+@pytest.mark.parametrize("skew", [0.0, 0.2, 1.2])
+def test_what_acts_as_a_universal_joint_points_anywhere_only_if_its_link_is_square_to_it(skew: float) -> None:
+    """Elsewhere answers in positions would have open loops: there are none, whichever engine answers."""
+    joints = []
+    for k, angle in enumerate(np.radians([0, 60, 120, 180, 240, 300])):
+        foot = 100.0 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        turned = angle + 0.5 * (-1) ** k
+        head = np.array([60.0 * np.cos(turned), 60.0 * np.sin(turned), 150.0])
+        line = (head - foot) / np.linalg.norm(head - foot)
+        first = np.cross(line, [0.3, 0.2, 1.0])
+        first /= np.linalg.norm(first)
+        second = np.cos(skew) * np.cross(line, first) + np.sin(skew) * line
+        joints += [
+            Joint(f"A{k}", "prismatic", ("base", f"c{k}"), axis=(0, 0, 1), actuated=True),
+            Joint(f"B{k}", "revolute", (f"c{k}", f"d{k}"), at=foot, axis=first),
+            Joint(f"C{k}", "revolute", (f"d{k}", f"r{k}"), at=foot, axis=second),
+            Joint(f"D{k}", "spherical", (f"r{k}", "platform"), at=head),
+        ]
+    hexapod = Mechanism("crossing hinges", joints, "platform", (0, 0, 150))
+    assert {chain.engine for chain in pf.decompose(hexapod)} == {"reaching" if skew == 0.0 else "closure"}
+    answers = pf.solve_ik(hexapod, [[x, y, 150] for x in (-60, 0, 60) for y in (-60, 0, 60)])
+    assert pf.closure_residual(answers).max() <= 1e-9 * hexapod.characteristic_length
+
+
+def test_the_default_axes_of_a_universal_joint_do_not_depend_on_which_body_it_names_first() -> None:
+    machine = pf.load("servo_hexapod")
+    swapped = [
+        dataclasses.replace(joint, connects=joint.connects[::-1]) if joint.type == "universal" else joint
+        for joint in machine.joints
+    ]
+    other = Mechanism("swapped", swapped, machine.end_effector, machine.reference_point)
+    target = pf.pose(np.add(machine.reference_point, (5, -4, 3)), rotvec=(0.05, 0.1, -0.02))
+    answers = pf.solve_ik(machine, target), pf.solve_ik(other, target)
+    np.testing.assert_allclose(answers[0].actuators, answers[1].actuators, atol=1e-9)
+    assert max(map(pf.closure_residual, answers)) <= 1e-9 * machine.characteristic_length
 
 
 @pytest.mark.parametrize("gap, engine", [(0.5e-6, "reaching"), (2e-4, "closure")])

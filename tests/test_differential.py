@@ -361,10 +361,10 @@ class TestJacobians:
         assert forward_jacobian(none).shape == inverse_jacobian(none).shape == (0, 6, 6)
         assert singularity(none).kinds == []
 
-    def test_a_solution_of_another_machine_is_refused(self):
-        machine, q = closed("stewart")
-        with pytest.raises(InvalidArgument, match=r"solution: found an answer of another '6-UPS"):
-            forward_jacobian(pf.load("five_bar"), answer(machine, q, (2,)))
+    def test_what_is_no_solution_is_refused(self):
+        for function in (forward_jacobian, inverse_jacobian, singularity, pf.closure_residual):
+            with pytest.raises(InvalidArgument, match="solution: found ndarray; expected a Solution"):
+                function(closed("stewart")[1])
 
 
 class TestSingularity:

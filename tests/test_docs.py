@@ -33,6 +33,11 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
+def files_named(page: Path) -> list[str]:
+    """Files and folders of the package in back quotes: `engine.py`, `decomposition/`."""
+    return re.findall(r"`((?:\w+/)*(?:\w+\.py|\w+/))`", page.read_text(encoding="utf-8"))
+
+
 def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Python in a folder of its own, with this package, warnings being errors."""
     environment = os.environ | {"PYTHONPATH": str(Path(pf.__file__).parents[1])}
@@ -55,6 +60,12 @@ def test_links_within_the_project_lead_somewhere(page: Path) -> None:
         target = (page.parent / path).resolve() if path else page
         assert target.exists(), link
         assert not anchor or anchor in anchors(target), link
+
+
+def test_the_page_on_the_method_names_files_that_there_are() -> None:
+    named = files_named(ROOT / "docs" / "how-it-works.md")
+    assert len(named) > 15
+    assert [name for name in named if not (ROOT / "src" / "pfabrik" / name).exists()] == []
 
 
 @pytest.mark.parametrize("page", sorted(ROOT.glob("docs/**/*.md")), ids=lambda page: str(page.relative_to(ROOT)))

@@ -1,4 +1,4 @@
-"""Closed forms: against other closed forms in NumPy, the library's own engines, published tables and brute force."""
+"""The three closed forms: against other closed forms in NumPy, the library's own engines and brute force."""
 
 from __future__ import annotations
 
@@ -18,13 +18,11 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import oracles
+import oracles_by_leg as by_leg
 import pfabrik as pf
-from fk_machines import PUBLISHED, published_gough
-from machines import MACHINES, hexapod_ups
 from pfabrik import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument, NoClosedForm
-from pfabrik.geometric import Geometric, arms, facts, platforms, targets
-from pfabrik.geometric.drives import DRIVES
+from pfabrik.geometric import arms, facts, targets
 from pfabrik.geometric.topologies import TOPOLOGIES, closed_form
 from pfabrik.kernels import _jit
 from pfabrik.tolerances import TOLERANCES
@@ -77,35 +75,13 @@ def test_a_topology_is_told_from_its_sub_chains(topology: Any) -> None:
     assert closed_form(renamed).kernel is topology.kernel
 
 
-def test_every_solving_kernel_is_in_the_registry() -> None:
-    folder = Path(pf.geometric.__file__).parent
-    modules = [importlib.import_module(f"pfabrik.geometric.{path.stem}") for path in folder.glob("[!_]*.py")]
-    solving = {name for module in modules for name in vars(module) if name.startswith("solve_")} - {"solve_ik"}
-    solved = {"solve_arm", "solve_legs"}  # a part of `solve_arms`, and all that the drives solve
-    drives = {drive.solve.__name__ for drive in DRIVES if drive.solve is not None}
-    assert solving - solved == {topology.kernel.__name__ for topology in TOPOLOGIES} | drives
-
-
-SAYING = [topology.kernel for topology in TOPOLOGIES] + [drive.solve for drive in DRIVES if drive.solve is not None]
-
-
-@pytest.mark.parametrize(
-    "solve", [*SAYING, platforms._guided, platforms._hinged, platforms._mirrored], ids=lambda each: each.__name__
-)
-def test_every_closed_form_says_how_many_solutions_which_branch_and_where_from(solve: Any) -> None:
-    said = getattr(solve, "py_func", solve).__doc__
-    references = (DOCS / "references.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("topology", TOPOLOGIES, ids=str)
+def test_every_closed_form_says_how_many_solutions_which_branch_and_where_from(topology: Any) -> None:
+    said = getattr(topology.kernel, "py_func", topology.kernel).__doc__
     assert "solution" in said
-    assert "Degenerate" in said or "no choice of branch" in said or "rule" in said
-    keys = [source.split()[0].rstrip(".") for source in said.split("Source: ")[1].split(";")]
-    assert [f"**{key}**" in references for key in keys if key[0].isupper()].count(False) == 0
-    assert keys[0][0].isupper()
-
-
-def test_every_kind_of_leg_is_documented() -> None:
-    page = (DOCS / "geometric.md").read_text(encoding="utf-8")
-    for drive in DRIVES:
-        assert f"`{drive.chain}`" in page
+    assert "Degenerate" in said or "rule" in said
+    source = said.split("Source: ")[1].split()[0].rstrip(".")
+    assert f"**{source}**" in (DOCS / "references.md").read_text(encoding="utf-8")
 
 
 # --- agreement -------------------------------------------------------------------------------------------------------
@@ -122,15 +98,6 @@ def test_reached_exactly_where_the_oracle_says(name: str) -> None:
     assert 0.2 < answer.reached.mean() < 0.8
     expected = oracles.actuators(mechanism, wanted)[answer.reached]
     np.testing.assert_allclose(answer.actuators[answer.reached], expected, rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize("mechanism", [pf.load("five_bar"), pf.load("stewart"), hexapod_ups()], ids=lambda m: m.name)
-def test_the_solver_reaches_exactly_what_the_closed_form_reaches(mechanism: Mechanism) -> None:
-    wanted = some_targets(mechanism)
-    answer, solution = pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
-    np.testing.assert_array_equal(answer.reached, solution.status == pf.Status.REACHED)
-    assert 0 < answer.reached.sum() < len(wanted)
-    np.testing.assert_allclose(answer.actuators[answer.reached], solution.actuators[answer.reached], rtol=0, atol=1e-9)
 
 
 def test_the_solver_reaches_every_redundant_target_that_the_closed_form_reaches() -> None:
@@ -175,71 +142,21 @@ def test_redundant_answers_close_and_keep_every_limit() -> None:
             np.testing.assert_allclose(values[:, column(strut.slide.name)], length, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("case", ["gsp_conroy", "gsp_linuxcnc_home"])
-def test_published_lengths_are_met(case: str) -> None:
-    published = PUBLISHED[case]
-    rows = published.get("rows_p_rpy_L") or [[published["p"], [0, 0, 0], published["L"]]]
-    mechanism = published_gough(case, rows[0][0])
-    wanted = [pf.pose(p, rpy=rpy) for p, rpy, _ in rows]
-    answer = pf.geometric.solve_ik(mechanism, wanted)
-    tolerance = published.get("tol", 1e-4)
-    np.testing.assert_allclose(answer.actuators, [lengths for *_, lengths in rows], rtol=0, atol=tolerance)
-    assert answer
+# --- branches of cranks ----------------------------------------------------------------------------------------------
 
 
-# --- branches --------------------------------------------------------------------------------------------------------
-
-
-def leg_modes(mechanism: Mechanism, tips: oracles.Array) -> tuple[oracles.Array, oracles.Array]:
-    """Crank angles of the legs of a 5-bar on home's side and on the other, (n, legs, 2), and how well they are kept."""
-    legs = oracles._cranks(mechanism)
-    values = np.stack([leg.solve(tips)[0][:, :, 0] for leg in legs], axis=1)
-    return values, np.stack([leg.margins(tips) for leg in legs], axis=1)
-
-
-def test_a_leg_takes_its_other_branch_where_homes_breaks_a_limit_and_only_there() -> None:
-    """Elbows that may bend to both sides."""
-    limits = {"p1": (-3.0, 3.0), "p5": (-3.0, 3.0), "p2": (-1.7, 2.5), "p4": (-2.5, 1.7)}
-    mechanism = relimited(pf.load("five_bar"), **limits)
-    wanted = some_targets(mechanism)
-    answer = pf.geometric.solve_ik(mechanism, wanted)
-    values, margins = leg_modes(mechanism, wanted[:, :3, 3])
-    clear = (abs(margins) > ON_THE_EDGE).all(axis=(1, 2))
-    kept = margins > 0
-    np.testing.assert_array_equal(answer.reached[clear], kept.any(axis=2).all(axis=1)[clear])
-    taken = np.where(kept[..., 0], values[..., 0], values[..., 1])
-    rows = answer.reached & clear
-    np.testing.assert_allclose(answer.actuators[rows], taken[rows], rtol=0, atol=1e-9)
-    assert (~kept[rows][..., 0]).any()
-    assert kept[rows].all(axis=2).any()
-    assert not answer.reached.all()
-
-
-@pytest.mark.parametrize("elbow", [(-3.4, -1.2), (-5.0, -1.0), (-6.0, 0.2), (-1.6, 4.2), (-7.0, 1.0), None])
-@pytest.mark.parametrize("crank", [(-0.5, 4.5), (-6.5, 0.4), (-8.0, 8.0), None])
-def test_ranges_wider_than_half_a_turn_allow_what_the_oracle_says(elbow: Any, crank: Any) -> None:
-    """An elbow may have two intervals of bends; a crank counts where its range has it."""
-    mechanism = relimited(pf.load("five_bar"), p1=crank, p5=None, p2=elbow, p4=None)
+@pytest.mark.parametrize(
+    "elbow", [(-3.4, -1.2), (-5.0, -1.0), (-6.0, 0.2), (-1.6, 4.2), (-7.0, 1.0), (-1.7, 2.5), None]
+)
+@pytest.mark.parametrize("crank", [(-0.5, 4.5), (-6.5, 0.4), (-8.0, 8.0), (-3.0, 3.0), None])
+def test_a_leg_takes_its_other_branch_where_homes_breaks_a_limit_and_only_there(elbow: Any, crank: Any) -> None:
+    """As leg by leg in NumPy; an elbow may have two intervals of bends, and a crank counts where its range has it."""
+    mechanism = relimited(pf.load("five_bar"), p1=crank, p5=(-3.0, 3.0), p2=elbow, p4=(-2.5, 1.7))
     wanted = some_targets(mechanism, 500)
-    answer = pf.geometric.solve_ik(mechanism, wanted)
-    kept = np.ones((len(wanted), 2), bool)
-    reached = np.ones(len(wanted), bool)
-    for leg in oracles._cranks(mechanism):
-        values, reach = leg.solve(wanted[:, :3, 3])
-        own = np.tile(reach[:, None] >= 0, 2)
-        for k, joint in enumerate((leg.shoulder, leg.elbow)):
-            turns = values[:, :, k, None] + 2 * np.pi * np.arange(-3, 4)
-            low, high = joint.range or (-np.inf, np.inf)
-            own &= ((turns >= low) & (turns <= high)).any(axis=2)
-        kept &= own
-        reached &= own.any(axis=1)
-    np.testing.assert_array_equal(answer.reached, reached)
-    home = kept[:, 0]
-    assert home.any()
-    inside = answer.actuators[reached][:, 0]
-    assert crank is None or ((inside >= crank[0]) & (inside <= crank[1])).all()
-    solution = pf.solve_ik(mechanism, wanted, options=pf.Options(working_mode="keep"))
-    np.testing.assert_allclose(answer.actuators[home], solution.actuators[home], rtol=0, atol=1e-9)
+    answer, expected = pf.geometric.solve_ik(mechanism, wanted), by_leg.solve_ik(mechanism, wanted)
+    np.testing.assert_array_equal(answer.reached, expected.reached)
+    assert answer.reached.any()
+    np.testing.assert_allclose(answer.actuators, expected.actuators, rtol=0, atol=1e-9)
 
 
 def five_bar(crank: float = 100.0, forearm: float = 100.0, stretched: bool = False) -> Mechanism:
@@ -276,17 +193,24 @@ def test_a_tip_off_its_plane_is_not_reached() -> None:
     assert not pf.geometric.solve_ik(mechanism, [90, 80, -2 * slack])
 
 
-def test_a_tip_on_its_shoulder_leaves_the_crank_where_home_has_it() -> None:
-    answer = pf.geometric.solve_ik(five_bar(), [0.0, 0, 0])
-    assert answer
-    assert answer.actuators[0] == 0.0
-
-
-def test_a_leg_that_is_stretched_at_home_bends_to_the_left() -> None:
+def test_where_a_leg_has_no_side_the_branch_is_the_documented_one() -> None:
+    on_shoulder = pf.geometric.solve_ik(five_bar(), [0.0, 0, 0])
+    assert on_shoulder
+    assert on_shoulder.actuators[0] == 0.0  # every angle serves: home's
     mechanism = five_bar(stretched=True)
-    answer = pf.geometric.solve_ik(mechanism, 0.9 * np.array(mechanism.reference_point))
-    assert answer
-    assert answer.actuators[0] == pytest.approx(np.arccos(0.9))
+    bent = pf.geometric.solve_ik(mechanism, 0.9 * np.array(mechanism.reference_point))
+    assert bent
+    assert bent.actuators[0] == pytest.approx(np.arccos(0.9))  # home is stretched: to the left
+
+
+def test_a_tip_has_no_orientation() -> None:
+    bar = pf.load("five_bar")
+    wanted = some_targets(bar, 100)
+    turned = wanted.copy()
+    turned[:, :3, :3] = Rotation.random(len(wanted), random_state=1).as_matrix()
+    np.testing.assert_array_equal(
+        pf.geometric.solve_ik(bar, turned).actuators, pf.geometric.solve_ik(bar, wanted).actuators
+    )
 
 
 # --- redundant coordinates -------------------------------------------------------------------------------------------
@@ -299,34 +223,34 @@ def grid_of(mechanism: Mechanism) -> oracles.Array:
     return np.stack(np.meshgrid(*sides, indexing="ij")).reshape(2, -1).T
 
 
-@pytest.mark.parametrize("seeded", [False, True])
-def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(seeded: bool) -> None:
+@pytest.mark.parametrize("started", [False, True])
+def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(started: bool) -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism, 200, seed=2)
     column = mechanism.actuator_names.index
-    seeds = np.tile([mechanism.home_coordinate(name) for name in mechanism.actuator_names], (len(wanted), 1))
-    if seeded:
+    starts = np.tile([mechanism.home_coordinate(name) for name in mechanism.actuator_names], (len(wanted), 1))
+    if started:
         rng = np.random.default_rng(4)
         for arm in oracles._arms(mechanism):
             for joint in (arm.hinge, arm.slide):
-                seeds[:, column(joint.name)] = rng.uniform(*joint.range, len(wanted))
-    answer = pf.geometric.solve_ik(mechanism, wanted, start=SimpleNamespace(actuators=seeds) if seeded else None)
+                starts[:, column(joint.name)] = rng.uniform(*joint.range, len(wanted))
+    answer = pf.geometric.solve_ik(mechanism, wanted, start=SimpleNamespace(actuators=starts) if started else None)
     grid = grid_of(mechanism)
     found = np.ones(len(wanted), bool)
     stayed = 0
     for arm in oracles._arms(mechanism):
         columns = [column(arm.hinge.name), column(arm.slide.name)]
         size = np.ptp([arm.hinge.range, arm.slide.range], axis=1)
-        keeps = arm.lines(wanted, seeds[:, columns[0]]).slack(seeds[:, columns[1]]) >= 0
+        keeps = arm.lines(wanted, starts[:, columns[0]]).slack(starts[:, columns[1]]) >= 0
         stayed += keeps.sum()
         for row, target in enumerate(wanted):
-            options = seeds[row : row + 1, columns]
+            options = starts[row : row + 1, columns]
             if not keeps[row]:
                 feasible = arm.lines(np.tile(target, (len(grid), 1, 1)), grid[:, 0]).slack(grid[:, 1]) >= -1e-9
                 options = grid[feasible]
             found[row] &= len(options) > 0
             if answer.reached[row]:
-                distance = (((options - seeds[row, columns]) / size) ** 2).sum(axis=1)
+                distance = (((options - starts[row, columns]) / size) ** 2).sum(axis=1)
                 taken = options[np.isclose(distance, distance.min(), rtol=1e-9)]
                 assert np.isclose(taken, answer.actuators[row, columns], rtol=0, atol=1e-12).all(axis=1).any()
     np.testing.assert_array_equal(answer.reached, found)
@@ -334,23 +258,16 @@ def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(seeded: bool)
     assert 0 < found.sum() < len(wanted)
 
 
-def test_an_answer_as_seed_keeps_its_redundant_coordinates() -> None:
+def test_an_answer_as_start_keeps_its_redundant_coordinates() -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism, 400)
-    first = pf.geometric.solve_ik(mechanism, wanted)
-    wanted = wanted[first.reached]
-    first = pf.geometric.solve_ik(mechanism, wanted)
-    for again in (
-        pf.geometric.solve_ik(mechanism, wanted, start=first),
-        pf.geometric.solve_ik(mechanism, wanted, start=SimpleNamespace(actuators=first.actuators.tolist())),
-    ):
-        np.testing.assert_allclose(again.actuators, first.actuators, rtol=0, atol=1e-9)
-    solution = pf.solve_ik(mechanism, wanted)
-    from_solution = pf.geometric.solve_ik(mechanism, wanted, start=solution)
-    np.testing.assert_allclose(from_solution.actuators, solution.actuators, rtol=0, atol=1e-6)
+    wanted = wanted[pf.geometric.solve_ik(mechanism, wanted).reached]
+    for first in (pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)):
+        again = pf.geometric.solve_ik(mechanism, wanted, start=first)
+        np.testing.assert_allclose(again.actuators, first.actuators, rtol=0, atol=1e-6)
 
 
-def test_a_single_seed_serves_every_row_as_it_serves_one() -> None:
+def test_a_single_start_serves_every_row_as_it_serves_one() -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism, 400)
     near = pf.geometric.solve_ik(mechanism, pf.pose([30, 20, 215]))
@@ -362,7 +279,7 @@ def test_a_single_seed_serves_every_row_as_it_serves_one() -> None:
         np.testing.assert_array_equal(single.actuators, batch.actuators[row])
 
 
-def test_a_seed_out_of_range_does_not_stay() -> None:
+def test_a_start_out_of_range_does_not_stay() -> None:
     mechanism = pf.load("nrpm")
     home = pf.geometric.solve_ik(mechanism, mechanism.home_pose).actuators
     for joint, value, slack in (("A1", np.radians(135), 1e-9), ("B2", 130.0, 1e-9 * mechanism.characteristic_length)):
@@ -370,11 +287,11 @@ def test_a_seed_out_of_range_does_not_stay() -> None:
         wide = wide.with_limits(dict.fromkeys(("CL1", "CR1", "EL1", "ER1", "CL2", "CR2", "EL2", "ER2")))
         column = mechanism.actuator_names.index(joint)
         for beyond, stays in ((0.5 * slack, True), (2 * slack, False)):
-            seed = home.copy()
-            seed[column] = value + beyond
-            answer = pf.geometric.solve_ik(wide, mechanism.home_pose, start=SimpleNamespace(actuators=seed))
+            start = home.copy()
+            start[column] = value + beyond
+            answer = pf.geometric.solve_ik(wide, mechanism.home_pose, start=SimpleNamespace(actuators=start))
             assert answer
-            assert (answer.actuators[column] == seed[column]) == stays
+            assert (answer.actuators[column] == start[column]) == stays
             assert answer.actuators[column] == pytest.approx(value)
 
 
@@ -523,16 +440,6 @@ def test_arms_and_cranks_may_be_described_from_their_other_end() -> None:
         np.testing.assert_allclose(answer.actuators, expected, rtol=0, atol=1e-9)
 
 
-def test_an_arm_may_count_downwards() -> None:
-    """Candidates that are equally near come in another order: another answer, but none that breaks a limit."""
-    backwards = {"connects": ("arm3", "base"), "home": -np.radians(90), "range": tuple(-np.radians([135, 45]))}
-    nrpm, other = pf.load("nrpm"), redescribed(pf.load("nrpm"), A3=backwards)
-    wanted = some_targets(nrpm, 400)
-    answer = pf.geometric.solve_ik(other, wanted)
-    np.testing.assert_array_equal(answer.reached, pf.geometric.solve_ik(nrpm, wanted).reached)
-    assert (arm_slacks(other, wanted[answer.reached], answer.actuators[answer.reached]) > -ON_THE_EDGE).all()
-
-
 def test_bodies_that_are_fixed_to_the_base_count_as_the_base() -> None:
     stewart = pf.load("stewart")
     mount = {"connects": ("mount", "cylinderL1"), "cone": Cone((0, 0, 1), np.radians(50), "mount")}
@@ -551,17 +458,17 @@ def test_a_batch_is_answered_row_by_row(name: str) -> None:
     mechanism = pf.load(name)
     wanted = some_targets(mechanism, 300)[: 2 * (len(some_targets(mechanism, 300)) // 2)]
     flat = pf.geometric.solve_ik(mechanism, wanted)
-    assert flat.shape == (len(wanted),)
+    assert flat.reached.shape == (len(wanted),)
     assert not flat
     np.testing.assert_array_equal(
         np.isnan(flat.actuators), np.tile(~flat.reached, (len(mechanism.actuator_names), 1)).T
     )
     folded = pf.geometric.solve_ik(mechanism, wanted.reshape(2, -1, 4, 4))
-    assert folded.shape == folded.reached.shape == (2, len(wanted) // 2)
+    assert folded.reached.shape == (2, len(wanted) // 2)
     np.testing.assert_array_equal(folded.actuators.reshape(flat.actuators.shape), flat.actuators)
     for row in range(0, len(wanted), 29):
         single = pf.geometric.solve_ik(mechanism, wanted[row])
-        assert single.shape == ()
+        assert single.actuators.shape == flat.actuators.shape[1:]
         assert single.reached is bool(flat.reached[row]) is bool(single)
         np.testing.assert_array_equal(single.actuators, flat.actuators[row])
 
@@ -584,24 +491,6 @@ def test_targets_come_in_every_form_that_the_solver_takes(name: str) -> None:
     )
     if not INTERPRETED:
         assert len(closed_form(mechanism).kernel.signatures) == 1
-
-
-def test_an_empty_batch_has_an_empty_answer() -> None:
-    answer = pf.geometric.solve_ik(pf.load("stewart"), np.empty((0, 4, 4)))
-    assert answer.reached.shape == (0,)
-    assert answer.actuators.shape == (0, 6)
-
-
-@pytest.mark.skipif(INTERPRETED, reason="slow")
-def test_blocks_on_several_cores_answer_as_one() -> None:
-    mechanism = pf.load("nrpm")
-    wanted = np.tile(some_targets(mechanism, 1000), (9, 1, 1))
-    answer = pf.geometric.solve_ik(mechanism, wanted)
-    np.testing.assert_array_equal(answer.actuators[:1000], answer.actuators[-1000:])
-    rows = pf.geometric.solve_ik(
-        mechanism, wanted, start=SimpleNamespace(actuators=np.tile(closed_form(mechanism).home, (9000, 1)))
-    )
-    np.testing.assert_array_equal(rows.actuators, answer.actuators)
 
 
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # of interpreted kernels
@@ -653,36 +542,15 @@ def test_no_target_is_too_far_to_be_missed(name: str, distance: float) -> None:
         assert np.isnan(answer.actuators).all() == (not may_reach)
 
 
-@pytest.mark.parametrize("name", ["serial_planar", "serial_spherical"])
-def test_other_topologies_are_said_to_have_no_closed_form(name: str) -> None:
-    mechanism = MACHINES[name]()
-    with pytest.raises(NoClosedForm) as caught:
-        pf.geometric.solve_ik(mechanism, mechanism.home_pose)
-    error = caught.value
-    assert isinstance(error, ValueError)
-    assert error.mechanism == mechanism.name
-    assert error.sub_chains == tuple(map(str, pf.decompose(mechanism)))
-    expected = (mechanism.name, *error.sub_chains, *EXAMPLES, *(drive.chain for drive in DRIVES))
-    assert [part in str(error) for part in expected].count(False) == 0
-    assert vars(pickle.loads(pickle.dumps(error))) == vars(error)
-
-
 STEWART, FIVE_BAR = pf.load("stewart"), pf.load("five_bar")
 
 
-def measured_from(weld: str) -> list[Joint]:
-    """The joints of a 6-UPS, one of whose struts stands on a mount and is measured from where that is welded on."""
-    changes = {"AL1": {"connects": ("base", "mount"), "cone": None}, "BL1": {"along": (weld, "CL1"), "range": None}}
-    changes["CL1"] = {"cone": None}
-    return [dataclasses.replace(joint, **changes.get(joint.name, {})) for joint in STEWART.joints]
-
-
-def two_struts(cone: Cone | None = None, tip: bool = False) -> Mechanism:
+def two_struts(tip: bool = False) -> Mechanism:
     """Two struts on a platform that they do not hold, or that meet at a tip."""
     joints = []
     for i, foot in enumerate(([0, 0, 0], [200, 30, 0]), 1):
         joints += [
-            Joint(f"A{i}", "universal", ("base", f"c{i}"), at=foot, cone=cone if i == 1 else None),
+            Joint(f"A{i}", "universal", ("base", f"c{i}"), at=foot),
             Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", "T" if tip else f"C{i}"), actuated=True),
             Joint(f"C{i}", "spherical", (f"r{i}", "platform"), at=(80 + 20 * i, 60, 250)),
         ]
@@ -692,90 +560,57 @@ def two_struts(cone: Cone | None = None, tip: bool = False) -> Mechanism:
     return Mechanism("two struts", joints, "T" if tip else "platform", None if tip else (100, 60, 250))
 
 
+def spinning() -> Mechanism:
+    """A 6-UPS with a driven tool that hangs beside the way to its platform."""
+    tool = [
+        Joint(f"spin{k}", "revolute", bodies, at=(0, 0, 200), axis=(0, 0, 1), actuated=k == 1)
+        for k, bodies in enumerate((("platform", "tool"), ("tool", "platform")), 1)
+    ]
+    return dataclasses.replace(STEWART, joints=(*STEWART.joints, *tool))
+
+
 UNSUITABLE = {
-    "the cone of A1 turns with a rod that is free to spin": lambda: redescribed(
-        two_struts(Cone((1, 0, 0), 0.9, "c1")), A1={"type": "spherical"}
+    "another topology": lambda: pf.load("delta"),
+    "the cone of A1 turns with its strut": lambda: redescribed(two_struts(), A1={"cone": Cone((1, 0, 0), 0.9, "c1")}),
+    "A1 has ranges about two axes": lambda: redescribed(
+        two_struts(), A1={"axes": ((-60, 100, 0), (0, 0, 1)), "range": ((-1, 1), (-1, 1))}
     ),
-    "BL1 does not point along": lambda: redescribed(
+    "BL1 does not point along its strut": lambda: redescribed(
         STEWART, BL1={"along": None, "axis": (0, 0, 1), "range": (-10, 10)}
     ),
-    "A1 and B1 are not quite parallel": lambda: redescribed(pf.load("rrr"), B1={"axis": (1e-7, 0, 1)}),
+    "its end effector is a joint": lambda: two_struts(tip=True),
     "the range of p3 ties its legs together": lambda: redescribed(FIVE_BAR, p3={"range": (-1, 1)}),
     "its axes are not all parallel": lambda: redescribed(FIVE_BAR, p2={"axis": (1, 0.01, 0)}),
-    "actuated joint spin1 is in no sub-chain": lambda: dataclasses.replace(
-        STEWART,
-        joints=(
-            *STEWART.joints,
-            *(
-                Joint(f"spin{k}", "revolute", bodies, at=(0, 0, 200), axis=(0, 0, 1), actuated=k == 1)
-                for k, bodies in enumerate((("platform", "tool"), ("tool", "platform")), 1)
-            ),
-        ),
-    ),
-    "J1, J2, J3, J4 drive one leg": lambda: pf.load("serial_arm"),
+    "actuated joint spin1 is in no sub-chain": spinning,
     "its task leaves out a part of the pose": lambda: dataclasses.replace(pf.load("nrpm"), task=("z", "tilt")),
-    "what follows from x, y has no closed form here": lambda: dataclasses.replace(pf.load("rrr"), task=("x", "y")),
-    "fewer than three of its legs stay in a plane": lambda: dataclasses.replace(STEWART, task=("z", "tilt")),
-    "no point of its end effector rests": lambda: dataclasses.replace(pf.load("prs"), task=("rotation",)),
 }
 
 
 @pytest.mark.parametrize("reason", UNSUITABLE)
-def test_what_is_not_covered_is_said(reason: str) -> None:
+def test_what_has_no_closed_form_is_told_what_has(reason: str) -> None:
     mechanism = UNSUITABLE[reason]()
-    with pytest.raises(NoClosedForm, match=re.escape(reason)):
+    with pytest.raises(NoClosedForm, match=re.escape(reason)) as caught:
         pf.geometric.solve_ik(mechanism, mechanism.home_pose)
-
-
-COVERED = {
-    "a cone that turns with its strut": lambda: two_struts(Cone((1, 0, 0), 0.9, "c1")),
-    "ranges about the two axes of a universal joint": lambda: redescribed(
-        STEWART, AL1={"cone": None, "axes": ((3, 0, 0.6 * 100 / 65), (0, 1, 0)), "range": ((-0.1, 0.1), (-0.2, 0.1))}
-    ),
-    "a strut measured from where its cylinder is welded on": lambda: dataclasses.replace(
-        STEWART, joints=(Joint("weld", "fixed", ("mount", "cylinderL1"), at=(88, 24, 39)), *measured_from("weld"))
-    ),
-    "struts that meet at a tip": lambda: two_struts(tip=True),
-}
-
-
-@pytest.mark.parametrize("what", COVERED)
-def test_right_chains_with_something_else_are_solved_leg_by_leg(what: str) -> None:
-    mechanism = COVERED[what]()
-    assert closed_form(mechanism).kernel is None
-    rng, n = np.random.default_rng(3), 20 if INTERPRETED else 300
-    wanted = oracles.poses(mechanism.reference_point + rng.uniform(-40, 40, (n, 3)))
-    wanted[:, :3, :3] = Rotation.from_rotvec(rng.normal(0, 0.15, (n, 3))).as_matrix()
-    answer, solution = pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
-    np.testing.assert_array_equal(answer.reached, solution.status == pf.Status.REACHED)
-    assert answer.reached.any()
-    np.testing.assert_allclose(answer.actuators[answer.reached], solution.actuators[answer.reached], rtol=0, atol=1e-8)
+    error = caught.value
+    assert (error.mechanism, error.sub_chains) == (mechanism.name, tuple(map(str, pf.decompose(mechanism))))
+    assert [part in str(error) for part in (mechanism.name, *error.sub_chains, *EXAMPLES)].count(False) == 0
+    assert vars(pickle.loads(pickle.dumps(error))) == vars(error)
 
 
 def test_wrong_calls_are_told() -> None:
     stewart = pf.load("stewart")
-    for mechanism, target, seed, argument in (
+    for mechanism, target, start, argument in (
         ("stewart", [0, 0, 190], None, "mechanism"),
         (stewart, [0, 190], None, "target"),
         (stewart, "up", None, "target"),
-        (stewart, [0, 0, 190], "home", "seed"),
-        (stewart, [0, 0, 190], SimpleNamespace(actuators=[1, 2]), "seed"),
-        (stewart, [[0, 0, 190]] * 3, SimpleNamespace(actuators=np.ones((2, 6))), "seed"),
-        (stewart, [0, 0, 190], pf.geometric.solve_ik(stewart, [0, 0, 1e4]), "seed"),
+        (stewart, [0, 0, 190], "home", "start"),
+        (stewart, [0, 0, 190], SimpleNamespace(actuators=[1, 2]), "start"),
+        (stewart, [[0, 0, 190]] * 3, SimpleNamespace(actuators=np.ones((2, 6))), "start"),
+        (stewart, [0, 0, 190], pf.geometric.solve_ik(stewart, [0, 0, 1e4]), "start"),
     ):
         with pytest.raises(InvalidArgument) as caught:
-            pf.geometric.solve_ik(mechanism, target, start=seed)
+            pf.geometric.solve_ik(mechanism, target, start=start)
         assert caught.value.argument == argument
-
-
-def test_an_answer_is_frozen_and_its_own() -> None:
-    stewart = pf.load("stewart")
-    answer = pf.geometric.solve_ik(stewart, stewart.home_pose)
-    assert isinstance(answer, Geometric)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        answer.reached = False
-    answer.actuators[:] = 0.0
-    assert pf.geometric.solve_ik(stewart, stewart.home_pose).actuators == pytest.approx([205] * 6)
 
 
 # --- the cache -------------------------------------------------------------------------------------------------------
@@ -805,22 +640,10 @@ def test_an_edit_beside_a_closed_form_or_in_the_kernels_makes_its_cache_stale(
     caller = tmp_path / "closed" / "caller.py"
     caller.write_text("def double(x):\n    return 2.0 * x\n")
     monkeypatch.setenv("NUMBA_CACHE_DIR", "")
-    hits = []
+    kernels = []  # all kept: a module that cannot be imported by name is found only while one of them lives
     for _ in range(2):
         for _again in range(2):
-            double = load(tmp_path / "kernels" / "_jit.py").kernel(load(caller).double)
-            assert double(2.0) == 4.0
-            hits.append(sum(double.stats.cache_hits.values()))
+            kernels.append(load(tmp_path / "kernels" / "_jit.py").kernel(load(caller).double))
+            assert kernels[-1](2.0) == 4.0
         (tmp_path / edited).write_text("# edited\n")
-    assert hits == [0, 1, 0, 1]
-
-
-def test_turned_targets_turn_nothing_that_has_no_orientation() -> None:
-    """A tip is a point: what orientation its target has does not matter."""
-    bar = pf.load("five_bar")
-    wanted = some_targets(bar, 100)
-    turned = wanted.copy()
-    turned[:, :3, :3] = Rotation.random(len(wanted), random_state=1).as_matrix()
-    np.testing.assert_array_equal(
-        pf.geometric.solve_ik(bar, turned).actuators, pf.geometric.solve_ik(bar, wanted).actuators
-    )
+    assert [sum(double.stats.cache_hits.values()) for double in kernels] == [0, 1, 0, 1]

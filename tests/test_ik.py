@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-import checking
+import checks
 import oracles
 import pfabrik as pf
 from machines import MACHINES
@@ -33,8 +33,8 @@ def assert_feasible(mechanism: pf.Mechanism, answer: pf.Solution) -> None:
     assert np.max(answer.status) <= pf.Status.PROJECTED
     assert np.max(answer.residual) <= 1e-9 * mechanism.characteristic_length
     assert np.max(answer.limit_excess) <= 1e-9
-    assert np.max(checking.worst_gap(mechanism, answer)) <= 1e-9
-    assert np.max(checking.worst_excess(mechanism, answer)) <= 1e-9
+    assert np.max(checks.gap_of_points(mechanism, answer)) <= 1e-9
+    assert np.max(checks.excess_of_points(mechanism, answer)) <= 1e-9
 
 
 def assert_same_as_closed_form(machine: pf.Mechanism, targets: np.ndarray, answer: pf.Solution) -> None:
@@ -44,15 +44,10 @@ def assert_same_as_closed_form(machine: pf.Mechanism, targets: np.ndarray, answe
     assert_feasible(machine, answer)
 
 
-def test_reached_exactly_where_the_closed_form_says(machine: pf.Mechanism) -> None:
-    targets = oracles.random_targets(machine, np.random.default_rng(1), 40 if INTERPRETED else 1000)
-    assert_same_as_closed_form(machine, targets, pf.solve_ik(machine, targets))
-
-
-@pytest.mark.slow
-def test_reached_exactly_where_the_closed_form_says_for_10000_targets_cold_and_warm(machine: pf.Mechanism) -> None:
-    rng = np.random.default_rng(2)
-    targets = oracles.random_targets(machine, rng, 10_000)
+@pytest.mark.parametrize("count", [40 if INTERPRETED else 1000, pytest.param(10_000, marks=pytest.mark.campaign)])
+def test_reached_exactly_where_the_closed_form_says_cold_and_warm(machine: pf.Mechanism, count: int) -> None:
+    rng = np.random.default_rng(count)
+    targets = oracles.random_targets(machine, rng, count)
     cold = pf.solve_ik(machine, targets)
     assert_same_as_closed_form(machine, targets, cold)
     seeds = cold[rng.permutation(len(targets))]
@@ -60,23 +55,22 @@ def test_reached_exactly_where_the_closed_form_says_for_10000_targets_cold_and_w
     assert_same_as_closed_form(machine, targets, warm)
 
 
-def test_status_is_right_on_both_sides_of_the_boundary(machine: pf.Mechanism) -> None:
-    """Targets a millionth of L inside and outside the edge, found by bisection on the closed form."""
+@pytest.mark.parametrize("count", [30, pytest.param(200, marks=pytest.mark.campaign)])
+def test_status_is_right_on_both_sides_of_the_boundary(machine: pf.Mechanism, count: int) -> None:
+    """Targets a millionth of L inside and outside the edge, by the closed form."""
     rng = np.random.default_rng(3)
-    outward = rng.normal(size=(30 if INTERPRETED else 200, 3)) * ([0, 1, 1] if machine.name.startswith("Planar") else 1)
+    outward = rng.normal(size=(count, 3)) * ([0, 1, 1] if machine.name.startswith("Planar") else 1)
     outward /= np.linalg.norm(outward, axis=1)[:, None]
     home, length = np.array(machine.reference_point), machine.characteristic_length
 
     def targets(distance: np.ndarray) -> np.ndarray:
         return oracles.poses(home + distance[:, None] * outward)
 
-    low, high = np.zeros(len(outward)), np.full(len(outward), 10 * length)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        inside = oracles.margin(machine, targets(middle)) >= 0
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    within = pf.solve_ik(machine, targets(low - 1e-6 * length))
-    beyond = pf.solve_ik(machine, targets(low + 1e-6 * length))
+    farthest, width = np.full(count, 10 * length), 1e-7 * length
+    edge = oracles.edge(lambda distance: oracles.margin(machine, targets(distance)), farthest, width)
+    inner, outer = targets(edge - 1e-6 * length), targets(edge + 1e-6 * length)
+    assert (oracles.margin(machine, inner) >= 0).all() and (oracles.margin(machine, outer) < 0).all()
+    within, beyond = pf.solve_ik(machine, inner), pf.solve_ik(machine, outer)
     assert (within.status == pf.Status.REACHED).all()
     assert (beyond.status == pf.Status.PROJECTED).all()
     assert np.median(beyond.position_error) <= 1.1e-6 * length
@@ -96,7 +90,6 @@ _scales = st.sampled_from([0.0, 0.03, 0.3, 1.0, 10.0, 1e6, 1e150])
 
 
 @pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
-@settings(max_examples=4 if INTERPRETED else 40, deadline=None)
 @given(direction=st.tuples(_numbers, _numbers, _numbers), scale=_scales, turn=st.tuples(*[st.floats(-3.2, 3.2)] * 3))
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 def test_limits_are_kept_and_loops_closed_for_any_finite_target(

@@ -1,6 +1,7 @@
 """The routines that kernels are made of, one by one, against NumPy, SciPy, brute force and finite differences.
 
-Routines are only callable from compiled code: each is called through a kernel of its own here.
+Routines are only callable from compiled code: each is called through a kernel of its own here. To compile these takes
+longer than all else, so `make test` runs them as plain Python, and a campaign compiled.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-import checking
+import checks
 import pfabrik as pf
 from machines import MACHINES, ring
 from pfabrik import Cone, Joint, Mechanism
@@ -28,7 +29,10 @@ from pfabrik.kernels.reaching import passes as reach
 from pfabrik.kernels.reaching import plan as P
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),
+    *([] if INTERPRETED else [pytest.mark.campaign]),
+]
 
 TURN, TRANSLATE, BOTH, NEITHER = settle.TURNS, settle.TRANSLATES, settle.TURNS | settle.TRANSLATES, 0
 
@@ -750,7 +754,7 @@ def test_settling_closes_the_loops(name: str) -> None:
             now.pose[:3, :3] = np.eye(3)
         free = TRANSLATE if compiled.plan.scalars[P.POINT_END] == 1.0 else BOTH
         assert settle_all(compiled.plan, free, now, work)
-        assert checking.worst_gap(mechanism, as_answer(compiled, now))[0] <= 1e-12
+        assert checks.gap_of_points(mechanism, as_answer(compiled, now))[0] <= 1e-12
         np.testing.assert_allclose(now.pose[:3, :3].T @ now.pose[:3, :3], np.eye(3), rtol=0, atol=1e-14)
 
 

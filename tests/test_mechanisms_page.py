@@ -17,12 +17,13 @@ from click.testing import CliRunner
 import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
 from pfabrik.cli import main
+from pfabrik.description.places import joint_places, slider_place
 from pfabrik.errors import InvalidArgument
 
 pytest.importorskip("matplotlib")
 from matplotlib.figure import Figure
 
-from pfabrik.view.drawing import around, draw, joint_places, rail_of, slider_place
+from pfabrik.view.drawing import around, draw, rail_of
 
 DOCS = Path(__file__).parents[1] / "docs"
 ADDING = (DOCS / "adding-a-mechanism.md").read_text(encoding="utf-8")
@@ -40,7 +41,7 @@ def generator() -> ModuleType:
 
 def places_of(mechanism: pf.Mechanism, solution: pf.Solution | None = None) -> dict[str, np.ndarray]:
     reference = mechanism.home_pose[:3, 3] if solution is None else solution.pose[:3, 3]
-    return joint_places(mechanism, solution, reference)
+    return joint_places(mechanism, None if solution is None else solution.points, reference)
 
 
 def gantry() -> pf.Mechanism:

@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from checking import worst_excess, worst_gap
-from nearest_oracles import Problem, drawn_targets, nearest
+from checks import excess_of_points, gap_of_points
+from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -65,8 +65,8 @@ def check_feasible(mechanism: Mechanism, targets: np.ndarray, answers: Solution)
     """Closed, within all limits, and finite: measured from the description alone, and by the closure engine."""
     assert np.isin(answers.status, (Status.REACHED, Status.PROJECTED)).all()
     assert all(np.isfinite(array).all() for array in (answers.pose, answers.actuators, *answers.joints.values()))
-    assert worst_gap(mechanism, answers).max() <= FEASIBLE
-    assert worst_excess(mechanism, answers).max() <= FEASIBLE
+    assert gap_of_points(mechanism, answers).max() <= FEASIBLE
+    assert excess_of_points(mechanism, answers).max() <= FEASIBLE
     assert pf.closure_residual(answers).max() <= FEASIBLE * mechanism.characteristic_length
     problems = [Problem(mechanism, target, None, answer) for target, answer in zip(targets, answers, strict=True)]
     assert max(problem.excess(problem.answer) for problem in problems) <= FEASIBLE
@@ -89,7 +89,7 @@ def test_limits_are_kept_and_loops_closed_however_far_the_target(name: str, hold
     check_anywhere(name, hold, few(name))
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "hold"), CASES)
 def test_limits_are_kept_and_loops_closed_however_far_any_target(name: str, hold: str | None) -> None:
     check_anywhere(name, hold, 300)
@@ -114,7 +114,7 @@ def test_no_feasible_pose_is_nearer(name: str, hold: str | None) -> None:
     assert gains(*projections(name, hold, few(name)), starts=1).max() <= SAME
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "hold"), CASES)
 def test_hardly_any_feasible_pose_is_nearer_and_none_by_much(name: str, hold: str | None) -> None:
     farther = gains(*projections(name, hold, 100, seed=1), starts=6)
@@ -353,7 +353,7 @@ def test_answers_come_nearer_as_their_limits_give_way(name: str, hold: str | Non
     check_multipliers(name, hold, 1 if INTERPRETED else 3, seed=4)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "hold"), CASES)
 def test_answers_come_nearer_as_any_of_their_limits_give_way(name: str, hold: str | None) -> None:
     check_multipliers(name, hold, 25, seed=5)

@@ -9,8 +9,8 @@ import pytest
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
-import oracles
 import pfabrik as pf
+from oracles import closed_forms as oracles
 from pfabrik.description.mechanism import Mechanism
 
 NAMES = ("five_bar", "stewart", "nrpm")

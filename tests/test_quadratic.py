@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
 from pfabrik.kernels._jit import kernel
 from pfabrik.kernels.qp import factorise, new_programme, solve_programme
+
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+pytestmark = [] if INTERPRETED else [pytest.mark.campaign]  # a kernel of its own, as in `test_kernels`
 
 
 @kernel

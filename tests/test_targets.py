@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import closure_machines
 import pfabrik as pf
+from machines import closure
 from pfabrik import Options, Status
 from pfabrik.errors import InvalidArgument
 
@@ -37,7 +37,7 @@ def test_coordinates_beyond_the_range_are_projected_to_it() -> None:
 
 def test_one_coordinate_counts_from_where_its_joint_does() -> None:
     """A hinge whose home is 0.3 rad, and a slide told from the platform's side, whose home is 7."""
-    hinge, slider = closure_machines.hinge(), closure_machines.slider()
+    hinge, slider = closure.hinge(), closure.slider()
     found = pf.solve_ik(hinge, {"R": [0.5, 1.9]})
     np.testing.assert_allclose(found.actuators[:, 0], [0.5, 1.9], atol=1e-9)
     np.testing.assert_allclose(found.pose[0, :3, :3], Rotation.from_rotvec([0, 0, 0.2]).as_matrix(), atol=1e-9)

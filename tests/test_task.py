@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import closure_machines
 import pfabrik as pf
+from machines import closure
 from pfabrik import Joint, Mechanism, Status
 from pfabrik.description.task import Task, task_of
 from pfabrik.errors import InvalidMechanism
@@ -74,11 +74,11 @@ def test_the_whole_pose_is_out_of_reach_where_the_task_is_not() -> None:
 @pytest.mark.parametrize(
     "build, task, freedoms",
     [
-        (closure_machines.delta, ("x", "y", "z"), 3),
-        (closure_machines.pinned_delta, ("x", "y", "z"), 3),
-        (closure_machines.orthoglide, ("x", "y", "z"), 3),
-        (closure_machines.ankle, ("tilt",), 2),
-        (closure_machines.tricept, ("x", "y", "z"), 3),
+        (closure.delta, ("x", "y", "z"), 3),
+        (closure.pinned_delta, ("x", "y", "z"), 3),
+        (closure.orthoglide, ("x", "y", "z"), 3),
+        (closure.ankle, ("tilt",), 2),
+        (closure.tricept, ("x", "y", "z"), 3),
         (rps, ("z", "tilt"), 3),
     ],
 )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import checking
+import checks
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik import Joint, Mechanism, Options, Status
@@ -64,8 +64,8 @@ def test_a_path_partly_out_of_reach_is_followed_as_far_as_it_goes(name: str) -> 
     length = machine.characteristic_length
     assert followed.residual.max() <= 1e-9 * length
     assert followed.limit_excess.max() <= 1e-9
-    assert checking.worst_gap(machine, followed).max() <= 1e-9
-    assert checking.worst_excess(machine, followed).max() <= 1e-9
+    assert checks.gap_of_points(machine, followed).max() <= 1e-9
+    assert checks.excess_of_points(machine, followed).max() <= 1e-9
 
 
 @pytest.mark.parametrize("name", [*CIRCLES, "hexapod_rus", "tripod_prs", "mixed"])
@@ -332,7 +332,7 @@ def test_links_that_were_stretched_out_beyond_reach_bend_back_the_way_they_did(m
     assert not followed.jumps.any()
     np.testing.assert_allclose(followed.actuators[-1], followed.actuators[0], rtol=0, atol=1e-9)
     np.testing.assert_allclose(followed.pose, followed.pose[::-1], rtol=0, atol=1e-5 * machine.characteristic_length)
-    assert checking.worst_excess(machine, followed).max() <= 1e-9
+    assert checks.excess_of_points(machine, followed).max() <= 1e-9
 
 
 def out_and_back(steps: int) -> np.ndarray:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import closure_machines
+import oracles_by_leg as by_leg
 import pfabrik as pf
-from machines import tripod_rps
+from machines import closure, tripod_rps
 from pfabrik import Joint, Mechanism, Options, Solution, Status
 from pfabrik.errors import InvalidArgument
 from pfabrik.tolerances import TOLERANCES
@@ -52,7 +52,7 @@ def test_closed_forms_reach_all_the_way_and_no_farther(name: str) -> None:
     for ray, far in zip(rays, distances, strict=True):
         steps = np.append(np.linspace(0.0, far, 100, endpoint=False), (far - beside, far + beside))
         way = np.array(mechanism.reference_point) + np.outer(steps, ray / np.linalg.norm(ray))
-        reached = pf.geometric.solve_ik(mechanism, way).reached
+        reached = by_leg.solve_ik(mechanism, way).reached
         np.testing.assert_array_equal(reached, [True] * 101 + [False])
 
 
@@ -166,7 +166,7 @@ def test_a_hexapod_goes_along_and_turns_about_a_point_until_its_tightest_limit_i
 
 
 def test_a_hinge_turns_about_its_own_axis_as_far_as_its_range_and_about_no_other_line() -> None:
-    machine = closure_machines.hinge()  # at (10, 0, 0), counted from 0.3, range -1 to 2
+    machine = closure.hinge()  # at (10, 0, 0), counted from 0.3, range -1 to 2
     home = home_of(machine)
     found = pf.travel(home, about=[2 * Z, -Z, X], pivot=(10, 0, 7))
     np.testing.assert_allclose(found.distances, [1.7, 1.3, 0.0], atol=1e-8)

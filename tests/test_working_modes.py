@@ -11,13 +11,13 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-import checking
-import closure_machines
-import fk_oracles
-import joint_checking
+import checks
 import machines
+import oracles_by_leg as by_leg
 import pfabrik as pf
-from pfabrik import Status, geometric
+from machines import closure
+from oracles import assembly
+from pfabrik import Status
 from pfabrik.errors import ContinuumOfSolutions, InvalidArgument, PfabrikError
 
 Z = (0.0, 0.0, 1.0)
@@ -41,7 +41,6 @@ def assert_modes(modes: Sequence[pf.Solution], target: np.ndarray) -> None:
         mechanism = mode.mechanism
         length = mechanism.characteristic_length
         assert pf.closure_residual(mode) <= 1e-9 * length
-        assert fk_oracles.joint_gap(mechanism, mode) <= 1e-8
         offset = np.abs(mode.pose - target)
         if not mechanism.end_effector_is_joint and "rotation" in mechanism.task:
             assert offset[:3, :3].max() <= 1e-9
@@ -50,11 +49,9 @@ def assert_modes(modes: Sequence[pf.Solution], target: np.ndarray) -> None:
         for axis, name in enumerate("xyz"):
             assert name not in mechanism.task or offset[axis, 3] <= 1e-9 * length
         assert mode.status is (pf.Status.REACHED if mode.limit_excess <= 1e-9 else pf.Status.EXCEEDED)
-        assert not mode or checking.worst_excess(mechanism, mode).max() <= 1.1e-9
-        if all(joint.axes is not None for joint in mechanism.joints if joint.type == "universal"):
-            assert joint_checking.worst_opening(mechanism, mode).max() <= 1e-9
-            excess = joint_checking.worst_excess(mechanism, mode).max()
-            assert abs(max(excess, 0.0) - mode.limit_excess) <= 1e-8
+        assert not mode or checks.excess_of_points(mechanism, mode).max() <= 1.1e-9
+        assert checks.gap_of_joints(mechanism, mode).max() <= 1e-9
+        assert abs(max(checks.excess_of_joints(mechanism, mode).max(), 0.0) - mode.limit_excess) <= 1e-8
         assert mode or any(limit.joint for limit in mode.active_limits)
     for one, other in combinations(modes[:64], 2):
         assert apart(one, other) > 1e-6
@@ -120,9 +117,7 @@ def test_a_planar_3rrr_has_eight_modes() -> None:
     for i in (1, 2, 3):
         a, b, c = (at(mechanism, f"{letter}{i}") * [1, 1, 0] for letter in "ABC")
         end = moved(mechanism, at(mechanism, f"C{i}"), target) * [1, 1, 0]
-        elbows = fk_oracles.circles_meet(
-            a, float(np.linalg.norm(b - a)), end, float(np.linalg.norm(c - b)), np.array(Z)
-        )
+        elbows = assembly.circles_meet(a, float(np.linalg.norm(b - a)), end, float(np.linalg.norm(c - b)), np.array(Z))
         home = np.arctan2(*(b - a)[1::-1])
         cranks.append([np.arctan2(*(elbow - a)[1::-1]) - home for elbow in elbows])
     modes = pf.working_modes(mechanism, target, most_starts=MOST)
@@ -150,7 +145,7 @@ def test_a_servo_hexapod_has_two_to_the_sixth() -> None:
 
 
 def delta_arms(mechanism: pf.Mechanism, target: np.ndarray) -> list:
-    """Arm angles of `closure_machines.delta` without a turn of its platform: the middles of paired rods are a rod."""
+    """Arm angles of `closure.delta` without a turn of its platform: the middles of paired rods are a rod."""
     arms = []
     for i in (1, 2, 3):
         elbow, wrist = (0.5 * (at(mechanism, f"{letter}{i}l") + at(mechanism, f"{letter}{i}r")) for letter in "BC")
@@ -161,7 +156,7 @@ def delta_arms(mechanism: pf.Mechanism, target: np.ndarray) -> list:
 
 @pytest.mark.slow
 def test_a_delta_has_eight_modes_with_its_platform_level() -> None:
-    mechanism = closure_machines.delta()
+    mechanism = closure.delta()
     target = pf.pose([20.0, -30.0, -230.0])
     modes = pf.working_modes(mechanism, target)
     assert_modes(modes, target)
@@ -171,7 +166,7 @@ def test_a_delta_has_eight_modes_with_its_platform_level() -> None:
 @pytest.mark.slow
 def test_what_a_task_leaves_open_is_found_too() -> None:
     """Only the position asked for: the eight modes with a level platform, and others with a turned one."""
-    whole = closure_machines.delta()
+    whole = closure.delta()
     mechanism = pf.Mechanism("delta", whole.joints, "platform", whole.reference_point, task=["x", "y", "z"])
     target = pf.pose([20.0, -30.0, -230.0])
     modes = pf.working_modes(mechanism, target)
@@ -399,7 +394,7 @@ def test_what_no_arm_is_long_enough_for_has_no_modes(name: str, position: tuple)
 @pytest.mark.parametrize("name", ["stewart", "rps"])
 def test_a_strut_has_a_mode_however_far_and_exceeds_its_stroke(name: str, away: float) -> None:
     modes = pf.working_modes(pf.load(name), (0, 0, away))
-    assert len(modes) == len(geometric.working_modes(pf.load(name), (0, 0, away)).actuators) > 0
+    assert len(modes) == len(by_leg.working_modes(pf.load(name), (0, 0, away)).actuators) > 0
     assert all(mode.status == Status.EXCEEDED for mode in modes)
 
 
@@ -469,7 +464,7 @@ SEEDED = {
         pf.pose([5, -8, 130], rpy=[0.05, 0.1, -0.15]),
         pf.pose([5.2, -8.1, 130.2], rpy=[0.051, 0.1, -0.15]),
     ),
-    "delta": (closure_machines.delta, pf.pose([20, -30, -230]), pf.pose([20.5, -30.3, -230.2])),
+    "delta": (closure.delta, pf.pose([20, -30, -230]), pf.pose([20.5, -30.3, -230.2])),
     "6R": (
         wrist_arm,
         wrist_arm_pose([0.3, 0.4, -0.2, 0.5, 0.7, 0.1]),

@@ -1,4 +1,20 @@
-"""pfabrik: the kinematics of parallel mechanisms, from a small file to exact, honest answers."""
+"""pfabrik: the kinematics of parallel mechanisms, from a small file to exact, honest answers.
+
+    import pfabrik as pf
+
+    m = pf.load("stewart")                       # a catalogue name (see pf.catalog()) or the path of a file
+    sol = pf.solve_ik(m, [10, 0, 190])           # REACHED, or PROJECTED to the nearest feasible pose
+    fk = pf.solve_fk(m, sol.actuators)           # from actuator values to the pose
+
+Describe   load, save, catalog; Mechanism, Joint, Cone, Leg
+Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, working_modes; pose, Options
+Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
+To first order   mobility, inverse_jacobian, forward_jacobian, singularity
+Structure  decompose, SubChain; geometric (closed forms of the paper's machines); errors
+
+Lengths are in the mechanism's own unit, angles in radians; a pose is a 4x4 matrix from platform to base coordinates;
+batch axes come first.
+"""
 
 from __future__ import annotations
 
@@ -44,6 +60,7 @@ _HOMES = {
     "forward_jacobian": "answers.differential",
     "singularity": "answers.differential",
     "solve_fk": "fk",
+    "warm_up": "warm_up",
 }
 # Modules that are themselves public.
 _MODULES = ("errors", "geometric")
@@ -84,6 +101,7 @@ __all__ = [
     "solve_ik",
     "track",
     "travel",
+    "warm_up",
     "working_modes",
 ]
 
@@ -109,6 +127,7 @@ if TYPE_CHECKING:
     from .poses import pose
     from .track import track
     from .travel import Travel, travel
+    from .warm_up import warm_up
 
 
 def __getattr__(name: str) -> Any:

@@ -7,8 +7,7 @@ from numpy.typing import ArrayLike
 
 from .answers.solution import Solution, Status
 from .answers.starts import joint_vectors
-from .closure.close import measured
-from .closure.nearest import CLOSED, is_feasible
+from .closure.close import CLOSED, measured
 from .description.mechanism import Mechanism
 from .engine import engine_of
 
@@ -33,6 +32,6 @@ def configuration(mechanism: Mechanism, q: ArrayLike) -> Solution:
     deviations, shape = joint_vectors(mechanism, q, "q")
     closing = measured(mechanism, deviations)
     found = engine_of(mechanism).at(closing)
-    within = np.where(is_feasible(closing), Status.REACHED, Status.EXCEEDED)
+    within = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
     found.rows.status[:] = np.where(closing.gap <= CLOSED, within, Status.FAILED)
     return Solution(mechanism, found, shape)

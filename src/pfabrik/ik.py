@@ -6,12 +6,17 @@ from .answers.solution import Solution, Wanted
 from .answers.starts import Start, start_of
 from .description.mechanism import Mechanism
 from .engine import engine_of
+from .errors import InvalidArgument
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
 
 
 def solve_ik(
-    mechanism: Mechanism, target: Target, *, start: Start | None = None, options: Options | None = None
+    mechanism: Mechanism,
+    target: Target,
+    *misplaced: object,
+    start: Start | None = None,
+    options: Options | None = None,
 ) -> Solution:
     """Actuator values that put the end effector on a target, or as near as possible, with every limit kept.
 
@@ -31,6 +36,9 @@ def solve_ik(
     ------
     InvalidArgument : a target or start of the wrong shape, or (unless marked) rows that are no poses.
     """
+    if misplaced:
+        expected = "one target, such as [x, y, z], and the rest by name: solve_ik(m, target, start=..., options=...)"
+        raise InvalidArgument("target", f"{1 + len(misplaced)} arguments", expected)
     options = checked_options(options)
     targets, shape = as_targets(mechanism, target)
     begin = start_of(mechanism, start, shape)

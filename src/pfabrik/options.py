@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import reprlib
+import sys
 from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Literal
 
-from .errors import InvalidArgument
+from .errors import InvalidArgument, UnknownName
 from .tolerances import TOLERANCES
 
 _CHOICES: dict[str, tuple[object, ...]] = {
@@ -57,6 +59,12 @@ class Options:
     actuator_tolerance: float = TOLERANCES.position
     on_invalid: Literal["raise", "mark"] = "raise"
 
+    def __new__(cls, *args: object, **given: object) -> Options:
+        for name in given:
+            if name not in cls.__dataclass_fields__:
+                raise UnknownName("option", name, cls.__dataclass_fields__)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         for name, choices in _CHOICES.items():
             if getattr(self, name) not in choices:
@@ -66,8 +74,8 @@ class Options:
         for name in ("tolerance", "rotation_tolerance", "rotation_length", "actuator_tolerance"):
             value = getattr(self, name)
             optional = name in ("tolerance", "rotation_length") and value is None
-            if not optional and not (_is_a(Real, value) and 0.0 < value < float("inf")):
-                raise InvalidArgument(f"options.{name}", repr(value), "a positive number")
+            if not optional and not (_is_a(Real, value) and 0.0 < value <= sys.float_info.max):
+                raise InvalidArgument(f"options.{name}", reprlib.repr(value), "a positive number")
         for name in ("max_iterations", "max_rounds"):
             value = getattr(self, name)
             if not (_is_a(Integral, value) and 1 <= value <= 1_000_000):

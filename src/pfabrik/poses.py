@@ -24,7 +24,7 @@ class SupportsMatrix(Protocol):
 
 def pose(
     xyz: ArrayLike,
-    *,
+    *misplaced: object,
     rpy: ArrayLike | None = None,
     rotvec: ArrayLike | None = None,
     quat_xyzw: ArrayLike | None = None,
@@ -53,6 +53,8 @@ def pose(
     given = [name for name, value in rotations.items() if value is not None]
     if len(given) > 1:
         raise InvalidArgument("pose", " and ".join(given), "at most one rotation")
+    if misplaced:
+        raise InvalidArgument("xyz", f"{1 + len(misplaced)} arguments", "one position: pose([x, y, z], rpy=...)")
     positions = _numbers("xyz", xyz, (3,))
     turned = np.eye(3)
     for name in given:
@@ -85,7 +87,9 @@ def _batch(shape: tuple[int, ...]) -> str:
 
 
 def as_floats(name: str, value: Any, expected: str) -> Floats:
-    """`value` as an array of float64; InvalidArgument for text, ragged nests, complex numbers, booleans."""
+    """`value` as an array of float64; InvalidArgument for text, ragged nests, complex, boolean and masked values."""
+    if np.ma.is_masked(value):
+        raise InvalidArgument(name, "an array with masked values", expected)
     try:
         array = np.asarray(value)
     except ValueError as error:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .description.mechanism import Mechanism, checked_mechanism
+from .description.task import task_of
 from .errors import InvalidArgument
 from .kernels.reaching.plan import INVALID
 from .motion.displacements import columns, home_coordinates, joint_displacements
@@ -31,7 +32,10 @@ def as_targets(mechanism: Mechanism, target: Target) -> tuple[Floats, tuple[int,
     checked_mechanism(mechanism)
     if isinstance(target, Mapping):
         return _from_joint(mechanism, target)
-    return as_poses(target)
+    poses, shape = as_poses(target)
+    if np.shape(cast(Any, target)) == (*shape, 3) and not any(task_of(mechanism).axes):
+        raise InvalidArgument("target", "positions", f"poses: the task of '{mechanism.name}' has no position")
+    return poses, shape
 
 
 def _from_joint(mechanism: Mechanism, target: Mapping[str, Any]) -> tuple[Floats, tuple[int, ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,7 +70,11 @@ class Travel(Sequence[Reach]):
     def __len__(self) -> int:
         return len(self.reaches)
 
-    def __getitem__(self, index: Any) -> Any:
+    @overload
+    def __getitem__(self, index: int) -> Reach: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Reach, ...]: ...
+    def __getitem__(self, index: int | slice) -> Reach | tuple[Reach, ...]:
         return self.reaches[index]
 
     def __iter__(self) -> Iterator[Reach]:
@@ -127,7 +131,7 @@ def travel(
     """
     mechanism, options = checked_solution(solution).mechanism, checked_options(options)
     if solution.shape != () or solution.status > Status.PROJECTED:
-        found = f"batch shape {solution.shape}" if solution.shape else f"an answer that is {solution.status.name}"
+        found = f"batch shape {solution.shape}" if solution.shape else f"an answer that is {solution.status}"
         raise InvalidArgument("solution", found, "one feasible configuration")
     default = along is None and about is None
     lines = _lines(mechanism, along, default)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,14 +54,15 @@ def inverse_jacobian(solution: Solution) -> Floats:
 def singularity(solution: Solution) -> Singularity:
     """How near every configuration of a solution is to a singularity of each kind; INVALID rows are NaN."""
     found = measures(*_of(solution))
+    kinds = cast(list[tuple[str, ...]], found.kinds)
     return Singularity(
-        serial=_shaped(solution, found.serial),
-        parallel=_shaped(solution, found.parallel),
-        constraint=_shaped(solution, found.constraint),
-        passive=_shaped(solution, found.passive),
+        serial=_shaped(solution, np.asarray(found.serial)),
+        parallel=_shaped(solution, np.asarray(found.parallel)),
+        constraint=_shaped(solution, np.asarray(found.constraint)),
+        passive=_shaped(solution, np.asarray(found.passive)),
         lost=_shaped(solution, found.lost),
         gained=_shaped(solution, found.gained),
-        kinds=found.kinds[0] if solution.shape == () else found.kinds,
+        kinds=kinds[0] if solution.shape == () else kinds,
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from .solution import Solution, checked_solution
 Floats = NDArray[np.float64]
 
 
-def margins(solution: Solution) -> Mapping[tuple[str, str], Any]:
+def margins(solution: Solution) -> Mapping[tuple[str, str], float | Floats]:
     """(joint, bound) -> how far every limit is from being met, (...,), for every limit of its mechanism.
 
     Bounds are "min", "max" and "cone", as in `ActiveLimit`. A margin is a share of the room there is: of half the
@@ -47,5 +46,5 @@ def _share(off: Floats, room: float, tolerance: float) -> Floats:
     return np.where(np.abs(off) <= tolerance, 0.0 * off, np.copysign(np.inf, off))
 
 
-def _shaped(array: Floats, shape: tuple[int, ...]) -> Any:
-    return array.reshape(shape) if shape else array.item()
+def _shaped(array: Floats, shape: tuple[int, ...]) -> float | Floats:
+    return array.reshape(shape) if shape else float(array[0])

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 
 from ..description.task import Task
 from ..motion.displacements import columns, end_effector_pose, gaps, home_coordinates
 from .solution import Solution, checked_solution
 
 
-def closure_residual(solution: Solution) -> Any:
+def closure_residual(solution: Solution) -> float | NDArray[np.float64]:
     """Largest gap of any loop of an answer, by the closure engine, (...,) [length].
 
     Bodies are posed from `solution.joints` alone, along one tree of joints. Compared are the two bodies of every other
@@ -34,4 +33,4 @@ def closure_residual(solution: Solution) -> Any:
         place = columns(mechanism)[name].start
         value = q[known, place] + home_coordinates(mechanism)[place]
         found[known] = np.maximum(found[known], np.abs(value - rows.actuators[known, column]) * unit)
-    return found.item() if solution.shape == () else found.reshape(solution.shape)
+    return float(found[0]) if solution.shape == () else found.reshape(solution.shape)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from enum import IntEnum
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any, NamedTuple, cast
+from types import EllipsisType, MappingProxyType
+from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,14 @@ from ..motion.displacements import columns, home_coordinates
 from .limits import ActiveLimit, active_limits, binding_limits, holding_limits
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+Held: TypeAlias = Literal["orientation", "position"] | None
+"""What of its target a projected answer has."""
+
+_AlongAxis: TypeAlias = int | slice | EllipsisType | Sequence[int] | NDArray[np.integer] | NDArray[np.bool_]
+Index: TypeAlias = _AlongAxis | tuple[_AlongAxis, ...]
+"""What NumPy takes as an index of the axes of a batch."""
 
 
 NUMBERS = tuple("bdoxXneEfFgG%")
@@ -124,8 +132,8 @@ class Solution:
         return shaped if shaped.ndim else shaped.item()
 
     @property
-    def status(self) -> Any:
-        return Status(int(self._rows.status[0])) if self.shape == () else self._shaped(self._rows.status)
+    def status(self) -> Status | Integers:
+        return Status(int(self._rows.status[0])) if self.shape == () else self._rows.status.reshape(self.shape)
 
     @property
     def pose(self) -> Floats:
@@ -136,45 +144,45 @@ class Solution:
         return cast(Floats, self._shaped(self._rows.actuators))
 
     @property
-    def position_error(self) -> Any:
-        return self._shaped(self._rows.measures[:, 0])
+    def position_error(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, 0]))
 
     @property
-    def rotation_error(self) -> Any:
-        return self._shaped(self._rows.measures[:, 1])
+    def rotation_error(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, 1]))
 
     @property
-    def residual(self) -> Any:
-        return self._shaped(self._rows.measures[:, 2])
+    def residual(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, 2]))
 
     @property
-    def limit_excess(self) -> Any:
-        return self._shaped(self._rows.measures[:, 3])
+    def limit_excess(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, 3]))
 
     @property
-    def iterations(self) -> Any:
-        return self._shaped(self._rows.counters[:, 0])
+    def iterations(self) -> int | Integers:
+        return cast(int | Integers, self._shaped(self._rows.counters[:, 0]))
 
     @property
-    def rounds(self) -> Any:
-        return self._shaped(self._rows.counters[:, 1])
+    def rounds(self) -> int | Integers:
+        return cast(int | Integers, self._shaped(self._rows.counters[:, 1]))
 
     @property
-    def held(self) -> Any:
+    def held(self) -> Held | NDArray[np.object_]:
         names = np.array([None, "orientation", "position"], dtype=object)
         held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, 2], P.HOLD_NOTHING)]
         return held[0] if self.shape == () else held.reshape(self.shape)
 
     @property
-    def actuator_error(self) -> Any:
-        return self._shaped(self._rows.measures[:, 4])
+    def actuator_error(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, 4]))
 
     @cached_property
     def q(self) -> Floats:
         return cast(Floats, self._shaped(self._coordinates + home_coordinates(self.mechanism)))
 
     @cached_property
-    def joints(self) -> Mapping[str, Any]:
+    def joints(self) -> Mapping[str, Floats]:
         spans = ((name, span) for name, span in columns(self.mechanism).items() if span.stop > span.start)
         single = {name: span.start if span.stop - span.start == 1 else span for name, span in spans}
         return MappingProxyType({name: self.q[..., place][()] for name, place in single.items()})
@@ -187,7 +195,13 @@ class Solution:
         return MappingProxyType({name: self._shaped(np.where(unknown, np.nan, found[name])) for name in order})
 
     @cached_property
-    def active_limits(self) -> Any:
+    def active_limits(self) -> tuple[ActiveLimit, ...] | list[tuple[ActiveLimit, ...]]:
+        listed = self._limits
+        return listed[0] if self.shape == () else listed
+
+    @cached_property
+    def _limits(self) -> list[tuple[ActiveLimit, ...]]:
+        """The same as a list of rows, also of a single answer."""
         rows = self._rows
         held: list[tuple[ActiveLimit, ...]] = [()] * len(rows.status)
         away = np.flatnonzero((rows.status != Status.REACHED) & (rows.status != Status.INVALID))
@@ -198,7 +212,7 @@ class Solution:
         if self._wanted is not None and len(projected):
             for row, found in zip(projected, self._holding(self._wanted, projected), strict=True):
                 held[row] = found
-        return held[0] if self.shape == () else held
+        return held
 
     @cached_property
     def binding(self) -> NDArray[np.void]:
@@ -207,8 +221,7 @@ class Solution:
         Fields: joint, bound (text), coordinate (int), value, limit [length or rad], multiplier (NaN where none is
         known).
         """
-        listed = [self.active_limits] if self.shape == () else self.active_limits
-        return binding_limits(listed).reshape(self.shape)
+        return binding_limits(self._limits).reshape(self.shape)
 
     def _holding(self, wanted: Wanted, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
         """The limits that hold projected rows back from the poses that were asked for."""
@@ -231,11 +244,11 @@ class Solution:
             raise TypeError("the answer to one target has no length")
         return self.shape[0]
 
-    def __getitem__(self, index: Any) -> Solution:
+    def __getitem__(self, index: Index) -> Solution:
         """The answer at `index` of the batch axes; NumPy's rules for integers, slices and arrays."""
         if self.shape == ():
             raise TypeError("the answer to one target cannot be indexed")
-        chosen = np.arange(len(self._found)).reshape(self.shape)[index]
+        chosen = np.arange(len(self._found)).reshape(self.shape)[cast(Any, index)]
         places = np.ravel(chosen)
         wanted = None if self._wanted is None else self._wanted._replace(targets=self._wanted.targets[places])
         return Solution(self.mechanism, self._found.at(places), np.shape(chosen), wanted)
@@ -248,6 +261,7 @@ class Solution:
         names = (
             "pose",
             "actuators",
+            "q",
             "position_error",
             "rotation_error",
             "residual",
@@ -261,15 +275,24 @@ class Solution:
         plain["held"] = as_plain(self.held)
         plain["joints"] = {name: as_plain(value) for name, value in self.joints.items()}
         plain["points"] = {name: as_plain(point) for name, point in self.points.items()}
-        limits = [self.active_limits] if self.shape == () else self.active_limits
-        listed = [[vars(limit) for limit in row] for row in limits]
+        listed = [[vars(limit) for limit in row] for row in self._limits]
         plain["active_limits"] = listed[0] if self.shape == () else listed
         return plain
 
     def __repr__(self) -> str:
-        counts = {status.name: int((self._rows.status == status).sum()) for status in Status}
-        found = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        found = ", ".join(f"{count} {name}" for name, count in self._counts().items())
         return f"<{type(self).__name__} of '{self.mechanism.name}': {found or 'empty'}>"
+
+    def _repr_html_(self) -> str:
+        """Status, errors, actuators and a small drawing, for notebooks; of a batch, how many rows have each status."""
+        from .notebook import solution_html
+
+        return solution_html(self, self._counts())
+
+    def _counts(self) -> dict[str, int]:
+        """How many rows have each status that occurs."""
+        counts = {status.name: int((self._rows.status == status).sum()) for status in Status}
+        return {name: count for name, count in counts.items() if count}
 
 
 def checked_solution(solution: Any) -> Solution:

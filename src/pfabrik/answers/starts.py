@@ -37,7 +37,8 @@ def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) 
         _require_shape(own, shape)
         return engine_of(mechanism).at(measured(mechanism, deviations))
     if start.mechanism != mechanism:
-        raise InvalidArgument("start", f"an answer of '{start.mechanism.name}'", f"an answer of '{mechanism.name}'")
+        found = f"an answer of another mechanism, '{start.mechanism.name}'"
+        raise InvalidArgument("start", found, f"one of '{mechanism.name}' itself, or joint coordinates")
     if (np.asarray(start.status) >= Status.FAILED).any():
         raise InvalidArgument("start", "an answer that is FAILED or INVALID", "a feasible configuration")
     _require_shape(start.shape, shape)

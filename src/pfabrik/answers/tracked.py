@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,8 @@ from ..description.task import task_of
 from ..errors import InvalidArgument, UnknownName
 from ..poses import between
 from ..tolerances import TOLERANCES
-from .solution import Solution, Status, Wanted, as_plain
+from .limits import ActiveLimit
+from .solution import Integers, Solution, Status, Wanted, as_plain
 
 Floats = NDArray[np.float64]
 
@@ -63,6 +64,29 @@ class Track(Solution):
         self._targets = wanted.targets
         self._follow = follow
         self._pace = pace
+
+    if TYPE_CHECKING:  # a path is a batch: all of these are arrays
+
+        @property
+        def status(self) -> Integers: ...
+        @property
+        def position_error(self) -> Floats: ...
+        @property
+        def rotation_error(self) -> Floats: ...
+        @property
+        def actuator_error(self) -> Floats: ...
+        @property
+        def residual(self) -> Floats: ...
+        @property
+        def limit_excess(self) -> Floats: ...
+        @property
+        def iterations(self) -> Integers: ...
+        @property
+        def rounds(self) -> Integers: ...
+        @property
+        def held(self) -> NDArray[np.object_]: ...
+        @cached_property
+        def active_limits(self) -> list[tuple[ActiveLimit, ...]]: ...
 
     def __getstate__(self) -> Any:
         """As that of a `Solution`; whether there are jumps is found out before."""
@@ -120,7 +144,9 @@ class Track(Solution):
         return [tuple(name for name, over in zip(names, row, strict=True) if over) for row in beyond]
 
 
-def pace_of(mechanism: Mechanism, sample_time: float | None, speed_limits: Any) -> Pace | None:
+def pace_of(
+    mechanism: Mechanism, sample_time: float | None, speed_limits: float | Mapping[str, float] | None
+) -> Pace | None:
     """What was said of time and speeds, checked."""
     names = mechanism.actuator_names
     if sample_time is None:

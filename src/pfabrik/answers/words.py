@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..description.joint_types import KINDS
+from ..description.readouts import readouts
 from ..motion.first_order import are_stretched, forward_map
 from ..tolerances import TOLERANCES
 
@@ -20,45 +20,6 @@ if TYPE_CHECKING:
     from .solution import Solution
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Readout:
-    """How the coordinate of an actuator is shown.
-
-    Attributes
-    ----------
-    name : of the actuator.
-    is_angle : whether the coordinate is an angle; a length otherwise.
-    unit : ``"deg"`` or the mechanism's length unit.
-    limits : lowest and highest value in `unit`, infinite where there is no limit.
-    """
-
-    name: str
-    is_angle: bool
-    unit: str
-    limits: tuple[float, float]
-
-    def display(self, values: Floats) -> Floats:
-        """Coordinates [rad or length] in `unit`."""
-        return np.degrees(values) if self.is_angle else values
-
-    def coordinate(self, shown: float) -> float:
-        """The coordinate [rad or length] that is shown as a value in `unit`."""
-        return math.radians(shown) if self.is_angle else shown
-
-
-def readouts(mechanism: Mechanism) -> tuple[Readout, ...]:
-    """One readout for each actuator, in the order of ``mechanism.actuator_names``."""
-    return tuple(readout(mechanism.joint(name), mechanism.length_unit) for name in mechanism.actuator_names)
-
-
-def readout(joint: Joint, length_unit: str) -> Readout:
-    """How the coordinate of one actuated revolute or prismatic joint is shown."""
-    is_angle = joint.type == "revolute"
-    low, high = (float(bound) for bound in joint.range or (-math.inf, math.inf))  # type: ignore[arg-type]
-    limits = (math.degrees(low), math.degrees(high)) if is_angle else (low, high)
-    return Readout(joint.name, is_angle, "deg" if is_angle else length_unit, limits)
 
 
 def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
@@ -71,7 +32,7 @@ def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
     ----------
     asked : actuator values (n_a,) [length or rad], where these were asked for and not a pose.
     """
-    status = solution.status.name.lower()
+    status = str(solution.status).lower()
     if status == "reached":
         return "reached"
     if status == "projected" and asked is not None:
@@ -162,7 +123,7 @@ def loop_gap(solution: Solution) -> str:
 def reasons(solution: Solution) -> list[str]:
     """What holds a projected answer back, the hardest first, one phrase for those of a kind and value."""
     names: dict[tuple[str, str], list[str]] = {}
-    for limit in solution.active_limits:
+    for limit in solution._limits[0]:
         is_plain = solution.mechanism.joint(limit.joint).type != "universal"  # length or angle: the bound's unit tells
         names.setdefault(in_words(limit, solution.mechanism), []).append(limit.joint if is_plain else name_of(limit))
     return [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
@@ -207,7 +168,7 @@ def short_names(limits: Iterable[ActiveLimit]) -> str:
 
 def exceeded(solution: Solution) -> list[ActiveLimit]:
     """The limits that a failed answer exceeds, not those that it only lies on."""
-    return [limit for limit in solution.active_limits if is_exceeded(limit, solution.mechanism)]
+    return [limit for limit in solution._limits[0] if is_exceeded(limit, solution.mechanism)]
 
 
 def is_exceeded(limit: ActiveLimit, mechanism: Mechanism) -> bool:

@@ -11,7 +11,9 @@ import click
 
 import pfabrik as pf
 
-from ..answers.words import Floats, as_sentence, by_bound, exceeded, loop_gap, readouts
+from ..answers.words import Floats, as_sentence, by_bound, exceeded, loop_gap
+from ..description.notebook import bound_text
+from ..description.readouts import readouts
 from ..errors import ContinuumOfSolutions
 from ..rotations import to_rpy
 from ..tolerances import TOLERANCES
@@ -20,8 +22,8 @@ from .table import aligned
 
 if TYPE_CHECKING:
     from ..answers.solution import Solution
-    from ..answers.words import Readout
     from ..description.mechanism import Mechanism
+    from ..description.readouts import Readout
     from ..modes.lists import Modes
 
 
@@ -64,7 +66,8 @@ def in_units(shown: Sequence[Readout], values: Floats) -> list[str]:
 def margins_of(solution: Solution) -> list[tuple[str, str, float]]:
     """Joint, bound and margin of every limit, nearest first."""
     found = pf.margins(solution)
-    return sorted(((joint, bound, margin) for (joint, bound), margin in found.items()), key=lambda limit: limit[2])
+    named = ((joint, bound, float(margin)) for (joint, bound), margin in found.items())
+    return sorted(named, key=lambda limit: limit[2])
 
 
 def margins_table(solution: Solution) -> str:
@@ -126,11 +129,6 @@ def describe_modes(found: Modes, kind: str, header: Sequence[str], cells: Callab
 def pose_header(mechanism: Mechanism) -> list[str]:
     """The columns of `pose_texts`."""
     return [*(f"{name} [{mechanism.length_unit}]" for name in "xyz"), "roll [deg]", "pitch [deg]", "yaw [deg]"]
-
-
-def bound_text(bound: float) -> str:
-    """A limit; ``-`` where there is none."""
-    return f"{bound:.6g}" if math.isfinite(bound) else "-"
 
 
 def plain(value: float, smallest: float) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import click
 
 from ..catalog import catalog as names
@@ -10,10 +12,12 @@ from .table import aligned
 
 
 @click.command()
-def catalog() -> int:
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def catalog(as_json: bool) -> int:
     """List the mechanisms supplied.
 
     Each file begins with more about its mechanism: whose dimensions it has, what home is, what its joints count.
     """
-    click.echo(aligned(("name", "mechanism"), [(name, description(name)) for name in names()]))
+    described = {name: description(name) for name in names()}
+    click.echo(json.dumps(described) if as_json else aligned(("name", "mechanism"), described.items()))
     return 0

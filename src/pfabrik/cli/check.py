@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -12,8 +14,10 @@ import numpy as np
 import pfabrik as pf
 
 from ..description.task import task_of
+from ..errors import InvalidMechanism
 from ..motion.first_order import generic_of
 from ..tolerances import TOLERANCES
+from .mech import MECH, load
 
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
@@ -25,15 +29,30 @@ FULL_TURN = 2.0 * math.pi
 
 
 @click.command()
-@click.argument("mech")
-def check(mech: str) -> int:
+@click.argument("mech", type=MECH)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout: faults, or what there is, and notes.")
+def check(mech: str, as_json: bool) -> int:
     """Check a mechanism file.
 
     Says "ok", or names every fault, one a line. What is sound but may not be what was meant is noted on stderr.
     """
-    mechanism = pf.load(mech)
-    chains = pf.decompose(mechanism)
-    for note in notes(mechanism):
+    try:
+        mechanism = load(mech)
+    except InvalidMechanism as error:
+        if as_json:
+            click.echo(json.dumps({"ok": False, "faults": [dataclasses.asdict(fault) for fault in error.faults]}))
+        raise
+    chains, noted = pf.decompose(mechanism), list(notes(mechanism))
+    if as_json:
+        counts = {
+            "joints": len(mechanism.joints),
+            "actuators": len(mechanism.actuator_names),
+            "sub_chains": len(chains),
+        }
+        found = {"ok": True, "name": mechanism.name, **counts, "task": mechanism.task, "notes": noted}
+        click.echo(json.dumps(found))
+        return 0
+    for note in noted:
         click.echo(f"pfabrik: note: {note}", err=True)
     click.echo(
         f"ok: {mechanism.name}: {len(mechanism.joints)} joints, {len(mechanism.actuator_names)} actuated, "

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..answers.solution import Solution
     from ..answers.tracked import Track
     from ..reproduce.study import Case
 
@@ -79,11 +78,11 @@ def follow(case: Case, steps: int) -> Run:
 def write(run: Run, folder: Path) -> None:
     """The picture and the CSV file of one run."""
     from ..view.tracking import draw_tracking
-    from .pathfile import write_track
+    from .pathfile import PathFile, write_track
 
     draw_tracking(run.targets, run.solution, folder / f"{run.key}.png")
     with (folder / f"{run.key}.csv").open("w", newline="", encoding="utf-8") as handle:
-        write_track(handle, run.targets, run.solution)
+        write_track(handle, PathFile(run.targets), run.solution)
 
 
 def table(runs: list[Run]) -> str:
@@ -109,7 +108,7 @@ def row(run: Run) -> tuple[str, ...]:
     )
 
 
-def holds(solution: Solution) -> bool:
+def holds(solution: Track) -> bool:
     """Whether every step has an answer with its loops closed and its limits kept."""
     from ..tolerances import TOLERANCES
 

@@ -9,6 +9,9 @@ import click
 
 import pfabrik as pf
 
+from .finite import is_finite
+from .mech import MECH, load
+
 if TYPE_CHECKING:
     from ..answers.solution import Solution
     from ..answers.words import Floats
@@ -17,8 +20,6 @@ if TYPE_CHECKING:
 
 def finite_numbers(context: click.Context, parameter: click.Parameter, words: tuple[str, ...]) -> tuple[float, ...]:
     """The words as finite numbers; options that do not exist arrive here too."""
-    from .pathfile import is_finite
-
     for word in words:
         if not is_finite(word):
             expected = "a finite number, or an option of this command" if word.startswith("-") else "a finite number"
@@ -27,7 +28,7 @@ def finite_numbers(context: click.Context, parameter: click.Parameter, words: tu
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -5 is a value
-@click.argument("mech")
+@click.argument("mech", type=MECH)
 @click.argument("values", nargs=-1, metavar="VALUE...", callback=finite_numbers)
 @click.option("--all", "list_all", is_flag=True, help="List every assembly mode, limits kept or not.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
@@ -41,7 +42,7 @@ def fk(mech: str, values: tuple[float, ...], list_all: bool, as_json: bool) -> i
     found for get the feasible one whose actuators are nearest. With --all the exit code is 0 if some mode keeps all
     limits.
     """
-    mechanism = pf.load(mech)
+    mechanism = load(mech)
     asked = coordinates(mechanism, values)
     if list_all:
         return list_modes(mechanism, asked, as_json)
@@ -54,7 +55,7 @@ def coordinates(mechanism: Mechanism, values: tuple[float, ...]) -> Floats:
     """The values as coordinates (n_a,) [length or rad]; a usage error for too few or too many."""
     import numpy as np
 
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     shown = readouts(mechanism)
     if len(values) != len(shown):

@@ -10,6 +10,7 @@ import click
 import pfabrik as pf
 
 from .answer import describe, in_units, margins_of, margins_table, pose_header, pose_texts, tell_modes
+from .mech import MECH, load
 from .projecting import note_left_out, note_unused, options_projecting, projecting
 from .target import Triple, target_of, targeted
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("mech")
+@click.argument("mech", type=MECH)
 @targeted
 @projecting
 @click.option("--margins", "with_margins", is_flag=True, help="List how far off every limit is, nearest first.")
@@ -49,9 +50,9 @@ def ik(
         raise click.UsageError("--margins is of one answer: it does not go with --all")
     if position is None and rpy is None and joint is None:
         raise click.UsageError("no target: give --position, --rpy or both, or --joint")
-    mechanism = pf.load(mech)
-    note_ignored(mechanism, position, rpy)
+    mechanism = load(mech)
     target = target_of(mechanism, position, rpy, joint)
+    note_ignored(mechanism, position, rpy)
     if list_all:
         note_unused("--all")
         return list_modes(mechanism, target, as_json)
@@ -84,7 +85,7 @@ def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | No
 
 def list_modes(mechanism: Mechanism, target: Target, as_json: bool) -> int:
     """Print all working modes, each with its actuator values, and its pose where the task leaves it open."""
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     shown = readouts(mechanism)
     header = [f"{readout.name} [{readout.unit}]" for readout in shown]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -13,6 +15,7 @@ import pfabrik as pf
 
 from ..decomposition.decompose import closure_reason, engine_of
 from ..description.joint_types import KINDS
+from .mech import MECH, load
 from .table import aligned
 
 if TYPE_CHECKING:
@@ -22,16 +25,57 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("mech")
-def info(mech: str) -> int:
+@click.argument("mech", type=MECH)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
+def info(mech: str, as_json: bool) -> int:
     """Show what a mechanism is made of.
 
     Its joints, limits, actuators, mobility and task, and its sub-chains with the engine that answers, and why.
     """
-    mechanism = pf.load(mech)
+    mechanism = load(mech)
+    if as_json:
+        click.echo(json.dumps(as_object(mechanism), allow_nan=False))
+        return 0
     tables = [summary(mechanism), joint_table(mechanism), chain_table(mechanism)]
     click.echo("\n\n".join([*tables, *parallelogram_tables(mechanism)]))
     return 0
+
+
+def as_object(mechanism: Mechanism) -> dict[str, object]:
+    """The same as plain numbers, lists and dicts, angles in radians; a limit that is not there is None."""
+    counted = pf.mobility(mechanism)
+    return {
+        "name": mechanism.name,
+        "length_unit": mechanism.length_unit,
+        "characteristic_length": mechanism.characteristic_length,
+        "base": mechanism.base,
+        "end_effector": mechanism.end_effector,
+        "reference_point": mechanism.reference_point,
+        "task": mechanism.task,
+        "actuators": mechanism.actuator_names,
+        "coordinates": mechanism.coordinate_names,
+        "mobility": dataclasses.asdict(counted) | {"redundancy": counted.redundancy},
+        "joints": [joint_as_object(joint, mechanism) for joint in mechanism.joints],
+        "sub_chains": [
+            {"notation": str(chain), "engine": engine_of(mechanism), "why": why(chain, mechanism)}
+            for chain in pf.decompose(mechanism)
+        ],
+    }
+
+
+def joint_as_object(joint: Joint, mechanism: Mechanism) -> dict[str, object]:
+    """One joint: what it connects, its coordinate at home, and its limits."""
+    return {
+        "name": joint.name,
+        "type": joint.type,
+        "connects": joint.connects,
+        "actuated": joint.actuated,
+        "home": mechanism.home_coordinate(joint.name),
+        "range": joint.range,
+        "max_speed": joint.max_speed,
+        "max_acceleration": joint.max_acceleration,
+        "cone": None if joint.cone is None else dataclasses.asdict(joint.cone),
+    }
 
 
 def summary(mechanism: Mechanism) -> str:

@@ -5,29 +5,45 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from click.shell_completion import CompletionItem
 
-from ..catalog import template, templates, title
+from ..catalog import catalog, catalog_file, template, templates, title
+from .mech import MECH
 from .table import aligned
 from .whole import whole_file
 
 
+class Kind(click.ParamType):  # type: ignore[type-arg]  # generic in new versions only
+    """A text that completes to the kinds there are."""
+
+    name = "kind"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Kinds that begin so."""
+        return [CompletionItem(name) for name in templates() if name.lower().startswith(incomplete.lower())]
+
+
+KIND = Kind()
+
+
 @click.command()
-@click.argument("kind", required=False)
+@click.argument("kind", required=False, type=KIND)
+@click.option("--from", "machine", type=MECH, metavar="NAME", help="A machine of the catalogue, in place of a KIND.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write. Default: print it.")
 @click.option("--force", is_flag=True, help="Replace the file if it exists.")
 @click.option("--list", "list_all", is_flag=True, help="List the kinds of machines there are files for.")
-def new(kind: str | None, output: Path | None, force: bool, list_all: bool) -> int:
+def new(kind: str | None, machine: str | None, output: Path | None, force: bool, list_all: bool) -> int:
     """Write a starting file for a machine of your own.
 
     KIND is a name from `pfabrik new --list`. The file describes a machine of this kind that works as it is; its
-    comments say what to measure and where to put it.
+    comments say what to measure and where to put it. With --from it is a machine of `pfabrik catalog`, as it is there.
     """
     if list_all:
         click.echo(aligned(("kind", "machine"), [(name, title(name)) for name in templates()]))
         return 0
-    if kind is None:
-        raise click.UsageError(f"no KIND: give one of {', '.join(templates())}")
-    text = template(kind)
+    if (kind is None) == (machine is None):
+        raise click.UsageError(f"give either --from NAME or one KIND of {', '.join(templates())}")
+    text = text_of(kind) if machine is None else catalog_file(machine).read_text(encoding="utf-8")
     if output is None:
         click.echo(text, nl=False)
         return 0
@@ -39,3 +55,12 @@ def new(kind: str | None, output: Path | None, force: bool, list_all: bool) -> i
         handle.write(text)
     click.echo(f"wrote {output}; next: edit it, then pfabrik check {output}")
     return 0
+
+
+def text_of(kind: str | None) -> str:
+    """The text of a starting file; where there is none of that name, but a machine of the catalogue, it says so."""
+    name = str(kind)
+    spelt = name.lower().replace("-", "_")
+    if name.lower() not in map(str.lower, templates()) and spelt in catalog():
+        raise click.UsageError(f"no KIND '{name}'; a machine of the catalogue is called so: --from {spelt}")
+    return template(name)

@@ -32,11 +32,11 @@ def reproduce(out: Path, quick: bool, readme: Path | None) -> int:
     if missing:
         found = " and ".join(missing)
         raise click.UsageError(f"this needs {found}; install it with: pip install 'pfabrik[reproduce]'")
-    from ..reproduce import everything, report
+    from ..reproduce import everything, output, report
 
     with whole_folder(out) as folder, progress("reproduce") as on_progress:
         findings = everything.run(quick, on_progress)
-        everything.write(findings, folder)
+        output.write(findings, folder)
     if readme is not None:
         report.put_into(readme, report.summary(findings))
     promises = report.promises(findings)

@@ -10,7 +10,7 @@ import click
 
 import pfabrik as pf
 
-from .finite import FINITE
+from .finite import FINITE, is_finite
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -48,7 +48,6 @@ def target_of(mechanism: Mechanism, position: Triple | None, rpy: Triple | None,
 def joint_target(mechanism: Mechanism, words: str) -> dict[str, float | list[float]]:
     """Joint name -> coordinates [rad or length], from words such as ``pivot=5,10``."""
     from ..description.joint_types import KINDS
-    from .pathfile import is_finite
 
     name, equals, listed = words.partition("=")
     values = listed.split(",")

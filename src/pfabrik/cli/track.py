@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,13 +13,13 @@ import click
 import pfabrik as pf
 
 from ..errors import near_miss
-from .finite import FINITE
+from .finite import FINITE, is_finite
+from .mech import MECH, load
 from .progress import progress
 from .projecting import note_left_out, options_projecting, projecting
 from .whole import whole_file
 
 if TYPE_CHECKING:
-    from ..answers.solution import Solution
     from ..answers.tracked import Track
     from ..answers.words import Floats
     from ..description.mechanism import Mechanism
@@ -26,9 +28,11 @@ ROWS_NAMED = 5
 
 
 @click.command()
-@click.argument("mech")
-@click.argument("path", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="CSV file to write, or replace.")
+@click.argument("mech", type=MECH)
+@click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path, allow_dash=True), help="CSV file to write; - prints it."
+)
 @projecting
 @click.option("--sample-time", type=FINITE, metavar="S", help="Time from one target to the next [s].")
 @click.option(
@@ -38,63 +42,79 @@ ROWS_NAMED = 5
     metavar="[NAME=]VALUE",
     help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated.",
 )
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
 def track(
     mech: str,
     path: Path,
-    output: Path,
+    output: Path | None,
     hold: str,
     projection: str,
     sample_time: float | None,
     speeds: tuple[str, ...],
+    as_json: bool,
 ) -> int:
     """Follow a path of targets.
 
     Reads the targets from a CSV file and writes the answers to another. Each answer starts from the one before.
 
-    PATH has a header line and the columns x, y, z and, optionally, roll, pitch, yaw [deg]. In the output all angles
-    are in radians.
+    PATH has a header line and the columns x, y, z and, optionally, roll, pitch, yaw [deg] or roll_rad, pitch_rad,
+    yaw_rad; - is standard input. Coordinates that the machine cannot change may be missing, as z in a plane. Further
+    columns go out as they came in, and angles in the unit they came in.
 
     The exit code is 1 also where an actuator would have to be faster than --speed allows.
     """
-    from .pathfile import read_targets, write_track
+    from .pathfile import STANDARD, read_path, write_track
 
-    mechanism = pf.load(mech)
+    if output is None and not as_json:
+        raise click.UsageError("no place for the answers: give -o FILE, -o - or --json")
+    if as_json and output == STANDARD:
+        raise click.UsageError("-o - and --json both print on stdout: give one of them")
+    if mech == str(path) == str(STANDARD):
+        raise click.UsageError("MECH and PATH are both standard input: give a file for one of them")
+    mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
     if limits and sample_time is None:
         raise click.UsageError("--speed says nothing without --sample-time")
-    targets = read_targets(path)
-    if output.exists() and output.samefile(path):
-        raise click.UsageError(f"-o {output}: found the path of targets itself; expected another file")
-    note_ignored(mechanism, targets)
+    read = read_path(path, mechanism)
+    note_ignored(mechanism, read.targets)
     options = options_projecting(hold, projection)
-    with whole_file(output) as handle:
-        with progress(f"tracking {len(targets)} targets") as on_progress:
+    with nullcontext() if output is None else whole_file(output, inputs=(path, Path(mech))) as handle:
+        with progress(f"tracking {len(read.targets)} targets") as on_progress:
             followed = pf.track(
                 mechanism,
-                targets,
+                read.targets,
                 options=options,
                 on_progress=on_progress,
                 sample_time=sample_time,
                 speed_limits=limits or None,
             )
-        write_track(handle, targets, followed)
-    click.echo(summary(followed))
+        if handle is not None:
+            write_track(handle, read, followed)
+    if as_json:
+        click.echo(json.dumps(followed.to_dict(), allow_nan=False))
+    click.echo(summary(followed), err=as_json or output == STANDARD)
     return 0 if followed and not any(followed.too_fast or ()) else 1
 
 
 def note_ignored(mechanism: Mechanism, targets: Floats) -> None:
-    """Say so when the task leaves out columns that are not as at home."""
+    """Say so when the task leaves out columns that are not as at home; refuse a path that sets nothing else."""
     task, home = set(mechanism.task), mechanism.home_pose
     moved = (targets[:, :3, 3] != home[:3, 3]).any(axis=0)
+    turned = (targets[:, :3, :3] != home[:3, :3]).any()
     columns = [axis for axis, moves in zip("xyz", moved, strict=True) if moves and axis not in task]
-    if not task & {"rotation", "tilt"} and (targets[:, :3, :3] != home[:3, :3]).any():
+    if turned and not task - set("xyz"):
         columns += ["roll", "pitch", "yaw"]
+    sets_some = any(moves and axis in task for axis, moves in zip("xyz", moved, strict=True))
+    if columns and not sets_some and not (turned and task - set("xyz")):
+        raise click.ClickException(
+            f"the path sets {', '.join(columns)} only, none of which the task has: {' '.join(mechanism.task)}"
+        )
     note_left_out((f"column {name}" for name in columns), mechanism)
 
 
 def speed_limits(mechanism: Mechanism, given: Sequence[str]) -> dict[str, float]:
     """Speeds by name [rad/s or length/s], from words as of ``--speed``; what is said of one counts before all."""
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     shown = {readout.name: readout for readout in readouts(mechanism)}
     said: dict[str, float] = {}
@@ -109,8 +129,6 @@ def speed_limits(mechanism: Mechanism, given: Sequence[str]) -> dict[str, float]
 
 def positive(word: str, value: str) -> float:
     """A speed as a positive number."""
-    from .pathfile import is_finite
-
     if not is_finite(value) or float(value) <= 0.0:
         raise click.UsageError(f"--speed {word}: found '{value}'; expected a positive number")
     return float(value)
@@ -131,7 +149,7 @@ def summary(followed: Track) -> str:
 
 def hasty(followed: Track) -> list[str]:
     """The actuators that would have to be too fast, how fast, and where: one phrase each."""
-    from ..answers.words import readouts
+    from ..description.readouts import readouts
 
     too_fast, speeds, phrases = followed.too_fast, followed.speeds, []
     if too_fast is None or speeds is None:
@@ -150,6 +168,6 @@ def targets_named(rows: Sequence[int]) -> str:
     return f"target{'s' * (len(rows) > 1)} {', '.join(map(str, rows[:ROWS_NAMED]))}{more}"
 
 
-def count_statuses(solution: Solution) -> dict[str, int]:
+def count_statuses(solution: Track) -> dict[str, int]:
     """How many targets ended in each status, by its name in lower case."""
     return {status.name.lower(): int((solution.status == status).sum()) for status in pf.Status}

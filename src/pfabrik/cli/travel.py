@@ -11,6 +11,7 @@ import click
 import pfabrik as pf
 
 from .finite import FINITE
+from .mech import MECH, load
 from .table import aligned
 from .target import Triple, target_of, targeted
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("mech")
+@click.argument("mech", type=MECH)
 @targeted
 @click.option("--along", type=FINITE, nargs=3, multiple=True, metavar="X Y Z", help="A direction. May be repeated.")
 @click.option("--about", type=FINITE, nargs=3, multiple=True, metavar="X Y Z", help="An axis to turn about. Likewise.")
@@ -40,10 +41,10 @@ def travel(
     It starts at a pose within reach (default: home) and stays in its working mode; a limit, or the length of the links,
     stops it. By default it goes both ways along and about each axis of the task.
     """
-    mechanism = pf.load(mech)
+    mechanism = load(mech)
     start = pf.solve_ik(mechanism, target_of(mechanism, position, rpy, joint))
     if not start:
-        raise click.ClickException(f"cannot start there: {start.status.name.lower()}; see `pfabrik ik`")
+        raise click.ClickException(f"cannot start there: {str(start.status).lower()}; see `pfabrik ik`")
     found = pf.travel(start, along=along or None, about=about or None, pivot=pivot)
     click.echo(json.dumps(found.to_dict(), allow_nan=False) if as_json else describe(found))
     return 0
@@ -52,9 +53,15 @@ def travel(
 def describe(found: Travel) -> str:
     """One line a direction."""
     from ..answers.words import short_names
+    from .answer import plain
 
     rows = [
-        (each.kind, *(f"{part:.6g}" for part in each.direction), *distance(each, found), short_names(each.stopped_by))
+        (
+            each.kind,
+            *(plain(part, 1e-9) for part in each.direction),
+            *distance(each, found),
+            short_names(each.stopped_by),
+        )
         for each in found
     ]
     return aligned(["", "x", "y", "z", "travel", "unit", "stopped by"], rows)

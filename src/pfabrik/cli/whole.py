@@ -4,19 +4,33 @@ from __future__ import annotations
 
 import errno
 import os
+import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
+import click
+
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[TextIO]:
+def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
     """A text file for writing that takes the name `path` only when the block ends without an error.
 
-    It is opened at once, so an unwritable place is found before the work begins. A device or pipe is written directly.
+    It is opened at once, so an unwritable place is found before the work begins. A device or pipe, and standard output
+    for ``-``, is written directly.
+
+    Parameters
+    ----------
+    inputs : files that were read, by any name or link: none of them is ever overwritten.
     """
+    if path == Path("-"):
+        yield sys.stdout
+        return
+    for read in inputs:
+        if path.exists() and read.exists() and path.samefile(read):
+            raise click.UsageError(f"-o {path}: found a file that was read; expected another file")
     path = path.resolve()  # a link keeps pointing where it points
     if path.exists() and not path.is_file():
         with path.open("w", newline="", encoding="utf-8") as direct:

@@ -19,12 +19,19 @@ from ..description.mechanism import Mechanism
 from ..kernels.closure import loops as K
 from ..kernels.threads import in_blocks
 from ..motion.displacements import columns, displacements
+from ..tolerances import TOLERANCES
 from .loops import loops_of
 
 Floats = NDArray[np.float64]
 
 EVERYTHING_FREE = (0.0,) * 6
 HELD = (K.LOCKED,) * 6
+
+CLOSED = 0.3 * TOLERANCES.position
+"""Gap of a path that counts as closed [L or rad]: loops, which lead along two paths, may add their gaps up."""
+
+MARGIN = 0.1 * TOLERANCES.limit
+"""How far inside their limits answers are put: limits that are met to the last digit count as kept."""
 
 
 @dataclass(frozen=True)
@@ -140,9 +147,20 @@ class Closing(NamedTuple):
         """The largest excess over any limit of each row [L or rad]."""
         return np.asarray(self.excesses.max(axis=1, initial=0.0))
 
-    def at(self, rows: Any) -> Closing:
-        """Some of the rows."""
-        return Closing._make(array[rows] for array in self)
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Which rows are closed within every limit, (n,)."""
+        return np.asarray((self.gap <= CLOSED) & (self.excess <= TOLERANCES.limit))
+
+    @property
+    def off(self) -> Floats:
+        """What keeps each group of each row from being feasible: its gap or its excess, (n, groups) [L or rad]."""
+        return np.maximum(self.gaps, self.excesses)
+
+    def improve(self, places: NDArray[np.intp], tried: Closing) -> None:
+        """Put rows of another search in these places where they are feasible, or less far from it."""
+        better = np.flatnonzero(tried.feasible | (tried.off.max(axis=1) < self.off[places].max(axis=1)))
+        self.take(places[better], tried, better)
 
     def take(self, places: NDArray[np.intp], found: Closing, rows: Any = slice(None)) -> None:
         """Put rows of another search in some places of this one."""

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from ..kernels.closure.loops import Closed
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
-from .close import Closing, Closure
-from .nearest import MARGIN
+from .close import MARGIN, Closing, Closure
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -41,7 +40,7 @@ def approached(
 
     Returns
     -------
-    Closing : judge by `is_feasible`. Gaps and excesses are those of the whole, the same for every group.
+    Closing : judge by `feasible`. Gaps and excesses are those of the whole, the same for every group.
     """
     found = _run(closure, coordinates, _aim(closure, targets, platform, framed, MOST_STEPS))[0]
     found.poses[:, :3, 3] *= closure.mechanism.characteristic_length

@@ -11,9 +11,8 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import LOCKED
 from ..poses import pose
-from .close import close, closure_of
+from .close import MARGIN, close, closure_of
 from .descend import approached
-from .nearest import MARGIN, is_feasible
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .starts import random_starts
 
@@ -45,7 +44,7 @@ def corners_of(mechanism: Mechanism) -> tuple[Floats, ...]:
     home = np.zeros((len(directions), len(closure.scale)))
     ends = approached(closure, home, np.array(poses), platform=(1.0, 1.0, 1.0, turning, turning, turning))
     coordinates, places = chanced_upon(mechanism)
-    kept = is_feasible(ends)
+    kept = ends.feasible
     coordinates = np.concatenate([home[:1], ends.coordinates[kept], coordinates])
     places = np.concatenate([mechanism.home_pose[None], ends.poses[kept], places])
     chosen = [0]
@@ -68,5 +67,5 @@ def chanced_upon(mechanism: Mechanism) -> tuple[Floats, Floats]:
         poses = task.completed(poses, np.repeat(mechanism.home_pose[None], CHANCES, axis=0))
         platform = [LOCKED if weight == 0.0 else 0.0 for weight in task.held]
     found = close(closure, coordinates, poses, platform=platform, limits=True, margin=MARGIN)
-    feasible = is_feasible(found)
+    feasible = found.feasible
     return found.coordinates[feasible], found.poses[feasible]

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.closure.loops import LOCKED
-from ..tolerances import TOLERANCES
-from .close import EVERYTHING_FREE, Closing, Closure, close
+from .close import EVERYTHING_FREE, MARGIN, Closing, Closure, close
 
 Floats = NDArray[np.float64]
 
@@ -19,9 +18,6 @@ the loops open by less than the step that then closes them can notice."""
 
 STEPS = 60
 """Steps for each weight."""
-
-MARGIN = 0.1 * TOLERANCES.limit
-"""How far inside their limits answers are put: limits that are met to the last digit count as kept."""
 
 
 def nearest(
@@ -49,7 +45,7 @@ def nearest(
 
     Returns
     -------
-    Closing : judge by `is_feasible`.
+    Closing : judge by `feasible`.
     """
     wished, own = np.array(platform, dtype=float), np.zeros(len(closure.scale)) if weights is None else weights
     held = wished == LOCKED
@@ -79,12 +75,3 @@ def nearest(
         limits=True,
         margin=MARGIN,
     )
-
-
-CLOSED = 0.3 * TOLERANCES.position
-"""Gap of a path that counts as closed [L or rad]: loops, which lead along two paths, may add their gaps up."""
-
-
-def is_feasible(closing: Closing) -> NDArray[np.bool_]:
-    """Which rows are closed within every limit, (n,)."""
-    return np.asarray((closing.gap <= CLOSED) & (closing.excess <= TOLERANCES.limit))

@@ -16,7 +16,7 @@ from ..motion.displacements import displacements
 from .close import Closing, Closure, close
 from .descend import approached
 from .known import corners_of
-from .nearest import is_feasible, nearest
+from .nearest import nearest
 from .parasitic import strays
 
 Floats = NDArray[np.float64]
@@ -115,7 +115,7 @@ def _take_nearer(
     hits: NDArray[np.int64],
 ) -> NDArray[np.int64]:
     """Take over the rows that are feasible, and nearer than the best so far; how often each best was found by now."""
-    counts = is_feasible(found) & ~strays(closure.mechanism, found.poses)
+    counts = found.feasible & ~strays(closure.mechanism, found.poses)
     distances = np.where(counts, way.distances(closure, found.poses, targets[rows]), np.inf)
     least = best.distances[rows]
     better = distances < (1.0 - SAME) * least

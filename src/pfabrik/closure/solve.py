@@ -16,11 +16,11 @@ from ..motion.limits import within_turns
 from ..options import Options
 from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
-from .close import HELD, Closing, Closure, close, closure_of, measured, platform_poses
+from .assemble import assemble
+from .close import HELD, MARGIN, Closing, Closure, close, closure_of, measured, platform_poses
 from .configurations import Configurations, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
 from .known import chanced_upon
-from .nearest import MARGIN, is_feasible
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .projection import kept, project, ways_of
 from .starts import random_coordinates
@@ -90,7 +90,7 @@ class ClosureEngine:
         if not _has_loops_aside(self.mechanism):
             return begin
         present = measured(self.mechanism, begin)
-        away = np.flatnonzero(~is_feasible(present))
+        away = np.flatnonzero(~present.feasible)
         if len(away):
             closure, poses = closure_of(self.mechanism), present.poses[away]
             present.take(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=MARGIN))
@@ -110,7 +110,7 @@ class ClosureEngine:
         found = _reach(self._closure, targets, begin, platform_poses(self.mechanism, begin), keep_mode=True)
         rows = new_rows(self.mechanism, len(targets))
         write_closing(self._closure, found, rows)
-        rows.status[:] = np.where(is_feasible(found), P.REACHED, P.FAILED)
+        rows.status[:] = np.where(found.feasible, P.REACHED, P.FAILED)
         return Configurations(rows, found.coordinates)
 
     def at(self, closing: Closing) -> Configurations:
@@ -123,9 +123,9 @@ class ClosureEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         return centres(self.mechanism, found.coordinates)
 
-    def assemble(self, coordinates: Floats, poses: Floats, values: Floats) -> tuple[Floats, Floats] | None:
-        """None: legs with given actuator values are assembled around a platform by the reaching engine alone."""
-        return None
+    def assemble(self, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
+        """Forward kinematics: see `assemble.assemble`."""
+        return assemble(self.mechanism, coordinates, values, seeded=seeded)
 
 
 def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, keep_mode: bool) -> Configurations:
@@ -133,7 +133,7 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
     mechanism = closure.mechanism
     found = _reach(closure, wanted, start, platform_poses(mechanism, start), keep_mode)
     holds = np.full(len(wanted), P.HOLD_NOTHING)
-    away = np.flatnonzero(~is_feasible(found))
+    away = np.flatnonzero(~found.feasible)
     if len(away):
         stays = keep_mode or follows_task(mechanism)
         starts = [start[away]] if stays else [start[away], found.coordinates[away]]
@@ -156,7 +156,7 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
     near = (position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)) & (
         rotation <= options.rotation_tolerance
     )
-    rows.status[:] = np.where(is_feasible(found), np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
+    rows.status[:] = np.where(found.feasible, np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
     return Configurations(rows, found.coordinates)
 
 
@@ -178,9 +178,9 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
     held = HELD if follows else task.held
     found = _close_below(closure, start, wanted, held)
     is_far = _distances(closure, begin, wanted) > STRIDE
-    rest = np.flatnonzero(~is_feasible(found) | (is_far if keep_mode else False))
+    rest = np.flatnonzero(~found.feasible | (is_far if keep_mode else False))
     if len(rest):
-        _take_better(found, rest, _led(closure, wanted[rest], start[rest], begin[rest], held, limits=True))
+        found.improve(rest, _led(closure, wanted[rest], start[rest], begin[rest], held, limits=True))
     if not keep_mode:
         at_rest = follows or task.is_whole_pose
         if not at_rest:
@@ -195,16 +195,16 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
 def _start_nearby(closure: Closure, found: Closing, targets: Floats) -> None:
     """Look for what does not reach yet from known configurations whose end effectors are nearest to the targets."""
     coordinates, poses = chanced_upon(closure.mechanism)
-    task, rest = task_of(closure.mechanism), np.flatnonzero(~is_feasible(found))
+    task, rest = task_of(closure.mechanism), np.flatnonzero(~found.feasible)
     away = np.array([_distances(closure, poses, np.repeat(targets[[row]], len(poses), axis=0)) for row in rest])
     for places in np.argsort(away, axis=1)[:, :NEARBY].T if len(rest) else ():
-        waiting = ~is_feasible(found)[rest]
+        waiting = ~found.feasible[rest]
         if not waiting.any():
             break
         rows, places = rest[waiting], places[waiting]
         start = np.where(closure.idle, found.coordinates[rows], coordinates[places])
         wanted = task.completed(targets[rows], poses[places])
-        _take_better(found, rows, _close_below(closure, start, wanted, task.held, STEPS))
+        found.improve(rows, _close_below(closure, start, wanted, task.held, STEPS))
 
 
 def _search(
@@ -213,7 +213,7 @@ def _search(
     """Look for the legs that do not reach yet from random configurations; with the platform `at_rest`, one by one."""
     rng = np.random.default_rng(0)
     for _ in range(STARTS):
-        rest = rows[~is_feasible(found)[rows]]
+        rest = rows[~found.feasible[rows]]
         if not len(rest):
             break
         stays = _legs_reached(closure, found, rest) | closure.idle if at_rest else closure.idle
@@ -222,7 +222,7 @@ def _search(
         if at_rest:
             _take_legs(closure, found, rest, tried)
         else:
-            _take_better(found, rest, tried)
+            found.improve(rest, tried)
 
 
 def _assembled(closure: Closure, wanted: Floats, start: Floats, begin: Floats) -> Closing:
@@ -270,30 +270,19 @@ def _led(closure: Closure, targets: Floats, start: Floats, begin: Floats, held: 
     return found
 
 
-def _off(found: Closing) -> Floats:
-    """What keeps each group of each row from being feasible, (n, groups) [L or rad]."""
-    return np.maximum(found.gaps, found.excesses)
-
-
 def _legs_reached(closure: Closure, found: Closing, rows: NDArray[np.intp]) -> Mask:
     """Which coordinates belong to groups that are feasible, (m, columns)."""
-    reached = _off(found)[rows] <= TOLERANCES.limit
+    reached = found.off[rows] <= TOLERANCES.limit
     return np.asarray(reached[:, closure.loops.group_of])
 
 
 def _take_legs(closure: Closure, found: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
     """Take over the groups that came nearer."""
-    better = _off(tried) < _off(found)[rest]
+    better = tried.off < found.off[rest]
     columns = better[:, closure.loops.group_of]
     found.coordinates[rest] = np.where(columns, tried.coordinates, found.coordinates[rest])
     for array, own in ((found.gaps, tried.gaps), (found.excesses, tried.excesses)):
         array[rest] = np.where(better, own, array[rest])
-
-
-def _take_better(found: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
-    """Take over the rows that are feasible, or came nearer."""
-    better = np.flatnonzero(is_feasible(tried) | (_off(tried).max(axis=1) < _off(found)[rest].max(axis=1)))
-    found.take(rest[better], tried, better)
 
 
 def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:

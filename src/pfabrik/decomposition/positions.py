@@ -70,7 +70,7 @@ def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -
     """One branch, from the base (or from the body it hangs on) to the end effector."""
     near = TOLERANCES.alignment * mechanism.characteristic_length
     draft = _Draft(_merge(mechanism, _spots(steps, mechanism.end_effector_is_joint), near))
-    _check_pointing(draft.spots)
+    _check_pointing(mechanism, draft.spots)
     if steps[0].joint.type == "prismatic" and len(draft.spots) > 0:
         if not on_base:
             raise NotExpressible(f"joint {steps[0].joint.name} slides on a moving body")
@@ -192,31 +192,34 @@ def _common_centre(a: _Spot, b: _Spot, near: float) -> Array | None:
     return None
 
 
-def _check_pointing(spots: Sequence[_Spot]) -> None:
-    """See that universal joints with axes of their own let their links point wherever their cones do.
+def _check_pointing(mechanism: Mechanism, spots: Sequence[_Spot]) -> None:
+    """See that universal joints, and what acts as one, let their links point wherever their cones do.
 
     A link that is not square to the axis it carries, off by an angle, cannot come nearer than that angle to the other
-    axis. Axes that are not given are square to the link.
+    axis. Axes that are not given may be square to the link on the other side of the joint.
     """
     for k, spot in enumerate(spots):
-        joint = spot.steps[0].joint if spot.steps else None
-        if joint is None or spot.kind != "U" or joint.axes is None or len(spots) < 2:
+        if spot.kind != "U" or len(spots) < 2:
             continue
-        is_last = k == len(spots) - 1
+        first, is_last = spot.steps[0], k == len(spots) - 1
         line = spots[k - 1 if is_last else k + 1].at - spot.at
-        carried, other = (1, 0) if spot.steps[0].forward != is_last else (0, 1)
-        off = abs(float(np.array(joint.axes[carried]) @ line)) / float(np.linalg.norm(line))
-        if off > TOLERANCES.alignment and _nearest_to(joint, other) < math.asin(min(off, 1.0)):
-            raise NotExpressible(f"joint {joint.name} does not point anywhere: its link is not square to its axis")
+        axes = [axis for _, axis in _turns(mechanism, spot.steps)]
+        other, carried = reversed(axes) if is_last else axes
+        along, length = abs(float(carried @ line)), float(np.linalg.norm(line))
+        if length == 0.0 or along <= TOLERANCES.alignment * length:
+            continue
+        body = first.back.inward if is_last else first.inward
+        if _nearest_to(first.joint, body, other) < math.asin(min(along / length, 1.0)):
+            name = spot.steps[-1].joint.name
+            raise NotExpressible(f"joint {name} does not point anywhere: its link is not square to its axis")
 
 
-def _nearest_to(joint: Joint, axis: int) -> float:
-    """How near the cone of a universal joint lets its line come to one of its axes [rad]; 0 where nothing does."""
+def _nearest_to(joint: Joint, body: str, axis: Array) -> float:
+    """How near the cone of a universal joint lets its line come to the axis on a body [rad]; 0 where nothing does."""
     cone = joint.cone
-    if cone is None or joint.axes is None or cone.fixed_to != joint.connects[axis]:
+    if cone is None or cone.fixed_to != body:
         return 0.0
-    cosine = min(abs(float(np.array(cone.axis) @ np.array(joint.axes[axis]))), 1.0)
-    return math.acos(cosine) - cone.half_angle
+    return math.acos(min(abs(float(np.array(cone.axis) @ axis)), 1.0)) - cone.half_angle
 
 
 def _turns(mechanism: Mechanism, steps: Sequence[Step]) -> list[tuple[str, Array]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from heapq import heappop, heappush
 from itertools import chain
 
@@ -147,6 +148,20 @@ def components(edges: Sequence[Edge], *cut: str) -> list[list[Edge]]:
         for member in groups[target]:
             group_of.update({body: target for body in edges[member].bodies if body not in cut})
     return [[edges[member] for member in sorted(groups[number])] for number in sorted(groups)]
+
+
+@lru_cache(maxsize=256)
+def steps_from_base(mechanism: Structure) -> Mapping[str, int]:
+    """Body -> how many joints the shortest way from the base to it has; bodies that cannot be reached are missing."""
+    steps = {mechanism.base: 0}
+    ends = [mechanism.base]
+    for body in ends:  # grows while it is looked through
+        for joint in mechanism.joints:
+            for other in joint.connects:
+                if body in joint.connects and other not in steps:
+                    steps[other] = steps[body] + 1
+                    ends.append(other)
+    return steps
 
 
 def next_joints(joints: Sequence[Joint], joint: Joint, body: str) -> list[Joint]:

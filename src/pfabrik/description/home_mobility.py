@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..tolerances import TOLERANCES
-from .graph import next_joints, tree_of
+from .graph import next_joints, steps_from_base, tree_of
 from .joint_types import KINDS
 from .joints import Joint
 from .structure import Structure
@@ -79,17 +79,20 @@ def inexactness(mechanism: Structure) -> float:
 def universal_axes(mechanism: Structure, joint: Joint) -> NDArray[np.float64]:
     """The two axes of a universal joint at home, shape (2, 3): its own, or the default where none are given.
 
-    The default axes are normal to each other and to the line to the only next joint (on the second body, else on the
-    first), so that the joint keeps the link from spinning about itself; x and y where there is no such line.
+    The default axes are normal to each other and to the line to the only next joint (on the body farther from the
+    base, else on the nearer one), so that the joint keeps the link from spinning about itself; x and y where there is
+    no such line. They do not depend on which body the joint names first.
     """
     if joint.axes is not None:
         return np.asarray(joint.axes)
-    sides = [next_joints(mechanism.joints, joint, body) for body in reversed(joint.connects)]
+    steps = steps_from_base(mechanism)
+    inward, outward = sorted(joint.connects, key=lambda body: steps.get(body, 0))
+    sides = [next_joints(mechanism.joints, joint, body) for body in (outward, inward)]
     lines = [
         np.asarray(ends[0].at) - np.asarray(joint.at) for ends in sides if len(ends) == 1 and ends[0].at != joint.at
     ]
     normals = np.linalg.svd(lines[0].reshape(1, 3))[2][1:] if lines else np.eye(3)[:2]
-    return np.asarray(normals)
+    return np.asarray(normals if joint.connects[0] == inward else normals[::-1])
 
 
 def joint_screws(mechanism: Structure, joint: Joint) -> NDArray[np.float64]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
+
+from numpy.typing import ArrayLike
 
 from .coercion import home_value, numbers, text, texts, truth, unit_vector, unit_vectors
 from .joint_types import JointType
@@ -25,6 +28,10 @@ class Cone:
     axis: Vector
     half_angle: float
     fixed_to: str
+
+    if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
+
+        def __init__(self, axis: ArrayLike, half_angle: float, fixed_to: str) -> None: ...
 
     def __post_init__(self) -> None:
         set_fields(self, axis=unit_vector(self.axis), half_angle=numbers(self.half_angle), fixed_to=text(self.fixed_to))
@@ -64,6 +71,25 @@ class Joint:
     cone: Cone | None = None
     max_speed: float | None = None
     max_acceleration: float | None = None
+
+    if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
+
+        def __init__(
+            self,
+            name: str,
+            type: JointType,
+            connects: Sequence[str],
+            at: ArrayLike | None = None,
+            axis: ArrayLike | None = None,
+            axes: ArrayLike | None = None,
+            along: Sequence[str] | None = None,
+            actuated: bool = False,
+            home: ArrayLike = 0.0,
+            range: ArrayLike | None = None,
+            cone: Cone | None = None,
+            max_speed: float | None = None,
+            max_acceleration: float | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         set_fields(

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from numpy.typing import ArrayLike
+
 from ..errors import InvalidArgument
 from .coercion import numbers, text, texts
 from .form_faults import shown
@@ -46,15 +48,15 @@ class Leg:
     """
 
     chain: str
-    base: Any = None
-    platform: Any = None
-    via: Any = None
-    axis: Any = None
+    base: ArrayLike | None = None
+    platform: ArrayLike | None = None
+    via: ArrayLike | None = None
+    axis: ArrayLike | None = None
     stroke: Range | None = None
     name: str = ""
     connects: tuple[str, str] | None = None
-    by_letter: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    copies: Mapping[str, Any] | None = None
+    by_letter: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    copies: Mapping[str, int | ArrayLike] | None = None
 
     def __post_init__(self) -> None:
         deep = {name: numbers(getattr(self, name), 3) for name in ("base", "platform", "via", "axis", "stroke")}

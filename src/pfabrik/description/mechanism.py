@@ -6,7 +6,9 @@ import dataclasses
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from numpy.typing import ArrayLike
 
 from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from .faults import find_faults, in_order, merged
@@ -16,6 +18,7 @@ from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import faults_of_legs, legs_name, placed_joints
 from .legs import Leg, as_legs
+from .notebook import mechanism_html
 from .structure import Structure
 
 __all__ = ["JOINT_TYPES", "Cone", "Joint", "JointType", "Limit", "Mechanism", "Range", "Vector", "checked_mechanism"]
@@ -44,6 +47,20 @@ class Mechanism(Structure):
         default everything. What it leaves out follows from the mechanism.
     """
 
+    if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
+
+        def __init__(
+            self,
+            name: str,
+            joints: Iterable[Joint],
+            end_effector: str,
+            reference_point: ArrayLike | None = None,
+            base: str = "base",
+            length_unit: str = "mm",
+            angle_unit: Literal["deg", "rad"] = "deg",
+            task: Sequence[str] | None = None,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check()
@@ -51,6 +68,10 @@ class Mechanism(Structure):
 
     def __repr__(self) -> str:
         return f"<Mechanism '{self.name}': {self._counts()}, task {' '.join(self.task)}>"
+
+    def _repr_html_(self) -> str:
+        """Name, counts, task, actuators with their limits, and a small drawing of home, for notebooks."""
+        return mechanism_html(self, f"{self._counts()}; task {' '.join(self.task)}")
 
     def _counts(self) -> str:
         counts = {"joint": len(self.joints), "actuator": len(self.actuator_names)}
@@ -62,21 +83,21 @@ class Mechanism(Structure):
         legs: str | Leg | Sequence[Leg],
         /,
         *,
-        base: Any = None,
-        platform: Any = None,
-        via: Any = None,
-        axis: Any = None,
+        base: ArrayLike | None = None,
+        platform: ArrayLike | None = None,
+        via: ArrayLike | None = None,
+        axis: ArrayLike | None = None,
         stroke: Range | None = None,
-        copies: Mapping[str, Any] | None = None,
+        copies: Mapping[str, int | ArrayLike] | None = None,
         name: str | None = None,
         end_effector: str = "platform",
-        reference_point: Any = None,
+        reference_point: ArrayLike | None = None,
         task: Sequence[str] | None = None,
         base_body: str = "base",
         joints: Iterable[Joint] = (),
         length_unit: str = "mm",
         angle_unit: Literal["deg", "rad"] = "deg",
-        **by_letter: Mapping[str, Any],
+        **by_letter: Mapping[str, object],
     ) -> Mechanism:
         """A mechanism of legs: chains from its base to its end effector, one for each pair of points.
 
@@ -114,7 +135,7 @@ class Mechanism(Structure):
                 base=base_body,
                 length_unit=length_unit,
                 angle_unit=angle_unit,
-                task=cast(Any, task),
+                task=task,
             )
         except InvalidMechanism as error:
             raise InvalidMechanism(in_order(faults_of_legs(error.faults, len(own), placed))) from None

@@ -76,5 +76,7 @@ def task_of(mechanism: Mechanism) -> Task:
 
 
 def norms(vectors: Floats) -> Floats:
-    """Lengths of vectors (n, 3), (n,); however long they are, no square of them is too large to be represented."""
-    return np.asarray(np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2]))
+    """Lengths of vectors (n, 3), (n,); however long they are, they are finite: at most the largest number there is."""
+    with np.errstate(over="ignore"):
+        lengths = np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2])
+    return np.asarray(np.where(np.isinf(lengths), np.finfo(float).max, lengths))

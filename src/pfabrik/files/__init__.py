@@ -107,8 +107,15 @@ def _text(path: Path) -> str:
         raise _unusable(f"a file that cannot be read ({error.strerror})", "a readable file") from None
 
 
+FORMATS = {"<mujoco": "a MuJoCo model (MJCF)", "<robot": "a robot description (URDF)", "<": "XML"}
+"""Beginnings by which files of other programs are known."""
+
+
 def _parsed(text: str) -> dict[str, Any]:
     _refuse_large(text)
+    if text.lstrip().startswith("<"):
+        told = next(name for tag, name in FORMATS.items() if tag in text)
+        raise _unusable(told, "a mechanism file (TOML), as `pfabrik new` writes")
     try:
         if max(line.count(".") for line in text.split("\n") if not line.startswith("#")) > MOST_DOTS:
             raise RecursionError

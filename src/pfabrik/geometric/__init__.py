@@ -1,11 +1,11 @@
-"""Closed forms of inverse kinematics for the legs and topologies that have one: the baseline, an oracle, all branches.
+"""The paper's geometric approach: inverse kinematics by hand-made formulas, for three topologies.
 
-Nothing here leans on what it checks: a closed form has its own preparation and its own compiled code.
+It is the yardstick of speed and an oracle: nothing here leans on what it checks, and every topology has its own
+preparation and its own compiled code.
 """
 
 from __future__ import annotations
 
-from .branches import WorkingModes, working_modes
 from .ik import Geometric, solve_ik
 
-__all__ = ["Geometric", "WorkingModes", "solve_ik", "working_modes"]
+__all__ = ["Geometric", "solve_ik"]

@@ -2,7 +2,7 @@
 
 An arm's swing and extension are redundant: given these two, its struts follow. Which two is a rule, not a solution:
 
-1. they stay where the seed has them (home by default) if all limits of that arm hold there;
+1. they stay where the start has them (home by default) if all limits of that arm hold there;
 2. otherwise they are the nearest to them, as shares of their ranges, of a regular grid of candidates over both ranges
    at which the arm's ranges, strokes and cones hold;
 3. if there is none, the target is not reached. The grid can miss what lies between its candidates.
@@ -21,7 +21,7 @@ from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..kernels._jit import kernel, routine
 from ..tolerances import TOLERANCES
-from .facts import Array, Interval, centre, home_of, range_of, require, tolerances
+from .facts import Interval, centre, home_of, range_of, require, tolerances
 from .struts import FOOT_SIZE, measure_strut, read_strut, strut_records, write_status, write_strut
 from .targets import BLOCK, FREE, OVER, Floats, Records, Statuses, load_block
 
@@ -97,7 +97,7 @@ def _spans(mechanism: Mechanism, trunk: Sequence[Step]) -> list[Interval]:
     ]
 
 
-def _grid(mechanism: Mechanism, trunk: Sequence[Step], arm: np.void) -> Array:
+def _grid(mechanism: Mechanism, trunk: Sequence[Step], arm: np.void) -> Floats:
     """The candidates of one arm, (2, c), the nearest to home first."""
     values = [np.linspace(low, high, CANDIDATES_A_SIDE) for low, high in _spans(mechanism, trunk)]
     grid = np.stack(np.meshgrid(*values, indexing="ij")).reshape(2, -1)
@@ -120,46 +120,46 @@ def place_candidates(arms: Records, feet: Floats, candidates: Floats, candidate_
 
 @kernel
 def solve_arms(
-    plan: ArmPlan, targets: Floats, seeds: Floats, at_home: bool, actuators: Floats, status: Statuses
+    plan: ArmPlan, targets: Floats, starts: Floats, at_home: bool, actuators: Floats, status: Statuses
 ) -> int:
     """Swing and extension of the arms and lengths of their struts at every target; how many rows are no poses.
 
     Given the swing and the extension of an arm its struts are as those of `solve_struts`: one solution. The two are
-    chosen by the rule above, next to `seeds` (1 or n rows of actuators); home's come first in the order of the
+    chosen by the rule above, next to `starts` (1 or n rows of actuators); home's come first in the order of the
     candidates, so that with `at_home` the search may end early. Source: Merlet for the struts; the rule is ours.
     """
     n_struts = plan.struts.shape[0]
     table = np.zeros((FREE + 1 + n_struts, BLOCK))
     found = np.zeros(BLOCK)
     feet = np.zeros((n_struts, FOOT_SIZE))
-    block = BLOCK if seeds.shape[0] == 1 else 1
+    block = BLOCK if starts.shape[0] == 1 else 1
     invalid = 0
-    for start in range(0, targets.shape[0], block):
-        n = min(block, targets.shape[0] - start)
-        seed = seeds[start if block == 1 else 0]
-        if start == 0 or block == 1:
-            place_feet(plan, seed, feet)
-        invalid += load_block(targets, start, n, plan.far, table, status)
+    for row in range(0, targets.shape[0], block):
+        n = min(block, targets.shape[0] - row)
+        start = starts[row if block == 1 else 0]
+        if row == 0 or block == 1:
+            place_feet(plan, start, feet)
+        invalid += load_block(targets, row, n, plan.far, table, status)
         for m in range(plan.arms.shape[0]):
-            solve_arm(plan, m, feet, seed, at_home, start, n, table, found, actuators)
+            solve_arm(plan, m, feet, start, at_home, row, n, table, found, actuators)
         for k in range(n_struts):
-            write_strut(plan.struts[k], start, n, table, FREE + 1 + k, actuators)
+            write_strut(plan.struts[k], row, n, table, FREE + 1 + k, actuators)
         for i in range(n):
             if table[OVER, i] != 0.0:
                 for m in range(plan.arms.shape[0]):
-                    actuators[start + i, plan.arms[m]["columns"][0]] = math.nan
-                    actuators[start + i, plan.arms[m]["columns"][1]] = math.nan
-        write_status(start, n, table, status)
+                    actuators[row + i, plan.arms[m]["columns"][0]] = math.nan
+                    actuators[row + i, plan.arms[m]["columns"][1]] = math.nan
+        write_status(row, n, table, status)
     return invalid
 
 
 @routine
-def place_feet(plan: ArmPlan, seed: Floats, feet: Floats) -> None:
-    """Where the seed has the feet."""
+def place_feet(plan: ArmPlan, start: Floats, feet: Floats) -> None:
+    """Where the start has the feet."""
     for m in range(plan.arms.shape[0]):
         arm = plan.arms[m]
         for k in range(arm["first"], arm["last"]):
-            place_foot(arm, seed[arm["columns"][0]], seed[arm["columns"][1]], plan.feet[k], feet[k])
+            place_foot(arm, start[arm["columns"][0]], start[arm["columns"][1]], plan.feet[k], feet[k])
 
 
 @routine
@@ -187,43 +187,43 @@ def solve_arm(
     plan: ArmPlan,
     m: int,
     feet: Floats,
-    seed: Floats,
+    start: Floats,
     at_home: bool,
-    start: int,
+    row: int,
     n: int,
     table: Floats,
     found: Floats,
     actuators: Floats,
 ) -> None:
-    """One arm for `n` columns: where the seed has it, or at a candidate; over where at neither."""
+    """One arm for `n` columns: where the start has it, or at a candidate; over where at neither."""
     arm = plan.arms[m]
     swing, extension = arm["columns"][0], arm["columns"][1]
     outside = not (
-        arm["low"][0] <= seed[swing] <= arm["high"][0] and arm["low"][1] <= seed[extension] <= arm["high"][1]
+        arm["low"][0] <= start[swing] <= arm["high"][0] and arm["low"][1] <= start[extension] <= arm["high"][1]
     )
     for i in range(n):
         table[FREE, i] = 1.0 if outside else 0.0
     for k in range(arm["first"], arm["last"]):
         measure_strut(plan.struts[k], feet[k], n, table, FREE, FREE + 1 + k)
     for i in range(n):
-        actuators[start + i, swing] = seed[swing]
-        actuators[start + i, extension] = seed[extension]
+        actuators[row + i, swing] = start[swing]
+        actuators[row + i, extension] = start[extension]
         if table[FREE, i] != 0.0 and table[OVER, i] == 0.0:
-            best = search(plan, m, seed, at_home, i, table, found)
+            best = search(plan, m, start, at_home, i, table, found)
             if best < 0:
                 table[OVER, i] = 1.0
             else:
-                actuators[start + i, swing] = plan.candidates[m, 0, best]
-                actuators[start + i, extension] = plan.candidates[m, 1, best]
+                actuators[row + i, swing] = plan.candidates[m, 0, best]
+                actuators[row + i, extension] = plan.candidates[m, 1, best]
                 for k in range(arm["first"], arm["last"]):
                     table[FREE + 1 + k, i] = length_from(plan, k, best, i, table)
 
 
 @routine
-def search(plan: ArmPlan, m: int, seed: Floats, at_home: bool, i: int, table: Floats, found: Floats) -> int:
-    """The candidate nearest to the seed at which the arm keeps its limits for column `i`, or -1."""
+def search(plan: ArmPlan, m: int, start: Floats, at_home: bool, i: int, table: Floats, found: Floats) -> int:
+    """The candidate nearest to the start at which the arm keeps its limits for column `i`, or -1."""
     arm = plan.arms[m]
-    swing, extension = seed[arm["columns"][0]], seed[arm["columns"][1]]
+    swing, extension = start[arm["columns"][0]], start[arm["columns"][1]]
     best, least = -1, math.inf
     for first in range(0, plan.candidates.shape[2], BLOCK):
         n = min(BLOCK, plan.candidates.shape[2] - first)

@@ -1,4 +1,4 @@
-"""What a closed form takes for granted of a mechanism beyond the joints of its chains, checked while it is prepared."""
+"""What a closed form reads of a description, and takes for granted of it beyond the joints of its chains."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ import math
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
+from .targets import Floats
 
-Array: TypeAlias = NDArray[np.float64]
 Interval: TypeAlias = tuple[float, float]
 
 # Targets farther away than this many L are out of reach of anything: their rounding alone exceeds the tolerance.
@@ -33,7 +32,7 @@ def require(fact: bool, otherwise: str) -> None:
         raise Unsuitable(otherwise)
 
 
-def centre(step: Step) -> Array:
+def centre(step: Step) -> Floats:
     """Centre of a joint at home, (3,) [length]."""
     return np.array(step.joint.at, dtype=float)
 
@@ -61,14 +60,9 @@ def least_cosine(half_angle: float) -> float:
     return NO_CONE if angle >= math.pi else math.cos(angle) - COSINE_ROUNDING
 
 
-def is_parallel(a: Array, b: Array, sine: float = TOLERANCES.alignment) -> bool:
-    """Whether two unit vectors are parallel or opposite, up to a sine; by default to the one that descriptions have."""
-    return float(np.linalg.norm(np.cross(a, b))) <= sine
-
-
-def home_values(mechanism: Mechanism) -> Array:
-    """Actuated coordinates at home, (1, n_a)."""
-    return np.array([[mechanism.home_coordinate(name) for name in mechanism.actuator_names]], dtype=float)
+def is_parallel(a: Floats, b: Floats) -> bool:
+    """Whether two unit vectors are parallel or opposite."""
+    return float(np.linalg.norm(np.cross(a, b))) <= TOLERANCES.alignment
 
 
 def tolerances(mechanism: Mechanism) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..kernels._jit import kernel, routine
 from ..tolerances import TOLERANCES
-from .facts import NO_CONE, Array, centre, home_of, is_parallel, least_cosine, range_of, require, tolerances
+from .facts import NO_CONE, centre, home_of, is_parallel, least_cosine, range_of, require, tolerances
 from .targets import BLOCK, FREE, OVER, REACHED, Floats, Records, Statuses, load_block
 
 _vector = ("f8", (3,))
@@ -49,7 +49,7 @@ def plan_struts(mechanism: Mechanism, chains: Sequence[SubChain]) -> StrutPlan:
     return StrutPlan(strut_records(struts), np.array([foot for _, foot in struts]), tolerances(mechanism)[1])
 
 
-def strut_records(struts: Sequence[tuple[dict[str, Any], Array]]) -> Records:
+def strut_records(struts: Sequence[tuple[dict[str, Any], Floats]]) -> Records:
     """What was read of struts, as records."""
     records = np.zeros(len(struts), STRUT)
     for record, (fields, _) in zip(records, struts, strict=True):
@@ -58,7 +58,7 @@ def strut_records(struts: Sequence[tuple[dict[str, Any], Array]]) -> Records:
     return records
 
 
-def read_strut(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[dict[str, Any], Array]:
+def read_strut(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[dict[str, Any], Floats]:
     """The fields of a strut, and its foot at home, (FOOT_SIZE,)."""
     universal, slide, spherical = steps
     foot, head = centre(universal), centre(spherical)
@@ -85,7 +85,7 @@ def read_strut(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[dict[str, A
     return fields, np.concatenate([foot, foot_axis])
 
 
-def _count(mechanism: Mechanism, steps: Sequence[Step], direction: Array, length: float) -> tuple[float, float]:
+def _count(mechanism: Mechanism, steps: Sequence[Step], direction: Floats, length: float) -> tuple[float, float]:
     """Sign and offset of a strut's coordinate, over the distance of its ends."""
     universal, slide, spherical = steps
     name, along = slide.joint.name, slide.joint.along
@@ -98,7 +98,7 @@ def _count(mechanism: Mechanism, steps: Sequence[Step], direction: Array, length
     return sign, home_of(mechanism, slide) - sign * length
 
 
-def _cone(step: Step, on_link: bool) -> tuple[Array, float]:
+def _cone(step: Step, on_link: bool) -> tuple[Floats, float]:
     """Axis at home and least cosine of the cone at one end of a strut, whose line leads to the other end.
 
     `on_link` says whether the strut is the inward body of this joint; the cone must be fixed to the opposite one.
@@ -113,24 +113,24 @@ def _cone(step: Step, on_link: bool) -> tuple[Array, float]:
 
 @kernel
 def solve_struts(
-    plan: StrutPlan, targets: Floats, seeds: Floats, at_home: bool, actuators: Floats, status: Statuses
+    plan: StrutPlan, targets: Floats, starts: Floats, at_home: bool, actuators: Floats, status: Statuses
 ) -> int:
     """Lengths of the struts at every target; how many rows are no poses.
 
     The length of a strut is |p + R h - f|, with h its head in platform coordinates and f its foot. One solution, and
-    no choice of branch: `seeds` are not read. Degenerate where head and foot coincide: the length is 0, the strut has
+    no choice of branch: `starts` are not read. Degenerate where head and foot coincide: the length is 0, the strut has
     no direction, and every cone counts as kept. Source: Merlet.
     """
     table = np.zeros((FREE + plan.struts.shape[0], BLOCK))
     invalid = 0
-    for start in range(0, targets.shape[0], BLOCK):
-        n = min(BLOCK, targets.shape[0] - start)
-        invalid += load_block(targets, start, n, plan.far, table, status)
+    for row in range(0, targets.shape[0], BLOCK):
+        n = min(BLOCK, targets.shape[0] - row)
+        invalid += load_block(targets, row, n, plan.far, table, status)
         for k in range(plan.struts.shape[0]):
             measure_strut(plan.struts[k], plan.feet[k], n, table, OVER, FREE + k)
         for k in range(plan.struts.shape[0]):
-            write_strut(plan.struts[k], start, n, table, FREE + k, actuators)
-        write_status(start, n, table, status)
+            write_strut(plan.struts[k], row, n, table, FREE + k, actuators)
+        write_status(row, n, table, status)
     return invalid
 
 
@@ -161,16 +161,16 @@ def measure_strut(strut: Records, foot: Floats, n: int, table: Floats, over: int
 
 
 @routine
-def write_strut(strut: Records, start: int, n: int, table: Floats, length: int, actuators: Floats) -> None:
+def write_strut(strut: Records, row: int, n: int, table: Floats, length: int, actuators: Floats) -> None:
     """The coordinate of a strut; NaN where anything is exceeded."""
     sign, offset, column = strut["sign"], strut["offset"], strut["column"]
     for i in range(n):
-        actuators[start + i, column] = offset + sign * table[length, i] if table[OVER, i] == 0.0 else math.nan
+        actuators[row + i, column] = offset + sign * table[length, i] if table[OVER, i] == 0.0 else math.nan
 
 
 @routine
-def write_status(start: int, n: int, table: Floats, status: Statuses) -> None:
+def write_status(row: int, n: int, table: Floats, status: Statuses) -> None:
     """REACHED where nothing is exceeded; what is no pose stays so."""
     for i in range(n):
         if table[OVER, i] == 0.0:
-            status[start + i] = REACHED
+            status[row + i] = REACHED

@@ -27,13 +27,13 @@ NOT_A_ROTATION, ROUNDED = 1e-6, 1e-12
 
 
 @routine
-def load_block(targets: Floats, start: int, n: int, far: float, table: Floats, status: Statuses) -> int:
+def load_block(targets: Floats, row: int, n: int, far: float, table: Floats, status: Statuses) -> int:
     """Lay `n` targets out in the table, rotations made orthonormal; how many are no poses.
 
     These, and targets farther away than `far` (where rounding alone is more than the tolerance), are over, and zero.
     """
     for i in range(n):
-        T = targets[start + i]
+        T = targets[row + i]
         for k in range(3):
             for j in range(4):
                 table[4 * k + j, i] = T[k, j]
@@ -41,10 +41,10 @@ def load_block(targets: Floats, start: int, n: int, far: float, table: Floats, s
     judge_block(n, far, table)
     invalid = 0
     for i in range(n):
-        status[start + i] = MISSED
+        status[row + i] = MISSED
         if table[OVER, i] != 0.0:
-            if not is_pose(targets[start + i]):
-                status[start + i] = INVALID
+            if not is_pose(targets[row + i]):
+                status[row + i] = INVALID
                 invalid += 1
             elif is_near(i, far, table):
                 rectify(i, table)

@@ -1,4 +1,4 @@
-"""The registry: which topologies have compiled code of their own, which legs any other may consist of."""
+"""The registry: which topologies have a closed form, and the compiled code of each."""
 
 from __future__ import annotations
 
@@ -8,25 +8,24 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..decomposition.decompose import SubChain, decompose
 from ..description.mechanism import Mechanism
 from ..errors import NoClosedForm
 from .arms import plan_arms, solve_arms
-from .drives import DRIVES
 from .dyads import plan_dyads, solve_dyads
-from .facts import Array, Unsuitable, home_values, require
-from .modes import Legs, legs_of
+from .facts import Unsuitable, require
 from .struts import plan_struts, solve_struts
-from .targets import Statuses
+from .targets import Floats, Statuses
 
-Kernel = Callable[[Any, Array, Array, bool, Array, Statuses], int]
+Kernel = Callable[[Any, Floats, Floats, bool, Floats, Statuses], int]
+"""Takes plan, targets (n, 4, 4), starts (1 or n, n_a) and whether these are home; fills actuators (n, n_a) and status
+(n,), and returns how many targets are no poses."""
 
 
 @dataclass(frozen=True)
 class Topology:
-    """Mechanisms with compiled code of their own.
+    """Mechanisms with a closed form.
 
     Attributes
     ----------
@@ -34,43 +33,37 @@ class Topology:
     end : what the chains end on, in words.
     plan : reads a mechanism with such chains; `Unsuitable` says what else it lacks.
     kernel : solves it.
-    one_branch : whether the legs have branches of which the kernel tries home's alone.
     """
 
     chain: str
     end: str
     plan: Callable[[Mechanism, Sequence[SubChain]], Any]
     kernel: Kernel
-    one_branch: bool = False
 
     def __str__(self) -> str:
         return f"{self.chain} to {self.end}"
 
 
 TOPOLOGIES = (
-    Topology("R*-R-R", "a joint, all axes parallel", plan_dyads, solve_dyads, one_branch=True),
+    Topology("R*-R-R", "a joint, all axes parallel", plan_dyads, solve_dyads),
     Topology("U-P*-S", "a body", plan_struts, solve_struts),
     Topology("R*-P*-[U-P*-S, U-P*-S]", "a body", plan_arms, solve_arms),
 )
-LEGS = " or ".join(f"'{drive.chain}'" for drive in DRIVES)
-KNOWN = (*map(str, TOPOLOGIES), f"legs that are {LEGS}")
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """A mechanism as its compiled code takes it, as its legs, or as both.
+    """A mechanism as its compiled code takes it.
 
     Attributes
     ----------
-    plan, kernel : the compiled code and what it takes; None where the topology has none.
+    plan, kernel : the compiled code, and what it takes.
     home : actuated coordinates at home, (1, n_a).
-    legs : tried where the compiled code finds nothing; None where it tries everything.
     """
 
     plan: Any
-    kernel: Any
-    home: NDArray[np.float64]
-    legs: Legs | None
+    kernel: Kernel
+    home: Floats
 
 
 @lru_cache(maxsize=64)
@@ -79,29 +72,15 @@ def closed_form(mechanism: Mechanism) -> ClosedForm:
     chains = decompose(mechanism)
     written = {str(chain) for chain in chains}
     topology = next((each for each in TOPOLOGIES if written == {each.chain}), None)
-    reasons: list[str] = []
-    if topology is not None:
-        try:
-            require(mechanism.task == mechanism.whole_task, "its task leaves out a part of the pose")
-            _require_all_actuators(mechanism, chains)
-            plan = topology.plan(mechanism, chains)
-            legs = legs_of(mechanism) if topology.one_branch else None
-            return ClosedForm(plan, topology.kernel, home_values(mechanism), legs)
-        except Unsuitable as unsuitable:
-            reasons.append(str(unsuitable))
     try:
-        return ClosedForm(None, None, home_values(mechanism), legs_of(mechanism))
-    except Unsuitable as unsuitable:
-        reasons.append(str(unsuitable))
-    raise no_closed_form(mechanism, "; ".join(dict.fromkeys(reasons)))
-
-
-def no_closed_form(mechanism: Mechanism, reason: str) -> NoClosedForm:
-    """What to raise of a mechanism that lacks something."""
-    return NoClosedForm(mechanism.name, [str(chain) for chain in decompose(mechanism)], reason, KNOWN)
-
-
-def _require_all_actuators(mechanism: Mechanism, chains: Sequence[SubChain]) -> None:
-    known = {name for chain in chains for name in chain.joints}
-    for name in mechanism.actuator_names:
-        require(name in known, f"actuated joint {name} is in no sub-chain")
+        if topology is None:
+            raise Unsuitable("another topology")
+        require(mechanism.task == mechanism.whole_task, "its task leaves out a part of the pose")
+        known = {name for chain in chains for name in chain.joints}
+        for name in mechanism.actuator_names:
+            require(name in known, f"actuated joint {name} is in no sub-chain")
+        plan = topology.plan(mechanism, chains)
+    except Unsuitable as reason:
+        raise NoClosedForm(mechanism.name, [*map(str, chains)], str(reason), [*map(str, TOPOLOGIES)]) from None
+    home = np.array([[mechanism.home_coordinate(name) for name in mechanism.actuator_names]], dtype=float)
+    return ClosedForm(plan, topology.kernel, home)

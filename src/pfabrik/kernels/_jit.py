@@ -1,20 +1,29 @@
-"""The one decorator of the compiled code: cached on disk, keyed by the text of every kernel, announced when cold."""
+"""The decorators of the compiled code: cached on disk, keyed by the text of every kernel, announced when compiled.
+
+A kernel is what Python calls; its parts (`routine`, `inlined`, `allocator`) are called by compiled code alone. Most of
+the time of compiling grows with the number of functions and of their arguments, so parts are compiled for one set of
+types each, and take a NamedTuple of arrays as one pointer.
+"""
 
 from __future__ import annotations
 
-import contextlib
+import gc
 import hashlib
 import sys
-import threading
-from collections.abc import Callable
-from functools import lru_cache
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import numba
-from numba.core import codegen, compiler
+from numba import extending
+from numba.core import cgutils, codegen, compiler, imputils, types
 from numba.core.caching import FunctionCache
+from numba.core.typing.templates import AttributeTemplate
 
 # Numba is typed in some versions and not in others, and never for the options below the public ones.
 _njit: Any = numba.njit
@@ -22,6 +31,11 @@ _Cache: Any = FunctionCache
 _config: Any = numba.config
 _Library: Any = getattr(codegen, "JITCodeLibrary", object)
 _Compiler: Any = getattr(compiler, "Compiler", object)
+_types: Any = types
+_cgutils: Any = cgutils
+_imputils: Any = imputils
+_extending: Any = extending
+_AttributeTemplate: Any = AttributeTemplate
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -46,25 +60,121 @@ def _digest_for(function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 class _KernelCache(_Cache):  # type: ignore[misc]  # a class only at run time
-    """Numba's file cache, made stale by an edit to any file beside the kernel; says so when it has to compile."""
-
-    _announced = threading.Event()
+    """Numba's file cache, made stale by an edit to any file beside the kernel."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         self._cache_file._source_stamp = (self._cache_file._source_stamp, *_digest_for(function))
 
-    def load_overload(self, signature: Any, target_context: Any) -> Any:
-        overload = super().load_overload(signature, target_context)
-        if overload is None and not self._announced.is_set():
-            self._announced.set()
-            sys.stderr.write("pfabrik: compiling the kernels, once per version ...\n")
-            sys.stderr.flush()
-        return overload
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """No garbage collection: the compiler makes so many objects that collecting them is a tenth of its time."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
+
+
+def _name_of(function: Callable[..., Any]) -> str:
+    """A kernel as it is announced: its folder and its name."""
+    return f"{function.__module__.rpartition('.')[0].rpartition('.')[2]}.{function.__name__}".lstrip(".")
+
+
+def _compile_announced(name: str, original: Callable[..., Any], *arguments: Any) -> Any:
+    """Compile a kernel, saying so on standard error before, and afterwards how long it took.
+
+    Numba calls this for what is not in the cache, with its lock held: one thread compiles, others wait for it.
+    """
+    sys.stderr.write(f"pfabrik: compiling {name} ...")
+    sys.stderr.flush()
+    began = time.perf_counter()
+    try:
+        with _without_collection():
+            return original(*arguments)
+    finally:
+        sys.stderr.write(f" {time.perf_counter() - began:.1f} s\n")
+        sys.stderr.flush()
+
+
+@lru_cache(maxsize=1)
+def _warn_of_no_cache() -> None:
+    """Say once that compiled code cannot be kept."""
+    warnings.warn(
+        "compiled kernels cannot be kept, for neither the package's folder nor the user's cache folder can be written: "
+        "every process compiles them anew (the environment variable NUMBA_CACHE_DIR names another folder)",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
+class Reference(_types.Type):  # type: ignore[misc]  # a class only at run time
+    """Numba's type of a NamedTuple of arrays taken by reference: a pointer to what its owner keeps alive.
+
+    In compiled code it reads like the NamedTuple; whoever calls a part with one converts it. By value, every array
+    would be seven or more arguments of every function that it goes through.
+    """
+
+    def __init__(self, record: Any) -> None:
+        self.record = record
+        super().__init__(f"Reference({record.name})")
+
+
+@_extending.register_model(Reference)
+class _ReferenceModel(_extending.models.PrimitiveModel):  # type: ignore[misc]  # a class only at run time
+    def __init__(self, manager: Any, reference: Any) -> None:
+        super().__init__(manager, reference, manager.lookup(reference.record).get_value_type().as_pointer())
+
+
+@_extending.infer_getattr
+class _ReferenceAttribute(_AttributeTemplate):  # type: ignore[misc]  # a class only at run time
+    key = Reference
+
+    def generic_resolve(self, reference: Any, name: str) -> Any:
+        fields = reference.record.fields
+        return _argument_type(reference.record.types[fields.index(name)]) if name in fields else None
+
+
+@_extending.lower_getattr_generic(Reference)
+def _load_field(context: Any, builder: Any, reference: Any, pointer: Any, name: str) -> Any:
+    place = reference.record.fields.index(name)
+    own, field = reference.record.types[place], _cgutils.gep_inbounds(builder, pointer, 0, place)
+    if isinstance(own, _types.BaseNamedTuple):
+        return field
+    return _imputils.impl_ret_borrowed(context, builder, own, builder.load(field))
+
+
+@_extending.lower_cast(_types.BaseNamedTuple, Reference)
+def _refer(context: Any, builder: Any, record: Any, reference: Any, value: Any) -> Any:
+    return _cgutils.alloca_once_value(builder, value)
+
+
+def _argument_type(given: Any) -> Any:
+    """The type by which a part takes an argument: a number's value is not part of it, a NamedTuple is a reference."""
+    given = _types.unliteral(given)
+    return Reference(given) if isinstance(given, _types.BaseNamedTuple) else given
+
+
+def _resolve_call(dispatcher: Any, original: Callable[..., Any], arguments: Any, keywords: Any) -> Any:
+    """What Numba asks of a function called with arguments of some types, for the types that the part takes."""
+    _, folded = dispatcher._compiler.fold_argument_types(arguments, keywords)
+    return original(tuple(_argument_type(given) for given in folded), {})
 
 
 class _PartLibrary(_Library):  # type: ignore[misc]  # a class only at run time
     """The code of a part, not optimised and no machine code: each kernel that it goes into does both, for the whole."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Tidy each function by itself, all with the same passes; Numba makes them anew for each, also for those that
+        are only declared."""
+        module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager()
+        for function in module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
 
     def _optimize_final_module(self) -> None:
         pass
@@ -108,7 +218,10 @@ class _PartCompiler(_KernelCompiler):
 
 
 # Numba promises these to nobody: with a version that has others, all is compiled in its own way, which takes longer.
-_HOOKS = ((_Library, "_optimize_final_module _finalize_final_module codegen"), (_Compiler, "define_pipelines"))
+_HOOKS = (
+    (_Library, "_optimize_functions _optimize_final_module _finalize_final_module codegen"),
+    (_Compiler, "define_pipelines"),
+)
 _IS_HOOKED = all(hasattr(owner, name) for owner, names in _HOOKS for name in names.split())
 
 _KERNEL: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
@@ -119,12 +232,26 @@ if _IS_HOOKED:
 
 
 def kernel(function: F) -> F:
-    """Compile `function` for any thread: no GIL, IEEE division, results cached on disk."""
+    """Compile `function` for any thread: no GIL, IEEE division, results cached on disk.
+
+    The cache is beside the source if that can be written, else in the user's cache folder, else there is none.
+    """
     dispatcher: Any = _njit(**_KERNEL)(function)
     if not _config.DISABLE_JIT:
-        # where neither the package's folder nor the user's cache can be written, every process compiles anew
-        with contextlib.suppress(RuntimeError):
+        compile_quietly = dispatcher._compiler.compile
+        dispatcher._compiler.compile = partial(_compile_announced, _name_of(function), compile_quietly)
+        try:
             dispatcher._cache = _KernelCache(function)
+        except RuntimeError:
+            _warn_of_no_cache()
+    return dispatcher
+
+
+def _part(function: F, **options: Any) -> F:
+    """Compile `function` as a part of kernels."""
+    dispatcher: Any = _njit(**_PART, **options)(function)
+    if not _config.DISABLE_JIT:
+        dispatcher.get_call_template = partial(_resolve_call, dispatcher, dispatcher.get_call_template)
     return dispatcher
 
 
@@ -134,14 +261,14 @@ def routine(function: F) -> F:
     Without Numba's memory manager no reference is counted, which is most of the time of code as small as this, and
     most of its compilation.
     """
-    return _njit(**_PART, _nrt=False)(function)
+    return _part(function, _nrt=False)
 
 
 def inlined(function: F) -> F:
     """A `routine` that every caller takes in whole: it is called so often that a call would show in the time."""
-    return _njit(**_PART, _nrt=False, forceinline=True)(function)
+    return _part(function, _nrt=False, forceinline=True)
 
 
 def allocator(function: F) -> F:
     """Compile `function` as a part of kernels that may allocate."""
-    return _njit(**_PART)(function)
+    return _part(function)

@@ -91,10 +91,11 @@ def apply_inverse(L: Floats, n: int, b: Floats, x: Floats) -> None:
 def worst_violated(p: Programme, n: int, k: int) -> tuple[int, float]:
     """The limit violated most, or -1; and by how much."""
     worst, most = -1, KEPT
+    G, x = p.G, p.x
     for c in range(k):
         value = p.h[c]
         for i in range(n):
-            value += p.G[c, i] * p.x[i]
+            value += G[c, i] * x[i]
         if value > most:
             worst, most = c, value
     return worst, most
@@ -106,19 +107,19 @@ def divide(p: Programme, n: int, m: int, c: int) -> float:
 
     Returns how fast it falls along that direction; 0 where it depends on the active ones.
     """
-    G, S = p.G, p.system
+    G, S, pull, step, share, active = p.G, p.system, p.pull, p.step, p.share, p.active
     apply_inverse(p.factor, n, G[c], p.step)
     for a in range(m):
         for b in range(a + 1):
             S[a, b] = 0.0
             for i in range(n):
-                S[a, b] += p.pull[a, i] * G[p.active[b], i]
-        p.share[a] = 0.0
+                S[a, b] += pull[a, i] * G[active[b], i]
+        share[a] = 0.0
         for i in range(n):
-            p.share[a] += p.step[i] * G[p.active[a], i]
+            share[a] += step[i] * G[active[a], i]
     own = 0.0
     for i in range(n):
-        own += p.step[i] * G[c, i]
+        own += step[i] * G[c, i]
     for a in range(m):  # Cholesky, in place
         for b in range(a + 1):
             value = S[a, b]
@@ -126,21 +127,21 @@ def divide(p: Programme, n: int, m: int, c: int) -> float:
                 value -= S[a, j] * S[b, j]
             S[a, b] = value * S[b, b] if b < a else 1.0 / math.sqrt(max(value, 1e-300))
     for a in range(m):
-        value = p.share[a]
+        value = share[a]
         for b in range(a):
-            value -= S[a, b] * p.share[b]
-        p.share[a] = value * S[a, a]
+            value -= S[a, b] * share[b]
+        share[a] = value * S[a, a]
     for a in range(m - 1, -1, -1):
-        value = p.share[a]
+        value = share[a]
         for b in range(a + 1, m):
-            value -= S[b, a] * p.share[b]
-        p.share[a] = value * S[a, a]
+            value -= S[b, a] * share[b]
+        share[a] = value * S[a, a]
     for i in range(n):
         for a in range(m):
-            p.step[i] -= p.share[a] * p.pull[a, i]
+            step[i] -= share[a] * pull[a, i]
     rate = 0.0
     for i in range(n):
-        rate += p.step[i] * G[c, i]
+        rate += step[i] * G[c, i]
     return rate if m < n and rate > DEPENDENT * own else 0.0
 
 

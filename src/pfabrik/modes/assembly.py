@@ -14,7 +14,7 @@ from ..errors import ContinuumOfSolutions, InvalidArgument
 from ..fk import Actuators, as_values, assembled
 from ..motion.first_order import stepped_freely
 from ..tolerances import TOLERANCES
-from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Modes, Sightings, as_count
+from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes, as_count
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class _Search:
         self.locked = frozenset(closure.mechanism.actuator_names)
         self.rng = np.random.default_rng(0)
         self.starts = 0
-        self.found = Sightings()
+        self.found = Clusters()
 
     @property
     def is_done(self) -> bool:

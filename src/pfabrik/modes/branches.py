@@ -7,15 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closure.close import HELD, Closing, Closure, close, platform_poses
-from ..closure.nearest import MARGIN
+from ..closure.close import HELD, MARGIN, Closing, Closure, close, platform_poses
 from ..closure.starts import random_starts
 from ..description.task import task_of
 from ..errors import ContinuumOfWorkingModes
 from ..motion.displacements import columns
 from ..tolerances import TOLERANCES
-from .fingerprints import Marks, close_on_target, count_from_home, shifts
-from .lists import LEAST_STARTS, STEPS, Sightings
+from .fingerprints import Fingerprints, close_on_target, count_from_home, shifts
+from .lists import LEAST_STARTS, STEPS, Clusters
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -62,9 +61,9 @@ class BranchSearch:
         self.task = task_of(closure.mechanism)
         self.rng = np.random.default_rng(0)
         self.starts = 0
-        self.poses = Sightings()
-        self.legs: list[list[Sightings]] = []
-        self._marks: Marks | None = None
+        self.poses = Clusters()
+        self.legs: list[list[Clusters]] = []
+        self._marks: Fingerprints | None = None
         self._whole = np.zeros(len(closure.scale))
         self._lacking = np.ones(len(closure.loops.groups) - 1, bool)
         self._waiting: list[tuple[Floats, Floats, Mask]] = []
@@ -111,7 +110,7 @@ class BranchSearch:
         count_from_home(self.closure, coordinates)
         if self._marks is None:
             self._refuse_continuum(coordinates[0], poses[0])
-            self._marks = Marks(self.closure, coordinates[0], poses[0])
+            self._marks = Fingerprints(self.closure, coordinates[0], poses[0])
         marks = self._marks
 
         def settle_pose(row: int) -> tuple[Floats, Floats]:
@@ -120,13 +119,13 @@ class BranchSearch:
 
         places = self.poses.count(marks.of_poses(poses), settle_pose)
         while len(self.legs) < len(self.poses.hits):
-            self.legs.append([Sightings() for _ in range(marks.n_legs)])
+            self.legs.append([Clusters() for _ in range(marks.n_legs)])
         for place in np.unique(places):
             for leg, branches in enumerate(self.legs[place]):
                 rows = np.flatnonzero((places == place) & closed[:, marks.leg_of_group == leg].all(axis=1))
                 self._sort_leg(leg, branches, coordinates[rows], poses[rows])
 
-    def _sort_leg(self, leg: int, branches: Sightings, coordinates: Floats, poses: Floats) -> None:
+    def _sort_leg(self, leg: int, branches: Clusters, coordinates: Floats, poses: Floats) -> None:
         """Count configurations of one leg among its branches; of each branch, keep the best."""
         marks = self._marks
         assert marks is not None

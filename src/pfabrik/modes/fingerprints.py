@@ -29,7 +29,7 @@ STRAIGHT = 0.2
 the same as the half, it is off by all of it."""
 
 
-class Marks:
+class Fingerprints:
     """What working modes are told apart by: where the platform is, and for each leg actuators and joint centres.
 
     What moves while actuators and end effector rest, as the elbow of a rod that spins, tells nothing. If that is the
@@ -70,11 +70,11 @@ class Marks:
         return int(self.leg_of_group.max()) + 1
 
     def of_poses(self, poses: Floats) -> Floats:
-        """Marks of platforms (n, 4, 4): positions [L], and rotation matrices; (n, 0) if platforms tell nothing."""
+        """Fingerprints of platforms (n, 4, 4): positions [L], rotation matrices; (n, 0) if platforms tell nothing."""
         return self._placed(poses) if self.pose_rests else np.zeros((len(poses), 0))
 
     def of_legs(self, coordinates: Floats) -> Floats:
-        """Marks of the legs of closed configurations (n, columns): actuators [L, or cosine and sine], centres [L]."""
+        """Fingerprints of legs of closed configurations (n, columns): actuators [L, or cosine, sine], centres [L]."""
         values = self._closure.actuators(coordinates)
         first = np.where(self._turning, np.cos(values), values * self._scale)
         second = np.where(self._turning, np.sin(values), 0.0)

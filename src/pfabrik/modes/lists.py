@@ -85,7 +85,7 @@ class Modes(Sequence[Solution]):
         return len(self.modes)
 
 
-class Sightings:
+class Clusters:
     """Configurations found so far, each once, told apart by their marks: numbers that differ where modes do.
 
     Attributes

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ..answers.solution import Solution, Status
 from ..closure.close import close, closure_of
-from ..closure.nearest import is_feasible
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..engine import engine_of
@@ -101,7 +100,7 @@ def _answered(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
     rows, n = found.rows, len(found)
     if mechanism.end_effector_is_joint:
         rows.poses[:, :3, :3] = target[:3, :3]
-    rows.status[:] = np.where(is_feasible(closing), Status.REACHED, Status.EXCEEDED)
+    rows.status[:] = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
     position, rotation = task_of(mechanism).errors(rows.poses, np.repeat(target[None], n, axis=0))
     rows.measures[:, 0], rows.measures[:, 1] = position, rotation
     return Solution(mechanism, found, (n,))

@@ -97,13 +97,13 @@ class Singularity:
     kinds : the kinds whose measure is below `TOLERANCES.singular`; for a batch, one tuple a row, in row order.
     """
 
-    serial: Any
-    parallel: Any
-    constraint: Any
-    passive: Any
+    serial: float | Floats
+    parallel: float | Floats
+    constraint: float | Floats
+    passive: float | Floats
     lost: Floats
     gained: Floats
-    kinds: Any
+    kinds: tuple[str, ...] | list[tuple[str, ...]]
 
 
 def forward_map(mechanism: Mechanism, q: Floats) -> Floats:

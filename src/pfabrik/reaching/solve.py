@@ -8,6 +8,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ..closure.assemble import assemble
 from ..closure.close import Closing, closure_of, platform_poses
 from ..closure.configurations import Configurations, joint_coordinates, new_rows, put_rows, rows_at, write_closing
 from ..closure.descend import within_sight
@@ -125,7 +126,11 @@ class ReachingEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]; merged joints share a centre."""
         return joint_points(self._compiled, found.rows)
 
-    def assemble(self, coordinates: Floats, poses: Floats, values: Floats) -> tuple[Floats, Floats] | None:
+    def assemble(self, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
+        """Forward kinematics: see `closure.assemble.assemble`."""
+        return assemble(self.mechanism, coordinates, values, seeded=seeded, by_positions=self._by_positions)
+
+    def _by_positions(self, coordinates: Floats, poses: Floats, values: Floats) -> tuple[Floats, Floats]:
         """Legs whose actuators have given values (n, n_a), assembled in positions around platforms (n, 4, 4).
 
         The range of every actuator shrinks to its value; the platform is then projected to where the legs let it be.

@@ -40,7 +40,7 @@ def feasibility(solution: Solution) -> Feasibility:
     mechanism = solution.mechanism
     return Feasibility(
         failed=int((np.asarray(solution.status) >= Status.FAILED).sum()),
-        limit_excess=float(solution.limit_excess.max()),
-        closure=float(closure_residual(solution).max() / mechanism.characteristic_length),
+        limit_excess=float(np.max(solution.limit_excess)),
+        closure=float(np.max(closure_residual(solution)) / mechanism.characteristic_length),
         independent=float(worst_excess(solution).max()),
     )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from ..answers.solution import Solution, Status
+from ..answers.tracked import Track
 from ..tolerances import TOLERANCES
 from .feasible import Model, model_of
 from .study import Tick
@@ -48,7 +49,7 @@ class Comparison(NamedTuple):
         return float(np.fmin(self.exact, self.searched))
 
 
-def compare(targets: Floats, solution: Solution, exact: Solution, searches: int, tick: Tick) -> list[Comparison]:
+def compare(targets: Floats, solution: Track, exact: Solution, searches: int, tick: Tick) -> list[Comparison]:
     """Projected answers, and those by exact projection, next to the nearest feasible poses of the same orientation.
 
     Left out are answers that gave up the target's orientation.

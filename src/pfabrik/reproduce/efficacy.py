@@ -72,7 +72,7 @@ def follow(case: Case, targets: Floats, options: Options) -> Followed:
         solution=solution,
         position_errors=np.linalg.norm(poses[:, :3, 3] - targets[:, :3, 3], axis=1),
         orientation_errors=np.degrees(angles_between(poses, targets)),
-        newton=float(np.mean([*start.iterations, *rest.iterations])),
+        newton=float(np.mean(np.append(start.iterations, rest.iterations))),
         feasibility=feasibility(solution),
     )
 
@@ -94,7 +94,7 @@ def summary(found: Efficacy) -> list[dict[str, Any]]:
             "mechanism": found.case.key,
             "options": name,
             "steps": len(found.targets),
-            "reached": int((run.solution.status == Status.REACHED).sum()),
+            "reached": int(np.count_nonzero(run.solution.status == Status.REACHED)),
             "position_rmse": run.position_rmse,
             "orientation_rmse_deg": None if is_point(found.case) else run.orientation_rmse,
             "iterations": float(np.mean(run.solution.iterations)),

@@ -46,17 +46,21 @@ class Answered:
 
     @property
     def reached(self) -> int:
-        return int((self.solution.status == Status.REACHED).sum())
+        return int(np.count_nonzero(self._are_reached))
 
     @property
     def position_rms(self) -> float:
         """Of the errors of the targets that are reached [length]."""
-        return rms(self.solution.position_error[self.solution.status == Status.REACHED])
+        return rms(np.asarray(self.solution.position_error)[self._are_reached])
 
     @property
     def iterations(self) -> float:
         """Passes, on average over the targets that are reached."""
-        return float(np.mean(self.solution.iterations[self.solution.status == Status.REACHED]))
+        return float(np.mean(np.asarray(self.solution.iterations)[self._are_reached]))
+
+    @property
+    def _are_reached(self) -> NDArray[np.bool_]:
+        return np.asarray(self.solution.status == Status.REACHED)
 
 
 @dataclass(frozen=True)
@@ -205,7 +209,7 @@ def summary(found: Efficiency) -> list[dict[str, Any]]:
             "reached": answered.reached,
             "position_rms": answered.position_rms,
             "iterations": answered.iterations,
-            "iterations_most": int(answered.solution.iterations.max()),
+            "iterations_most": int(np.max(answered.solution.iterations)),
             "agreement": found.agreement if (options, start) == ("default", "cold") else None,
             **answered.feasibility._asdict(),
         }

@@ -1,47 +1,66 @@
 """Whether an answer is feasible, from the description alone: closed-form loops and limits in plain NumPy.
 
 Two kinds of machine are covered, told apart by their joints: struts (U-P-S) whose feet are on the base or on arms that
-hinges and slides carry, and cranks with forearms that meet in one plane. No code of the solver is used.
+hinges and slides carry, and cranks with forearms that meet in one plane. Nothing of the engines is used.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.solution import Solution
+from ..decomposition.decompose import decompose
+from ..description.graph import Step
 from ..description.mechanism import Cone, Joint, Mechanism
-from ..errors import UnsupportedMechanism
+from ..rotations import from_rotvec
 
 Floats = NDArray[np.float64]
 
+ROOM = 4.0
+"""How far from home positions are looked for, along each axis [L]."""
 
-class Model(Protocol):
+
+class Model:
     """A machine at a fixed orientation of its platform, as functions of its free variables x (k,) [L or rad].
 
-    The first variables are the position of the reference point, along `axes` (m, 3).
+    Attributes
+    ----------
+    axes : (m, 3); the first m variables are the position of the reference point along them.
+    names : of the actuators that are the other variables.
+    bounds : (k, 2).
+    home : (k,).
     """
 
-    length: float
-    axes: Floats
-    bounds: Floats  # (k, 2)
-    home: Floats  # (k,)
-
-    def slacks(self, x: Floats, rotation: Floats) -> Floats:
-        """How far every limit is away [L or rad]; negative where it is exceeded."""
-        ...
-
-    def gaps(self, x: Floats, rotation: Floats) -> Floats:
-        """By how much every loop is open [L]; empty where the variables close all of them."""
-        ...
+    def __init__(self, mechanism: Mechanism, axes: Floats, driven: Sequence[Joint]) -> None:
+        self.mechanism = mechanism
+        self.length = mechanism.characteristic_length
+        self.axes = axes
+        self.names = [joint.name for joint in driven]
+        self.units = np.array([self.length if joint.type == "prismatic" else 1.0 for joint in driven])
+        position = axes @ np.array(mechanism.reference_point) / self.length
+        ranges = np.array([_range(joint) for joint in driven]).reshape(-1, 2) / self.units[:, None]
+        self.bounds = np.concatenate([position[:, None] + [-ROOM, ROOM], ranges])
+        homes = np.array([joint.home for joint in driven], dtype=float) / self.units
+        self.home = np.concatenate([position, homes])
 
     def variables(self, solution: Solution) -> Floats:
         """The variables of answers (n, k)."""
-        ...
+        order = [self.mechanism.actuator_names.index(name) for name in self.names]
+        positions = solution.pose[:, :3, 3] @ self.axes.T / self.length
+        return np.concatenate([positions, solution.actuators[:, order] / self.units], axis=1)
+
+    def slacks(self, x: Floats, rotation: Floats) -> Floats:
+        """How far every limit is away [L or rad]; negative where it is exceeded."""
+        raise NotImplementedError
+
+    def gaps(self, x: Floats, rotation: Floats) -> Floats:
+        """By how much every loop is open [L]; empty where the variables close all of them."""
+        return np.zeros(0)
 
 
 @lru_cache(maxsize=8)
@@ -57,18 +76,6 @@ def worst_excess(solution: Solution) -> Floats:
     return np.array([max(0.0, -model.slacks(x, R).min(), np.abs(model.gaps(x, R)).max(initial=0.0)) for x, R in poses])
 
 
-def _turned(axis: Floats, angle: float) -> Floats:
-    """Rotation matrix about a unit axis."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
-
-
-def _unit(vector: object) -> Floats:
-    array = np.array(vector, dtype=float)
-    return np.asarray(array / np.linalg.norm(array))
-
-
 def _at(joint: Joint) -> Floats:
     return np.array(joint.at, dtype=float)
 
@@ -78,88 +85,26 @@ def _range(joint: Joint) -> tuple[float, float]:
     return float(low), float(high)  # type: ignore[arg-type]
 
 
-def _beyond(joint: Joint, body: str) -> str:
-    """The body on the other side of a joint."""
-    first, second = joint.connects
-    return first if second == body else second
-
-
-def _toward_base(mechanism: Mechanism, body: str, but: tuple[Joint, ...] = ()) -> list[Joint]:
-    """The R and P joints that carry a body, from the base outward; empty for the base itself."""
-    carried: list[Joint] = []
-    while body != mechanism.base:
-        found = [j for j in mechanism.joints if body in j.connects and j.type in ("revolute", "prismatic")]
-        joint = next((j for j in found if j not in (*carried, *but)), None)
-        if joint is None:
-            raise UnsupportedMechanism(mechanism.name, [f"body '{body}' is not carried by hinges and slides"])
-        carried.insert(0, joint)
-        body = _beyond(joint, body)
-    return carried
-
-
-@dataclass(frozen=True)
-class _Carrier:
-    """A body that moves with the joints between it and the base."""
-
-    joints: tuple[Joint, ...]
-    senses: tuple[float, ...]
-    first: int  # of its variables
-
-    def placed(self, x: Floats, length: float) -> tuple[Floats, Floats]:
-        """Rotation and translation of the body from home."""
-        rotation, shift = np.eye(3), np.zeros(3)
-        for joint, sense, value in zip(self.joints, self.senses, x[self.first :], strict=False):
-            if joint.type == "revolute":
-                turn = _turned(_unit(joint.axis), sense * (value - joint.home))
-                shift = shift + rotation @ (_at(joint) - turn @ _at(joint))
-                rotation = rotation @ turn
-            else:
-                shift = shift + rotation @ _unit(joint.axis) * (sense * (value * length - joint.home))
-        return rotation, shift
-
-
-class Struts:
+class Struts(Model):
     """Struts from feet, on the base or on arms, to a platform; x is the position, then the arms' joints."""
 
     def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
-        self.length = mechanism.characteristic_length
-        self.axes = np.eye(3)
-        struts = [joint for joint in mechanism.joints if joint.along is not None]
-        ends = [sorted(map(mechanism.joint, s.along or ()), key=self._is_head) for s in struts]
-        self.low, self.high = np.array([_range(strut) for strut in struts]).T / self.length
-        self.feet = np.array([_at(foot) for foot, _ in ends])
-        self.tops = np.array([_at(head) - mechanism.reference_point for _, head in ends])
-        bodies = [_foot_body(foot, strut, mechanism) for (foot, _), strut in zip(ends, struts, strict=True)]
-        self.carriers, self.carried_by = self._carriers(bodies)
-        self.foot_axes, self.foot_angles = _cones([foot for foot, _ in ends], bodies)
-        self.head_axes, self.head_angles = _cones([head for _, head in ends], [mechanism.end_effector] * len(ends))
-        joints = [joint for carrier in self.carriers for joint in carrier.joints]
-        self.names = [joint.name for joint in joints]
-        self.units = np.array([self.length if joint.type == "prismatic" else 1.0 for joint in joints])
-        ranges = np.array([_range(joint) for joint in joints]).reshape(-1, 2) / self.units[:, None]
-        reach = np.array([[-4.0, 4.0]] * 3) + np.array(mechanism.reference_point)[:, None] / self.length
-        self.bounds = np.concatenate([reach, ranges])
-        homes = np.array([joint.home for joint in joints], dtype=float) / self.units
-        self.home = np.concatenate([np.array(mechanism.reference_point) / self.length, homes])
-
-    def _is_head(self, joint: Joint) -> bool:
-        return self.mechanism.end_effector in joint.connects
-
-    def _carriers(self, bodies: list[str]) -> tuple[list[_Carrier], NDArray[np.intp]]:
-        names, first, carriers = list(dict.fromkeys(bodies)), 3, []
-        for name in names:
-            joints = _toward_base(self.mechanism, name)
-            inner, senses = self.mechanism.base, []
-            for joint in joints:
-                senses.append(1.0 if joint.connects[0] == inner else -1.0)
-                inner = _beyond(joint, inner)
-            carriers.append(_Carrier(tuple(joints), tuple(senses), first))
-            first += len(joints)
-        return carriers, np.array([names.index(body) for body in bodies])
+        chains = decompose(mechanism)
+        self.arms = [chain.trunk for chain in chains]
+        super().__init__(mechanism, np.eye(3), [step.joint for arm in self.arms for step in arm])
+        struts = [branch for chain in chains for branch in chain.branches]
+        self.carried_by = np.array([arm for arm, chain in enumerate(chains) for _ in chain.branches])
+        self.low, self.high = np.array([_range(slide.joint) for _, slide, _ in struts]).T / self.length
+        self.feet = np.array([_at(foot.joint) for foot, _, _ in struts])
+        self.tops = np.array([_at(head.joint) - mechanism.reference_point for *_, head in struts])
+        self.foot_axes, self.foot_angles = _cones([foot for foot, _, _ in struts])
+        self.head_axes, self.head_angles = _cones([head.back for *_, head in struts])
 
     def slacks(self, x: Floats, rotation: Floats) -> Floats:
-        placed = [carrier.placed(x, self.length) for carrier in self.carriers]
+        own, placed = x[3:], []
+        for arm in self.arms:
+            placed.append(_placed(arm, own, self.length))
+            own = own[len(arm) :]
         turns = np.stack([turn for turn, _ in placed])[self.carried_by]
         shifts = np.stack([shift for _, shift in placed])[self.carried_by]
         feet = (turns @ self.feet[:, :, None])[:, :, 0] + shifts
@@ -173,19 +118,19 @@ class Struts:
         low, high = self.bounds[3:].T
         return np.concatenate([scaled - self.low, self.high - scaled, at_foot, at_head, own - low, high - own])
 
-    def gaps(self, x: Floats, rotation: Floats) -> Floats:
-        return np.zeros(0)
 
-    def variables(self, solution: Solution) -> Floats:
-        order = [self.mechanism.actuator_names.index(name) for name in self.names]
-        return np.concatenate(
-            [solution.pose[:, :3, 3] / self.length, solution.actuators[:, order] / self.units], axis=1
-        )
-
-
-def _foot_body(foot: Joint, strut: Joint, mechanism: Mechanism) -> str:
-    """The body on which a strut stands."""
-    return foot.connects[0] if foot.connects[1] in strut.connects else foot.connects[1]
+def _placed(arm: Sequence[Step], values: Floats, length: float) -> tuple[Floats, Floats]:
+    """Rotation and translation from home of the body on an arm; its joints have the first of some values [L or rad]."""
+    rotation, shift = np.eye(3), np.zeros(3)
+    for step, value in zip(arm, values, strict=False):
+        joint, axis = step.joint, np.array(step.joint.axis)
+        if joint.type == "revolute":
+            turn = from_rotvec(axis * (step.sign * (value - joint.home)))
+            shift = shift + rotation @ (_at(joint) - turn @ _at(joint))
+            rotation = rotation @ turn
+        else:
+            shift = shift + rotation @ axis * (step.sign * (value * length - joint.home))
+    return rotation, shift
 
 
 def _angles(lines: Floats, axes: Floats) -> Floats:
@@ -194,14 +139,18 @@ def _angles(lines: Floats, axes: Floats) -> Floats:
     return np.asarray(np.arctan2(across, np.einsum("ki,ki->k", lines, axes)))
 
 
-def _cones(joints: list[Joint], bodies: list[str]) -> tuple[Floats, Floats]:
-    """Axes at home (k, 3) and half angles (k,); without a cone, any direction is allowed."""
-    any_line = Cone(axis=(0.0, 0.0, 1.0), half_angle=np.pi, fixed_to="")
-    cones = [joint.cone or replace(any_line, fixed_to=body) for joint, body in zip(joints, bodies, strict=True)]
-    for cone, body in zip(cones, bodies, strict=True):
-        if cone.fixed_to != body:
-            raise ValueError(f"a cone is fixed to '{cone.fixed_to}'; the closed form expects it on '{body}'")
-    return np.array([_unit(cone.axis) for cone in cones]), np.array([float(cone.half_angle) for cone in cones])
+def _cones(steps: Sequence[Step]) -> tuple[Floats, Floats]:
+    """Axes at home (k, 3) and half angles (k,) of the cones at some ends of struts; half a turn where there is none.
+
+    Each must be fixed to the body that carries this end.
+    """
+    cones = []
+    for step in steps:
+        cone = step.joint.cone or Cone(axis=(0.0, 0.0, 1.0), half_angle=np.pi, fixed_to=step.inward)
+        if cone.fixed_to != step.inward:
+            raise ValueError(f"a cone is fixed to '{cone.fixed_to}'; the closed form expects it on '{step.inward}'")
+        cones.append(cone)
+    return np.array([cone.axis for cone in cones]), np.array([float(cone.half_angle) for cone in cones])
 
 
 @dataclass(frozen=True)
@@ -211,9 +160,9 @@ class _Crank:
     shoulder: Floats
     crank: Floats
     forearm: Floats
-    homes: tuple[float, float]
-    senses: tuple[float, float]
-    ranges: Floats  # of shoulder and elbow
+    homes: Floats  # of shoulder and elbow, as all below
+    senses: Floats
+    ranges: Floats
 
     def elbow(self, angle: float) -> Floats:
         turn = self.senses[0] * (angle - self.homes[0])
@@ -232,34 +181,16 @@ def _turn(start: Floats, end: Floats) -> float:
     return float(np.arctan2(start[0] * end[1] - start[1] * end[0], start @ end))
 
 
-class Cranks:
+class Cranks(Model):
     """Cranks and forearms that meet in a tip; x is the tip in the plane, then the angles of the cranks."""
 
     def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
-        self.length = mechanism.characteristic_length
-        tip = mechanism.joint(mechanism.end_effector)
-        normal = _unit(tip.axis)
+        normal = np.array(mechanism.joint(mechanism.end_effector).axis)
         axes = np.linalg.svd(normal[None])[2][1:]
-        self.axes = axes if np.cross(*axes) @ normal > 0.0 else axes[::-1]
-        self.chains = [_toward_base(mechanism, forearm, but=(tip,)) for forearm in tip.connects]
-        self.cranks = [self._crank(shoulder, elbow, tip, normal) for shoulder, elbow in self.chains]
-        self.names = [shoulder.name for shoulder, _ in self.chains]
-        reach = (self.axes @ np.array(mechanism.reference_point))[:, None] / self.length + np.array([[-4.0, 4.0]] * 2)
-        self.bounds = np.concatenate([reach, [crank.ranges[0] for crank in self.cranks]])
-        tip_home = self.axes @ _at(tip) / self.length
-        self.home = np.concatenate([tip_home, [crank.homes[0] for crank in self.cranks]])
-
-    def _crank(self, shoulder: Joint, elbow: Joint, tip: Joint, normal: Floats) -> _Crank:
-        link = _beyond(shoulder, self.mechanism.base)
-        senses = (
-            float(np.sign(_unit(shoulder.axis) @ normal)) * (1.0 if shoulder.connects[1] == link else -1.0),
-            float(np.sign(_unit(elbow.axis) @ normal)) * (1.0 if elbow.connects[0] == link else -1.0),
-        )
-        points = np.array([_at(joint) for joint in (shoulder, elbow, tip)]) @ self.axes.T
-        ranges = np.array([_range(shoulder), _range(elbow)])
-        homes = (float(shoulder.home), float(elbow.home))  # type: ignore[arg-type]
-        return _Crank(points[0], points[1] - points[0], points[2] - points[1], homes, senses, ranges)
+        axes = axes if np.cross(*axes) @ normal > 0.0 else axes[::-1]
+        legs = [chain.branches[0] for chain in decompose(mechanism)]
+        super().__init__(mechanism, axes, [shoulder.joint for shoulder, *_ in legs])
+        self.cranks = [_crank(leg, axes, normal) for leg in legs]
 
     def slacks(self, x: Floats, rotation: Floats) -> Floats:
         values = []
@@ -275,7 +206,16 @@ class Cranks:
         reach = [np.linalg.norm(tip - crank.elbow(angle)) - np.linalg.norm(crank.forearm) for crank, angle in pairs]
         return np.array(reach) / self.length
 
-    def variables(self, solution: Solution) -> Floats:
-        order = [self.mechanism.actuator_names.index(name) for name in self.names]
-        tips = solution.pose[:, :3, 3] @ self.axes.T / self.length
-        return np.concatenate([tips, solution.actuators[:, order]], axis=1)
+
+def _crank(leg: Sequence[Step], axes: Floats, normal: Floats) -> _Crank:
+    """One leg in the plane along `axes` (2, 3)."""
+    turning = [step.joint for step in leg[:2]]
+    points = np.array([_at(step.joint) for step in leg]) @ axes.T
+    return _Crank(
+        shoulder=points[0],
+        crank=points[1] - points[0],
+        forearm=points[2] - points[1],
+        homes=np.array([joint.home for joint in turning], dtype=float),
+        senses=np.array([step.sign * np.sign(np.array(step.joint.axis) @ normal) for step in leg[:2]]),
+        ranges=np.array([_range(joint) for joint in turning]),
+    )

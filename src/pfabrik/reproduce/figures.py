@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from ..answers.solution import Status
-from ..answers.words import Readout, readout
+from ..description.readouts import Readout, readout
 from ..view.tracking import ACHIEVED, OFF_TARGET, SHADE, TARGET, common_keys, draw_limits, line_style, shade_steps
 from .efficacy import Efficacy, is_point
 from .efficiency import Efficiency

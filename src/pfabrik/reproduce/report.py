@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +13,10 @@ from ..errors import InvalidArgument
 from .checking import Feasibility
 from .efficacy import Efficacy, is_point
 from .efficiency import Efficiency
+from .everything import Findings
 from .robustness import Jump, Robustness
 from .tables import markdown, number, tiny
 from .timing import machine
-
-if TYPE_CHECKING:
-    from .everything import Findings
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import geometric
-from ..answers.solution import Solution, Status
+from ..answers.solution import Status
+from ..answers.tracked import Track
 from ..answers.words import short_names
 from ..description.mechanism import Mechanism
 from ..ik import solve_ik
@@ -67,7 +68,7 @@ class Robustness:
 
     case: Case
     targets: Floats
-    solution: Solution
+    solution: Track
     feasibility: Feasibility
     exact_feasibility: Feasibility
     jumps: dict[str, dict[str, Jump]]
@@ -111,7 +112,7 @@ def run(case: Case, extent: Extent, tick: Tick) -> Robustness:
     )
 
 
-def jumps(solution: Solution, finer: Solution) -> dict[str, dict[str, Jump]]:
+def jumps(solution: Track, finer: Track) -> dict[str, dict[str, Jump]]:
     """The largest changes of the actuators of either kind, in each part of the path."""
     mechanism = solution.mechanism
     is_length = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names])
@@ -123,13 +124,13 @@ def jumps(solution: Solution, finer: Solution) -> dict[str, dict[str, Jump]]:
     }
 
 
-def _jump(solution: Solution, finer: Solution, chosen: NDArray[np.bool_], part: str) -> Jump:
+def _jump(solution: Track, finer: Track, chosen: NDArray[np.bool_], part: str) -> Jump:
     changes = _changes(solution, chosen, part)
     step = int(changes.argmax()) + 1 if changes.max() > 0.0 else -1
     return Jump(float(changes.max()), step, float(_changes(finer, chosen, part).max()))
 
 
-def _changes(solution: Solution, chosen: NDArray[np.bool_], part: str) -> Floats:
+def _changes(solution: Track, chosen: NDArray[np.bool_], part: str) -> Floats:
     """Largest change of the chosen actuators into each step but the first; 0 outside the part."""
     off = np.asarray(solution.status) != Status.REACHED
     parts = {"inside": ~off[1:] & ~off[:-1], "outside": off[1:] & off[:-1], "edge": off[1:] != off[:-1]}
@@ -152,7 +153,7 @@ def workspace(mechanism: Mechanism, circle: Circle, grid: int) -> Workspace:
     return Workspace(y, z, reached.reshape(grid, grid))
 
 
-def step_times(mechanism: Mechanism, targets: Floats, solution: Solution, repeats: int) -> Floats:
+def step_times(mechanism: Mechanism, targets: Floats, solution: Track, repeats: int) -> Floats:
     """Median time of each step [s], on one core."""
     taken = np.zeros((repeats, len(targets)))
     seeds = [None, *solution[:-1]]

@@ -10,6 +10,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from numpy.typing import NDArray
 
 from ..description.joint_types import KINDS
+from ..description.places import Places, joint_places, joints_on, middle
 from ..errors import InvalidArgument
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
 
 Floats = NDArray[np.float64]
-Places = dict[str, Floats]
 
 # Lightness tells base, platform and links apart, and actuated from passive joints, without any colour.
 BASE, PLATFORM, LINK, EDGE, ACTUATED, PASSIVE = "#c8c8c8", "#79b4d9", "#4d4d4d", "#1a1a1a", "#d55e00", "#ffffff"
@@ -31,7 +31,7 @@ ZOOM = 0.92  # leaves room for the labels of tall machines
 TICKS = 5  # at most, on the longest axis
 
 
-def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = None) -> Any:
+def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = None, beside: Floats | None = None) -> Any:
     """Draw a mechanism in space; a planar one along the normal of its plane.
 
     Joints are markers by type, actuated ones filled; links are lines, and bodies with three or more joints polygons.
@@ -42,6 +42,7 @@ def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = Non
     ----------
     solution : one answer of this mechanism; home by default.
     axes : three-dimensional matplotlib axes to draw on; by default those of a new figure, which is `axes.figure`.
+    beside : points (n, 3) in the base frame that are to lie within the picture too.
 
     Returns
     -------
@@ -54,7 +55,7 @@ def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = Non
     check(mechanism, solution)
     axes = Figure(figsize=(6, 5), dpi=120).add_subplot(projection="3d") if axes is None else axes
     reference = mechanism.home_pose[:3, 3] if solution is None else solution.pose[:3, 3]
-    places = joint_places(mechanism, solution, reference)
+    places = joint_places(mechanism, None if solution is None else solution.points, reference)
     rails = {joint.name: rail for joint in mechanism.joints if (rail := rail_of(mechanism, joint, places, solution))}
     for body in mechanism.bodies:
         draw_body(axes, mechanism, body, body_points(mechanism, body, places, rails))
@@ -63,7 +64,8 @@ def draw(mechanism: Mechanism, solution: Solution | None = None, axes: Any = Non
     draw_reference(axes, mechanism, places, reference)
     draw_joints(axes, mechanism, places)
     axes.set(**{f"{name}label": f"{name} [{mechanism.length_unit}]" for name in "xyz"})
-    set_view(axes, np.array([*places.values(), reference, *(end for rail in rails.values() for end in rail)]))
+    ends = [end for rail in rails.values() for end in rail]
+    set_view(axes, np.array([*places.values(), reference, *ends, *([] if beside is None else beside)]))
     return axes
 
 
@@ -75,41 +77,6 @@ def check(mechanism: Mechanism, solution: Solution | None) -> None:
         raise InvalidArgument("solution", f"a solution of '{solution.mechanism.name}'", f"one of '{mechanism.name}'")
     if solution.shape != ():
         raise InvalidArgument("solution", f"a batch of shape {solution.shape}", "one answer, such as solution[0]")
-
-
-def joint_places(mechanism: Mechanism, solution: Solution | None, reference: Floats) -> Places:
-    """Joint name -> where it is drawn [length]: its centre or, for a prismatic joint without one, a place near by."""
-    if solution is None:
-        places = {joint.name: np.array(joint.at) for joint in mechanism.joints if joint.at is not None}
-    else:
-        places = {name: np.asarray(point) for name, point in solution.points.items()}
-    waiting = [joint for joint in mechanism.joints if joint.name not in places]
-    while waiting:
-        found = {joint.name: slider_place(mechanism, joint, places) for joint in waiting}
-        placed = {name: place for name, place in found.items() if place is not None}
-        places |= placed or dict.fromkeys(found, reference)  # a gantry of slides has no centre at all
-        waiting = [joint for joint in waiting if joint.name not in places]
-    return {joint.name: places[joint.name] for joint in mechanism.joints}
-
-
-def slider_place(mechanism: Mechanism, joint: Joint, places: Places) -> Floats | None:
-    """Where a prismatic joint is drawn: amid the joints of its larger moving body, or between two of equal size."""
-    if joint.along is not None:
-        return middle([places[name] for name in joint.along])
-    moving = [body for body in joint.connects if body != mechanism.base]
-    sides = [[places[name] for name in joints_on(mechanism, body) if name in places] for body in moving]
-    most = max(map(len, sides))
-    return middle([middle(side) for side in sides if len(side) == most]) if most else None
-
-
-def joints_on(mechanism: Mechanism, body: str) -> list[str]:
-    """Names of the joints of a body."""
-    return [joint.name for joint in mechanism.joints if body in joint.connects]
-
-
-def middle(points: list[Floats]) -> Floats:
-    """The mean of some points."""
-    return np.asarray(np.mean(points, axis=0))
 
 
 def rail_of(

@@ -76,24 +76,25 @@ def feel_curvature(loops: Loops, row: int, want: Aim, state: State, trial: State
     """
     n, slope, H, rows = len(loops.lo), view.slope, desk.curve.H, len(desk.balance)
     motions = slope.counts[MOTIONS]
+    basis, here, there, along = view.basis, desk.here, desk.there, desk.row
     for i in range(rows):
         desk.balance[i] = 0.0
     pull(loops, row, want, state, desk, desk.here)
     for r in range(slope.counts[RANK]):
         for i in range(rows):
-            desk.balance[i] -= desk.here[view.pivots[r]] * view.transform[r, i]
+            desk.balance[i] -= here[view.pivots[r]] * view.transform[r, i]
     pull(loops, row, want, state, desk, desk.here)
     for a in range(motions):
         probe = PROBE / math.sqrt(slope.metric[a, a])
         for j in range(n):
-            desk.row[j] = view.basis[j, a]
+            along[j] = basis[j, a]
         copy_state(state, trial)
         move(loops, desk.row, probe, trial)
         pull(loops, row, want, trial, desk, desk.there)
         for b in range(motions):
             H[b, a] = 0.0
             for j in range(n):
-                H[b, a] += view.basis[j, b] * (desk.there[j] - desk.here[j]) / probe
+                H[b, a] += basis[j, b] * (there[j] - here[j]) / probe
     largest = 0.0
     for a in range(motions):
         largest = max(largest, abs(H[a, a]))

@@ -102,34 +102,35 @@ def walk_all(loops: Loops, state: State, desk: Desk) -> float:
 @routine
 def add_force(loops: Loops, path: int, force: Floats, desk: Desk, out: Floats) -> None:
     """What a force and moment at the end of a path do at every coordinate, added to `out`."""
-    rows = desk.eq.rows
+    rows, columns = desk.eq.rows, loops.row_columns
     for r in range(loops.visit_rows[loops.paths[path]], loops.visit_rows[loops.paths[path + 1]]):
         a = rows[r]
         share = a[0] * force[0] + a[1] * force[1] + a[2] * force[2]
-        out[loops.row_columns[r]] += share + a[3] * force[3] + a[4] * force[4] + a[5] * force[5]
+        out[columns[r]] += share + a[3] * force[3] + a[4] * force[4] + a[5] * force[5]
 
 
 @routine
 def look(loops: Loops, row: int, want: Aim, state: State, desk: Desk, view: View) -> None:
     """Look at a configuration."""
     slope, n = view.slope, len(loops.lo)
+    basis, here, g, metric = view.basis, desk.here, slope.g, slope.metric
     gap = walk_all(loops, state, desk)
     slope.scalars[VALUE], held = look_at_aim(want, want.targets[row], state.X, desk.aim)
     for k in range(held):
         gap = max(gap, abs(desk.aim.errors[k]))
     slope.scalars[GAP] = gap
     for j in range(n):
-        desk.here[j] = 0.0
+        here[j] = 0.0
     add_force(loops, 0, desk.aim.force, desk, desk.here)
     eliminate(lay_out(loops, held, desk), n, desk, view)
     for a in range(slope.counts[MOTIONS]):
-        slope.g[a] = 0.0
+        g[a] = 0.0
         for j in range(n):
-            slope.g[a] += view.basis[j, a] * desk.here[j]
+            g[a] += basis[j, a] * here[j]
         for b in range(a + 1):
-            slope.metric[a, b] = 0.0
+            metric[a, b] = 0.0
             for j in range(n):
-                slope.metric[a, b] += view.basis[j, a] * view.basis[j, b]
+                metric[a, b] += basis[j, a] * basis[j, b]
     look_at_limits(loops, want.margin, state, desk, view)
 
 
@@ -138,6 +139,7 @@ def lay_out(loops: Loops, held: int, desk: Desk) -> int:
     """The equations of the loops and of what is held, with an identity beside them; how many."""
     paths, n, A, eq = len(loops.paths) - 1, len(loops.lo), desk.A, desk.eq
     first = 6 * (paths - 1)
+    rows, holds = eq.rows, desk.aim.holds
     for r in range(first + held):
         for j in range(A.shape[1]):
             A[r, j] = 0.0
@@ -148,12 +150,12 @@ def lay_out(loops: Loops, held: int, desk: Desk) -> int:
             j = loops.row_columns[r]
             for i in range(6):
                 if path > 0:
-                    A[6 * (path - 1) + i, j] += eq.rows[r, i]
+                    A[6 * (path - 1) + i, j] += rows[r, i]
                     continue
                 for other in range(paths - 1):
-                    A[6 * other + i, j] -= eq.rows[r, i]
+                    A[6 * other + i, j] -= rows[r, i]
                 for k in range(held):
-                    A[first + k, j] += desk.aim.holds[k, i] * eq.rows[r, i]
+                    A[first + k, j] += holds[k, i] * rows[r, i]
     return first + held
 
 
@@ -161,15 +163,16 @@ def lay_out(loops: Loops, held: int, desk: Desk) -> int:
 def eliminate(rows: int, n: int, desk: Desk, view: View) -> None:
     """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what closes the loops."""
     A, rank, width = desk.A, 0, n + 1 + rows
+    taken, used, filled_at, basis, shift, pivots = desk.row, desk.used, desk.filled, view.basis, view.shift, view.pivots
     for j in range(n):
-        view.shift[j] = 0.0
-        desk.row[j] = 0.0  # 1 for pivot columns
+        shift[j] = 0.0
+        taken[j] = 0.0  # 1 for pivot columns
     for row in range(rows):
         largest, pivot = 0.0, -1
         for j in range(n):
             size = abs(A[row, j])
-            if size > DEPENDENT and desk.row[j] == 0.0:
-                size *= SHARED if desk.used[j] > 1 else 1.0
+            if size > DEPENDENT and taken[j] == 0.0:
+                size *= SHARED if used[j] > 1 else 1.0
                 if size > largest:
                     largest, pivot = size, j
         if pivot < 0:  # it follows from those before
@@ -178,28 +181,28 @@ def eliminate(rows: int, n: int, desk: Desk, view: View) -> None:
         for j in range(width):
             A[row, j], A[rank, j] = A[rank, j], factor * A[row, j]
             if A[rank, j] != 0.0:
-                desk.filled[filled] = j
+                filled_at[filled] = j
                 filled += 1
         for i in range(rows):
             share = A[i, pivot]
             if i != rank and share != 0.0:
                 for k in range(filled):
-                    A[i, desk.filled[k]] -= share * A[rank, desk.filled[k]]
+                    A[i, filled_at[k]] -= share * A[rank, filled_at[k]]
                 A[i, pivot] = 0.0
-        desk.row[pivot] = 1.0
-        view.pivots[rank] = pivot
+        taken[pivot] = 1.0
+        pivots[rank] = pivot
         rank += 1
     motions = 0
     for j in range(n):
-        if desk.row[j] == 0.0 and desk.used[j] > 0:
+        if taken[j] == 0.0 and used[j] > 0:
             for i in range(n):
-                view.basis[i, motions] = 0.0
-            view.basis[j, motions] = 1.0
+                basis[i, motions] = 0.0
+            basis[j, motions] = 1.0
             for r in range(rank):
-                view.basis[view.pivots[r], motions] = -A[r, j]
+                basis[pivots[r], motions] = -A[r, j]
             motions += 1
     for r in range(rank):
-        view.shift[view.pivots[r]] = A[r, n]
+        shift[pivots[r]] = A[r, n]
         for i in range(rows):
             view.transform[r, i] = A[r, n + 1 + i]
     view.slope.counts[MOTIONS], view.slope.counts[RANK] = motions, rank
@@ -209,14 +212,15 @@ def eliminate(rows: int, n: int, desk: Desk, view: View) -> None:
 def look_at_limits(loops: Loops, margin: float, state: State, desk: Desk, view: View) -> None:
     """Excess and gradient of every limit within reach."""
     slope = view.slope
+    basis, shift, G, row = view.basis, view.shift, slope.G, desk.row
     n, k, excess = len(loops.lo), 0, -math.inf
     for j in range(n):
         for side in range(2):
             h = loops.lo[j] + margin - state.q[j] if side == 0 else state.q[j] - loops.hi[j] + margin
             if h > -REACH and desk.used[j] > 0:
                 for a in range(slope.counts[MOTIONS]):
-                    slope.G[k, a] = -view.basis[j, a] if side == 0 else view.basis[j, a]
-                slope.drift[k] = -view.shift[j] if side == 0 else view.shift[j]
+                    G[k, a] = -basis[j, a] if side == 0 else basis[j, a]
+                slope.drift[k] = -shift[j] if side == 0 else shift[j]
                 slope.h[k], slope.which[k] = h, 2 * j + side
                 excess = max(excess, h)
                 k += 1
@@ -224,15 +228,15 @@ def look_at_limits(loops: Loops, margin: float, state: State, desk: Desk, view: 
         h = cone_excess(loops, cone, margin, state, desk)
         if h > -REACH and desk.used[loops.columns[loops.cone_units[cone, 0]]] > 0:
             for j in range(n):
-                desk.row[j] = 0.0
+                row[j] = 0.0
             add_cone(loops, cone, 1.0, desk, desk.row)
             for a in range(slope.counts[MOTIONS]):
-                slope.G[k, a] = 0.0
+                G[k, a] = 0.0
                 for j in range(n):
-                    slope.G[k, a] += desk.row[j] * view.basis[j, a]
+                    G[k, a] += row[j] * basis[j, a]
             slope.drift[k] = 0.0
             for j in range(n):
-                slope.drift[k] += desk.row[j] * view.shift[j]
+                slope.drift[k] += row[j] * shift[j]
             slope.h[k], slope.which[k] = h, 2 * n + cone
             excess = max(excess, h)
             k += 1

@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..description.joint_types import KINDS
-from ..description.joints import Joint
-from ..description.mechanism import Mechanism
-from ..tolerances import TOLERANCES
+from pfabrik.description.joint_types import KINDS
+from pfabrik.description.joints import Joint
+from pfabrik.description.mechanism import Mechanism
+from pfabrik.tolerances import TOLERANCES
+
 from .facts import Array
 from .legs import Leg, Line
 from .rods import TIP, Passage

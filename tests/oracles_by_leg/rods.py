@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..description.home_mobility import universal_axes
-from ..description.joints import Joint
-from ..description.mechanism import Mechanism
-from ..tolerances import TOLERANCES
+from pfabrik.description.home_mobility import universal_axes
+from pfabrik.description.joints import Joint
+from pfabrik.description.mechanism import Mechanism
+from pfabrik.tolerances import TOLERANCES
+
 from .facts import Array, is_parallel, require
 from .turns import Placed, aimed, anchored, shortest_turn
 

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decomposition.decompose import decompose
-from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument
-from ..poses import are_poses, as_poses, what_is_wrong
-from ..tolerances import TOLERANCES
-from .facts import Array, Unsuitable
+from pfabrik.decomposition.decompose import decompose
+from pfabrik.description.mechanism import Mechanism
+from pfabrik.poses import as_poses
+from pfabrik.tolerances import TOLERANCES
+
+from .facts import Array
 from .modes import Legs, are_near, legs_of, orthonormal, try_leg
-from .topologies import no_closed_form
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,22 +65,9 @@ def working_modes(mechanism: Mechanism, target: Any) -> WorkingModes:
     ----------
     target : pose (4, 4) of the end effector in the base frame [length], position (3,) at home orientation, or a SciPy
         RigidTransform; what the mechanism's task sets of it counts.
-
-    Raises
-    ------
-    NoClosedForm : its legs have none here, or a continuum of branches (redundant arms).
-    InvalidArgument : no target, or more than one.
     """
-    checked_mechanism(mechanism)
-    try:
-        plan = legs_of(mechanism)
-    except Unsuitable as unsuitable:
-        raise no_closed_form(mechanism, str(unsuitable)) from None
-    targets, shape = as_poses(target)
-    if shape != ():
-        raise InvalidArgument("target", f"a batch of shape {shape}", "one target")
-    if not are_poses(targets).all():
-        raise InvalidArgument("target", what_is_wrong(targets[0]), "a finite pose whose rotation is one")
+    plan = legs_of(mechanism)
+    targets, _ = as_poses(target)
     modes = list(_modes(plan, orthonormal(targets))) if are_near(plan, targets).all() else []
     return _wrapped(mechanism, modes)
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from joint_checking import _cone_angle, motion
+from checks import cone_angle, placed_bodies
 from pfabrik import Mechanism
 from pfabrik.description.joint_types import KINDS
 
@@ -59,29 +59,8 @@ def residuals(mechanism: Mechanism, target: Array, x: Array) -> Array:
     widths = [len(KINDS[joint.type].coordinates) for joint in mechanism.joints]
     parts = np.split(x * units(mechanism), np.cumsum(widths)[:-1], axis=1)
     moved = {joint.name: part for joint, part in zip(mechanism.joints, parts, strict=True)}
-    placed, open_by = place(mechanism, moved)
+    placed, open_by = placed_bodies(mechanism, moved)
     return np.concatenate([*open_by, off_task(mechanism, target, placed), *excesses(mechanism, moved, placed)], axis=1)
-
-
-def place(mechanism: Mechanism, moved: dict[str, Array]) -> tuple[dict[str, Array], list[Array]]:
-    """Body -> displacements (n, 4, 4); and by how much every loop is open, (n, 12) [L and entries of matrices]."""
-    n = len(next(iter(moved.values())))
-    placed, open_by, waiting = {mechanism.base: np.tile(np.eye(4), (n, 1, 1))}, [], list(mechanism.joints)
-    while waiting:
-        joint = next(each for each in waiting if set(each.connects) & placed.keys())
-        waiting.remove(joint)
-        first, second = joint.connects
-        T = motion(mechanism, joint, moved[joint.name])
-        if first not in placed:
-            placed[first] = placed[second] @ np.linalg.inv(T)
-        elif second not in placed:
-            placed[second] = placed[first] @ T
-        else:
-            at = np.append(mechanism.reference_point if joint.at is None else joint.at, 1.0)
-            apart = placed[first] @ T - placed[second]
-            shifts = (apart @ at)[:, :3] / mechanism.characteristic_length
-            open_by.append(np.concatenate([shifts, apart[:, :3, :3].reshape(n, 9)], axis=1))
-    return placed, open_by
 
 
 def off_task(mechanism: Mechanism, target: Array, placed: dict[str, Array]) -> Array:
@@ -108,6 +87,6 @@ def excesses(mechanism: Mechanism, moved: dict[str, Array], placed: dict[str, Ar
             low, high = np.reshape(joint.range, (-1, 2)).T / unit
             found.append(np.maximum(0.0, np.maximum(low + INSIDE - values, values - high + INSIDE)))
         if joint.cone is not None:
-            over = _cone_angle(mechanism, joint, placed) - joint.cone.half_angle + INSIDE
+            over = cone_angle(mechanism, joint, placed) - joint.cone.half_angle + INSIDE
             found.append(np.maximum(0.0, over)[:, None])
     return found

@@ -89,6 +89,28 @@ def inside_targets(mechanism: Mechanism, rng: np.random.Generator, n: int, least
     return found[:n]
 
 
+def edge(margin: Callable[[Array], Array], farthest: Array, width: float) -> Array:
+    """Where margins that are positive at 0 and negative at `farthest` change sign, ``(n,)``, to within `width`.
+
+    Brackets are halved ten times, then narrowed by false positions, aimed beside the root so that both ends close in;
+    every third step halves again, for margins that leap.
+    """
+    low, high = np.zeros_like(farthest), farthest
+    at_low, at_high = margin(low), margin(high)
+    step = 0
+    while (high - low).max() > width:
+        share = 0.5 if step < 10 or step % 3 == 0 else at_low / (at_low - at_high)
+        middle = low + share * (high - low)
+        aside = np.minimum(0.4 * width, 0.5 * (high - low))
+        middle = np.clip(middle + np.where(share < 0.5, aside, -aside), low + 0.5 * aside, high - 0.5 * aside)
+        value = margin(middle)
+        inside = value >= 0.0
+        low, at_low = np.where(inside, middle, low), np.where(inside, value, at_low)
+        high, at_high = np.where(inside, high, middle), np.where(inside, at_high, value)
+        step += 1
+    return 0.5 * (low + high)
+
+
 def poses(positions: Array, rotations: Array | None = None) -> Array:
     """``T_base_platform`` of positions ``(n, 3)`` and rotations ``(n, 3, 3)``, level when left out."""
     result = np.tile(np.eye(4), (len(positions), 1, 1))

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..description.mechanism import Mechanism
-from ..tolerances import TOLERANCES
+from pfabrik.description.mechanism import Mechanism
+from pfabrik.tolerances import TOLERANCES
+
 from .facts import Array, require
 from .legs import Leg
 from .turns import Placed, either_angle, turns_about
@@ -82,7 +83,6 @@ CRANK = Drive("R*-rod", 2, solve_crank)
 CARRIAGE = Drive("P*-rod", 2, solve_carriage)
 STRUT = Drive("strut", 1, None)
 GUIDE = Drive("U, S or U-P", 1, None)
-DRIVES = (CRANK, CARRIAGE, STRUT, GUIDE)
 
 
 def drive_of(mechanism: Mechanism, leg: Leg) -> Drive:

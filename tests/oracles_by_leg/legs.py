@@ -12,11 +12,12 @@ from itertools import combinations
 
 import numpy as np
 
-from ..decomposition.decompose import SubChain, decompose
-from ..description.graph import cone_line, opposite
-from ..description.joints import Joint
-from ..description.mechanism import Mechanism
-from ..tolerances import TOLERANCES
+from pfabrik.decomposition.decompose import SubChain, decompose
+from pfabrik.description.graph import cone_line, opposite
+from pfabrik.description.joints import Joint
+from pfabrik.description.mechanism import Mechanism
+from pfabrik.tolerances import TOLERANCES
+
 from .facts import Array, is_parallel, require
 from .rods import TIP, Passage, Rod, passage, read_rod
 

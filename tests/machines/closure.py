@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from machines import ring
 from pfabrik import Cone, Joint, Mechanism
+
+from .positions import ring
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TURNS = (0.0, 120.0, 240.0)

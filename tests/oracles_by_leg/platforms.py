@@ -7,16 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..description.graph import tree_of
-from ..description.home_mobility import (
+from pfabrik.description.graph import tree_of
+from pfabrik.description.home_mobility import (
     body_twist,
     column_joints,
     joint_screws,
     loop_conditions,
     orthonormal_rates,
 )
-from ..description.mechanism import Mechanism, Vector
-from ..tolerances import TOLERANCES
+from pfabrik.description.mechanism import Mechanism, Vector
+from pfabrik.tolerances import TOLERANCES
+
 from .facts import Array, Unsuitable, is_parallel, require
 from .legs import Leg
 from .turns import aimed, either_angle, shortest_turn

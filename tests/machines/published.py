@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-import fk_oracles
+from oracles import assembly
 from pfabrik import Joint, Mechanism
 
 Array = NDArray[np.float64]
 
 PUBLISHED: dict[str, Any] = json.loads(
-    (Path(__file__).parent / "data" / "published_cases.json").read_text(encoding="utf-8")
+    (Path(__file__).parents[1] / "data" / "published_cases.json").read_text(encoding="utf-8")
 )
 """Published geometries and answers, each with its source."""
 
@@ -32,7 +32,7 @@ def moved_from_home(pose: Array, home_pose: Array) -> Array:
 # --- planar ----------------------------------------------------------------------------------------------------------
 
 
-def planar_3rpr(geometry: fk_oracles.Planar3RPR, p: Sequence[float]) -> tuple[Mechanism, Array]:
+def planar_3rpr(geometry: assembly.Planar3RPR, p: Sequence[float]) -> tuple[Mechanism, Array]:
     """A planar 3-RPR at home in the first of its configurations with strut lengths p, and home's (theta, x, y)."""
     home = np.array(geometry.solutions(p)[0])
     joints = []
@@ -174,7 +174,7 @@ DIETMAIER_LENGTHS = np.array([1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771
 
 def dietmaier() -> tuple[Mechanism, Array]:
     """The platform with 40 real assembly modes at `DIETMAIER_LENGTHS`, at home in one of them, and that home pose."""
-    poses, hits = fk_oracles.gough_modes(DIETMAIER_BASE, DIETMAIER_PLATFORM, DIETMAIER_LENGTHS, starts=100)
+    poses, hits = assembly.gough_modes(DIETMAIER_BASE, DIETMAIER_PLATFORM, DIETMAIER_LENGTHS, starts=100)
     home = poses[hits.argmax()]
     return gough(DIETMAIER_BASE, DIETMAIER_PLATFORM, home, "Dietmaier's platform"), home
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from pfabrik.answers.solution import Solution
-from pfabrik.description.mechanism import Joint, Mechanism
+from pfabrik.description.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 
@@ -307,84 +306,3 @@ def rps_tops(
 def _swung(base_radius: float, out: Array, lengths: Array, swing: Array) -> Array:
     reach = np.cos(swing)[..., None] * out + np.sin(swing)[..., None] * [0, 0, 1.0]
     return base_radius * out + lengths[:, None] * reach
-
-
-# --- any machine: does a set of joint coordinates close it? ----------------------------------------------------------
-
-
-def joint_gap(mechanism: Mechanism, solution: Solution) -> float:
-    """Largest disagreement of one answer's `joints` about where the bodies are, lengths relative to L.
-
-    The bodies are placed one after the other through joints, starting from the base; the joints left over, and the
-    pose, must agree. A universal joint whose axes the description leaves open counts by its centre alone.
-    """
-    placed = {mechanism.base: np.eye(4)}
-    if not mechanism.end_effector_is_joint:
-        placed[mechanism.end_effector] = solution.pose @ np.linalg.inv(mechanism.home_pose)
-    waiting = True
-    while waiting:
-        waiting = False
-        for joint in mechanism.joints:
-            first, second = joint.connects
-            if (first in placed) == (second in placed) or _is_open(joint):
-                continue
-            motion = _motion(mechanism, joint, solution.joints)
-            if first in placed:
-                placed[second] = placed[first] @ motion
-            else:
-                placed[first] = placed[second] @ np.linalg.inv(motion)
-            waiting = True
-    L = mechanism.characteristic_length
-    gaps = [0.0]
-    for joint in mechanism.joints:
-        if not all(body in placed for body in joint.connects):
-            continue
-        here, there = (placed[body] for body in joint.connects)
-        if not _is_open(joint):
-            here = here @ _motion(mechanism, joint, solution.joints)
-            gaps.append(np.abs(here[:3, :3] - there[:3, :3]).max())
-            gaps.append(np.abs(here[:3, 3] - there[:3, 3]).max() / L)
-        if joint.at is not None:
-            centre = np.append(joint.at, 1.0)
-            if joint.type != "cylindrical":
-                gaps.append(np.abs((here - there) @ centre).max() / L)
-            if joint.name == mechanism.end_effector:
-                gaps.append(np.abs((there @ centre)[:3] - solution.pose[:3, 3]).max() / L)
-    return float(max(gaps))
-
-
-def unplaced(mechanism: Mechanism) -> set[str]:
-    """Bodies that `joint_gap` cannot place: only universal joints without axes lead there."""
-    placed = {mechanism.base} | ({mechanism.end_effector} & set(mechanism.bodies))
-    for _ in mechanism.bodies:
-        for joint in mechanism.joints:
-            if not _is_open(joint) and placed & set(joint.connects):
-                placed |= set(joint.connects)
-    return set(mechanism.bodies) - placed
-
-
-def _is_open(joint: Joint) -> bool:
-    return joint.type == "universal" and joint.axes is None
-
-
-def _motion(mechanism: Mechanism, joint: Joint, joints: dict[str, Array]) -> Array:
-    """Motion (4, 4) of a joint's second body relative to its first since home, in base coordinates at home."""
-    motion = np.eye(4)
-    if joint.type == "fixed":
-        return motion
-    moved = np.subtract(joints[joint.name], mechanism.home_coordinate(joint.name))
-    if joint.type == "prismatic":
-        motion[:3, 3] = moved * np.array(mechanism.home_axis(joint.name))
-        return motion
-    if joint.type == "spherical":
-        turn = Rotation.from_rotvec(moved)
-    elif joint.type == "universal":
-        turn = Rotation.from_rotvec(moved[0] * np.array(joint.axes[0]))
-        turn = turn * Rotation.from_rotvec(moved[1] * np.array(joint.axes[1]))
-    else:
-        turn = Rotation.from_rotvec((moved[0] if joint.type == "cylindrical" else moved) * np.array(joint.axis))
-    motion[:3, :3] = turn.as_matrix()
-    motion[:3, 3] = np.array(joint.at) - motion[:3, :3] @ np.array(joint.at)
-    if joint.type == "cylindrical":
-        motion[:3, 3] += moved[1] * np.array(joint.axis)
-    return motion

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..tolerances import TOLERANCES
+from pfabrik.tolerances import TOLERANCES
+
 from .facts import Array
 
 

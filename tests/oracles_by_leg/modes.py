@@ -9,8 +9,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..description.mechanism import Mechanism
-from ..tolerances import TOLERANCES
+from pfabrik.description.mechanism import Mechanism
+from pfabrik.tolerances import TOLERANCES
+
 from .drives import Drive, drive_of
 from .facts import HORIZON, Array, home_values, require
 from .kept import Mask, judge
@@ -193,7 +194,7 @@ def orthonormal(targets: Array) -> Array:
 
 
 def start_of(plan: Legs, actuators: Array, poses: Array | None) -> tuple[Array, Ints]:
-    """On which branch every leg is at a seed (at home, without poses), (1 or n, legs), and on which completion."""
+    """On which branch every leg is at a start (at home, without poses), (1 or n, legs), and on which completion."""
     if poses is None:
         return plan.home_sides[None], np.zeros(1, dtype=np.intp)
     n = max(len(poses), len(actuators))

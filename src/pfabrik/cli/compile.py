@@ -1,0 +1,22 @@
+"""``pfabrik compile``: all kernels ahead, so that no answer has to wait for them."""
+
+from __future__ import annotations
+
+import time
+
+import click
+
+import pfabrik as pf
+
+
+@click.command()
+def compile() -> int:
+    """Compile all kernels ahead.
+
+    Each kernel is printed with the seconds it took. What is compiled stays in a cache, so that this is needed once per
+    version; where all is there already it takes a second.
+    """
+    start = time.perf_counter()
+    pf.warm_up(on_step=lambda what, seconds: click.echo(f"{seconds:6.1f} s  {what}"))
+    click.echo(f"{time.perf_counter() - start:6.1f} s  in all")
+    return 0

@@ -1,0 +1,102 @@
+"""A small drawing of a mechanism as SVG: a planar one in its plane, any other from above, along a diagonal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .joints import Joint
+from .places import Places, joint_places, joints_on
+from .structure import Structure
+
+Floats = NDArray[np.float64]
+
+WIDTH, HEIGHT, MARGIN = 260.0, 200.0, 14.0
+"""Size of the picture, and room around what is drawn [pixels]."""
+
+RADIUS, HALF_SIDE = 3.5, 5.0
+"""Sizes of a joint's circle, and of a slide's square, which is to be seen behind a joint in the same place [pixels]."""
+
+FLAT = 1e-6
+"""Joints that leave a plane by no more than this share of their spread lie in it."""
+
+VIEWER = np.array([1.0, -1.0, 1.0]) / math.sqrt(3.0)
+"""Where a machine in space is seen from: x to the right, y to the back, z up, all at one scale."""
+
+BASE, END_EFFECTOR, LINK, ACTUATED, PASSIVE = "#9a9a9a", "#0072b2", "#6a6a6a", "#d55e00", "#ffffff"
+
+
+def sketch(mechanism: Structure, points: Mapping[str, Floats] | None = None, reference: Floats | None = None) -> str:
+    """An SVG element: bodies as lines and faces between their joints, joints as circles, actuated ones filled.
+
+    Squares are prismatic joints, and a cross marks the reference point. Each marker has its joint's name as title.
+
+    Parameters
+    ----------
+    points, reference : joint centres and reference point of an answer [length]; by default those at home.
+    """
+    home = mechanism.home_pose[:3, 3]
+    centre = home if reference is None else reference
+    places = joint_places(mechanism, points, centre)
+    plane = _plane_of_view(np.array(list(joint_places(mechanism, None, home).values())))
+    flat = np.array([*places.values(), centre]) @ plane.T * (1.0, -1.0)  # y points down in a picture
+    low, extents = flat.min(axis=0), np.ptp(flat, axis=0)
+    room = np.array([WIDTH, HEIGHT]) - 2.0 * MARGIN
+    scale = min((side / extent for side, extent in zip(room, extents, strict=True) if extent > 0.0), default=1.0)
+    drawn = np.array([WIDTH, HEIGHT]) / 2.0 + scale * (flat - low - extents / 2.0)
+    spots = dict(zip(places, drawn[:-1], strict=True))
+    x, y = drawn[-1]
+    slides, others = ([j for j in mechanism.joints if (j.type == "prismatic") is it] for it in (True, False))
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH:g}" height="{HEIGHT:g}" role="img">',
+        f"<title>{escape(mechanism.name)}</title>",
+        *(_body(mechanism, body, spots, drawn[-1]) for body in mechanism.bodies),
+        f'<path d="M{x - 5:.1f} {y:.1f}h10M{x:.1f} {y - 5:.1f}v10" stroke="{END_EFFECTOR}"/>',
+        *(_square(joint, *spots[joint.name]) for joint in slides),
+        *(_circle(joint, *spots[joint.name]) for joint in others),
+        "</svg>",
+    ]
+    return "".join(parts)
+
+
+def _plane_of_view(places: Floats) -> Floats:
+    """The directions that are drawn to the right and up, unit vectors as rows (2, 3)."""
+    spreads, axes = np.linalg.svd(places - places.mean(axis=0))[1:]
+    is_planar = len(places) >= 3 and spreads[2] <= FLAT * spreads[0] < spreads[1]
+    normal = axes[2] * np.copysign(1.0, axes[2] @ VIEWER) if is_planar else VIEWER
+    upward = next(each for each in np.eye(3)[[2, 1]] if np.linalg.norm(np.cross(each, normal)) > FLAT)
+    right = np.cross(upward, normal)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(normal, right)])
+
+
+def _body(mechanism: Structure, body: str, spots: Places, reference: Floats) -> str:
+    """A body between its joints: a line for two, a face for more; of an end effector also the way to its reference."""
+    corners = [spots[name] for name in joints_on(mechanism, body)]
+    colour = {mechanism.base: BASE, mechanism.end_effector: END_EFFECTOR}.get(body, LINK)
+    middle = np.mean(corners, axis=0)
+    corners.sort(key=lambda corner: math.atan2(*(corner - middle)[::-1]))
+    face = f'fill="{colour}" fill-opacity="0.25"' if len(corners) > 2 else 'fill="none"'
+    outline = f'stroke="{colour}" stroke-width="{2 if colour == LINK else 3}" stroke-linejoin="round"'
+    listed, tip = (" ".join(f"{x:.1f},{y:.1f}" for x, y in spots) for spots in (corners, (middle, reference)))
+    tool = f'<polyline points="{tip}" {outline}/>' if colour == END_EFFECTOR else ""
+    return f'<polygon points="{listed}" {face} {outline}/>{tool}'
+
+
+def _square(joint: Joint, x: float, y: float) -> str:
+    corner, side = f'x="{x - HALF_SIDE:.1f}" y="{y - HALF_SIDE:.1f}"', 2.0 * HALF_SIDE
+    return f'<rect {corner} width="{side:g}" height="{side:g}" {_style(joint)}</rect>'
+
+
+def _circle(joint: Joint, x: float, y: float) -> str:
+    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS:g}" {_style(joint)}</circle>'
+
+
+def _style(joint: Joint) -> str:
+    """The rest of a marker: its colours, and as its title the name, with ``*`` where it is actuated."""
+    colour = ACTUATED if joint.actuated else PASSIVE
+    return f'fill="{colour}" stroke="#1a1a1a"><title>{escape(joint.name)}{"*" * joint.actuated}</title>'

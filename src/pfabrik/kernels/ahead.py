@@ -1,0 +1,65 @@
+"""Compiling ahead: every kernel that a mechanism's questions lead to, without a mechanism."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+
+from ._jit import _config, _name_of
+from .closure.close import close
+from .closure.descend import approach
+from .closure.loops import Closed, Layout, Loops, Wishes
+from .closure.pose_objective import Aim
+from .reaching import plan as P
+from .reaching.solve import solve_by_iteration, solve_directly
+
+_typeof: Any = numba.typeof
+
+_PLAN_RECORDS = (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT, P.COORDINATE)
+
+
+def _values(codes: str) -> list[Any]:
+    """Values of the types that codes stand for: i and f for numbers, followed by their dimensions for arrays."""
+    numbers = {"i": 0, "f": 0.0}
+    return [numbers[c] if len(c) == 1 else np.zeros((0,) * int(c[1]), c[0] + "8") for c in codes.split()]
+
+
+_PLAN = P.Plan._make([*(np.zeros(0, record) for record in _PLAN_RECORDS), np.zeros(0)])
+_LOOPS = Loops(*_values("i1 f2 f2 i1 i2 i1 i1 i1 i1 i1 i1 f1 f1 f1 i2 f2 f2 f1 i1 i2 i1 f2 i2 i1"))
+_LAYOUT = Layout(*_values("i1 i1"))
+_CLOSED = Closed(*_values("f2 f3 f2 f2 f2 i1"))
+_ROWS = (
+    _PLAN,
+    np.zeros((0, 4, 4)),
+    P.Seeds(*_values("f3 f3 f2")),
+    P.Settings(*_values("f f f i i i i i i f i")),
+    P.Rows(*_values("i1 i2 f3 f3 f2 f2 f2")),
+)
+
+KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
+    (solve_directly, _ROWS),
+    (close, (_LOOPS, _LAYOUT, Wishes(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
+    (solve_by_iteration, _ROWS),
+    (approach, (_LOOPS, _LAYOUT, Aim(*_values("f3 f1 i f f i")), _CLOSED, np.zeros((0, 0)))),
+)
+"""Every kernel with arguments of the types it takes, what most questions need first."""
+
+
+def compile_all(report: Callable[[str, float], None] | None = None) -> None:
+    """Compile every kernel that is not in the cache yet, or load it.
+
+    Parameters
+    ----------
+    report : called after each kernel with its name and the seconds it took.
+    """
+    if _config.DISABLE_JIT:
+        return
+    for kernel, arguments in KERNELS:
+        began = time.perf_counter()
+        kernel.compile(tuple(_typeof(argument) for argument in arguments))
+        if report is not None:
+            report(_name_of(kernel.py_func), time.perf_counter() - began)

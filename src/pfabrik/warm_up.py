@@ -1,0 +1,61 @@
+"""Compiling ahead: what answers need is compiled, or loaded from the cache, before the first question."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TypeAlias
+
+import numpy as np
+
+from .answers.solution import Solution
+from .description.mechanism import Mechanism, checked_mechanism
+from .fk import solve_fk
+from .ik import solve_ik
+from .kernels.ahead import compile_all
+from .poses import pose
+from .track import track
+
+Step: TypeAlias = tuple[str, Callable[[], object]]
+
+FAR = 3.0
+"""How far away from home a target is out of reach of any machine [L or rad]."""
+
+
+def warm_up(mechanism: Mechanism | None = None, *, on_step: Callable[[str, float], None] | None = None) -> None:
+    """Compile ahead what questions need: seconds once per version, then kept in a cache on disk.
+
+    In every new process the compiled code is loaded when it is first needed, which takes a part of a second; this does
+    it at a time of your choice.
+
+    Parameters
+    ----------
+    mechanism : the machine to be asked: inverse and forward kinematics within and out of reach, paths, and all joints.
+        What it does not need is not compiled. Default: everything that any machine needs.
+    on_step : called after each step with its name and how long it took [s].
+    """
+    if mechanism is None:
+        compile_all(on_step)
+        return
+    for name, step in _questions(checked_mechanism(mechanism)):
+        start = time.perf_counter()
+        step()
+        if on_step is not None:
+            on_step(name, time.perf_counter() - start)
+
+
+def _questions(mechanism: Mechanism) -> Iterator[Step]:
+    """Questions to one machine, so chosen that whatever answers them is compiled."""
+    home, shift = mechanism.home_pose, FAR * mechanism.characteristic_length
+    far = pose(home[:3, 3] + shift, rotvec=(FAR, 0.0, 0.0))
+
+    def forward(change: float) -> Solution:
+        return solve_fk(mechanism, solve_ik(mechanism, home).actuators + change)
+
+    yield "targets within reach", partial(solve_ik, mechanism, home)
+    yield "targets out of reach", partial(solve_ik, mechanism, far)
+    yield "paths", partial(track, mechanism, np.stack([home, far]))
+    yield "coordinates of all joints", lambda: solve_ik(mechanism, np.stack([home, far])).q
+    yield "forward kinematics", partial(forward, 0.0)
+    yield "actuator values out of reach", partial(forward, shift)

@@ -1,0 +1,222 @@
+"""Whether an answer is a configuration of its mechanism, from the description alone: no code of the solver is used.
+
+Twice, from what an answer tells: by the positions of joint centres, and by the coordinates of all joints.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pfabrik import Joint, Mechanism, Solution
+from pfabrik.description.home_mobility import universal_axes
+
+Array = NDArray[np.float64]
+
+# --- by the positions of joint centres -------------------------------------------------------------------------------
+
+
+def gap_of_points(mechanism: Mechanism, solution: Solution) -> np.ndarray:
+    """Largest change of any distance that a rigid body fixes, (n,), over the characteristic length.
+
+    Joint centres of one body keep their distances; centres on the base stay, those on the end effector move with it;
+    a link hinged to the base keeps its offset along the hinge's axis.
+    """
+    points = {name: np.reshape(point, (-1, 3)) for name, point in solution.points.items()}
+    pose = solution.pose.reshape(-1, 4, 4)
+    gaps = [np.zeros(len(pose))]
+    for body in mechanism.bodies:
+        centred = [j for j in mechanism.joints if body in j.connects and j.name in points]
+        for a, b in combinations(centred, 2):
+            length = np.linalg.norm(np.subtract(a.at, b.at))
+            gaps.append(np.abs(np.linalg.norm(points[a.name] - points[b.name], axis=1) - length))
+        for joint in centred:
+            if body == mechanism.base:
+                gaps.append(np.linalg.norm(points[joint.name] - joint.at, axis=1))
+            if body == mechanism.end_effector:
+                offset = np.subtract(joint.at, mechanism.reference_point)
+                gaps.append(np.linalg.norm(points[joint.name] - (pose[:, :3, :3] @ offset + pose[:, :3, 3]), axis=1))
+    gaps += [_hinge_gap(mechanism, joint, points) for joint in mechanism.joints if joint.type == "revolute"]
+    if mechanism.end_effector_is_joint:
+        gaps.append(np.linalg.norm(points[mechanism.end_effector] - pose[:, :3, 3], axis=1))
+    return np.max(gaps, axis=0) / mechanism.characteristic_length
+
+
+def _hinge_gap(mechanism: Mechanism, hinge: Joint, points: dict[str, np.ndarray]) -> np.ndarray:
+    n = len(next(iter(points.values())))
+    if mechanism.base not in hinge.connects or hinge.name not in points:
+        return np.zeros(n)
+    link = hinge.connects[0] if hinge.connects[1] == mechanism.base else hinge.connects[1]
+    gap = np.zeros(n)
+    for other in mechanism.joints:
+        if link in other.connects and other.name in points and other is not hinge:
+            along = (points[other.name] - hinge.at) @ np.array(hinge.axis)
+            gap = np.maximum(gap, np.abs(along - np.subtract(other.at, hinge.at) @ np.array(hinge.axis)))
+    return gap
+
+
+def excess_of_points(mechanism: Mechanism, solution: Solution) -> np.ndarray:
+    """Largest excess over a range of an actuator or a cone fixed to base or platform, (n,) [L or rad]."""
+    points = {name: np.reshape(point, (-1, 3)) for name, point in solution.points.items()}
+    pose = solution.pose.reshape(-1, 4, 4)
+    excess = [np.zeros(len(pose))]
+    values = solution.actuators.reshape(len(pose), -1)
+    for column, name in enumerate(mechanism.actuator_names):
+        joint = mechanism.joint(name)
+        if joint.range is not None:
+            scale = mechanism.characteristic_length if joint.type == "prismatic" else 1.0
+            over = np.maximum(joint.range[0] - values[:, column], values[:, column] - joint.range[1])
+            excess.append(over / scale)
+        if joint.along is not None:
+            length = np.linalg.norm(points[joint.along[0]] - points[joint.along[1]], axis=1)
+            excess.append(np.abs(length - values[:, column]) / mechanism.characteristic_length)
+    for joint in mechanism.joints:
+        if joint.cone is not None and joint.cone.fixed_to in (mechanism.base, mechanism.end_effector):
+            axis = np.broadcast_to(np.array(joint.cone.axis), (len(pose), 3))
+            if joint.cone.fixed_to == mechanism.end_effector:
+                axis = pose[:, :3, :3] @ np.array(joint.cone.axis)
+            line = _next_centre(mechanism, joint, points) - points[joint.name]
+            cosine = np.einsum("ij,ij->i", axis, line) / np.linalg.norm(line, axis=1)
+            excess.append(np.arccos(np.clip(cosine, -1, 1)) - joint.cone.half_angle)
+    return np.max(excess, axis=0)
+
+
+def _next_centre(mechanism: Mechanism, joint: Joint, points: dict[str, np.ndarray]) -> np.ndarray:
+    """The next joint centre on the body opposite to the cone's, through prismatic joints."""
+    body = joint.connects[0] if joint.connects[1] == joint.cone.fixed_to else joint.connects[1]
+    came_by = joint
+    while True:
+        after = next(j for j in mechanism.joints if body in j.connects and j is not came_by)
+        if after.name in points:
+            return points[after.name]
+        body = after.connects[0] if after.connects[1] == body else after.connects[1]
+        came_by = after
+
+
+# --- by the coordinates of all joints --------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=64)
+def with_axes(mechanism: Mechanism) -> Mechanism:
+    """The same machine, with the axes of its universal joints written out where the library chooses them."""
+    if all(joint.axes is not None for joint in mechanism.joints if joint.type == "universal"):
+        return mechanism
+    joints = [
+        dataclasses.replace(joint, axes=universal_axes(mechanism, joint)) if joint.type == "universal" else joint
+        for joint in mechanism.joints
+    ]
+    return dataclasses.replace(mechanism, joints=tuple(joints))
+
+
+def deviations(mechanism: Mechanism, solution: Solution) -> dict[str, Array]:
+    """Joint name -> its coordinates less home's, (n, freedoms)."""
+    n = int(np.prod(solution.shape))
+    return {
+        name: np.reshape(value, (n, -1)) - np.ravel(mechanism.home_coordinate(name))
+        for name, value in solution.joints.items()
+    }
+
+
+def motion(mechanism: Mechanism, joint: Joint, moved: Array) -> Array:
+    """Motions (n, 4, 4) of a joint's second body relative to its first since home, in home coordinates."""
+    T = np.tile(np.eye(4), (len(moved), 1, 1))
+    if joint.type == "prismatic":
+        T[:, :3, 3] = moved * np.array(mechanism.home_axis(joint.name))
+    if joint.type in ("prismatic", "fixed"):
+        return T
+    if joint.type == "spherical":
+        turn = Rotation.from_rotvec(moved)
+    elif joint.type == "universal":
+        first, second = np.array(joint.axes)
+        turn = Rotation.from_rotvec(moved[:, :1] * first) * Rotation.from_rotvec(moved[:, 1:] * second)
+    else:
+        turn = Rotation.from_rotvec(moved[:, :1] * np.array(joint.axis))
+    T[:, :3, :3] = turn.as_matrix()
+    T[:, :3, 3] = np.array(joint.at) - T[:, :3, :3] @ np.array(joint.at)
+    if joint.type == "cylindrical":
+        T[:, :3, 3] += moved[:, 1:] * np.array(joint.axis)
+    return T
+
+
+def placed_bodies(mechanism: Mechanism, moved: dict[str, Array]) -> tuple[dict[str, Array], list[Array]]:
+    """Body -> displacements (n, 4, 4); and by how much every loop is open, (n, 12) [L, entries of matrices].
+
+    Bodies are placed one after the other through joints, from the base; the joints left over must agree.
+    """
+    n = len(next(iter(moved.values())))
+    placed, open_by, waiting = {mechanism.base: np.tile(np.eye(4), (n, 1, 1))}, [], list(mechanism.joints)
+    while waiting:
+        joint = next(each for each in waiting if set(each.connects) & placed.keys())
+        waiting.remove(joint)
+        first, second = joint.connects
+        T = motion(mechanism, joint, moved.get(joint.name, np.zeros((n, 0))))
+        if first not in placed:
+            placed[first] = placed[second] @ np.linalg.inv(T)
+        elif second not in placed:
+            placed[second] = placed[first] @ T
+        else:
+            at = np.append(mechanism.reference_point if joint.at is None else joint.at, 1.0)
+            apart = placed[first] @ T - placed[second]
+            shifts = (apart @ at)[:, :3] / mechanism.characteristic_length
+            open_by.append(np.concatenate([shifts, apart[:, :3, :3].reshape(n, 9)], axis=1))
+    return placed, open_by
+
+
+def gap_of_joints(mechanism: Mechanism, solution: Solution) -> Array:
+    """How far an answer's `joints` are from closed loops, its pose, and its actuators, (n,) [L or rad]."""
+    mechanism = with_axes(mechanism)
+    placed, open_by = placed_bodies(mechanism, deviations(mechanism, solution))
+    length, pose = mechanism.characteristic_length, solution.pose.reshape(-1, 4, 4)
+    worst = np.zeros(len(pose))
+    for each in open_by:
+        turned = np.linalg.norm(each[:, 3:], axis=1) / np.sqrt(2.0)
+        worst = np.max([worst, np.linalg.norm(each[:, :3], axis=1), turned], axis=0)
+    if mechanism.end_effector_is_joint:
+        body = placed[mechanism.joint(mechanism.end_effector).connects[0]]
+    else:
+        body = placed[mechanism.end_effector]
+        worst = np.maximum(worst, np.linalg.norm((body - pose)[:, :3, :3], axis=(1, 2)) / np.sqrt(2.0))
+    point = (body @ np.append(mechanism.reference_point, 1.0))[:, :3]
+    worst = np.maximum(worst, np.linalg.norm(point - pose[:, :3, 3], axis=1) / length)
+    values = solution.actuators.reshape(len(pose), -1)
+    for column, name in enumerate(mechanism.actuator_names):
+        unit = length if mechanism.joint(name).type == "prismatic" else 1.0
+        worst = np.maximum(worst, np.abs(np.ravel(solution.joints[name]) - values[:, column]) / unit)
+    return np.asarray(worst)
+
+
+def excess_of_joints(mechanism: Mechanism, solution: Solution) -> Array:
+    """Largest excess of an answer's `joints` over any range or cone, (n,) [L or rad]."""
+    mechanism = with_axes(mechanism)
+    moved = deviations(mechanism, solution)
+    placed, _ = placed_bodies(mechanism, moved)
+    worst = np.zeros(len(moved[mechanism.joints[0].name]))
+    for joint in mechanism.joints:
+        if joint.range is not None:
+            values = moved[joint.name] + np.ravel(mechanism.home_coordinate(joint.name))
+            low, high = np.reshape(joint.range, (-1, 2)).T
+            slides = {"prismatic": [True], "cylindrical": [False, True]}.get(joint.type, [False] * len(low))
+            unit = np.where(slides, mechanism.characteristic_length, 1.0)
+            worst = np.maximum(worst, (np.maximum(low - values, values - high) / unit).max(axis=1))
+        if joint.cone is not None:
+            worst = np.maximum(worst, cone_angle(mechanism, joint, placed) - joint.cone.half_angle)
+    return np.asarray(worst)
+
+
+def cone_angle(mechanism: Mechanism, joint: Joint, placed: dict[str, Array]) -> Array:
+    fixed = joint.cone.fixed_to
+    body = joint.connects[0] if joint.connects[1] == fixed else joint.connects[1]
+    came_by, end_body = joint, body
+    while True:
+        after = next(j for j in mechanism.joints if end_body in j.connects and j is not came_by)
+        if after.at is not None and after.type not in ("prismatic", "fixed"):
+            break
+        came_by, end_body = after, after.connects[after.connects[0] == end_body]
+    line = (placed[end_body] @ np.append(after.at, 1.0) - placed[body] @ np.append(joint.at, 1.0))[:, :3]
+    axis = placed[fixed][:, :3, :3] @ np.array(joint.cone.axis)
+    return np.arctan2(np.linalg.norm(np.cross(axis, line), axis=1), (axis * line).sum(axis=1))

@@ -1,0 +1,61 @@
+"""Compiling ahead: nothing is left to compile, and what is compiled is announced."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from pfabrik.kernels import ahead
+from test_compiled_and_interpreted import INTERPRETED
+
+pytestmark = pytest.mark.skipif(INTERPRETED, reason="nothing is compiled")
+
+ANNOUNCED = """
+import sys
+from pfabrik.kernels._jit import kernel
+
+@kernel
+def double(x):
+    return 2.0 * x
+
+print(double(float(sys.argv[1])))
+"""
+
+
+def test_every_kernel_is_compiled_for_the_types_that_questions_have() -> None:
+    reported: list[str] = []
+    ahead.compile_all(lambda name, seconds: reported.append(name))
+    assert reported == [
+        "reaching.solve_directly",
+        "closure.close",
+        "reaching.solve_by_iteration",
+        "closure.approach",
+    ]
+    for name in ("stewart", "delta"):
+        mechanism = pf.load(name)
+        far = pf.solve_ik(mechanism, np.array(mechanism.reference_point) * 3.0)
+        assert far.joints and far.active_limits
+        assert pf.solve_fk(mechanism, far.actuators).joints
+    for kernel, _ in ahead.KERNELS:
+        assert len(kernel.signatures) == 1
+
+
+def test_a_kernel_is_announced_when_it_is_compiled_and_not_when_it_is_loaded(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(ANNOUNCED)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    told = []
+    for _ in range(2):
+        ran = subprocess.run(
+            [sys.executable, str(script), "2"], env=environment, check=True, capture_output=True, text=True
+        )
+        assert ran.stdout == "4.0\n"
+        told.append(ran.stderr)
+    assert told[0].startswith("pfabrik: compiling double ... ") and told[0].endswith(" s\n")
+    assert told[1] == ""
