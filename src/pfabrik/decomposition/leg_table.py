@@ -11,16 +11,16 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import NDArray
 
-from ..description.graph import cone_line, opposite
-from ..description.home_mobility import column_joints, end_effector_freedom
+from ..description.graph import cone_line
+from ..description.home_mobility import column_joints
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
-from .decompose import decompose
-from .legs import Ending, Item, LegForm, NoLeg, Pivot, Rod, holds_spin, legs_of_chain
+from .decompose import decompose, engine_of
+from .legs import Item, LegForm, NoLeg, Pivot, Rod, holds_spin, legs_of_chain
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -28,6 +28,9 @@ Records = NDArray[np.void]
 _ENDINGS = {"": K.WELD, "R": K.HINGE, "RR": K.CROSS, "RRR": K.TRIPLE, "S": K.BALL}
 _CARRIERS = {"R": K.CRANK, "P": K.CARRIAGE}
 _NO_BOUNDS = (-math.inf, math.inf)
+
+NO_WAY = "does not lead to the end effector"
+"""The reason of a sub-chain beside every way to the end effector."""
 
 COMPLETED_WITHIN = 2.0
 """How far what a task leaves open may go from where it began [L or rad]: farther off there may be other completions."""
@@ -40,8 +43,9 @@ class LegTable:
     Attributes
     ----------
     forms : what each record is.
-    limited : every coordinate that has a range; `driven` : every actuator, its column that of its value; `known` : every
-        coordinate that legs tell, its column that among all joint coordinates.
+    limited : every coordinate that has a range.
+    driven : every actuator; its column is that of its value.
+    known : every coordinate that legs tell; its column is that among all joint coordinates.
     aimed : the legs with the angles of all endings asked for, to be read with `known`.
     task : one record.
     limits : (joint, bound) of the limits, those of `limited` (two each), then those of `cones`.
@@ -78,60 +82,53 @@ def leg_table(mechanism: Mechanism) -> LegTable | str:
         return str(reason)
 
 
+def legs_answer(mechanism: Mechanism) -> bool:
+    """Whether legs in closed form answer first: where they are faster than what would answer without them."""
+    return engine_of(mechanism) == "closure" and isinstance(leg_table(mechanism), LegTable)
+
+
 def _table(mechanism: Mechanism) -> LegTable:
+    forms = _forms(mechanism)
+    legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
+    legs["first_row"] = [0, *accumulate(_row_counts(legs))][:-1]
+    told = [(leg, item, place) for leg, form in enumerate(forms) for item, place in _places(form)]
+    _require_all(mechanism, {(item.joint.name, item.place) for _, item, _ in told})
+    known = np.array([_coordinate(mechanism, *each) for each in told], K.COORDINATE)
+    joints = [item.joint for _, item, _ in told]
+    limited = known[[joint.range is not None for joint in joints]]
+    driven = known[[joint.actuated for joint in joints]]
+    driven["column"] = [mechanism.actuator_names.index(joint.name) for joint in joints if joint.actuated]
+    coned = [joint for joint in mechanism.joints if joint.cone is not None]
+    cones = np.array([_cone(mechanism, forms, joint) for joint in coned], K.CONE)
+    aimed = _aimed(legs, known)
+    limits = [(joint.name, bound) for joint in joints if joint.range is not None for bound in ("min", "max")]
+    limits += [(joint.name, "cone") for joint in coned]
+    task = _task(mechanism, legs)
+    legs = _aimed(legs, np.concatenate([limited, driven]))
+    return LegTable(tuple(forms), legs, aimed, limited, cones, driven, known, task, tuple(limits))
+
+
+def _forms(mechanism: Mechanism) -> list[LegForm]:
+    """The legs of all sub-chains."""
     forms: list[LegForm] = []
     for chain in decompose(mechanism):
-        if chain.reason == "does not lead to the end effector":
-            raise NoLeg(f"sub-chain {chain} {chain.reason}")
+        if chain.reason == NO_WAY:
+            raise NoLeg(f"sub-chain {chain} {NO_WAY}")
         try:
             forms += legs_of_chain(mechanism, chain)
         except NoLeg as reason:
             raise NoLeg(f"sub-chain {chain}: {reason}") from None
-    legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
-    legs["first_row"] = [0, *accumulate(_row_counts(legs))][:-1]
-    places = [dict(_places(form)) for form in forms]
-    coordinates = [
-        (leg, item, place) for leg, (form, own) in enumerate(zip(forms, places, strict=True)) for item, place in own.items()
-    ]
-    limited, driven, known, limits = [], [], [], []
-    seen: set[tuple[str, int]] = set()
-    starts = np.searchsorted(column_joints(mechanism), np.arange(len(mechanism.joints)))
-    first = {joint.name: int(start) for joint, start in zip(mechanism.joints, starts, strict=True)}
-    for leg, item, place in coordinates:
-        seen.add((item.joint.name, item.place))
-        # the angles at a head are those of the rod as seen from the body beyond
-        is_beyond = isinstance(forms[leg], Rod) and place >= K.HEAD
-        record = _coordinate(mechanism, leg, item.back if is_beyond else item, place)
-        known.append((*record[:2], first[item.joint.name] + item.place, *record[3:]))
-        if item.joint.range is not None:
-            limited.append(record)
-            limits += [(item.joint.name, "min"), (item.joint.name, "max")]
-        if item.joint.actuated:
-            driven.append((*record[:2], mechanism.actuator_names.index(item.joint.name), *record[3:]))
-    cones = [_cone(mechanism, forms, joint) for joint in mechanism.joints if joint.cone is not None]
-    limits += [(joint.name, "cone") for joint in mechanism.joints if joint.cone is not None]
-    _require_all(mechanism, seen)
-    aimed = legs.copy()
-    for end in ("foot", "head"):
-        aimed[f"{end}_aimed"] = (legs["kind"] == K.ROD) & np.isin(legs[end], (K.HINGE, K.CROSS))
-        wanted = np.zeros(len(legs), bool)
-        start = K.FOOT if end == "foot" else K.HEAD
-        for record in (*limited, *driven):
-            wanted[record[0]] |= start <= record[1] < start + 3
-        wanted |= (legs["twists"] == 1) & (legs[end] == K.CROSS)
-        legs[f"{end}_aimed"] = wanted & (aimed[f"{end}_aimed"] == 1)
-    table = LegTable(
-        tuple(forms),
-        legs,
-        aimed,
-        np.array(limited, K.COORDINATE),
-        np.array(cones, K.CONE),
-        np.array(driven, K.COORDINATE),
-        np.array(known, K.COORDINATE),
-        _task(mechanism, legs),
-        tuple(limits),
-    )
-    return table
+    return forms
+
+
+def _aimed(legs: Records, asked: Records) -> Records:
+    """Legs with the angles of those endings asked for that coordinates are among, or that keep a rod from spinning."""
+    legs = legs.copy()
+    for end, start in (("foot", K.FOOT), ("head", K.HEAD)):
+        wanted = (legs["twists"] == 1) & (legs[end] == K.CROSS)
+        wanted[asked["leg"][(asked["place"] >= start) & (asked["place"] < start + 3)]] = True
+        legs[f"{end}_aimed"] = wanted & (legs["kind"] == K.ROD)
+    return legs
 
 
 def _require_all(mechanism: Mechanism, seen: set[tuple[str, int]]) -> None:
@@ -156,19 +153,31 @@ def _places(form: LegForm) -> Iterator[tuple[Item, int]]:
     if holds_spin(form.foot_ending):
         yield from ((item, K.FOOT + place) for place, item in enumerate(form.foot_ending.items))
     if holds_spin(form.head_ending):
-        yield from ((item, K.HEAD + place) for place, item in enumerate(form.head_ending.items[::-1]))
+        # as the body beyond sees the rod
+        yield from ((item.back, K.HEAD + place) for place, item in enumerate(form.head_ending.items[::-1]))
 
 
 def _coordinate(mechanism: Mechanism, leg: int, item: Item, place: int) -> tuple[float, ...]:
-    """A record of `COORDINATE`, without its column."""
-    is_length = item.kind == "P"
+    """A record of `COORDINATE`, its column that among all joint coordinates."""
+    joint, is_length = item.joint, item.kind == "P"
     unit = mechanism.characteristic_length if is_length else 1.0
-    home = float(np.ravel(mechanism.home_coordinate(item.joint.name))[item.place])
-    lo, hi = _NO_BOUNDS if item.joint.range is None else np.reshape(item.joint.range, (-1, 2))[item.place].tolist()
-    if item.joint.along is not None:
+    home = float(np.ravel(mechanism.home_coordinate(joint.name))[item.place])
+    lo, hi = _NO_BOUNDS if joint.range is None else np.reshape(joint.range, (-1, 2))[item.place].tolist()
+    if joint.along is not None:
         lo = max(lo, 0.0)
-    turns = int(item.joint.type == "revolute" or (item.joint.actuated and not is_length))
-    return leg, place, -1, turns, item.sense, (lo - home) / unit, (hi - home) / unit, home, unit
+    index = [each.name for each in mechanism.joints].index(joint.name)
+    column = int(np.searchsorted(column_joints(mechanism), index)) + item.place
+    return (
+        leg,
+        place,
+        column,
+        int(joint.type == "revolute"),
+        item.sense,
+        (lo - home) / unit,
+        (hi - home) / unit,
+        home,
+        unit,
+    )
 
 
 def _record(mechanism: Mechanism, form: LegForm) -> Records:
@@ -241,8 +250,9 @@ def _rod_record(mechanism: Mechanism, rod: Rod) -> Records:
         record[f"{end}_side"] = _home_side(axes, line) if ending.kind == "RR" else 0.0
     ends = (rod.foot_ending, rod.head_ending)
     record["twists"] = all(map(holds_spin, ends)) and rod.twist is None
-    marks = [ending.items[place].axis for ending, place in zip(ends, (-1, 0), strict=True)]
-    record["twist"] = math.atan2(line @ np.cross(*marks), marks[0] @ marks[1] - (line @ marks[0]) * (line @ marks[1]))
+    foot_mark, head_mark = rod.foot_ending.items[-1].axis, rod.head_ending.items[0].axis
+    flat = foot_mark @ head_mark - (line @ foot_mark) * (line @ head_mark)
+    record["twist"] = math.atan2(line @ np.cross(foot_mark, head_mark), flat)
     record["carrier"] = K.SHARED if rod.is_shared else K.NO_CARRIER
     if rod.carrier is not None:
         _put_carrier(record, rod.carrier, rod.foot, line)

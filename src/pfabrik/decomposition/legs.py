@@ -12,9 +12,9 @@ the carrier and the others are rods on it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 from typing import Literal
 
 import numpy as np
@@ -67,9 +67,9 @@ class Item:
 
 @dataclass(frozen=True, eq=False)
 class Ending:
-    """Where a rod ends: its items, in order from the base outward as the leg is read, and the point all of them meet in.
+    """Where a rod ends: its items, in the order in which the leg is read, and the point that all of them meet in.
 
-    A single hinge meets in any point of its axis.
+    Of a single hinge that is its joint's centre.
     """
 
     kind: Literal["", "R", "RR", "RRR", "S"]
@@ -238,7 +238,7 @@ def _ending(items: Sequence[Item]) -> Ending | None:
     kind = "".join(item.kind for item in items)
     if kind == "" or kind == "S" or kind == "R":
         return Ending(kind, tuple(items), items[0].point if items else NO_AXIS)  # type: ignore[arg-type]
-    if kind not in ("RR", "RRR") or any(_parallel(*pair) for pair in zip(items, items[1:], strict=False)):
+    if kind not in ("RR", "RRR") or any(_parallel(*pair) for pair in pairwise(items)):
         return None
     centre = _crossing(items[0], items[1])
     off = max(_area(centre - item.point, item.axis) for item in items)
@@ -301,4 +301,3 @@ def _ends(foot: Ending, head: Ending) -> tuple[Floats, Floats]:
 def holds_spin(ending: Ending) -> bool:
     """Whether an ending keeps a rod from spinning about itself."""
     return ending.kind in ("R", "RR")
-

@@ -39,20 +39,22 @@ class LegsEngine:
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        if not options.exact:
-            return self._inner.answer(targets, self._positioned(start), options, keep_mode=keep_mode)
+        if not options.exact and isinstance(self._inner, ReachingEngine):
+            return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
         sides = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
         rows = new_rows(self.mechanism, len(targets))
         left = self._reach(targets, start, sides, keep_mode, rows)
         if left == len(targets):
-            return self._inner.answer(targets, self._positioned(start), options, keep_mode=keep_mode)
+            return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
         others, rest = None, np.flatnonzero(rows.status != P.REACHED)
         if left:
             begin = start if start is None or len(start) == 1 else start.at(rest)
-            others = self._inner.answer(targets[rest], self._positioned(begin), options, keep_mode=keep_mode)
+            others = self._inner.answer(targets[rest], self._start(begin), options, keep_mode=keep_mode)
             put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
         begins = _begins(self.mechanism, self._table, start, sides)
-        return Configurations(rows, partial(_coordinates, self.mechanism, self._table, rows, sides, begins, rest, others))
+        return Configurations(
+            rows, partial(_coordinates, self.mechanism, self._table, rows, sides, begins, rest, others)
+        )
 
     def follow(
         self,
@@ -62,7 +64,7 @@ class LegsEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        return self._inner.follow(targets, self._positioned(start), options, on_progress)
+        return self._inner.follow(targets, self._start(start), options, on_progress)
 
     def advance(self, targets: Floats, start: Configurations, options: Options) -> Configurations:
         """Go on to targets (n, 4, 4) in the working mode of as many configurations."""
@@ -76,9 +78,9 @@ class LegsEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         return self._inner.points(self._positioned(found))
 
-    def assemble(self, coordinates: Floats, poses: Floats, values: Floats) -> tuple[Floats, Floats] | None:
-        """Legs whose actuators have given values, assembled around platforms, if the other engine does that."""
-        return self._inner.assemble(coordinates, poses, values)
+    def assemble(self, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
+        """Forward kinematics, by the other engine."""
+        return self._inner.assemble(coordinates, values, seeded=seeded)
 
     def _reach(
         self, targets: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: P.Rows
@@ -108,9 +110,12 @@ class LegsEngine:
 
         return sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
 
-    def _positioned(self, start: Configurations | None) -> Configurations | None:
+    def _start(self, start: Configurations | None) -> Configurations | None:
+        return None if start is None else self._positioned(start)
+
+    def _positioned(self, start: Configurations) -> Configurations:
         """Configurations as the other engine starts from them: with the positions that it stores."""
-        if start is None or not isinstance(self._inner, ReachingEngine) or self._inner.stores(start):
+        if not isinstance(self._inner, ReachingEngine) or self._inner.stores(start):
             return start
         found = self._inner.at(measured(self.mechanism, start.coordinates))
         found.rows.status[:] = start.rows.status

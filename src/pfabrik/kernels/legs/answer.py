@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from .._jit import kernel, routine
 from ..linear import solve_spd
-from ..vectors import Vec, add, cross, dot, norm, scale, vec, wrap_into
+from ..vectors import Vec, cross, dot, norm, scale, vec, wrap_into
 from .endings import SURE, turned
 from .pivots import pivot_rows, pivot_slopes, place_pivot
-from .records import N_VALUES, PIVOT, SHARED, Floats, Records
+from .records import N_VALUES, PIVOT, SHARED, Floats, Record, Records
 from .rods import place_rod, rod_rows, rod_slopes
 
 # Status of a row; REACHED is the public one's number.
@@ -31,7 +31,7 @@ KEPT = 1e-9
 
 
 @routine
-def set_frames(pose: Floats, task: Records, frames: Floats) -> None:
+def set_frames(pose: Floats, task: Record, frames: Floats) -> None:
     """The platform's displacement as seen from the base, and the base's as seen from the platform.
 
     Rows 0 to 2 of each map head points; row 3 is the point about which the platform turns.
@@ -81,9 +81,7 @@ def put_rows(legs: Records, frames: Floats, values: Floats, lines: Floats, rows:
 
 
 @routine
-def put_slopes(
-    legs: Records, frames: Floats, values: Floats, lines: Floats, follow: Floats, slopes: Floats
-) -> None:
+def put_slopes(legs: Records, frames: Floats, values: Floats, lines: Floats, follow: Floats, slopes: Floats) -> None:
     """Fill the derivatives of the constraints of all legs."""
     main = 0
     for k in range(legs.shape[0]):
@@ -97,7 +95,7 @@ def put_slopes(
 
 
 @routine
-def put_motions(task: Records, pose: Floats, motions: Floats) -> None:
+def put_motions(task: Record, pose: Floats, motions: Floats) -> None:
     """Fill the twists (velocity, angular velocity) of the coordinates of the pose that the task does not set."""
     for i in range(task["unset"]):
         for j in range(6):
@@ -115,7 +113,7 @@ def put_motions(task: Records, pose: Floats, motions: Floats) -> None:
 
 
 @routine
-def newton_step(task: Records, pose: Floats, rows: Floats, slopes: Floats, motions: Floats, normal: Floats) -> float:
+def newton_step(task: Record, pose: Floats, rows: Floats, slopes: Floats, motions: Floats, normal: Floats) -> float:
     """Move what is not set so that the constraints vanish, by least squares; how far, infinite where it cannot be."""
     n = task["unset"]
     put_motions(task, pose, motions)
@@ -160,7 +158,7 @@ def turn_pose(pose: Floats, spin: Vec) -> None:
 
 
 @routine
-def load(target: Floats, begin: Floats, task: Records, pose: Floats) -> bool:
+def load(target: Floats, begin: Floats, task: Record, pose: Floats) -> bool:
     """A target [length] as a pose [L], what it does not set as in another; False where it is no pose, or turned over.
 
     Of the rotation the nearest is taken: two steps of R <- R (3 - R^T R) / 2. Where the direction of the z axis is
@@ -224,9 +222,9 @@ def make_exact(pose: Floats) -> None:
 
 
 @routine
-def deviation(coordinate: Records, values: Floats) -> float:
+def deviation(coordinate: Record, values: Floats) -> float:
     """A coordinate's deviation from home [L or rad], angles counted into their range."""
-    value = coordinate["sense"] * values[coordinate["leg"], coordinate["place"]]
+    value: float = coordinate["sense"] * values[coordinate["leg"], coordinate["place"]]
     return wrap_into(value, coordinate["lo"], coordinate["hi"]) if coordinate["turns"] == 1 else value
 
 
@@ -245,7 +243,7 @@ def excess_of(limited: Records, cones: Records, values: Floats) -> float:
 
 
 @routine
-def cone_cosine(cone: Records, values: Floats) -> float:
+def cone_cosine(cone: Record, values: Floats) -> float:
     own, place = values[cone["leg"]], cone["place"]
     return dot(vec(cone["axis"]), (own[place], own[place + 1], own[place + 2]))
 
@@ -318,7 +316,7 @@ def worst_of(rows: Floats) -> float:
 @routine
 def complete(
     legs: Records,
-    task: Records,
+    task: Record,
     sides: Floats,
     frames: Floats,
     values: Floats,
@@ -348,9 +346,7 @@ def complete(
 
 
 @kernel
-def read_coordinates(
-    legs: Records, known: Records, task: Records, poses: Floats, sides: Floats, found: Floats
-) -> None:
+def read_coordinates(legs: Records, known: Records, task: Records, poses: Floats, sides: Floats, found: Floats) -> None:
     """Fill deviations from home [length or rad], `found` (n, columns), of the coordinates that legs tell at poses."""
     n_legs = legs.shape[0]
     frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
@@ -367,9 +363,7 @@ def read_coordinates(
 
 
 @kernel
-def measure_rows(
-    legs: Records, task: Records, poses: Floats, sides: Floats, rows: Floats, slopes: Floats
-) -> None:
+def measure_rows(legs: Records, task: Records, poses: Floats, sides: Floats, rows: Floats, slopes: Floats) -> None:
     """Fill the constraints (n, rows) of all legs at poses [length], and their derivatives (n, rows, 6) [L, rad]."""
     n_legs = legs.shape[0]
     frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))

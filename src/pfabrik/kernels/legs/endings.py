@@ -10,7 +10,7 @@ import math
 
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, move, put, scale, sub, vec
-from .records import Floats, Records
+from .records import Floats, Record
 
 # Sine of the angle from a dead point, or from aligned hinges, below which a solution is not sure to half its digits.
 SURE = 1e-6
@@ -74,7 +74,7 @@ def spin_angle(T: Floats, axis: Vec) -> float:
 
 
 @routine
-def put_pose_slope(leg: Records, frame: Floats, a: Vec, c: Vec, slope: Floats) -> None:
+def put_pose_slope(leg: Record, frame: Floats, a: Vec, c: Vec, slope: Floats) -> None:
     """Derivative (6,) of a . dH + c . w by the platform's velocity (at its reference point) and angular velocity.
 
     dH and w are those of the head as `frame` has them: the platform's, or the base's as seen from the platform.

@@ -11,7 +11,7 @@ import math
 from .._jit import routine
 from ..vectors import Vec, cross, dot, move, sub, turn, vec
 from .endings import aim, angle_to, put_pose_slope, spin_angle, turned
-from .records import CROSS, FOOT, HEAD, HINGE, TRIPLE, Floats, Records
+from .records import CROSS, FOOT, HEAD, HINGE, TRIPLE, Floats, Record
 
 NOWHERE: Vec = (0.0, 0.0, 0.0)
 # What is added to conditions that an axis meets also where it is turned over.
@@ -19,7 +19,7 @@ TURNED_OVER = 2.0
 
 
 @routine
-def place_pivot(pivot: Records, frame: Floats, side: float, own: Floats) -> float:
+def place_pivot(pivot: Record, frame: Floats, side: float, own: Floats) -> float:
     """Fill a pivot's values; how sure they are, see `SURE`."""
     offset = sub(move(frame, vec(pivot["head_point"])), vec(pivot["foot_point"]))
     for i in range(pivot["slides"]):
@@ -59,7 +59,7 @@ def any_across(v: Vec) -> Vec:
 
 
 @routine
-def pivot_rows(pivot: Records, frame: Floats, rows: Floats) -> None:
+def pivot_rows(pivot: Record, frame: Floats, rows: Floats) -> None:
     """Fill a pivot's constraints."""
     n, n_fixed = pivot["first_row"], 3 - pivot["slides"]
     offset = sub(move(frame, vec(pivot["head_point"])), vec(pivot["foot_point"]))
@@ -75,7 +75,7 @@ def pivot_rows(pivot: Records, frame: Floats, rows: Floats) -> None:
 
 
 @routine
-def pivot_slopes(pivot: Records, frame: Floats, slopes: Floats) -> None:
+def pivot_slopes(pivot: Record, frame: Floats, slopes: Floats) -> None:
     """Fill the derivatives of a pivot's constraints."""
     n, n_fixed = pivot["first_row"], 3 - pivot["slides"]
     for i in range(n_fixed):

@@ -9,13 +9,14 @@ A rod is [carrier] + foot ending + rigid or sliding rod + head ending; a pivot i
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
 Records: TypeAlias = NDArray[np.void]
+Record: TypeAlias = Any  # one of them: its fields are numbers and arrays
 
 ROD, PIVOT = 0, 1
 # What carries the foot: nothing, a hinge, a slide; or what carries the rod before (a second forearm).

@@ -33,14 +33,14 @@ from .records import (
     SINE,
     SLIDE,
     Floats,
-    Records,
+    Record,
 )
 
 NOWHERE: Vec = (0.0, 0.0, 0.0)
 
 
 @routine
-def carry(rod: Records, head: Vec, side: float, own: Floats) -> float:
+def carry(rod: Record, head: Vec, side: float, own: Floats) -> float:
     """Turn the crank, or move the carriage, until the rod reaches the head; how far from a dead point, see `SURE`.
 
     A crank: |o + spoke cos q + across sin q - H| = length; a carriage: |F + q a - H| = length. Where none reaches, it
@@ -62,7 +62,7 @@ def carry(rod: Records, head: Vec, side: float, own: Floats) -> float:
 
 
 @routine
-def carried_foot(rod: Records, carrier: Records, own: Floats) -> Vec:
+def carried_foot(rod: Record, carrier: Record, own: Floats) -> Vec:
     """Where the foot is, with the carrier (the rod's, or the one it shares) as `own` says."""
     if carrier["carrier"] == NO_CARRIER:
         return vec(rod["foot_point"])
@@ -77,7 +77,7 @@ def carried_foot(rod: Records, carrier: Records, own: Floats) -> Vec:
 
 
 @routine
-def carried(carrier: Records, own: Floats, v: Vec, sense: float) -> Vec:
+def carried(carrier: Record, own: Floats, v: Vec, sense: float) -> Vec:
     """A direction turned with the crank, or back (sense -1)."""
     if carrier["carrier"] != CRANK:
         return v
@@ -86,7 +86,7 @@ def carried(carrier: Records, own: Floats, v: Vec, sense: float) -> Vec:
 
 @routine
 def place_rod(
-    rod: Records, carrier: Records, frame: Floats, side: float, lead: Floats, own: Floats, line: Floats
+    rod: Record, carrier: Record, frame: Floats, side: float, lead: Floats, own: Floats, line: Floats
 ) -> float:
     """Fill a rod's values, and the present `line` from foot to head; how sure they are, see `SURE`.
 
@@ -97,20 +97,18 @@ def place_rod(
     head, sure = move(frame, vec(rod["head_point"])), 1.0
     if rod["carrier"] == CRANK or rod["carrier"] == CARRIAGE:
         sure = carry(rod, head, side, own)
-    l = sub(head, carried_foot(rod, carrier, lead))
-    length = norm(l)
-    u, home = scale(1.0 / length, l), vec(rod["line"])
+    span = sub(head, carried_foot(rod, carrier, lead))
+    length = norm(span)
+    u, home = scale(1.0 / length, span), vec(rod["line"])
     foot_line, head_line = carried(carrier, lead, u, -1.0), turned_back(frame, u)
-    put(line, l)
+    put(line, span)
     put(own[FOOT_LINE:HEAD_LINE], foot_line)
     put(own[HEAD_LINE:COSINE], head_line)
     own[SLIDE] = length - rod["length"]
     if rod["foot_aimed"] == 1:
         sure = min(sure, aim_end(rod["foot"], rod["foot_axes"], home, foot_line, rod["foot_side"], own[FOOT:SLIDE]))
     if rod["head_aimed"] == 1:
-        sure = min(
-            sure, aim_end(rod["head"], rod["head_axes"], home, head_line, rod["head_side"], own[HEAD:FOOT_LINE])
-        )
+        sure = min(sure, aim_end(rod["head"], rod["head_axes"], home, head_line, rod["head_side"], own[HEAD:FOOT_LINE]))
     return sure
 
 
@@ -150,9 +148,7 @@ def spin_rate(ending: int, first: Vec, last: Vec, u: Vec) -> tuple[Vec, Vec]:
 
 
 @routine
-def twist_rate(
-    rod: Records, carrier: Records, frame: Floats, lead: Floats, own: Floats, u: Vec
-) -> tuple[Vec, Vec, Vec]:
+def twist_rate(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, u: Vec) -> tuple[Vec, Vec, Vec]:
     """Derivative of the twist of a rod by du, W and w."""
     foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
     head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
@@ -165,7 +161,7 @@ def twist_rate(
 
 @routine
 def put_slope(
-    rod: Records, carrier: Records, frame: Floats, lead: Floats, follow: Floats, a: Vec, b: Vec, c: Vec, slope: Floats
+    rod: Record, carrier: Record, frame: Floats, lead: Floats, follow: Floats, a: Vec, b: Vec, c: Vec, slope: Floats
 ) -> None:
     """Derivative (6,) of a . (dH - dF) + b . W + c . w by the platform's velocity and angular velocity.
 
@@ -181,7 +177,7 @@ def put_slope(
 
 
 @routine
-def carrier_rate(rod: Records, carrier: Records, lead: Floats, a: Vec, b: Vec) -> float:
+def carrier_rate(rod: Record, carrier: Record, lead: Floats, a: Vec, b: Vec) -> float:
     """Derivative of - a . F + b . W by the carrier's coordinate."""
     axis = vec(carrier["carrier_axis"])
     if carrier["carrier"] == CARRIAGE:
@@ -191,7 +187,7 @@ def carrier_rate(rod: Records, carrier: Records, lead: Floats, a: Vec, b: Vec) -
 
 
 @routine
-def put_follow(rod: Records, frame: Floats, own: Floats, u: Vec, follow: Floats) -> None:
+def put_follow(rod: Record, frame: Floats, own: Floats, u: Vec, follow: Floats) -> None:
     """Derivative (6,) of the coordinate of a carrier that keeps the rod's length."""
     put_pose_slope(rod, frame, u, NOWHERE, follow)
     rate = carrier_rate(rod, rod, own, u, NOWHERE)
@@ -201,29 +197,29 @@ def put_follow(rod: Records, frame: Floats, own: Floats, u: Vec, follow: Floats)
 
 @routine
 def rod_rows(
-    rod: Records, carrier: Records, frame: Floats, lead: Floats, own: Floats, line: Floats, rows: Floats
+    rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, line: Floats, rows: Floats
 ) -> None:
     """Fill a rod's constraints."""
-    n, l = rod["first_row"], vec(line)
+    n, span = rod["first_row"], vec(line)
     if rod["slides"] == 0 and (rod["carrier"] == NO_CARRIER or rod["carrier"] == SHARED):
         rows[n] = own[SLIDE]
         n += 1
     if rod["foot"] == HINGE:
-        rows[n] = norm(l) * dot(vec(rod["foot_axes"][0]), vec(own[FOOT_LINE:HEAD_LINE]))
+        rows[n] = norm(span) * dot(vec(rod["foot_axes"][0]), vec(own[FOOT_LINE:HEAD_LINE]))
         n += 1
     if rod["head"] == HINGE:
-        rows[n] = norm(l) * dot(vec(rod["head_axes"][0]), vec(own[HEAD_LINE:COSINE]))
+        rows[n] = norm(span) * dot(vec(rod["head_axes"][0]), vec(own[HEAD_LINE:COSINE]))
         n += 1
     if rod["twists"] == 1:
         foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
         head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
-        rows[n] = wrap(angle_to(scale(1.0 / norm(l), l), foot, head) - rod["twist"], 0.0)
+        rows[n] = wrap(angle_to(scale(1.0 / norm(span), span), foot, head) - rod["twist"], 0.0)
 
 
 @routine
 def rod_slopes(
-    rod: Records,
-    carrier: Records,
+    rod: Record,
+    carrier: Record,
     frame: Floats,
     lead: Floats,
     own: Floats,
@@ -232,8 +228,8 @@ def rod_slopes(
     slopes: Floats,
 ) -> None:
     """Fill the derivatives of a rod's constraints, and of its carrier's coordinate (`follow`)."""
-    n, l = rod["first_row"], vec(line)
-    u = scale(1.0 / norm(l), l)
+    n, span = rod["first_row"], vec(line)
+    u = scale(1.0 / norm(span), span)
     if rod["carrier"] == CRANK or rod["carrier"] == CARRIAGE:
         put_follow(rod, frame, own, u, follow)
     elif rod["slides"] == 0:
@@ -241,13 +237,13 @@ def rod_slopes(
         n += 1
     if rod["foot"] == HINGE:
         axis = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
-        put_slope(rod, carrier, frame, lead, follow, axis, cross(axis, l), NOWHERE, slopes[n])
+        put_slope(rod, carrier, frame, lead, follow, axis, cross(axis, span), NOWHERE, slopes[n])
         n += 1
     if rod["head"] == HINGE:
         axis = turn(frame, vec(rod["head_axes"][0]))
-        put_slope(rod, carrier, frame, lead, follow, axis, NOWHERE, cross(axis, l), slopes[n])
+        put_slope(rod, carrier, frame, lead, follow, axis, NOWHERE, cross(axis, span), slopes[n])
         n += 1
     if rod["twists"] == 1:
         by_line, b, c = twist_rate(rod, carrier, frame, lead, own, u)
-        by_line = scale(1.0 / norm(l), along(by_line, -dot(by_line, u), u))
+        by_line = scale(1.0 / norm(span), along(by_line, -dot(by_line, u), u))
         put_slope(rod, carrier, frame, lead, follow, by_line, b, c, slopes[n])
