@@ -12,11 +12,13 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from pfabrik.closure.configurations import new_rows
 from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.description.home_mobility import end_effector_freedom
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.kernels.legs.answer import measure_rows, read_coordinates
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
+from pfabrik.platform.coordinates import sides_at
 from pfabrik.platform.solve import LegsEngine
 
 SERVED = [name for name in pf.catalog() if isinstance(leg_table(pf.load(name)), LegTable)]
@@ -131,7 +133,7 @@ def test_constraints_leave_the_freedom_of_the_mechanism(name: str) -> None:
     assert np.abs(rows).max() <= 1e-12
     columns = slice(0, 3) if machine(name).end_effector_is_joint else slice(0, 6)
     rank = np.linalg.matrix_rank(slopes[0][:, columns], tol=1e-6)
-    assert rank == columns.stop - pf.mobility(machine(name)).end_effector
+    assert rank == columns.stop - end_effector_freedom(machine(name), frozenset())
 
 
 @pytest.mark.parametrize("name", COMPLETED)
@@ -145,22 +147,22 @@ def test_completed_poses_have_what_the_task_sets(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["delta", "prs", "agile_eye"])
 def test_a_start_keeps_its_working_mode(name: str) -> None:
-    mechanism = machine(name)
-    others = [each for each in pf.working_modes(mechanism, mechanism.home_pose) if each]
+    mechanism = machine(name).without_limits()
     home = pf.solve_ik(mechanism, mechanism.home_pose)
-    apart = [off(name, each.actuators[None], home.actuators[None])[0] for each in others]
-    if max(apart) < 1e-3:
-        pytest.skip("limits leave one working mode")
-    start = others[int(np.argmax(apart))]
+    modes = pf.working_modes(mechanism, mechanism.home_pose)
+    others = [each for each in modes if each and np.abs(each.pose - mechanism.home_pose).max() < 1e-6]
+    start = max(others, key=lambda each: off(name, each.actuators[None], home.actuators[None])[0])
+    assert off(name, start.actuators[None], home.actuators[None])[0] > 0.1
     near = poses_around_home(name, 30, 0.01, 0.02)
     engine = engine_of(mechanism)
     assert isinstance(engine, LegsEngine)
-    found = pf.solve_ik(mechanism, near, start=start)
+    rows = new_rows(mechanism, len(near))
+    engine._reach(near, start._found, sides_at(mechanism, engine._table, start._found), True, rows)
     behind = engine._inner.answer(near, start._found, Options(), keep_mode=True)
-    np.testing.assert_array_equal(found.status, behind.rows.status)
-    reached = np.asarray(found.status) == pf.Status.REACHED
-    assert reached.any()
-    assert off(name, found.actuators[reached], behind.rows.actuators[reached]).max() <= 1e-9
+    assert (rows.status == pf.Status.REACHED).all()
+    assert off(name, rows.actuators, behind.rows.actuators).max() <= 1e-9
+    answers = pf.solve_ik(mechanism, near, start=start)
+    assert pf.closure_residual(answers).max() <= 1e-9 * mechanism.characteristic_length
 
 
 @pytest.mark.parametrize("name", ["nrpm", "serial_arm"])
@@ -168,3 +170,37 @@ def test_a_chain_that_is_no_leg_is_named_with_the_reason(name: str) -> None:
     reason = leg_table(machine(name))
     assert isinstance(reason, str)
     assert reason.startswith("sub-chain ")
+
+
+@pytest.mark.parametrize("name", ["delta", "rps", "canfield", "stewart", "rrr"])
+def test_feasibility_is_the_least_margin_and_tells_what_is_reached(name: str) -> None:
+    mechanism = machine(name)
+    targets = poses_around_home(name, 120, 0.25, 0.0 if name == "rrr" else 0.45)
+    if name == "rrr":
+        targets[:, 2, 3] = mechanism.home_pose[2, 3]
+    found = pf.feasibility(mechanism, targets)
+    answers = pf.solve_ik(mechanism, targets, options=Options(working_mode="keep"))
+    reached = np.asarray(answers.status) == pf.Status.REACHED
+    np.testing.assert_array_equal(found.margin > 0.0, reached)
+    assert 0 < reached.sum() < len(reached)
+    least = np.min(list(pf.margins(answers[reached]).values()), axis=0)
+    np.testing.assert_allclose(found.margin[reached], least, atol=1e-9)
+    bounds = {found.limits[each][1] for each in found.binding}
+    assert bounds <= {"min", "max", "cone", "reach", "closed"}
+    for row in np.flatnonzero(reached)[:10]:
+        named = pf.margins(answers[row])[found.limits[found.binding[row]]]
+        assert named == pytest.approx(found.margin[row], abs=1e-9)
+
+
+def test_feasibility_of_one_target_is_a_number_and_of_no_pose_unknown() -> None:
+    mechanism = machine("delta")
+    assert pf.feasibility(mechanism, mechanism.home_pose).margin > 0.0
+    broken = np.stack([mechanism.home_pose, np.full((4, 4), np.nan)])
+    found = pf.feasibility(mechanism, broken)
+    assert np.isnan(found.margin[1])
+    assert found.binding[1] == -1
+
+
+def test_feasibility_without_closed_forms_says_why() -> None:
+    with pytest.raises(pf.errors.UnsupportedMechanism, match="no legs in closed form"):
+        pf.feasibility(machine("nrpm"), machine("nrpm").home_pose)

@@ -25,7 +25,7 @@ from .legs import Item, LegForm, NoLeg, Pivot, Rod, holds_spin, legs_of_chain
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
 
-_ENDINGS = {"": K.WELD, "R": K.HINGE, "RR": K.CROSS, "RRR": K.TRIPLE, "S": K.BALL}
+_ENDINGS = {"weld": K.WELD, "hinge": K.HINGE, "cross": K.CROSS, "triple": K.TRIPLE, "ball": K.BALL}
 _CARRIERS = {"R": K.CRANK, "P": K.CARRIAGE}
 _NO_BOUNDS = (-math.inf, math.inf)
 
@@ -143,7 +143,7 @@ def _places(form: LegForm) -> Iterator[tuple[Item, int]]:
     """Items whose coordinates a leg tells, each with its place in the leg's values."""
     if isinstance(form, Pivot):
         yield from ((item, K.HEAD + place) for place, item in enumerate(form.slides))
-        if form.ending.kind != "S":
+        if form.ending.kind != "ball":
             yield from ((item, K.FOOT + place) for place, item in enumerate(form.ending.items))
         return
     if form.carrier is not None:
@@ -203,7 +203,7 @@ def _pivot_record(mechanism: Mechanism, pivot: Pivot) -> Records:
     centre = pivot.ending.centre
     if not pivot.ending.items:
         centre = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
-    axes = _axes(pivot.ending.items) if kind else np.eye(3)
+    axes = np.eye(3) if kind == "weld" else _axes(pivot.ending.items)
     record["kind"], record["reversed"], record["foot"] = K.PIVOT, pivot.is_reversed, _ENDINGS[kind]
     record["foot_point"], record["head_point"] = centre, _head_point(mechanism, centre, pivot.is_reversed)
     record["foot_axes"], n_slides = axes, len(pivot.slides)
@@ -212,10 +212,10 @@ def _pivot_record(mechanism: Mechanism, pivot: Pivot) -> Records:
     record["slide_rows"][:n_slides] = np.linalg.pinv(directions.T) if n_slides else 0.0
     record["fixed_rows"][: 3 - n_slides] = np.linalg.svd(directions)[2][n_slides:] if n_slides else np.eye(3)
     pairs = _axis_pairs(kind, axes)
-    record["axis_rows"], record["upright"] = len(pairs), {"R": 1, "": 3}.get(kind, 0)
+    record["axis_rows"], record["upright"] = len(pairs), {"hinge": 1, "weld": 3}.get(kind, 0)
     for row, (kept, moved) in enumerate(pairs):
         record["kept"][row], record["moved"][row], record["value"][row] = kept, moved, kept @ moved
-    if kind == "RRR":
+    if kind == "triple":
         record["side"] = _home_side(axes, axes[2])
     return record
 
@@ -223,11 +223,11 @@ def _pivot_record(mechanism: Mechanism, pivot: Pivot) -> Records:
 def _axis_pairs(kind: str, axes: Floats) -> list[tuple[Floats, Floats]]:
     """Pairs of directions, of base and platform, that keep their angle."""
     x, y, z = axes
-    if kind == "RR":
+    if kind == "cross":
         return [(x, y)]
-    if kind == "R":
+    if kind == "hinge":
         return [(across, x) for across in np.linalg.svd(x[None])[2][1:]]
-    return [(x, y), (y, z), (z, x)] if kind == "" else []
+    return [(x, y), (y, z), (z, x)] if kind == "weld" else []
 
 
 def _home_side(axes: Floats, line: Floats) -> float:
@@ -247,7 +247,7 @@ def _rod_record(mechanism: Mechanism, rod: Rod) -> Records:
     for end, ending, order in (("foot", rod.foot_ending, 1), ("head", rod.head_ending, -1)):
         axes = _axes(ending.items[::order])
         record[end], record[f"{end}_axes"] = _ENDINGS[ending.kind], axes
-        record[f"{end}_side"] = _home_side(axes, line) if ending.kind == "RR" else 0.0
+        record[f"{end}_side"] = _home_side(axes, line) if ending.kind == "cross" else 0.0
     ends = (rod.foot_ending, rod.head_ending)
     record["twists"] = all(map(holds_spin, ends)) and rod.twist is None
     foot_mark, head_mark = rod.foot_ending.items[-1].axis, rod.head_ending.items[0].axis

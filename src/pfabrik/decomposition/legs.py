@@ -29,6 +29,7 @@ from .decompose import SubChain
 
 Floats = NDArray[np.float64]
 Kind = Literal["R", "P", "S"]
+EndingKind = Literal["weld", "hinge", "cross", "triple", "ball"]
 
 NO_AXIS = np.zeros(3)
 MOST_HINGES = 3
@@ -72,7 +73,7 @@ class Ending:
     Of a single hinge that is its joint's centre.
     """
 
-    kind: Literal["", "R", "RR", "RRR", "S"]
+    kind: EndingKind
     items: tuple[Item, ...]
     centre: Floats
 
@@ -235,14 +236,20 @@ def _rod(carrier: Item | None, items: list[Item], is_reversed: bool) -> Rod:
 
 def _ending(items: Sequence[Item]) -> Ending | None:
     """Items as an ending; None where they do not meet in a point."""
-    kind = "".join(item.kind for item in items)
-    if kind == "" or kind == "S" or kind == "R":
-        return Ending(kind, tuple(items), items[0].point if items else NO_AXIS)  # type: ignore[arg-type]
-    if kind not in ("RR", "RRR") or any(_parallel(*pair) for pair in pairwise(items)):
+    if not items:
+        return Ending("weld", (), NO_AXIS)
+    if [item.kind for item in items] == ["S"]:
+        return Ending("ball", tuple(items), items[0].point)
+    if any(item.kind != "R" for item in items) or len(items) > MOST_HINGES:
+        return None
+    if len(items) == 1:
+        return Ending("hinge", tuple(items), items[0].point)
+    if any(_parallel(*pair) for pair in pairwise(items)):
         return None
     centre = _crossing(items[0], items[1])
     off = max(_area(centre - item.point, item.axis) for item in items)
-    return Ending(kind, tuple(items), centre) if off <= TOLERANCES.implied else None  # type: ignore[arg-type]
+    kind: EndingKind = "cross" if len(items) == 2 else "triple"
+    return Ending(kind, tuple(items), centre) if off <= TOLERANCES.implied else None
 
 
 def _crossing(first: Item, second: Item) -> Floats:
@@ -264,7 +271,7 @@ def _checked_rod(carrier: Item | None, foot: Ending, middle: Sequence[Item], hea
     if len(slides) > 1 or len(twists) > 1:
         raise NoLeg("several joints along its rod")
     for ending, axes in ((foot, foot.items), (head, head.items[::-1])):
-        if ending.kind in ("R", "RR") and _is_singular([item.axis for item in axes], line):
+        if ending.kind in ("hinge", "cross") and _is_singular([item.axis for item in axes], line):
             raise NoLeg("a hinge along its rod")
     if carrier is not None:
         if slides:
@@ -284,15 +291,15 @@ def _is_singular(axes: Sequence[Floats], line: Floats) -> bool:
 
 def _ends(foot: Ending, head: Ending) -> tuple[Floats, Floats]:
     """The two ends of a rod: on a single hinge the point nearest to the other end."""
-    if foot.kind == "R" and head.kind == "R":
+    if foot.kind == "hinge" and head.kind == "hinge":
         first, second = foot.items[0], head.items[0]
         if _parallel(first, second):
             return first.point + first.axis * (first.axis @ (second.point - first.point)), second.point
         return _crossing(first, second), _crossing(second, first)
-    if foot.kind == "R":
+    if foot.kind == "hinge":
         item = foot.items[0]
         return item.point + item.axis * (item.axis @ (head.centre - item.point)), head.centre
-    if head.kind == "R":
+    if head.kind == "hinge":
         item = head.items[0]
         return foot.centre, item.point + item.axis * (item.axis @ (foot.centre - item.point))
     return foot.centre, head.centre
@@ -300,4 +307,4 @@ def _ends(foot: Ending, head: Ending) -> tuple[Floats, Floats]:
 
 def holds_spin(ending: Ending) -> bool:
     """Whether an ending keeps a rod from spinning about itself."""
-    return ending.kind in ("R", "RR")
+    return ending.kind in ("hinge", "cross")

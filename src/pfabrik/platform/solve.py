@@ -108,7 +108,20 @@ class LegsEngine:
                 rows.measures[block],
             )
 
-        return sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
+        left = sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
+        if start is not None:
+            self._count_turns(start.rows.actuators, rows)
+        return left
+
+    def _count_turns(self, begin: Floats, rows: P.Rows) -> None:
+        """Count the angles of actuators that may turn more than once from those of a start (n or 1, n_a)."""
+        for driven in self._table.driven[(self._table.driven["turns"] == 1)]:
+            lo, hi, column = driven["lo"], driven["hi"], driven["column"]
+            if hi - lo > 2.0 * np.pi:
+                values = rows.actuators[:, column]  # a view
+                nearest = values - 2.0 * np.pi * np.round((values - begin[:, column]) / (2.0 * np.pi))
+                inside = (nearest >= driven["home"] + lo) & (nearest <= driven["home"] + hi)
+                values[:] = np.where(inside, nearest, values)
 
     def _start(self, start: Configurations | None) -> Configurations | None:
         return None if start is None else self._positioned(start)
