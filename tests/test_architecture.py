@@ -116,7 +116,7 @@ WRONG = [
 
 
 def test_help_and_wrong_input_load_nothing_heavy() -> None:
-    told, said = loaded_by("numba pydantic matplotlib scipy", [*HELP, *WRONG])
+    told, said = loaded_by("numba matplotlib scipy", [*HELP, *WRONG])
     assert told == [(None, []), *[(0, [])] * len(HELP), *[(2, [])] * len(WRONG)]
     assert "Traceback" not in said
 

@@ -22,6 +22,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import pfabrik as pf
+from machines import closure
 from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import template, templates
 from pfabrik.cli import main
@@ -814,6 +815,17 @@ def test_track_tells_where_answers_leap(run: Callable[..., Result], tmp_path: Pa
     result = run("track", "arm.toml", "path.csv", "-o", "answers.csv")
     assert [row["jump"] for row in rows_of(tmp_path / "answers.csv")] == ["0"] * 7 + ["1"] + ["0"] * 2
     assert "; 1 jump (target 8)" in result.stdout
+
+
+def test_a_tilt_that_a_yaw_leaves_out_is_not_dropped_silently(run: Callable[..., Result], tmp_path: Path) -> None:
+    pf.save(closure.scara(), tmp_path / "scara.toml")
+    at = ("ik", "scara.toml", "--position", 350, 50, 0, "--rpy")
+    assert run(*at, 0, 0, 20).stderr == ""
+    assert "the tilt in --rpy has no effect: the task is x y z yaw" in run(*at, 5, 0, 20).stderr
+    (tmp_path / "path.csv").write_text("x,y,z,roll,pitch,yaw\n350,50,0,0,0,5\n350,50,0,0,3,5\n")
+    said = run("track", "scara.toml", "path.csv", "-o", "answers.csv").stderr
+    assert [name for name in ("roll", "pitch", "yaw") if f"column {name} has no effect" in said] == ["roll", "pitch"]
+    assert run("check", "scara.toml").stderr == ""
 
 
 def test_columns_that_the_task_leaves_out_are_not_dropped_silently(run: Callable[..., Result], tmp_path: Path) -> None:

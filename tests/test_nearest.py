@@ -258,10 +258,11 @@ def test_an_answer_at_a_singular_pose_is_the_nearest() -> None:
     "name",
     ["stewart", pytest.param("nrpm", marks=pytest.mark.slow), pytest.param("servo_hexapod", marks=pytest.mark.slow)],
 )
-def test_what_is_held_is_given_up_only_where_no_pose_has_it(name: str, hold: str) -> None:
+@pytest.mark.parametrize("count", [6, pytest.param(20, marks=pytest.mark.campaign)])
+def test_what_is_held_is_given_up_only_where_no_pose_has_it(name: str, hold: str, count: int) -> None:
     mechanism = pf.load(name)
     sizes = (0.3, 0.5) if hold == "orientation" else (0.3, 0.3)
-    targets = turned_targets(mechanism, 6 if INTERPRETED else 20, *sizes)
+    targets = turned_targets(mechanism, count, *sizes)
     answers = pf.solve_ik(mechanism, targets, options=Options(hold=hold))
     away = np.flatnonzero(answers.status == Status.PROJECTED)
     kept = np.equal(answers.held[away], hold)

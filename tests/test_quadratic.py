@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pfabrik.kernels._jit import kernel
-from pfabrik.kernels.qp import factorise, new_programme, solve_programme
+from pfabrik.kernels.qp import factorise, new_qp, solve_qp
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = [] if INTERPRETED else [pytest.mark.campaign]  # a kernel of its own, as in `test_kernels`
@@ -20,11 +20,11 @@ def solve(
 ) -> tuple[bool, bool]:
     """Whether H is positive, and whether there is a solution, which goes to `x` and `multipliers`."""
     n, k = len(g), len(h)
-    p = new_programme(n, k)
+    p = new_qp(n, k)
     p.H[:], p.g[:], p.G[:], p.h[:] = H, g, G, h
     if not factorise(p.H, n, 0.0, p.factor):
         return False, False
-    found = solve_programme(p, n, k)
+    found = solve_qp(p, n, k)
     x[:], multipliers[:] = p.x, p.multipliers
     return True, found
 

@@ -290,13 +290,15 @@ def test_catalogue_machines_have_the_modes_of_textbooks(name: str, count: int) -
     assert modes[0]
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    "count", [pytest.param(1, marks=pytest.mark.slow), pytest.param(5, marks=pytest.mark.campaign)]
+)
 @pytest.mark.parametrize("name", [name for name in pf.catalog() if name != "nrpm"])
-def test_what_solve_ik_reaches_is_one_of_the_modes(name: str) -> None:
+def test_what_solve_ik_reaches_is_one_of_the_modes(name: str, count: int) -> None:
     mechanism = pf.load(name)
     rng = np.random.default_rng(5)
-    targets = np.repeat(mechanism.home_pose[None], 3, axis=0)
-    targets[:, :3, 3] += 0.02 * mechanism.characteristic_length * rng.normal(size=(3, 3))
+    targets = np.repeat(mechanism.home_pose[None], count, axis=0)
+    targets[:, :3, 3] += 0.02 * mechanism.characteristic_length * rng.normal(size=(count, 3))
     reached = pf.solve_ik(mechanism, targets)
     reached = pf.solve_ik(mechanism, reached.pose)  # projections are within reach
     for answer in reached:

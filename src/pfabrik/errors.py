@@ -21,9 +21,14 @@ __all__ = [
 ]
 
 
-def near_miss(name: str, known: Iterable[str]) -> str:
-    """``"; did you mean 'platform'?"`` when a known name is close to `name`, else an empty string."""
-    close = difflib.get_close_matches(str(name), list(known), n=1)
+def near_miss(name: str, known: Iterable[str], likeness: float = 0.6) -> str:
+    """``"; did you mean 'platform'?"`` when a known name is close to `name`, else an empty string.
+
+    Parameters
+    ----------
+    likeness : least share of the two names that are the same letters in the same order.
+    """
+    close = difflib.get_close_matches(str(name), list(known), n=1, cutoff=likeness)
     return f"; did you mean '{close[0]}'?" if close else ""
 
 

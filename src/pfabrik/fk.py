@@ -16,6 +16,7 @@ from .closure.configurations import Configurations, joint_coordinates
 from .description.mechanism import Mechanism, checked_mechanism
 from .engine import engine_of
 from .errors import InvalidArgument, UnknownName
+from .kernels.reaching.plan import ACTUATOR_ERROR
 from .options import Options, checked_options
 from .poses import as_floats
 from .tolerances import TOLERANCES
@@ -108,7 +109,7 @@ def _judged(mechanism: Mechanism, closing: Closing, values: Floats, tolerance: f
     """Configurations as answers to actuated values (n, n_a): which are what was asked for, and which are feasible."""
     found = engine_of(mechanism).at(closing)
     error = np.abs(actuator_errors(closure_of(mechanism), closing.coordinates, values)).max(axis=1, initial=0.0)
-    found.rows.measures[:, 4] = error
+    found.rows.measures[:, ACTUATOR_ERROR] = error
     asked, feasible = error <= tolerance, closing.feasible
     open_or_beyond = np.where((closing.gap <= TOLERANCES.position) & asked, Status.EXCEEDED, Status.FAILED)
     found.rows.status[:] = np.where(feasible, np.where(asked, Status.REACHED, Status.PROJECTED), open_or_beyond)

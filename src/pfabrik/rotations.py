@@ -108,6 +108,15 @@ OPPOSITE = 1e-9
 """Length of the sum of two unit vectors below which they are opposite, and any axis across will do."""
 
 
+def yaws(rotations: Floats) -> Floats:
+    """The twists about z (...,) [rad], within half a turn, of matrices (..., 3, 3).
+
+    R = S Rz(yaw), where S turns the z axis the shortest way to where it points. A rotation that turns z upside down has
+    none.
+    """
+    return np.arctan2(rotations[..., 1, 0] - rotations[..., 0, 1], rotations[..., 0, 0] + rotations[..., 1, 1])
+
+
 def random_quaternions(n: int, rng: np.random.Generator) -> Floats:
     """Unit quaternions (n, 4), scalar last, uniform over all rotations."""
     q = np.roll(rng.normal(size=(n, 4)), -1, axis=1)

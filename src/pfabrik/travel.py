@@ -114,7 +114,7 @@ def travel(
         orientation is kept. Default: both ways along each axis of the task, unless `about` is given.
     about : axes of rotation (n, 3) or (3,), right-handed, in the base frame. Default, unless `along` is given: both
         ways about each axis of the base where the task has a rotation, about the platform's x and y axes where it has a
-        tilt.
+        tilt, about the base's z axis, which alone is then allowed, where it has a yaw.
     pivot : point (3,) in the base frame that stays where it is as the end effector turns [length]; default: its
         reference point.
     options : of these, the tolerances.
@@ -169,10 +169,12 @@ def _axes(mechanism: Mechanism, solution: Solution, about: ArrayLike | None, def
     if about is None:
         chosen = np.zeros((0, 3))
         if default and rotations:
-            chosen = np.eye(3) if rotations == 3 else solution.pose[:3, :2].T
+            base = np.eye(3)
+            chosen = {3: base, 2: solution.pose[:3, :2].T, 1: base[2:]}[rotations]
         return np.stack([chosen, -chosen], axis=1).reshape(-1, 3)
     axes = _directions("about", about)
-    _require_task(mechanism, "about", axes, np.full(len(axes), rotations == 0))
+    off = np.abs(axes[:, :2]).max(axis=1, initial=0.0) > TOLERANCES.alignment
+    _require_task(mechanism, "about", axes, off if rotations == 1 else np.full(len(axes), rotations == 0))
     return axes
 
 

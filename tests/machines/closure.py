@@ -459,3 +459,42 @@ def _scaled(each: Joint, factor: float) -> Joint:
 def _with_joints(mechanism: Mechanism, joints: list[Joint], reference: Any = None) -> Mechanism:
     point = mechanism.reference_point if reference is None else reference
     return Mechanism(mechanism.name, joints, mechanism.end_effector, point, base=mechanism.base)
+
+
+def scara(task: Sequence[str] | None = ("x", "y", "z", "yaw")) -> Mechanism:
+    """Two arms, a quill and a turning tool: all axes upright."""
+    steps = (
+        ("R*", (0, 0, 0), Z, {"range": (-2.5, 2.5)}),
+        ("R*", (200, 0, 0), Z, {"range": (-2.4, 2.4)}),
+        ("P*", None, Z, {"range": (-50, 50)}),
+        ("R*", (350, 50, 0), Z),
+    )
+    return Mechanism("SCARA", chain(1, *steps, end="tool"), "tool", (350, 50, 0), task=task)
+
+
+H4_TWIST = 30.0
+"""Angle between the planes of the H4's arms and the plane of its two hinges [deg]."""
+
+
+def h4(task: Sequence[str] = ("x", "y", "z", "yaw")) -> Mechanism:
+    """Four arms with pairs of rods on two half platforms, hinged to a third that turns as these shift: x, y, z, yaw."""
+    joints = []
+    for leg, (x, y) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1)), 1):
+        # the arm of a quadrant points outward; its pair of rods is held square to it
+        outward = np.array([x * np.sin(np.radians(H4_TWIST)), y * np.cos(np.radians(H4_TWIST)), 0.0])
+        across = np.cross(Z, outward)
+        foot = np.array([100.0 * x, 173.20508075688772 * y, 0.0])
+        elbow, wrist = foot + 250.0 * outward, np.array([60.0 * x, 90.0 * y, -500.0])
+        half = "front" if y > 0 else "back"
+        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), foot, across, range=(-1.22, 1.57)))
+        for side, name in ((-1, "L"), (1, "R")):
+            offset = side * 40.0 * across
+            joints += [
+                joint("S", f"B{name}{leg}", (f"arm{leg}", f"rod{name}{leg}"), elbow + offset),
+                joint("S", f"C{name}{leg}", (f"rod{name}{leg}", half), wrist + offset),
+            ]
+    joints += [
+        joint("R", "Q1", ("front", "platform"), (0, 90, -500), Z, range=(-1.4, 1.4)),
+        joint("R", "Q2", ("back", "platform"), (0, -90, -500), Z),
+    ]
+    return Mechanism("H4", joints, "platform", (0, 0, -500), task=tuple(task))

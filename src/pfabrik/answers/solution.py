@@ -145,37 +145,37 @@ class Solution:
 
     @property
     def position_error(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, 0]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.POSITION_ERROR]))
 
     @property
     def rotation_error(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, 1]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.ROTATION_ERROR]))
 
     @property
     def residual(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, 2]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.RESIDUAL]))
 
     @property
     def limit_excess(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, 3]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.LIMIT_EXCESS]))
 
     @property
     def iterations(self) -> int | Integers:
-        return cast(int | Integers, self._shaped(self._rows.counters[:, 0]))
+        return cast(int | Integers, self._shaped(self._rows.counters[:, P.ITERATIONS]))
 
     @property
     def rounds(self) -> int | Integers:
-        return cast(int | Integers, self._shaped(self._rows.counters[:, 1]))
+        return cast(int | Integers, self._shaped(self._rows.counters[:, P.ROUNDS]))
 
     @property
     def held(self) -> Held | NDArray[np.object_]:
         names = np.array([None, "orientation", "position"], dtype=object)
-        held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, 2], P.HOLD_NOTHING)]
+        held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, P.HELD], P.HOLD_NOTHING)]
         return held[0] if self.shape == () else held.reshape(self.shape)
 
     @property
     def actuator_error(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, 4]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.ACTUATOR_ERROR]))
 
     @cached_property
     def q(self) -> Floats:
@@ -227,11 +227,14 @@ class Solution:
         """The limits that hold projected rows back from the poses that were asked for."""
         found: dict[int, tuple[ActiveLimit, ...]] = {}
         closure, task = closure_of(self.mechanism), task_of(self.mechanism)
-        holds, ways = self._rows.counters[projected, 2], ways_of(self.mechanism, wanted.hold, wanted.rotation_length)
+        holds, ways = (
+            self._rows.counters[projected, P.HELD],
+            ways_of(self.mechanism, wanted.hold, wanted.rotation_length),
+        )
         for way in ways:
             rows = projected[holds == way.hold]
             q = self._coordinates[rows]
-            weights = weighed_limits(closure, q, wanted.targets[rows], platform=way.weights, framed=task.is_framed)
+            weights = weighed_limits(closure, q, wanted.targets[rows], platform=way.weights, frame=task.frame)
             found.update(zip(rows.tolist(), holding_limits(self.mechanism, q, weights), strict=True))
         return [found[row] for row in projected.tolist()]
 

@@ -13,6 +13,8 @@ import numpy as np
 
 import pfabrik as pf
 
+from ..description.graph_faults import leaves
+from ..description.joint_types import TASK_TURNS
 from ..description.task import task_of
 from ..errors import InvalidMechanism
 from ..motion.first_order import generic_of
@@ -22,7 +24,7 @@ from .mech import MECH, load
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
 
-COUNTS = {"x": 1, "y": 1, "z": 1, "tilt": 2, "rotation": 3}
+COUNTS = {"x": 1, "y": 1, "z": 1, **TASK_TURNS}
 """Freedoms that each part of a task asks for."""
 
 FULL_TURN = 2.0 * math.pi
@@ -66,13 +68,16 @@ def notes(mechanism: Mechanism) -> Iterator[str]:
     asked, there = sum(COUNTS[part] for part in mechanism.task), pf.mobility(mechanism).platform
     task = task_of(mechanism)
     directions = generic_of(mechanism).directions
-    counts = [*task.axes, *[task.rotations > 0] * 3][: len(directions)]  # of a joint end effector, three
+    turns = [task.rotations > 1, task.rotations > 1, task.rotations > 0]
+    counts = [*task.axes, *turns][: len(directions)]  # of a joint end effector, three
     twists = directions[counts]
     if asked > there < np.linalg.matrix_rank(twists, TOLERANCES.alignment):  # not always the same, as in a plane
         yield (
             f"the task {' '.join(mechanism.task)} asks for {asked} freedoms, and the end effector has {there}, from "
             "which the others follow: hardly any target can be reached; `task` says which count"
         )
+    for _, joint, body in leaves(mechanism):
+        yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
     widths = [width for joint in mechanism.joints for width in angular_widths(joint)]
     if widths and mechanism.angle_unit == "rad" and max(widths) > 4 * FULL_TURN:
         yield f"a range of {max(widths):.4g} rad is {max(widths) / FULL_TURN:.3g} turns; were degrees meant?"

@@ -76,8 +76,10 @@ def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | No
     elif position:
         off = zip("xyz", position, mechanism.reference_point, strict=True)
         left_out += [f"{axis} of --position" for axis, asked, home in off if axis not in task and asked != home]
-    if rpy and not task & {"rotation", "tilt"}:
+    if rpy and not task & {"rotation", "tilt", "yaw"}:
         left_out.append("--rpy")
+    elif rpy and "yaw" in task and any(rpy[:2]):
+        left_out.append("the tilt in --rpy")
     elif rpy and "tilt" in task and any(rpy) and not any(rpy[:2]):
         left_out.append("the yaw of --rpy")
     note_left_out(left_out, mechanism)

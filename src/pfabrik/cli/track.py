@@ -104,6 +104,8 @@ def note_ignored(mechanism: Mechanism, targets: Floats) -> None:
     columns = [axis for axis, moves in zip("xyz", moved, strict=True) if moves and axis not in task]
     if turned and not task - set("xyz"):
         columns += ["roll", "pitch", "yaw"]
+    elif "yaw" in task and (targets[:, :3, 2] != home[:3, 2]).any():
+        columns += ["roll", "pitch"]
     sets_some = any(moves and axis in task for axis, moves in zip("xyz", moved, strict=True))
     if columns and not sets_some and not (turned and task - set("xyz")):
         raise click.ClickException(

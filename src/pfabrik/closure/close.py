@@ -175,7 +175,7 @@ def close(
     *,
     locked: frozenset[str] = frozenset(),
     platform: Sequence[float] = EVERYTHING_FREE,
-    framed: bool = False,
+    frame: int = K.BASE_AXES,
     targets: Floats | None = None,
     weights: Floats | None = None,
     anchors: Floats | None = None,
@@ -195,7 +195,8 @@ def close(
     locked : joints that keep their coordinates.
     platform : weights of the squares of the platform's distance from `targets` (default: `poses`), position [L], then
         rotation [rad]; `LOCKED` holds that part where it starts.
-    framed : the weights of the rotation are about the axes of the targets, not of the base.
+    frame : what the weights of the rotation are about: the axes of the base, those of the targets (of which the first
+        two tilt), or axes of which the third yaws; one of `K.BASE_AXES`, `K.TARGET_AXES`, `K.HALF_WAY`.
     weights, anchors : weights of the squares of the coordinates' distances from anchors, (columns,), (n, columns).
     centres : wished joint centres, (n, joints, 3); NaN for none.
     limits : keep all limits too, by `margin` inside.
@@ -216,11 +217,11 @@ def close(
         iterations=np.zeros(n, np.int64),
     )
     none = np.zeros((n, 0, 3))
-    wishes = K.Wishes(
+    problem = K.ClosureProblem(
         weights=np.zeros(len(closure.scale)) if weights is None else weights,
         anchors=none[:, :, 0] if anchors is None else anchors * closure.scale,
         platform=np.array(platform, dtype=float),
-        framed=int(framed),
+        frame=frame,
         targets=closed.poses.copy() if targets is None else _in_lengths(targets, 1.0 / length),
         centres=none if centres is None else centres / length,
         limits=int(limits),
@@ -232,7 +233,7 @@ def close(
         max_iterations=max_iterations,
     )
     layout = closure.layout(locked | closure.last_balls if follow else locked)
-    _run(closure.loops, layout, wishes, closed)
+    _run(closure.loops, layout, problem, closed)
     return Closing(closed.coordinates / closure.scale, _in_lengths(closed.poses, length), *closed[2:])
 
 
@@ -241,18 +242,18 @@ def measured(mechanism: Mechanism, coordinates: Floats) -> Closing:
     return close(closure_of(mechanism), coordinates, platform_poses(mechanism, coordinates), max_iterations=0)
 
 
-def _run(loops: K.Loops, layout: K.Layout, wishes: K.Wishes, closed: K.Closed) -> None:
+def _run(loops: K.Loops, layout: K.Layout, problem: K.ClosureProblem, closed: K.Closed) -> None:
     """The kernel over all rows, on all cores."""
     from ..kernels.closure.close import close as close_rows
 
     def run(block: slice) -> None:
-        own = wishes._replace(
-            anchors=wishes.anchors[block], targets=wishes.targets[block], centres=wishes.centres[block]
+        own = problem._replace(
+            anchors=problem.anchors[block], targets=problem.targets[block], centres=problem.centres[block]
         )
         close_rows(loops, layout, own, K.Closed._make(array[block] for array in closed))
 
     n = len(closed.poses)
-    in_blocks(run, n, rows_a_block=max(n, 1) if wishes.chained else 64)
+    in_blocks(run, n, rows_a_block=max(n, 1) if problem.chained else 64)
 
 
 def _in_lengths(poses: Floats, scale: float) -> Floats:

@@ -51,10 +51,10 @@ def write_closing(closure: Closure, closing: Closing, rows: P.Rows) -> None:
         rows.poses[:, :3, :3] = np.eye(3)
     rows.actuators[:] = closure.actuators(closing.coordinates)
     rows.counters[:] = 0
-    rows.counters[:, 0] = closing.iterations
+    rows.counters[:, P.ITERATIONS] = closing.iterations
     rows.measures[:] = 0.0
-    rows.measures[:, 2] = closing.gap * mechanism.characteristic_length
-    rows.measures[:, 3] = np.maximum(closing.excess, 0.0)
+    rows.measures[:, P.RESIDUAL] = closing.gap * mechanism.characteristic_length
+    rows.measures[:, P.LIMIT_EXCESS] = np.maximum(closing.excess, 0.0)
 
 
 class Configurations:

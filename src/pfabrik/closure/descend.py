@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.closure.loops import Closed
+from ..kernels.closure.loops import BASE_AXES, Closed
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .close import MARGIN, Closing, Closure
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
-    from ..kernels.closure.pose_objective import Aim
+    from ..kernels.closure.pose_objective import PoseObjective
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ MOST_STEPS = 200
 
 
 def approached(
-    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
 ) -> Closing:
     """Feasible configurations nearest to targets, (n, 4, 4): local minima of the distance, from given coordinates.
 
@@ -36,26 +36,28 @@ def approached(
     coordinates : where to start, (n, columns): closed within all limits, or not far from it.
     platform : what counts of the distance from the targets: weights of the squares of position [L] and rotation [rad];
         LOCKED for what is to be as the target has it.
-    framed : of the rotation, only the direction of the platform's z axis counts.
+    frame : of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY.
 
     Returns
     -------
     Closing : judge by `feasible`. Gaps and excesses are those of the whole, the same for every group.
     """
-    found = _run(closure, coordinates, _aim(closure, targets, platform, framed, MOST_STEPS))[0]
+    found = _run(closure, coordinates, _objective(closure, targets, platform, frame, MOST_STEPS))[0]
     found.poses[:, :3, 3] *= closure.mechanism.characteristic_length
     return Closing(found.coordinates / closure.scale, *found[1:])
 
 
 def weighed_limits(
-    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], framed: bool = False
+    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
 ) -> Floats:
     """How hard every limit holds configurations back from their targets: multipliers, (n, 2 columns + cones).
 
     First the low and high bounds of the coordinates in turn, then the cones: by how much of L the target comes nearer,
     per unit [L or rad] by which a limit gives way; 0 for limits that do not matter.
     """
-    return _run(closure, coordinates, _aim(closure, within_sight(closure.mechanism, targets), platform, framed, 0))[1]
+    return _run(
+        closure, coordinates, _objective(closure, within_sight(closure.mechanism, targets), platform, frame, 0)
+    )[1]
 
 
 def within_sight(mechanism: Mechanism, targets: Floats) -> Floats:
@@ -66,7 +68,7 @@ def within_sight(mechanism: Mechanism, targets: Floats) -> Floats:
     return near
 
 
-def _run(closure: Closure, coordinates: Floats, aim: Aim) -> tuple[Closed, Floats]:
+def _run(closure: Closure, coordinates: Floats, objective: PoseObjective) -> tuple[Closed, Floats]:
     """The kernel over all rows, on all cores: where they ended, or what holds them where they are."""
     from ..kernels.closure.descend import approach
 
@@ -75,18 +77,18 @@ def _run(closure: Closure, coordinates: Floats, aim: Aim) -> tuple[Closed, Float
 
     def run(block: slice) -> None:
         own = Closed._make(array[block] for array in closed)
-        approach(closure.loops, layout, aim._replace(targets=aim.targets[block]), own, weights[block])
+        approach(closure.loops, layout, objective._replace(targets=objective.targets[block]), own, weights[block])
 
     in_blocks(run, len(coordinates), rows_a_block=16)
     return closed, weights
 
 
-def _aim(closure: Closure, targets: Floats, platform: Sequence[float], framed: bool, steps: int) -> Aim:
-    from ..kernels.closure.pose_objective import Aim
+def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> PoseObjective:
+    from ..kernels.closure.pose_objective import PoseObjective
 
     wanted = targets.copy()
     wanted[:, :3, 3] /= closure.mechanism.characteristic_length
-    return Aim(wanted, np.array(platform, dtype=float), int(framed), MARGIN, TOLERANCES.active, steps)
+    return PoseObjective(wanted, np.array(platform, dtype=float), frame, MARGIN, TOLERANCES.active, steps)
 
 
 def _closed(closure: Closure, coordinates: Floats) -> Closed:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.closure.loops import LOCKED
+from ..kernels.closure.loops import BASE_AXES, LOCKED
 from .close import EVERYTHING_FREE, MARGIN, Closing, Closure, close
 
 Floats = NDArray[np.float64]
@@ -26,7 +26,7 @@ def nearest(
     poses: Floats,
     *,
     platform: Sequence[float] = EVERYTHING_FREE,
-    framed: bool = False,
+    frame: int = BASE_AXES,
     targets: Floats | None = None,
     weights: Floats | None = None,
     anchors: Floats | None = None,
@@ -39,7 +39,7 @@ def nearest(
     coordinates, poses : where to start; need not be closed, nor within limits.
     platform : what counts of the platform's distance from `targets`: six weights relative to each other; LOCKED keeps
         a part where it starts.
-    framed : the weights of the rotation are about the axes of the targets, not of the base.
+    frame : what the weights of the rotation are about, as of `close`.
     weights, anchors : what counts of the coordinates' distances from anchors, (columns,), (n, columns).
     gently : open the loops less on the way, so that the search stays in its working mode, and may end less near.
 
@@ -55,7 +55,7 @@ def nearest(
             coordinates,
             poses,
             platform=np.where(held, LOCKED, weight * wished).tolist(),
-            framed=framed,
+            frame=frame,
             targets=targets,
             weights=weight * own,
             anchors=anchors,
@@ -70,7 +70,7 @@ def nearest(
         coordinates,
         poses,
         platform=np.where(held, LOCKED, 0.0).tolist(),
-        framed=framed,
+        frame=frame,
         targets=targets,
         limits=True,
         margin=MARGIN,

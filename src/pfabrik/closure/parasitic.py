@@ -23,11 +23,20 @@ def follows_task(mechanism: Mechanism) -> bool:
     Then a target has one pose for each way of assembly. Told by the freedoms in general, not by those of home, which
     may be singular; of a joint end effector nothing turns.
     """
-    task = task_of(mechanism)
-    asked = sum(task.axes) + task.rotations
-    if mechanism.end_effector_is_joint or task.is_whole_pose:
+    if mechanism.end_effector_is_joint or task_of(mechanism).is_whole_pose:
         return False
-    return generic_of(mechanism).mobility.platform <= asked
+    return generic_of(mechanism).mobility.platform <= _asked(mechanism)
+
+
+def asks_too_much(mechanism: Mechanism) -> bool:
+    """Whether a task sets more of a pose than the end effector has freedoms: hardly any target is within reach."""
+    return generic_of(mechanism).mobility.platform < _asked(mechanism)
+
+
+def _asked(mechanism: Mechanism) -> int:
+    """How many coordinates of a pose the task sets."""
+    task = task_of(mechanism)
+    return sum(task.axes) + task.rotations
 
 
 @lru_cache(maxsize=64)

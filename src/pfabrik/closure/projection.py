@@ -85,7 +85,7 @@ def project(
     ways : tried in turn, until one has an answer.
     corners : search from the corners of the workspace too. Without, the search stays about where it starts.
     """
-    n, framed = len(targets), task_of(closure.mechanism).is_framed
+    n, frame = len(targets), task_of(closure.mechanism).frame
     best = Projected(
         close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, P.HOLD_NOTHING)
     )
@@ -96,7 +96,7 @@ def project(
         for start in everywhere:
             waiting = np.flatnonzero(open_to_it & (hits < HITS))
             if len(waiting):
-                found = approached(closure, start[waiting], targets[waiting], platform=way.weights, framed=framed)
+                found = approached(closure, start[waiting], targets[waiting], platform=way.weights, frame=frame)
                 hits[waiting] = _take_nearer(closure, best, waiting, found, targets, way, hits[waiting])
         lost = np.flatnonzero(np.isinf(best.distances))
         if len(lost) and LOCKED in way.weights:
@@ -136,6 +136,6 @@ def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Closi
     held[:3, 3], held[:3, :3] = np.array(way.weights[:3]) == LOCKED, LOCKED in way.weights[3:]
     placed = np.where(held, task.completed(targets, begin), begin)
     closed = nearest(
-        closure, start, placed, platform=way.weights, framed=task.is_framed, targets=task.completed(targets, begin)
+        closure, start, placed, platform=way.weights, frame=task.frame, targets=task.completed(targets, begin)
     )
-    return approached(closure, closed.coordinates, targets, platform=way.weights, framed=task.is_framed)
+    return approached(closure, closed.coordinates, targets, platform=way.weights, frame=task.frame)

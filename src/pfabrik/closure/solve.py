@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
+from ..kernels.closure.loops import BASE_AXES
 from ..kernels.reaching import plan as P
 from ..motion.displacements import centres
 from ..motion.limits import within_turns
@@ -21,7 +22,7 @@ from .close import HELD, MARGIN, Closing, Closure, close, closure_of, measured, 
 from .configurations import Configurations, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
 from .known import chanced_upon
-from .parasitic import differences, follows_task, has_parasitic_motion
+from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
 from .projection import kept, project, ways_of
 from .starts import random_coordinates
 from .stretched import Bends
@@ -41,7 +42,11 @@ STRANGE = 0.1
 STARTS = 80
 """Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
 
-NEARBY = 16
+HITS, SAME = 16, 1e-3
+"""How many of them must end at the least gap or excess found before a leg is given up, and the share by which two may
+differ and still be the same. A branch that is met half as often was by then met too, but for one time in 600."""
+
+NEARBY = 64
 """Known configurations that are tried before random ones, the nearest to the target first."""
 
 STEPS = 30
@@ -151,8 +156,8 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
     if mechanism.end_effector_is_joint:
         rows.poses[:, :3, :3] = wanted[:, :3, :3]
     position, rotation = task_of(mechanism).errors(rows.poses, wanted)
-    rows.measures[:, 0], rows.measures[:, 1] = position, rotation
-    rows.counters[:, 2] = holds
+    rows.measures[:, P.POSITION_ERROR], rows.measures[:, P.ROTATION_ERROR] = position, rotation
+    rows.counters[:, P.HELD] = holds
     near = (position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)) & (
         rotation <= options.rotation_tolerance
     )
@@ -187,8 +192,10 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
             _start_nearby(closure, found, targets)
         _search(closure, found, rows, wanted, held, at_rest=at_rest)
     if not keep_mode and follows and has_parasitic_motion(closure.mechanism):
-        anywhere = task.completed(targets, begin)  # in other ways of assembly, where this one does not reach
-        _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
+        _start_nearby(closure, found, targets)  # in other ways of assembly, where this one does not reach
+        if asks_too_much(closure.mechanism) or len(chanced_upon(closure.mechanism)[0]) < NEARBY:
+            anywhere = task.completed(targets, begin)
+            _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
     return found
 
 
@@ -210,19 +217,31 @@ def _start_nearby(closure: Closure, found: Closing, targets: Floats) -> None:
 def _search(
     closure: Closure, found: Closing, rows: NDArray[np.intp], wanted: Floats, held: Weights, *, at_rest: bool
 ) -> None:
-    """Look for the legs that do not reach yet from random configurations; with the platform `at_rest`, one by one."""
+    """Look for the legs that do not reach yet from random configurations; with the platform `at_rest`, one by one.
+
+    A row whose platform rests is given up where one of its legs keeps ending where it came nearest.
+    """
     rng = np.random.default_rng(0)
+    hits = np.zeros(found.gaps.shape, np.int64)
     for _ in range(STARTS):
-        rest = rows[~found.feasible[rows]]
+        rest = rows[~found.feasible[rows] & (hits[rows].max(axis=1) < HITS)]
         if not len(rest):
             break
         stays = _legs_reached(closure, found, rest) | closure.idle if at_rest else closure.idle
         scattered = np.where(stays, found.coordinates[rest], random_coordinates(closure, 1, rng))
         tried = _close_below(closure, scattered, wanted[rest], held, STEPS)
         if at_rest:
+            hits[rest] = _hits(found.off[rest], tried.off, hits[rest])
             _take_legs(closure, found, rest, tried)
         else:
             found.improve(rest, tried)
+
+
+def _hits(best: Floats, tried: Floats, hits: NDArray[np.int64]) -> NDArray[np.int64]:
+    """How often each leg has ended where it came nearest, (n, groups); 0 for those that reached."""
+    nearer, again = tried < (1.0 - SAME) * best, np.abs(tried - best) <= SAME * best
+    counted = np.where(nearer, 1, hits + again)
+    return np.where(np.minimum(best, tried) <= TOLERANCES.limit, 0, counted)
 
 
 def _assembled(closure: Closure, wanted: Floats, start: Floats, begin: Floats) -> Closing:
@@ -233,7 +252,7 @@ def _assembled(closure: Closure, wanted: Floats, start: Floats, begin: Floats) -
     task = task_of(closure.mechanism)
     if not has_parasitic_motion(closure.mechanism):
         return close(closure, start, wanted, platform=HELD)
-    found = close(closure, start, wanted, platform=task.held, framed=task.is_framed)
+    found = close(closure, start, wanted, platform=task.held, frame=task.frame)
     strange = np.flatnonzero((found.gap > TOLERANCES.position) | (differences(closure, found.poses, wanted) > STRANGE))
     if len(strange):
         found.take(strange, _led(closure, wanted[strange], start[strange], begin[strange], task.held, limits=False))
@@ -249,7 +268,7 @@ def _close_below(
         start,
         wanted,
         platform=held,
-        framed=task_of(closure.mechanism).is_framed and held != HELD,
+        frame=BASE_AXES if held == HELD else task_of(closure.mechanism).frame,
         limits=limits,
         margin=MARGIN,
         max_iterations=max_iterations,

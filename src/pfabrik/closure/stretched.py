@@ -60,7 +60,7 @@ class Bends:
         if found.status[0] != P.PROJECTED:
             return False
         holds = [way.hold for way in self._ways]
-        ours, theirs = (holds.index(rows.counters[0, 2]) for rows in (found, other))
+        ours, theirs = (holds.index(rows.counters[0, P.HELD]) for rows in (found, other))
         if ours != theirs:
             return theirs < ours
         closure, way = closure_of(self._mechanism), self._ways[ours]

@@ -88,6 +88,8 @@ def legs_answer(mechanism: Mechanism) -> bool:
 
 
 def _table(mechanism: Mechanism) -> LegTable:
+    if task_of(mechanism).rotations == 1:
+        raise NoLeg("the task sets the yaw alone of the rotation")
     forms = _forms(mechanism)
     legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
     legs["first_row"] = [0, *accumulate(_row_counts(legs))][:-1]

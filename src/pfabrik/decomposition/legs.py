@@ -121,6 +121,8 @@ def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
     ------
     NoLeg : with the reason.
     """
+    if not chain.parts:
+        raise NoLeg("has no joints")
     if chain.trunk:
         return _branched(mechanism, chain)
     if not all(isinstance(part, Step) for part in chain.parts):

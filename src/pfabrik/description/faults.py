@@ -11,7 +11,7 @@ from ..errors import Fault, near_miss
 from .form_faults import is_name, joint_faults, name_faults, number_faults, shown
 from .graph_faults import graph_faults
 from .home_faults import home_faults
-from .joint_types import TASK_COORDINATES, WHOLE_TASK
+from .joint_types import TASK_COORDINATES, TASK_TURNS, WHOLE_TASK
 from .joints import Joint
 from .legs import LEG_KEYS
 from .structure import Structure
@@ -96,7 +96,7 @@ def _head_faults(mechanism: Structure) -> Iterator[Fault]:
 
 
 def _task_faults(task: Any, mechanism: Structure) -> Iterator[Fault]:
-    """Faults of what targets set: at least one coordinate, none twice, and of the rotation all or the tilt."""
+    """Faults of what targets set: at least one coordinate, none twice, and of the rotation all, the tilt or the yaw."""
     expected = f"some of {', '.join(TASK_COORDINATES)}"
     if not isinstance(task, tuple) or not task:
         yield Fault("task", shown(task), expected)
@@ -106,9 +106,10 @@ def _task_faults(task: Any, mechanism: Structure) -> Iterator[Fault]:
             yield Fault("task", f"{shown(each)}{near_miss(each, TASK_COORDINATES)}", expected)
     if len(set(map(str, task))) < len(task):
         yield Fault("task", shown(list(task)), f"{expected}, none of them twice")
-    turns = [each for each in task if each in ("rotation", "tilt")]
-    if len(turns) == 2:
-        yield Fault("task", "both rotation and tilt", "one of the two: the tilt is a part of the rotation")
+    turns = list(dict.fromkeys(each for each in task if each in TASK_TURNS))
+    if len(turns) > 1:
+        expected = "one of the two: tilt and yaw are parts of the rotation, together all of it"
+        yield Fault("task", f"both {turns[0]} and {turns[1]}", expected)
     if turns and mechanism.whole_task == WHOLE_TASK[:3]:
         yield Fault("task", turns[0], "some of x, y, z: the end effector is a joint, of which only the position counts")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from string import digits
 
 from ..errors import Fault, near_miss
@@ -80,22 +80,43 @@ def _tip_faults(joint: Joint) -> Iterator[Fault]:
         yield Fault("end_effector", f"'{joint.name}', a {joint.type} joint", expected)
 
 
-def _dangling_faults(mechanism: Structure) -> Iterator[Fault]:
-    counts, allowed = _bodies(mechanism), {mechanism.base, mechanism.end_effector}
-    sound = {body for body, count in counts.items() if count > 1} | (allowed & set(counts))
+MISSPELT = 0.8
+"""Likeness from which the name of a body that one joint alone connects is taken for another one, misspelt: that of two
+names of five letters which differ in one."""
+
+
+def leaves(mechanism: Structure) -> Iterator[tuple[int, Joint, str]]:
+    """Bodies that one joint alone connects, as a finger of a gripper, with that joint and its index.
+
+    Not the base, nor the end effector, nor what hangs on an end effector that is a joint: that is the tool.
+    """
+    counts = Counter(body for joint in mechanism.joints for body in joint.connects)
     for index, joint in enumerate(mechanism.joints):
         if joint.name == mechanism.end_effector and mechanism.end_effector not in counts:
-            continue  # what hangs on the end effector alone is the tool
+            continue
         for body in joint.connects:
-            if body not in sound and body not in allowed:
-                found = f"'{body}', which no other joint connects{_meant(body, joint, [*sound, *allowed], counts)}"
-                yield Fault(f"joint[{index}].connects", found, "a body that other joints connect too")
+            if counts[body] == 1 and body not in (mechanism.base, mechanism.end_effector):
+                yield index, joint, body
 
 
-def _meant(body: str, joint: Joint, sound: Iterable[str], bodies: Iterable[str]) -> str:
-    """The body that was probably meant: a sound one, or one that is as lonely but not merely another copy."""
-    lonely = [each for each in bodies if each.rstrip(digits) != body.rstrip(digits)]
-    return near_miss(body, [each for each in (*sound, *lonely) if each not in joint.connects])
+def _dangling_faults(mechanism: Structure) -> Iterator[Fault]:
+    for index, joint, body in leaves(mechanism):
+        meant = _meant(body, joint, mechanism)
+        if meant:
+            found = f"'{body}', which no other joint connects{meant}"
+            yield Fault(f"joint[{index}].connects", found, "the name of a body, or one that is less like it")
+
+
+def _meant(body: str, joint: Joint, mechanism: Structure) -> str:
+    """The body that was probably meant by the name of a leaf.
+
+    Neither one that differs in a number at its end, nor one on the same body as the leaf: left and right are alike.
+    """
+    (beside,) = {*joint.connects} - {body}
+    together = {each for other in mechanism.joints if beside in other.connects for each in other.connects}
+    bodies = dict.fromkeys([mechanism.end_effector, *_bodies(mechanism)])
+    others = [each for each in bodies if each not in together and each.rstrip(digits) != body.rstrip(digits)]
+    return near_miss(body, others, MISSPELT)
 
 
 def _connection_faults(mechanism: Structure) -> Iterator[Fault]:

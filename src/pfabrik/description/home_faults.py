@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import Fault
 from ..tolerances import TOLERANCES
 from .enclosing import enclosing_radius
-from .form_faults import angle_text, coordinate_text, is_pair_of_names, is_point, kind_of, range_text
+from .form_faults import angle_text, coordinate_text, is_pair_of_names, is_point, kind_of, range_text, shown
 from .graph import next_joints, opposite
 from .joint_types import Coordinate
 from .joints import Joint
@@ -19,6 +19,11 @@ from .structure import Structure
 
 SMALLEST_LENGTH = 1e-9
 """Smallest characteristic length accepted: below it, a unit is wrong or joints are meant to coincide."""
+
+
+FARTHEST = 1e6
+"""How far from the origin joints may be, in sizes of the machine: coordinates of 16 digits then tell places apart to
+1e-10 of it, and loops close to 1e-9."""
 
 
 def home_faults(mechanism: Structure, sound: dict[str, Joint]) -> Iterator[Fault]:
@@ -32,10 +37,26 @@ def home_faults(mechanism: Structure, sound: dict[str, Joint]) -> Iterator[Fault
     if 0.0 < radius < SMALLEST_LENGTH:
         yield Fault("joint", f"joint centres within {radius:.3g} of each other", f"at least {SMALLEST_LENGTH:g}")
         return
+    yield from _distance_faults(mechanism, sound)
     for index, joint in enumerate(mechanism.joints):
         if _is_one_of(joint, sound):
             yield from _stroke_faults(f"joint[{index}]", joint, sound, radius or 1.0)
             yield from _angle_faults(f"joint[{index}].cone", joint, mechanism, sound)
+
+
+def _distance_faults(mechanism: Structure, sound: dict[str, Joint]) -> Iterator[Fault]:
+    """The place that is farthest from the origin, where that is too far for the size of the machine."""
+    if len(sound) < len(mechanism.joints) or not is_point(mechanism.reference_point):
+        return  # then its size is not known
+    places = {f"joint[{index}].at": joint.at for index, joint in enumerate(mechanism.joints) if joint.at is not None}
+    places["reference_point"] = mechanism.reference_point
+    place, farthest = max(places.items(), key=lambda item: math.hypot(*item[1]))
+    size = mechanism.characteristic_length
+    if math.hypot(*farthest) > FARTHEST * size:
+        found = f"{shown(farthest)}, {math.hypot(*farthest) / size:.3g} times the size of the machine from the origin"
+        yield Fault(
+            place, found, f"at most {FARTHEST:g} times, so that coordinates tell its places apart: move the origin"
+        )
 
 
 def _is_one_of(joint: Joint, sound: dict[str, Joint]) -> bool:

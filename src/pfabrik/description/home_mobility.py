@@ -55,10 +55,64 @@ def end_effector_freedom(mechanism: Structure, locked: frozenset[str]) -> int:
     """
     twist, closure = _home_motion(mechanism, locked)
     motions = _null_space(closure)
-    if not mechanism.end_effector_is_joint:
-        return _rank(twist @ motions)
-    centre = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
-    return _rank((twist[3:] + np.cross(twist[:3], centre, axisa=0, axisc=0)) @ motions)
+    return _rank((twist[3:] if mechanism.end_effector_is_joint else twist) @ motions)
+
+
+def is_held(mechanism: Structure) -> bool:
+    """Whether the loops hold the end effector at home, to second order too.
+
+    To first order they also do where links are stretched out so that the end effector is at the end of what it
+    reaches: it moves as these bend, with the square of what they bend by. On a chain of screws s with rates u the
+    acceleration is the sum of s u' and, over pairs in their order, of [s_i, s_j] u_i u_j; the u' close the loops. Where
+    no u' does, the second order does not tell, and the end effector is not said to be held.
+    """
+    if end_effector_freedom(mechanism, frozenset()) > 0:
+        return False
+    screws = _screws(mechanism)
+    owners, tree = column_joints(mechanism), tree_of(mechanism)
+    twist = body_twist(tree.paths[mechanism.end_effector_body][owners], screws)
+    closure = loop_conditions(tree.loops[:, owners], screws)
+    rates = _null_space(closure)
+    rates = rates @ np.random.default_rng(0).standard_normal((rates.shape[1], SAMPLED_RATES))
+    bent = np.zeros((0, rates.shape[1]))
+    for index in tree.closing:
+        first, second = mechanism.joints[index].connects
+        around = [*tree.way(second), (index, False), *_backward(tree.way(first))]
+        bent = np.concatenate([bent, _bracketed(around, screws, owners, rates)])
+    accelerations = -np.linalg.pinv(closure, TOLERANCES.alignment) @ bent if bent.size else np.zeros(rates.shape)
+    moved = twist @ accelerations + _bracketed(tree.way(mechanism.end_effector_body), screws, owners, rates)
+    if mechanism.end_effector_is_joint:
+        moved = moved[3:]
+    left_open = closure @ accelerations + bent
+    return bool(max(np.abs(moved).max(initial=0.0), np.abs(left_open).max(initial=0.0)) <= TOLERANCES.alignment)
+
+
+SAMPLED_RATES = 4
+"""Joint motions that are looked at to second order: what one of them does not show by chance, the others do."""
+
+
+def _backward(way: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
+    """A way from its end to its begin."""
+    return [(index, not forward) for index, forward in reversed(way)]
+
+
+def _bracketed(
+    way: list[tuple[int, bool]],
+    screws: NDArray[np.float64],
+    owners: NDArray[np.intp],
+    rates: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The sum of [s_i, s_j] u_i u_j over the pairs of a way in their order, (6, k), at rates u (c, k)."""
+    twist, total = np.zeros((6, rates.shape[1])), np.zeros((6, rates.shape[1]))
+    for index, forward in way:
+        places = np.flatnonzero(owners == index)
+        for place in places if forward else places[::-1]:
+            own = screws[place][:, None] * rates[place] * (1.0 if forward else -1.0)
+            angular = np.cross(twist[:3], own[:3], axis=0)
+            velocity = np.cross(twist[:3], own[3:], axis=0) - np.cross(own[:3], twist[3:], axis=0)
+            total += np.concatenate([angular, velocity])
+            twist = twist + own
+    return total
 
 
 def inexactness(mechanism: Structure) -> float:
@@ -95,16 +149,22 @@ def universal_axes(mechanism: Structure, joint: Joint) -> NDArray[np.float64]:
     return np.asarray(normals if joint.connects[0] == inward else normals[::-1])
 
 
-def joint_screws(mechanism: Structure, joint: Joint) -> NDArray[np.float64]:
-    """Unit screws of a joint's coordinates at home, (freedoms, 6): angular velocity, velocity at the origin [L].
+def joint_screws(
+    mechanism: Structure, joint: Joint, point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> NDArray[np.float64]:
+    """Unit screws of a joint's coordinates at home, (freedoms, 6): angular velocity, velocity at a point [L].
 
     The three of a spherical joint are the rotations about x, y and z.
+
+    Parameters
+    ----------
+    point : by default the origin [length].
     """
     if joint.type == "prismatic":
         return np.concatenate([np.zeros(3), mechanism.home_axis(joint.name)]).reshape(1, 6)
     if joint.type == "fixed":
         return np.empty((0, 6))
-    centre = np.asarray(joint.at) / mechanism.characteristic_length
+    centre = (np.asarray(joint.at) - point) / mechanism.characteristic_length
     if joint.type == "spherical":
         return _rotations(np.eye(3), centre)
     if joint.type == "universal":
@@ -142,9 +202,17 @@ def _rotations(axes: ArrayLike, centre: NDArray[np.float64]) -> NDArray[np.float
     return np.hstack([directions, np.cross(centre, directions)])
 
 
+def _screws(mechanism: Structure) -> NDArray[np.float64]:
+    """Unit screws of all coordinates at home, (c, 6), with the velocity at the reference point [L]."""
+    return np.vstack([joint_screws(mechanism, joint, mechanism.reference_point) for joint in mechanism.joints])
+
+
 def _home_motion(mechanism: Structure, locked: frozenset[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Twist of the end effector, (6, rates), and loop conditions, (6 loops, rates), per rate of what is not locked."""
-    screws = np.vstack([joint_screws(mechanism, joint) for joint in mechanism.joints])
+    """Twist of the end effector, (6, rates), and loop conditions, (6 loops, rates), per rate of what is not locked.
+
+    Velocities are those at the reference point: at an origin far away from the machine its motions would look alike.
+    """
+    screws = _screws(mechanism)
     owners = column_joints(mechanism)
     moving = np.array([joint.name not in locked for joint in mechanism.joints])[owners]
     screws, owners = (orthonormal_rates(mechanism) @ screws)[moving], owners[moving]

@@ -9,8 +9,12 @@ JointType: TypeAlias = Literal["revolute", "prismatic", "universal", "spherical"
 JOINT_TYPES: tuple[JointType, ...] = get_args(JointType)
 
 WHOLE_TASK = ("x", "y", "z", "rotation")
-TASK_COORDINATES = (*WHOLE_TASK, "tilt")
-"""What a target may set of a pose: its position, its rotation, or of that the direction of the platform's z axis."""
+TASK_TURNS: dict[str, int] = {"rotation": 3, "tilt": 2, "yaw": 1}
+"""What a target may set of a rotation, at most one, and how many freedoms that are: all of it, the direction of the
+platform's z axis, or the twist about z."""
+
+TASK_COORDINATES = (*WHOLE_TASK, "tilt", "yaw")
+"""What a target may set of a pose: its position, and its rotation or a part of it."""
 
 Coordinate: TypeAlias = Literal["angle", "length"]
 

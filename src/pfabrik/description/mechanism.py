@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from .faults import find_faults, in_order, merged
 from .form_faults import joint_faults
-from .home_mobility import end_effector_freedom, inexactness
+from .home_mobility import end_effector_freedom, inexactness, is_held
 from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import faults_of_legs, legs_name, placed_joints
@@ -43,8 +43,8 @@ class Mechanism(Structure):
     reference_point : the point of the end-effector body that targets place, at home [length]; the centre of the joint
         when the end effector is a joint, and then left out.
     length_unit, angle_unit : labels for people and files; nothing is ever converted by them.
-    task : what a target sets, of "x", "y", "z", "rotation" and "tilt" (the direction of the platform's z axis); by
-        default everything. What it leaves out follows from the mechanism.
+    task : what a target sets: of "x", "y", "z", and one of "rotation", "tilt" (where the platform's z axis points) and
+        "yaw" (the twist about z); by default everything. What it leaves out follows from the mechanism.
     """
 
     if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
@@ -162,7 +162,7 @@ class Mechanism(Structure):
                 f"the loops all but lock at home, by {missed_by:.0e}: axes that should be parallel, or meet, need more "
                 "digits, or home is next to a singularity"
             )
-        elif left == 0 and end_effector_freedom(self, frozenset()) == 0:
+        elif left == 0 and is_held(self):
             yield "the loops hold the end effector at home: it cannot move"
 
     def with_limits(self, limits: Mapping[str, Limit] | None = None, /, **by_name: Limit) -> Mechanism:

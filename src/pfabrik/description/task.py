@@ -8,8 +8,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.closure.loops import LOCKED
-from ..rotations import shortest_turns
+from ..kernels.closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES
+from ..rotations import from_rotvec, shortest_turns, yaws
+from .joint_types import TASK_TURNS
 from .mechanism import Mechanism
 
 Floats = NDArray[np.float64]
@@ -18,9 +19,14 @@ Weights = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Task:
-    """Which coordinates of a pose count: of the position x, y, z, and of the rotation all three, the tilt, or none.
+    """Which coordinates of a pose count: of the position x, y, z, and of the rotation all, the tilt, the yaw, or none.
 
-    The tilt is the direction of the platform's z axis: two rotations, about the x and y axes of the target.
+    The tilt is the direction of the platform's z axis: two rotations, about the x and y axes of the target. The yaw is
+    the twist about z that is left of a rotation R when the z axis is turned back the shortest way: R = S Rz(yaw).
+
+    Attributes
+    ----------
+    rotations : how many of the rotation's freedoms count: 3, 2 (the tilt), 1 (the yaw), or 0.
     """
 
     axes: tuple[bool, bool, bool]
@@ -31,13 +37,14 @@ class Task:
         return all(self.axes) and self.rotations == 3
 
     @property
-    def is_framed(self) -> bool:
-        """Whether rotations count about the target's own axes: two of three do not count alike about the base's."""
-        return self.rotations == 2
+    def frame(self) -> int:
+        """What rotations count about, for the closure kernel: axes of which those count that the weights say."""
+        return {2: TARGET_AXES, 1: HALF_WAY}.get(self.rotations, BASE_AXES)
 
     def weights(self, position: float, rotation: float) -> Weights:
         """Weights of a pose's coordinates, for the closure kernel: those given; 0 for what does not count."""
-        turns = [rotation if place < self.rotations else 0.0 for place in range(3)]
+        counted = (2,) if self.rotations == 1 else range(self.rotations)
+        turns = [rotation if place in counted else 0.0 for place in range(3)]
         return (*(position if counts else 0.0 for counts in self.axes), *turns)
 
     @property
@@ -51,6 +58,9 @@ class Task:
         wanted[:, :3, 3] = np.where(self.axes, targets[:, :3, 3], begin[:, :3, 3])
         if self.rotations == 0:
             wanted[:, :3, :3] = begin[:, :3, :3]
+        elif self.rotations == 1:
+            turned = self._yaw_errors(targets, begin)[:, None] * np.array([0.0, 0.0, 1.0])
+            wanted[:, :3, :3] = from_rotvec(turned) @ begin[:, :3, :3]
         elif self.rotations == 2:
             wanted[:, :3, :3] = shortest_turns(begin[:, :3, 2], targets[:, :3, 2]) @ begin[:, :3, :3]
         return wanted
@@ -60,18 +70,26 @@ class Task:
         offset = np.where(self.axes, (poses - targets)[:, :3, 3], 0.0)
         if self.rotations == 0:
             return norms(offset), np.zeros(len(poses))
+        if self.rotations == 1:
+            return norms(offset), np.abs(self._yaw_errors(poses, targets))
         if self.rotations == 2:
             return norms(offset), 2.0 * np.arcsin(np.minimum(norms((poses - targets)[:, :3, 2]) / 2.0, 1.0))
         turned = poses[:, :3, :3] @ np.swapaxes(targets[:, :3, :3], 1, 2)
         half_sine = np.linalg.norm(turned - np.eye(3), axis=(1, 2)) / np.sqrt(8.0)
         return norms(offset), 2.0 * np.arcsin(np.minimum(half_sine, 1.0))
 
+    @staticmethod
+    def _yaw_errors(poses: Floats, others: Floats) -> Floats:
+        """By how much poses yaw more than others, within half a turn, (n,) [rad]."""
+        angles = yaws(poses[:, :3, :3]) - yaws(others[:, :3, :3])
+        return np.asarray(angles - 2.0 * np.pi * np.round(angles / (2.0 * np.pi)))
+
 
 @lru_cache(maxsize=256)
 def task_of(mechanism: Mechanism) -> Task:
     """A mechanism's task. Of a joint end effector only the position ever counts."""
     asked = mechanism.task
-    rotations = 3 if "rotation" in asked else 2 if "tilt" in asked else 0
+    rotations = max(TASK_TURNS.get(each, 0) for each in asked)
     return Task(("x" in asked, "y" in asked, "z" in asked), rotations)
 
 

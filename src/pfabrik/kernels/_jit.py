@@ -64,7 +64,8 @@ class _KernelCache(_Cache):  # type: ignore[misc]  # a class only at run time
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self._cache_file._source_stamp = (self._cache_file._source_stamp, *_digest_for(function))
+        # with the version, not the stamp: an index of other sources may hold types there are no more, and is not read
+        self._cache_file._version = (self._cache_file._version, *_digest_for(function))
 
 
 @contextmanager

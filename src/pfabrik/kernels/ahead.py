@@ -12,8 +12,8 @@ import numpy as np
 from ._jit import _config, _name_of
 from .closure.close import close
 from .closure.descend import approach
-from .closure.loops import Closed, Layout, Loops, Wishes
-from .closure.pose_objective import Aim
+from .closure.loops import Closed, ClosureProblem, Layout, Loops
+from .closure.pose_objective import PoseObjective
 from .legs import records as R
 from .legs.answer import answer, measure_rows, read_coordinates
 from .legs.feasibility import feasibility
@@ -50,9 +50,9 @@ _KNOWN = np.zeros(0, R.COORDINATE)
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (solve_directly, _ROWS),
     (answer, (_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("f3 f3 f2 i1 f3 f2 f2"))),
-    (close, (_LOOPS, _LAYOUT, Wishes(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
+    (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
     (solve_by_iteration, _ROWS),
-    (approach, (_LOOPS, _LAYOUT, Aim(*_values("f3 f1 i f f i")), _CLOSED, np.zeros((0, 0)))),
+    (approach, (_LOOPS, _LAYOUT, PoseObjective(*_values("f3 f1 i f f i")), _CLOSED, np.zeros((0, 0)))),
     (read_coordinates, (_LEGS, _KNOWN, _TASK, *_values("f3 f2 f2"))),
     (feasibility, (_LEGS, *_LIMITS, _TASK, *_values("f3 f3 f2 f1 i1"))),
     (measure_rows, (_LEGS, _TASK, *_values("f3 f2 f2 f3"))),

@@ -19,7 +19,7 @@ from .closure.loops import Floats, Ints
 KEPT, ROUNDED, DEPENDENT = 1e-14, 1e-9, 1e-12
 
 
-class Programme(NamedTuple):
+class QP(NamedTuple):
     """Least x . H x / 2 + g . x with G x + h <= 0, for n unknowns and k limits, and room to solve it."""
 
     H: Floats  # (n, n)
@@ -37,9 +37,9 @@ class Programme(NamedTuple):
 
 
 @allocator
-def new_programme(n: int, k: int) -> Programme:
-    """Room for up to n unknowns and k limits."""
-    return Programme(
+def new_qp(n: int, k: int) -> QP:
+    """Memory for up to n unknowns and k limits."""
+    return QP(
         np.zeros((n, n)),
         np.zeros(n),
         np.zeros((k, n)),
@@ -88,7 +88,7 @@ def apply_inverse(L: Floats, n: int, b: Floats, x: Floats) -> None:
 
 
 @routine
-def worst_violated(p: Programme, n: int, k: int) -> tuple[int, float]:
+def worst_violated(p: QP, n: int, k: int) -> tuple[int, float]:
     """The limit violated most, or -1; and by how much."""
     worst, most = -1, KEPT
     G, x = p.G, p.x
@@ -102,7 +102,7 @@ def worst_violated(p: Programme, n: int, k: int) -> tuple[int, float]:
 
 
 @routine
-def divide(p: Programme, n: int, m: int, c: int) -> float:
+def divide(p: QP, n: int, m: int, c: int) -> float:
     """How limit `c` is made of the m active ones (`share`), and the direction that lowers it alone (`step`).
 
     Returns how fast it falls along that direction; 0 where it depends on the active ones.
@@ -146,7 +146,7 @@ def divide(p: Programme, n: int, m: int, c: int) -> float:
 
 
 @routine
-def drop(p: Programme, n: int, m: int, a: int) -> None:
+def drop(p: QP, n: int, m: int, a: int) -> None:
     """Take the a-th of m active limits out."""
     p.multipliers[p.active[a]] = 0.0
     for b in range(a, m - 1):
@@ -156,7 +156,7 @@ def drop(p: Programme, n: int, m: int, a: int) -> None:
 
 
 @routine
-def take_up(p: Programme, n: int, m: int, c: int, violation: float) -> int:
+def take_up(p: QP, n: int, m: int, c: int, violation: float) -> int:
     """Make limit `c` active; how many are active then, -1 if it contradicts the others."""
     multiplier = 0.0
     for _change in range(4 * n + 4):
@@ -187,7 +187,7 @@ def take_up(p: Programme, n: int, m: int, c: int, violation: float) -> int:
 
 
 @routine
-def solve_programme(p: Programme, n: int, k: int) -> bool:
+def solve_qp(p: QP, n: int, k: int) -> bool:
     """Solve a programme whose H is factorised; False where no x keeps all limits."""
     for c in range(k):
         p.multipliers[c] = 0.0

@@ -91,3 +91,32 @@ def difference(R: Floats, S: Floats, out: Floats) -> None:
         w, x, y, z = m10 - m01, m02 + m20, m12 + m21, 1.0 - m00 - m11 + m22
     norm = math.sqrt(w * w + x * x + y * y + z * z)
     out[0], out[1], out[2] = logarithm(w / norm, x / norm, y / norm, z / norm)
+
+
+@inlined
+def yaw_of(X: Floats) -> float:
+    """The twist of a rotation about z [rad], within half a turn: of R = S Rz(yaw), where S turns z the shortest way.
+
+    The first three columns of X. Undefined where it turns z upside down.
+    """
+    return math.atan2(X[1, 0] - X[0, 1], X[0, 0] + X[1, 1])
+
+
+@inlined
+def yaw_difference(X: Floats, Y: Floats) -> float:
+    """The twist about z of one rotation less that of another [rad], within half a turn."""
+    angle = yaw_of(X) - yaw_of(Y)
+    return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
+
+
+@inlined
+def turn_about_z(X: Floats, angle: float) -> None:
+    """Turn a rotation about the base's z axis, in place: its twist about z grows by the angle."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    for j in range(3):
+        x, y = X[0, j], X[1, j]
+        X[0, j], X[1, j] = cosine * x - sine * y, sine * x + cosine * y
+
+
+UPSIDE_DOWN = 1e-12
+"""Length of the sum of two z axes below which one is the other upside down, and there is no twist about them."""

@@ -3,6 +3,13 @@
 Sequential quadratic programming: at a feasible configuration the distance is modelled to second order and the limits
 to first, the step that this asks for is taken, brought back within the limits, and kept if it led down. Damping
 shortens steps where the model is poor, and vanishes where it is good (Nocedal and Wright, chapter 18).
+
+With g and H the gradient of the objective f and the Hessian of the Lagrangian f + sum_k m_k h_k, G the gradients of
+the limits h <= 0 and M the metric of the unknowns, a step x solves the quadratic programme
+
+    min g x + x (H + damping M) x / 2    subject to    h + G x <= 0
+
+whose conditions of optimality (Karush, Kuhn, Tucker) are g + (H + damping M) x + G^T m = 0, m >= 0, m (h + G x) = 0.
 """
 
 from __future__ import annotations
@@ -14,7 +21,7 @@ import numpy as np
 
 from ._jit import allocator, routine
 from .closure.loops import Floats, Ints
-from .qp import Programme, factorise, solve_programme
+from .qp import QP, factorise, solve_qp
 
 LONGEST_STEP = 0.3
 """Longest step of any unknown [rad or L]: beyond it the quadratic model says little."""
@@ -46,16 +53,16 @@ ENOUGH, GOOD = 1e-4, 0.5
 STEEPEST = 1e8
 """Damping, in units of curvature, that ends a search: no step however short leads down."""
 
-# Scalars and counts of a pace.
+# Scalars and counts of a control.
 DAMPING, LARGEST, PROMISE, BEFORE = 0, 1, 2, 3
 STEPS, DONE = 0, 1
 
-# Scalars of a slope: the objective, the largest gap of a loop, the largest excess. Counts: unknowns, limits, rank.
+# Scalars of a linear: the objective, the largest gap of a loop, the largest excess. Counts: unknowns, limits, rank.
 VALUE, GAP, EXCESS = 0, 1, 2
 MOTIONS, LIMITS, RANK = 0, 1, 2
 
 
-class Slope(NamedTuple):
+class Linearisation(NamedTuple):
     """What the unknowns do to first order at a configuration."""
 
     metric: Floats  # (n, n): squares of their steps, lower triangle
@@ -68,14 +75,14 @@ class Slope(NamedTuple):
     counts: Ints  # (3,)
 
 
-class Pace(NamedTuple):
-    """How a search goes on."""
+class StepControl(NamedTuple):
+    """Step control: how long the next step may be, and whether there is one."""
 
     scalars: Floats  # (4,): damping, the largest curvature, what the last step promised, and the one before
     counts: Ints  # (2,): steps taken, and 1 where none is worth taking any more
 
 
-class Curve(NamedTuple):
+class Hessian(NamedTuple):
     """What they do to second order, and what of the limits enters there."""
 
     H: Floats  # (n, n)
@@ -83,9 +90,9 @@ class Curve(NamedTuple):
 
 
 @allocator
-def new_slope(n: int, k: int) -> Slope:
+def new_linearisation(n: int, k: int) -> Linearisation:
     """Room for n unknowns and k limits."""
-    return Slope(
+    return Linearisation(
         np.zeros((n, n)),
         np.zeros(n),
         np.zeros((k, n)),
@@ -98,13 +105,13 @@ def new_slope(n: int, k: int) -> Slope:
 
 
 @allocator
-def new_curve(n: int, k: int) -> Curve:
-    return Curve(np.zeros((n, n)), np.zeros(k))
+def new_hessian(n: int, k: int) -> Hessian:
+    return Hessian(np.zeros((n, n)), np.zeros(k))
 
 
 @allocator
-def new_pace() -> Pace:
-    return Pace(np.zeros(4), np.zeros(2, np.int64))
+def new_step_control() -> StepControl:
+    return StepControl(np.zeros(4), np.zeros(2, np.int64))
 
 
 @routine
@@ -117,44 +124,44 @@ def longest(step: Floats, n: int) -> float:
 
 
 @routine
-def is_closed(slope: Slope, tolerance: float) -> bool:
+def is_closed(linear: Linearisation, tolerance: float) -> bool:
     """Whether loops are closed and limits kept."""
-    return bool(slope.scalars[GAP] <= tolerance and slope.scalars[EXCESS] <= tolerance)
+    return bool(linear.scalars[GAP] <= tolerance and linear.scalars[EXCESS] <= tolerance)
 
 
 @routine
-def way_back(slope: Slope, p: Programme) -> bool:
+def restoring_step(linear: Linearisation, p: QP) -> bool:
     """The shortest step within all limits, into `p.x`; False where there is none."""
-    motions, k = slope.counts[MOTIONS], slope.counts[LIMITS]
+    motions, k = linear.counts[MOTIONS], linear.counts[LIMITS]
     for a in range(motions):
         p.g[a] = 0.0
     for c in range(k):
-        p.h[c] = slope.h[c] + slope.drift[c]
+        p.h[c] = linear.h[c] + linear.drift[c]
         for a in range(motions):
-            p.G[c, a] = slope.G[c, a]
-    return factorise(slope.metric, motions, 0.0, p.factor) and solve_programme(p, motions, k)
+            p.G[c, a] = linear.G[c, a]
+    return factorise(linear.metric, motions, 0.0, p.factor) and solve_qp(p, motions, k)
 
 
 @routine
-def propose(slope: Slope, curve: Curve, damping: float, largest: float, p: Programme) -> tuple[float, float]:
+def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: float, p: QP) -> tuple[float, float]:
     """The step that the damped programme asks for, into `p.x`: what it promises, and the damping it took.
 
     Where curvature is not positive, that across active limits counts more: there is no room to move there. Where that
     is not enough, damping grows. A programme without a solution promises less than nothing.
     """
-    motions, k = slope.counts[MOTIONS], slope.counts[LIMITS]
+    motions, k = linear.counts[MOTIONS], linear.counts[LIMITS]
     for c in range(k):
-        p.h[c] = min(slope.h[c], 0.0)
+        p.h[c] = min(linear.h[c], 0.0)
         for a in range(motions):
-            p.G[c, a] = slope.G[c, a]
+            p.G[c, a] = linear.G[c, a]
     stiff = 0.0
     for attempt in range(60):
         for a in range(motions):
-            p.g[a] = slope.g[a]
+            p.g[a] = linear.g[a]
             for b in range(a + 1):
-                p.H[a, b] = curve.H[a, b] + max(damping, 1e-12 * largest) * slope.metric[a, b]
+                p.H[a, b] = hessian.H[a, b] + max(damping, 1e-12 * largest) * linear.metric[a, b]
         for c in range(k):
-            if stiff > 0.0 and curve.multipliers[slope.which[c]] > 0.0:
+            if stiff > 0.0 and hessian.multipliers[linear.which[c]] > 0.0:
                 for a in range(motions):
                     for b in range(a + 1):
                         p.H[a, b] += stiff * p.G[c, a] * p.G[c, b]
@@ -164,76 +171,76 @@ def propose(slope: Slope, curve: Curve, damping: float, largest: float, p: Progr
             stiff = 10.0 * largest
         else:
             damping = max(2.0 * damping, 1e-3 * largest)
-    if not solve_programme(p, motions, k):
+    if not solve_qp(p, motions, k):
         return -1.0, damping
     promise = 0.0
     for a in range(motions):
-        promise -= slope.g[a] * p.x[a]
+        promise -= linear.g[a] * p.x[a]
         for b in range(motions):
-            promise -= 0.5 * p.x[a] * curve.H[max(a, b), min(a, b)] * p.x[b]
+            promise -= 0.5 * p.x[a] * hessian.H[max(a, b), min(a, b)] * p.x[b]
     return promise, damping
 
 
 @routine
-def is_last(slope: Slope, promise: float, before: float) -> bool:
+def is_last(linear: Linearisation, promise: float, before: float) -> bool:
     """Whether a step promises so little that none is worth taking after it; `before` is what the last one promised."""
-    fine = FINE * slope.scalars[VALUE]
-    return bool(promise <= LAST * slope.scalars[VALUE] or (before <= fine and promise > CONVERGING * before))
+    fine = FINE * linear.scalars[VALUE]
+    return bool(promise <= LAST * linear.scalars[VALUE] or (before <= fine and promise > CONVERGING * before))
 
 
 @routine
-def leads_down(slope: Slope, other: Slope, promise: float) -> bool:
+def leads_down(linear: Linearisation, other: Linearisation, promise: float) -> bool:
     """Whether a step that promised so much led to something better."""
-    gain = slope.scalars[VALUE] - other.scalars[VALUE]
-    if promise <= FINE * slope.scalars[VALUE]:
-        return gain >= -ROUNDING * slope.scalars[VALUE]
+    gain = linear.scalars[VALUE] - other.scalars[VALUE]
+    if promise <= FINE * linear.scalars[VALUE]:
+        return gain >= -ROUNDING * linear.scalars[VALUE]
     return gain > ENOUGH * promise
 
 
 @routine
-def note_multipliers(slope: Slope, p: Programme, curve: Curve) -> None:
+def note_multipliers(linear: Linearisation, p: QP, hessian: Hessian) -> None:
     """Keep the multipliers of a programme by the limits' own numbers."""
-    for c in range(len(curve.multipliers)):
-        curve.multipliers[c] = 0.0
-    for c in range(slope.counts[LIMITS]):
-        curve.multipliers[slope.which[c]] = p.multipliers[c]
+    for c in range(len(hessian.multipliers)):
+        hessian.multipliers[c] = 0.0
+    for c in range(linear.counts[LIMITS]):
+        hessian.multipliers[linear.which[c]] = p.multipliers[c]
 
 
 @routine
-def begin_descent(slope: Slope, curve: Curve, pace: Pace) -> None:
+def begin_descent(linear: Linearisation, hessian: Hessian, control: StepControl) -> None:
     """Start at a feasible configuration."""
-    for c in range(len(curve.multipliers)):
-        curve.multipliers[c] = 0.0
-    pace.scalars[DAMPING] = longest(slope.g, slope.counts[MOTIONS]) / LONGEST_STEP
-    pace.scalars[PROMISE] = math.inf
-    pace.counts[STEPS] = pace.counts[DONE] = 0
+    for c in range(len(hessian.multipliers)):
+        hessian.multipliers[c] = 0.0
+    control.scalars[DAMPING] = longest(linear.g, linear.counts[MOTIONS]) / LONGEST_STEP
+    control.scalars[PROMISE] = math.inf
+    control.counts[STEPS] = control.counts[DONE] = 0
 
 
 @routine
-def plan_step(slope: Slope, curve: Curve, pace: Pace, most_steps: int, p: Programme) -> bool:
+def plan_step(linear: Linearisation, hessian: Hessian, control: StepControl, most_steps: int, p: QP) -> bool:
     """The next step to try, into `p.x`; False where none is worth trying."""
-    pace.counts[STEPS] += 1
-    pace.scalars[BEFORE] = pace.scalars[PROMISE]
-    promise, damping = propose(slope, curve, pace.scalars[DAMPING], pace.scalars[LARGEST], p)
-    pace.scalars[PROMISE], pace.scalars[DAMPING] = promise, damping
-    if promise <= 0.0 or damping > STEEPEST * pace.scalars[LARGEST] or pace.counts[STEPS] > most_steps:
-        pace.counts[DONE] = 1
+    control.counts[STEPS] += 1
+    control.scalars[BEFORE] = control.scalars[PROMISE]
+    promise, damping = propose(linear, hessian, control.scalars[DAMPING], control.scalars[LARGEST], p)
+    control.scalars[PROMISE], control.scalars[DAMPING] = promise, damping
+    if promise <= 0.0 or damping > STEEPEST * control.scalars[LARGEST] or control.counts[STEPS] > most_steps:
+        control.counts[DONE] = 1
         return False
-    note_multipliers(slope, p, curve)
+    note_multipliers(linear, p, hessian)
     return True
 
 
 @routine
-def judge_step(slope: Slope, other: Slope, feasible: bool, share: float, pace: Pace) -> bool:
-    """Whether a share of the step planned led from one slope down to another; damping follows how well it did."""
-    promise = pace.scalars[PROMISE] = share * pace.scalars[PROMISE]
-    led_down = feasible and leads_down(slope, other, promise)
-    if is_last(slope, promise, pace.scalars[BEFORE]):
-        pace.counts[DONE] = 1
-    damping, largest = pace.scalars[DAMPING], pace.scalars[LARGEST]
+def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, share: float, control: StepControl) -> bool:
+    """Whether a share of the step planned led from one linear down to another; damping follows how well it did."""
+    promise = control.scalars[PROMISE] = share * control.scalars[PROMISE]
+    led_down = feasible and leads_down(linear, other, promise)
+    if is_last(linear, promise, control.scalars[BEFORE]):
+        control.counts[DONE] = 1
+    damping, largest = control.scalars[DAMPING], control.scalars[LARGEST]
     if not led_down:
-        pace.scalars[DAMPING] = max(4.0 * damping, 1e-3 * largest)
-    elif slope.scalars[VALUE] - other.scalars[VALUE] > GOOD * promise:
+        control.scalars[DAMPING] = max(4.0 * damping, 1e-3 * largest)
+    elif linear.scalars[VALUE] - other.scalars[VALUE] > GOOD * promise:
         damping *= 0.1
-        pace.scalars[DAMPING] = damping if damping > 1e-8 * largest else 0.0
+        control.scalars[DAMPING] = damping if damping > 1e-8 * largest else 0.0
     return led_down

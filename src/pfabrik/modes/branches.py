@@ -218,9 +218,7 @@ class BranchSearch:
             (best, {"limits": True, "margin": MARGIN}),
         ):
             poses = self._poses_of(best)
-            tried = close(
-                self.closure, start, poses, locked=locked, platform=held, framed=self.task.is_framed, **wishes
-            )
+            tried = close(self.closure, start, poses, locked=locked, platform=held, frame=self.task.frame, **wishes)
             self._take_better(best, tried)
         return best
 

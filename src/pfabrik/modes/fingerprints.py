@@ -155,7 +155,7 @@ def _moved(pose: Floats, twists: Floats, length: float) -> Floats:
 def close_on_target(closure: Closure, coordinates: Floats, poses: Floats, **options: Any) -> Closing:
     """Close legs below platforms (n, 4, 4) that are held in all that the task asks for; options as of `close`."""
     task = task_of(closure.mechanism)
-    return close(closure, coordinates, poses, platform=task.held, framed=task.is_framed, **options)
+    return close(closure, coordinates, poses, platform=task.held, frame=task.frame, **options)
 
 
 def count_from_home(closure: Closure, coordinates: Floats) -> None:

@@ -14,6 +14,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..engine import engine_of
 from ..errors import InvalidArgument
+from ..kernels.reaching.plan import POSITION_ERROR, ROTATION_ERROR
 from ..poses import are_poses, made_exact, what_is_wrong
 from ..targets import Target, as_targets
 from .branches import BranchSearch, Listed
@@ -102,5 +103,5 @@ def _answered(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
         rows.poses[:, :3, :3] = target[:3, :3]
     rows.status[:] = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
     position, rotation = task_of(mechanism).errors(rows.poses, np.repeat(target[None], n, axis=0))
-    rows.measures[:, 0], rows.measures[:, 1] = position, rotation
+    rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR] = position, rotation
     return Solution(mechanism, found, (n,))

@@ -240,15 +240,17 @@ class ReachingEngine:
         self._solve(found.closing.poses, seeds, settings._replace(chained=0), reached)
         near = np.isfinite(found.distances) & (reached.status == P.REACHED)
         for way in ways:  # what fell back to a way tried later is farther, however near
-            ours, theirs = projected.counters[:, 2] == way.hold, found.holds == way.hold
+            ours, theirs = projected.counters[:, P.HELD] == way.hold, found.holds == way.hold
             distances = way.distances(closure, projected.poses, sought)
             near &= ~(ours & theirs & (found.distances > (1.0 - SAME) * distances))
             near &= ~(ours & ~theirs & (way is ways[0]))
         reached.status[:] = P.PROJECTED
         reached.counters[:] = projected.counters
-        reached.counters[:, 0] += found.closing.iterations
-        reached.counters[:, 2] = kept(mechanism, found.holds, reached.poses, wanted)
-        reached.measures[:, 0], reached.measures[:, 1] = task_of(mechanism).errors(reached.poses, wanted)
+        reached.counters[:, P.ITERATIONS] += found.closing.iterations
+        reached.counters[:, P.HELD] = kept(mechanism, found.holds, reached.poses, wanted)
+        reached.measures[:, P.POSITION_ERROR], reached.measures[:, P.ROTATION_ERROR] = task_of(mechanism).errors(
+            reached.poses, wanted
+        )
         put_rows(rows, away[near], rows_at(reached, near))
 
     def _answer_from(self, target: Floats, start: Floats, settings: P.Settings, options: Options) -> P.Rows:

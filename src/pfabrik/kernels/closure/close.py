@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from .._jit import inlined, kernel
-from ..rotations import exponential, turn_ball
+from ..rotations import exponential, turn_about_z, turn_ball, yaw_of
 from .equations import (
     add_anchors,
     add_cones,
@@ -20,9 +20,10 @@ from .equations import (
     clear,
     follow_platform,
     out_of_frame,
+    pose_frame,
     turn_equations,
 )
-from .loops import BALL, LOCKED, SLIDE, Closed, Floats, Layout, Loops, Wishes
+from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Floats, Layout, Loops
 from .path_kinematics import Equations, State, copy_state, load_row, new_equations, new_state, store_row
 
 LONGEST_STEP = 0.5
@@ -160,28 +161,28 @@ def move(loops: Loops, layout: Layout, eq: Equations, state: State) -> float:
 
 
 @inlined
-def is_close(wishes: Wishes, eq: Equations) -> bool:
+def is_close(problem: ClosureProblem, eq: Equations) -> bool:
     """Whether all that must hold does."""
     largest = 0.0
     for group in range(len(eq.gaps)):
         largest = max(largest, eq.gaps[group], eq.misses[group])
-        if wishes.limits:
+        if problem.limits:
             largest = max(largest, eq.excesses[group])
-    return largest <= wishes.closeness
+    return largest <= problem.closeness
 
 
 @kernel
-def close(loops: Loops, layout: Layout, wishes: Wishes, closed: Closed) -> None:
+def close(loops: Loops, layout: Layout, problem: ClosureProblem, closed: Closed) -> None:
     """Close the loops of every row, nearest to what is wished.
 
-    A row ends when all that must hold is within `wishes.closeness`, when its steps or gains vanish, or after
-    `wishes.max_iterations`; what was measured of it tells how far it came.
+    A row ends when all that must hold is within `problem.closeness`, when its steps or gains vanish, or after
+    `problem.max_iterations`; what was measured of it tells how far it came.
     """
     best, trial = new_state(loops), new_state(loops)
     eq = new_equations(loops, layout)
-    plunging = wishes.plunging == 1
+    plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
     for row in range(len(closed.coordinates)):
-        load_row(loops, layout, wishes.chained == 1 and row > 0, row, closed, trial)
+        load_row(loops, layout, problem.chained == 1 and row > 0, row, closed, trial)
         copy_state(trial, best)
         cost, factor, step = math.inf, 1.0, math.inf
         iterations, turn = 0, TRY
@@ -189,25 +190,26 @@ def close(loops: Loops, layout: Layout, wishes: Wishes, closed: Closed) -> None:
             clear(layout, eq)
             found = 0.0
             if turn != MEASURE:
-                found += add_paths(loops, layout, wishes, row, trial, eq)
-            if wishes.limits == 1 or turn == MEASURE:
-                found += add_ranges(loops, layout.slots, trial, wishes.margin, eq)
-                found += add_cones(loops, layout.slots, trial, wishes.margin, eq)
+                found += add_paths(loops, layout, problem, row, trial, eq)
+            if problem.limits == 1 or turn == MEASURE:
+                found += add_ranges(loops, layout.slots, trial, problem.margin, eq)
+                found += add_cones(loops, layout.slots, trial, problem.margin, eq)
             if turn == MEASURE:
                 for group in range(len(layout.sizes)):
                     closed.excesses[row, group] = eq.excesses[group]
                 break
-            found += add_anchors(loops, layout.slots, row, trial, wishes, eq)
-            if wishes.framed == 1:
-                turn_equations(wishes.targets[row], layout, eq)
-            found += add_platform(row, trial, wishes, eq)
+            found += add_anchors(loops, layout.slots, row, trial, problem, eq)
+            if problem.frame != BASE_AXES:
+                pose_frame(row, trial, problem, eq)
+                turn_equations(eq.frame, layout, eq)
+            found += add_platform(row, trial, problem, eq)
             if turn == TRY:
                 if found < cost or plunging:
                     gained, cost = cost - found, found
                     copy_state(trial, best)
                     note(eq, row, closed)
                     factor = max(factor / 4.0, 1e-3)
-                    if is_close(wishes, eq) or (gained <= 1e-13 * cost and not plunging):
+                    if is_close(problem, eq) or (gained <= 1e-13 * cost and not plunging):
                         turn = MEASURE
                 else:
                     factor *= 8.0
@@ -216,16 +218,19 @@ def close(loops: Loops, layout: Layout, wishes: Wishes, closed: Closed) -> None:
             elif turn == RETURN:
                 turn = TRY
             damping = LEAST_DAMPING if plunging else max(LEAST_DAMPING, DAMPING * factor * min(cost, 1.0))
-            if turn == TRY and (iterations == wishes.max_iterations or not damping < MOST_DAMPING):
+            if turn == TRY and (iterations == problem.max_iterations or not damping < MOST_DAMPING):
                 turn = MEASURE
             if turn == TRY:
                 solve(layout, damping, eq)
-                if wishes.framed == 1:
-                    out_of_frame(wishes.targets[row], eq.twist)
+                if problem.frame != BASE_AXES:
+                    out_of_frame(eq.frame, eq.twist)
+                yaw = yaw_of(trial.X) if keeps_yaw else 0.0
                 step = move(loops, layout, eq, trial)
+                if keeps_yaw:
+                    turn_about_z(trial.X, yaw - yaw_of(trial.X))  # what it yawed to second order
                 iterations += 1
             elif turn == MEASURE:
-                if wishes.balls_follow == 1:
+                if problem.balls_follow == 1:
                     follow_platform(loops, best, eq)
                 copy_state(best, trial)
         store_row(loops, row, best, closed)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from .._jit import kernel, routine
-from ..qp import Programme, apply_inverse, factorise, new_programme, solve_programme
+from ..qp import QP, apply_inverse, factorise, new_qp, solve_qp
 from ..rotations import turn_ball
 from ..sqp import (
     CLOSED,
@@ -28,69 +28,83 @@ from ..sqp import (
     RESTORING,
     STEPS,
     VALUE,
-    Slope,
+    Linearisation,
     begin_descent,
     is_closed,
     judge_step,
     longest,
     plan_step,
-    way_back,
+    restoring_step,
 )
-from .linearise import Desk, View, add_cone, add_force, cone_excess, look, new_desk, new_view, walk_all
+from .linearise import (
+    FreeMotions,
+    Workspace,
+    add_cone,
+    add_force,
+    cone_excess,
+    linearise,
+    new_free_motions,
+    new_workspace,
+    walk_all,
+)
 from .loops import BALL, Closed, Floats, Layout, Loops
 from .path_kinematics import State, copy_state, load_row, new_state, store_row
-from .pose_objective import Aim, look_at_aim
+from .pose_objective import PoseObjective, pose_gradient
 
 SHARING = 1e-10
 """Weight of the sum of their squares against the balance of multipliers: far below what a limit's gradient counts."""
 
 
 @routine
-def pull(loops: Loops, row: int, want: Aim, state: State, desk: Desk, out: Floats) -> None:
+def lagrangian_gradient(
+    loops: Loops, row: int, objective: PoseObjective, state: State, work: Workspace, out: Floats
+) -> None:
     """Gradient of the Lagrangian at a configuration, by multipliers of limits and the `balance` of the loops."""
-    n, paths, multipliers = len(loops.lo), len(loops.paths) - 1, desk.curve.multipliers
-    walk_all(loops, state, desk)
-    _, held = look_at_aim(want, want.targets[row], state.X, desk.aim)
+    n, paths, multipliers = len(loops.lo), len(loops.paths) - 1, work.hessian.multipliers
+    walk_all(loops, state, work)
+    _, held = pose_gradient(objective, objective.targets[row], state.X, work.gradient)
     for j in range(n):
         out[j] = multipliers[2 * j + 1] - multipliers[2 * j]
     for i in range(6):
-        desk.force[0, i] = desk.aim.force[i]
+        work.force[0, i] = work.gradient.force[i]
         for path in range(1, paths):
-            desk.force[path, i] = desk.balance[6 * (path - 1) + i]
-            desk.force[0, i] -= desk.force[path, i]
+            work.force[path, i] = work.balance[6 * (path - 1) + i]
+            work.force[0, i] -= work.force[path, i]
         for k in range(held):
-            desk.force[0, i] += desk.balance[6 * (paths - 1) + k] * desk.aim.holds[k, i]
+            work.force[0, i] += work.balance[6 * (paths - 1) + k] * work.gradient.holds[k, i]
     for path in range(paths):
-        add_force(loops, path, desk.force[path], desk, out)
+        add_force(loops, path, work.force[path], work, out)
     for cone in range(len(loops.cone_angles)):
         if multipliers[2 * n + cone] != 0.0:
-            cone_excess(loops, cone, want.margin, state, desk)
-            add_cone(loops, cone, multipliers[2 * n + cone], desk, out)
+            cone_excess(loops, cone, objective.margin, state, work)
+            add_cone(loops, cone, multipliers[2 * n + cone], work, out)
 
 
 @routine
-def feel_curvature(loops: Loops, row: int, want: Aim, state: State, trial: State, desk: Desk, view: View) -> float:
-    """Curvature of the objective and of the active limits along the loops, into `curve`; the largest on its diagonal.
+def lagrangian_hessian(
+    loops: Loops, row: int, objective: PoseObjective, state: State, trial: State, work: Workspace, view: FreeMotions
+) -> float:
+    """Curvature of the objective and of the active limits along the loops, into `hessian`; the largest on its diagonal.
 
     By differences of the gradient of the Lagrangian, whose multipliers of the loops balance it at pivot coordinates.
     """
-    n, slope, H, rows = len(loops.lo), view.slope, desk.curve.H, len(desk.balance)
-    motions = slope.counts[MOTIONS]
-    basis, here, there, along = view.basis, desk.here, desk.there, desk.row
+    n, linear, H, rows = len(loops.lo), view.linear, work.hessian.H, len(work.balance)
+    motions = linear.counts[MOTIONS]
+    basis, here, there, along = view.basis, work.here, work.there, work.row
     for i in range(rows):
-        desk.balance[i] = 0.0
-    pull(loops, row, want, state, desk, desk.here)
-    for r in range(slope.counts[RANK]):
+        work.balance[i] = 0.0
+    lagrangian_gradient(loops, row, objective, state, work, work.here)
+    for r in range(linear.counts[RANK]):
         for i in range(rows):
-            desk.balance[i] -= here[view.pivots[r]] * view.transform[r, i]
-    pull(loops, row, want, state, desk, desk.here)
+            work.balance[i] -= here[view.pivots[r]] * view.transform[r, i]
+    lagrangian_gradient(loops, row, objective, state, work, work.here)
     for a in range(motions):
-        probe = PROBE / math.sqrt(slope.metric[a, a])
+        probe = PROBE / math.sqrt(linear.metric[a, a])
         for j in range(n):
             along[j] = basis[j, a]
         copy_state(state, trial)
-        move(loops, desk.row, probe, trial)
-        pull(loops, row, want, trial, desk, desk.there)
+        move(loops, work.row, probe, trial)
+        lagrangian_gradient(loops, row, objective, trial, work, work.there)
         for b in range(motions):
             H[b, a] = 0.0
             for j in range(n):
@@ -115,103 +129,107 @@ def move(loops: Loops, step: Floats, share: float, state: State) -> None:
 
 
 @routine
-def take(loops: Loops, view: View, x: Floats, state: State, desk: Desk, closing: bool) -> float:
+def take(loops: Loops, view: FreeMotions, x: Floats, state: State, work: Workspace, closing: bool) -> float:
     """Take a step of the free motions, and with it one that closes the loops; the share of it that is not too long."""
     n = len(loops.lo)
     for j in range(n):
-        desk.row[j] = view.shift[j] if closing else 0.0
-        for a in range(view.slope.counts[MOTIONS]):
-            desk.row[j] += view.basis[j, a] * x[a]
-    share = LONGEST_STEP / max(longest(desk.row, n), LONGEST_STEP)
-    move(loops, desk.row, share, state)
+        work.row[j] = view.shift[j] if closing else 0.0
+        for a in range(view.linear.counts[MOTIONS]):
+            work.row[j] += view.basis[j, a] * x[a]
+    share = LONGEST_STEP / max(longest(work.row, n), LONGEST_STEP)
+    move(loops, work.row, share, state)
     return share
 
 
 @routine
-def restore(loops: Loops, row: int, want: Aim, state: State, desk: Desk, view: View, p: Programme) -> bool:
+def restore_feasibility(
+    loops: Loops, row: int, objective: PoseObjective, state: State, work: Workspace, view: FreeMotions, p: QP
+) -> bool:
     """Bring a configuration onto its loops and within its limits, by the shortest way; `view` is where it ends."""
     for _step in range(RESTORING):
-        look(loops, row, want, state, desk, view)
-        if is_closed(view.slope, CLOSED):
+        linearise(loops, row, objective, state, work, view)
+        if is_closed(view.linear, CLOSED):
             return True
-        if not way_back(view.slope, p):
+        if not restoring_step(view.linear, p):
             return False
-        take(loops, view, p.x, state, desk, True)
-    look(loops, row, want, state, desk, view)
-    return is_closed(view.slope, NEARLY_CLOSED)
+        take(loops, view, p.x, state, work, True)
+    linearise(loops, row, objective, state, work, view)
+    return is_closed(view.linear, NEARLY_CLOSED)
 
 
 @routine
-def scale_aim(loops: Loops, row: int, want: Aim, state: State, desk: Desk, view: View) -> None:
+def scale_objective(
+    loops: Loops, row: int, objective: PoseObjective, state: State, work: Workspace, view: FreeMotions
+) -> None:
     """Choose the unit of the objective, so that its gradient is of order one, and look again."""
-    desk.aim.unit[0] = 1.0
-    look(loops, row, want, state, desk, view)
-    desk.aim.unit[0] = 1.0 / max(math.sqrt(2.0 * view.slope.scalars[VALUE]), 1e-12)
-    look(loops, row, want, state, desk, view)
+    work.gradient.unit[0] = 1.0
+    linearise(loops, row, objective, state, work, view)
+    work.gradient.unit[0] = 1.0 / max(math.sqrt(2.0 * view.linear.scalars[VALUE]), 1e-12)
+    linearise(loops, row, objective, state, work, view)
 
 
 @routine
 def descend(
     loops: Loops,
     row: int,
-    want: Aim,
+    objective: PoseObjective,
     best: State,
     trial: State,
-    desk: Desk,
-    first: View,
-    second: View,
-    p: Programme,
+    work: Workspace,
+    first: FreeMotions,
+    second: FreeMotions,
+    p: QP,
 ) -> int:
     """From a feasible configuration down to the nearest; how many steps it took."""
-    view, other, curve, pace = first, second, desk.curve, desk.pace
-    scale_aim(loops, row, want, best, desk, view)
-    begin_descent(view.slope, curve, pace)
-    while pace.counts[DONE] == 0:
-        pace.scalars[LARGEST] = feel_curvature(loops, row, want, best, trial, desk, view)
+    view, other, hessian, control = first, second, work.hessian, work.control
+    scale_objective(loops, row, objective, best, work, view)
+    begin_descent(view.linear, hessian, control)
+    while control.counts[DONE] == 0:
+        control.scalars[LARGEST] = lagrangian_hessian(loops, row, objective, best, trial, work, view)
         led_down = False
-        while not led_down and pace.counts[DONE] == 0:
-            if plan_step(view.slope, curve, pace, want.max_iterations, p):
+        while not led_down and control.counts[DONE] == 0:
+            if plan_step(view.linear, hessian, control, objective.max_iterations, p):
                 copy_state(best, trial)
-                share = take(loops, view, p.x, trial, desk, False)
-                feasible = restore(loops, row, want, trial, desk, other, p)
-                led_down = judge_step(view.slope, other.slope, feasible, share, pace)
+                share = take(loops, view, p.x, trial, work, False)
+                feasible = restore_feasibility(loops, row, objective, trial, work, other, p)
+                led_down = judge_step(view.linear, other.linear, feasible, share, control)
                 if led_down:
                     copy_state(trial, best)
                     view, other = other, view
-    return int(pace.counts[STEPS])
+    return int(control.counts[STEPS])
 
 
 @routine
-def balance(slope: Slope, near: float, p: Programme, pulls: Floats) -> int:
-    """The multipliers, into `p.x`, with which limits that are met hold the slope of the objective; how many are met.
+def balance(linear: Linearisation, near: float, p: QP, pulls: Floats) -> int:
+    """The multipliers, into `p.x`, with which limits that are met hold the linear of the objective; how many are met.
 
     Of all that balance it as well, those whose squares have the least sum: limits that act as one share what they hold.
     """
-    motions, k = slope.counts[MOTIONS], 0
-    for c in range(slope.counts[LIMITS]):
-        if slope.h[c] > -near:
+    motions, k = linear.counts[MOTIONS], 0
+    for c in range(linear.counts[LIMITS]):
+        if linear.h[c] > -near:
             for a in range(motions):
-                slope.G[k, a] = slope.G[c, a]
-            slope.which[k] = slope.which[c]
+                linear.G[k, a] = linear.G[c, a]
+            linear.which[k] = linear.which[c]
             k += 1
-    if not factorise(slope.metric, motions, 0.0, p.factor):
+    if not factorise(linear.metric, motions, 0.0, p.factor):
         return 0
     for c in range(k):
-        apply_inverse(p.factor, motions, slope.G[c], pulls[c])
+        apply_inverse(p.factor, motions, linear.G[c], pulls[c])
     for c in range(k):
         p.g[c] = p.h[c] = 0.0
         for a in range(motions):
-            p.g[c] += pulls[c, a] * slope.g[a]
+            p.g[c] += pulls[c, a] * linear.g[a]
         for d in range(k):
             p.H[c, d] = SHARING if c == d else 0.0
             p.G[c, d] = -1.0 if c == d else 0.0
             for a in range(motions):
-                p.H[c, d] += slope.G[c, a] * pulls[d, a]
-    return k if factorise(p.H, k, 0.0, p.factor) and solve_programme(p, k, k) else 0
+                p.H[c, d] += linear.G[c, a] * pulls[d, a]
+    return k if factorise(p.H, k, 0.0, p.factor) and solve_qp(p, k, k) else 0
 
 
 @kernel
-def approach(loops: Loops, layout: Layout, want: Aim, closed: Closed, weights: Floats) -> None:
+def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Closed, weights: Floats) -> None:
     """Bring every row, from a configuration that is closed within its limits or nearly so, as near as it comes.
 
     With no steps to take, tell instead how hard every limit holds each row back where it is, (n, 2 columns + cones):
@@ -219,22 +237,26 @@ def approach(loops: Loops, layout: Layout, want: Aim, closed: Closed, weights: F
     """
     rows = 6 * len(loops.paths)  # of all paths but the first, and six that may be held
     best, trial = new_state(loops), new_state(loops)
-    first, second, desk = new_view(loops, rows), new_view(loops, rows), new_desk(loops, layout, rows)
-    k = len(first.slope.h)
-    p, pulls = new_programme(k, k), np.zeros((k, len(loops.lo)))
+    first, second, work = (
+        new_free_motions(loops, rows),
+        new_free_motions(loops, rows),
+        new_workspace(loops, layout, rows),
+    )
+    k = len(first.linear.h)
+    p, pulls = new_qp(k, k), np.zeros((k, len(loops.lo)))
     for row in range(len(closed.coordinates)):
         load_row(loops, layout, False, row, closed, best)
         closed.iterations[row] = 0
-        if want.max_iterations == 0:
-            scale_aim(loops, row, want, best, desk, first)
-            for c in range(balance(first.slope, want.near, p, pulls)):
-                weights[row, first.slope.which[c]] = p.x[c]
+        if objective.max_iterations == 0:
+            scale_objective(loops, row, objective, best, work, first)
+            for c in range(balance(first.linear, objective.near, p, pulls)):
+                weights[row, first.linear.which[c]] = p.x[c]
             continue
-        if restore(loops, row, want, best, desk, first, p):
-            closed.iterations[row] = descend(loops, row, want, best, trial, desk, first, second, p)
-        look(loops, row, want, best, desk, first)
+        if restore_feasibility(loops, row, objective, best, work, first, p):
+            closed.iterations[row] = descend(loops, row, objective, best, trial, work, first, second, p)
+        linearise(loops, row, objective, best, work, first)
         store_row(loops, row, best, closed)
         for group in range(closed.gaps.shape[1]):  # the loops are looked at as a whole
-            closed.gaps[row, group] = first.slope.scalars[GAP]
-            closed.excesses[row, group] = max(first.slope.scalars[EXCESS] - want.margin, 0.0)
+            closed.gaps[row, group] = first.linear.scalars[GAP]
+            closed.excesses[row, group] = max(first.linear.scalars[EXCESS] - objective.margin, 0.0)
             closed.misses[row, group] = 0.0

@@ -1,12 +1,22 @@
-"""The normal equations of closing loops, summed up term by term: paths, anchors, limits, cones and the platform."""
+"""The normal equations of closing loops, summed up term by term: paths, anchors, limits, cones and the platform.
+
+Unknown are the free joint coordinates q, group by group, and the platform's twist V. With X the platform's pose and
+FK_i(q) the pose at the end of path i, the residuals are
+
+    paths       position of FK_i - X [L], and the rotation vector of R_i R_X^T [rad]
+    wishes      sqrt(w) (q_j - anchor_j); sqrt(w) (X - target), as above
+    limits      q_j - hi, lo - q_j and angle - half_angle of cones, where they are positive
+
+and every group adds its J^T J to A (its own coordinates), C (with the twist), and b = J^T r; the twist's own are in G.
+"""
 
 from __future__ import annotations
 
 import math
 
 from .._jit import inlined, routine
-from ..rotations import difference, exponential
-from .loops import BALL, LOCKED, SLIDE, Floats, Ints, Layout, Loops, Wishes
+from ..rotations import UPSIDE_DOWN, difference, exponential, yaw_difference
+from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, TARGET_AXES, ClosureProblem, Floats, Ints, Layout, Loops
 from .path_kinematics import Equations, State, compare_end, end_path, pose_cone, walk_path
 
 
@@ -108,7 +118,7 @@ def follow_platform(loops: Loops, state: State, eq: Equations) -> None:
 def add_centres(
     loops: Loops, slots: Ints, group: int, path: int, state: State, centres: Floats, eq: Equations
 ) -> float:
-    """Wishes for joint centres along a path, as rows of its group; the square of their residuals."""
+    """ClosureProblem for joint centres along a path, as rows of its group; the square of their residuals."""
     square = 0.0
     A, b, rows, at = eq.A[group], eq.b[group], eq.rows, eq.at
     for mark in range(loops.path_marks[path], loops.path_marks[path + 1]):
@@ -147,13 +157,13 @@ def add_centres(
 
 
 @inlined
-def add_anchors(loops: Loops, slots: Ints, row: int, state: State, wishes: Wishes, eq: Equations) -> float:
+def add_anchors(loops: Loops, slots: Ints, row: int, state: State, problem: ClosureProblem, eq: Equations) -> float:
     """Distances of single coordinates from their anchors; the sum of their weighted squares."""
     square = 0.0
     for j in range(len(slots)):
-        s, group, weight = slots[j], loops.group_of[j], wishes.weights[j]
+        s, group, weight = slots[j], loops.group_of[j], problem.weights[j]
         if s >= 0 and weight > 0.0:
-            off = state.q[j] - wishes.anchors[row, j]
+            off = state.q[j] - problem.anchors[row, j]
             square += weight * off * off
             eq.A[group, s, s] += weight
             eq.b[group, s] += weight * off
@@ -215,22 +225,46 @@ def add_cones(loops: Loops, slots: Ints, state: State, margin: float, eq: Equati
 
 
 @inlined
-def add_platform(row: int, state: State, wishes: Wishes, eq: Equations) -> float:
+def add_platform(row: int, state: State, problem: ClosureProblem, eq: Equations) -> float:
     """The platform's distance from its target, in its own equations; the weighted square."""
-    square = 0.0
-    difference(state.X, wishes.targets[row], eq.e[3:])
-    if wishes.framed == 1:
-        into_frame(wishes.targets[row], eq.e[3:])
+    square, slope = 0.0, 1.0
+    difference(state.X, problem.targets[row], eq.e[3:])
+    if problem.frame != BASE_AXES:
+        into_frame(eq.frame, eq.e[3:])
+    if problem.frame == HALF_WAY:
+        eq.e[5] = yaw_difference(state.X, problem.targets[row])
+        slope = 1.0 / max(eq.frame[2, 2], UPSIDE_DOWN)
     for i in range(6):
-        weight = wishes.platform[i]
+        weight = problem.platform[i]
         if weight == LOCKED:
             eq.G[i, i] += weight
         elif weight > 0.0:
-            off = state.X[i, 3] - wishes.targets[row, i, 3] if i < 3 else eq.e[i]
+            off = state.X[i, 3] - problem.targets[row, i, 3] if i < 3 else eq.e[i]
+            rate = slope if i == 5 else 1.0
             square += weight * off * off
-            eq.G[i, i] += weight
-            eq.G[i, 6] -= weight * off
+            eq.G[i, i] += weight * rate * rate
+            eq.G[i, 6] -= weight * rate * off
     return square
+
+
+@inlined
+def pose_frame(row: int, state: State, problem: ClosureProblem, eq: Equations) -> None:
+    """The axes that the weights of the platform's rotation are about, into `frame`."""
+    F = eq.frame
+    if problem.frame == TARGET_AXES:
+        for i in range(3):
+            for j in range(3):
+                F[i, j] = problem.targets[row, i, j]
+        return
+    x, y, z = state.X[0, 2], state.X[1, 2], state.X[2, 2] + 1.0
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < UPSIDE_DOWN:
+        x, y, z, length = 0.0, 0.0, 1.0, 1.0
+    a, b, c = x / length, y / length, z / length
+    # the shortest turn of the z axis to half way
+    F[0, 0], F[0, 1], F[0, 2] = 1.0 - a * a / (1.0 + c), -a * b / (1.0 + c), a
+    F[1, 0], F[1, 1], F[1, 2] = -a * b / (1.0 + c), 1.0 - b * b / (1.0 + c), b
+    F[2, 0], F[2, 1], F[2, 2] = -a, -b, c
 
 
 @inlined
@@ -270,7 +304,7 @@ def turn_equations(F: Floats, layout: Layout, eq: Equations) -> None:
 
 @inlined
 def clear(layout: Layout, eq: Equations) -> None:
-    """Equations of nothing."""
+    """Set all sums to zero."""
     for group in range(len(layout.sizes)):
         for s in range(layout.sizes[group]):
             eq.b[group, s] = 0.0
@@ -285,14 +319,14 @@ def clear(layout: Layout, eq: Equations) -> None:
 
 
 @inlined
-def add_paths(loops: Loops, layout: Layout, wishes: Wishes, row: int, state: State, eq: Equations) -> float:
+def add_paths(loops: Loops, layout: Layout, problem: ClosureProblem, row: int, state: State, eq: Equations) -> float:
     """All paths, and the joint centres wished on them; the sum of their squares."""
     square = 0.0
     for group in range(len(layout.sizes)):
         eq.gaps[group] = eq.misses[group] = 0.0
         for path in range(loops.groups[group], loops.groups[group + 1]):
             last = loops.paths[path + 1]
-            follows = wishes.balls_follow == 1 and loops.last_balls[path] == 1
+            follows = problem.balls_follow == 1 and loops.last_balls[path] == 1
             last -= 1 if follows else 0
             walk_path(loops, path, last, state, eq)
             if follows:
@@ -303,6 +337,6 @@ def add_paths(loops: Loops, layout: Layout, wishes: Wishes, row: int, state: Sta
             end_path(loops, path, last, loops.end, eq)
             eq.gaps[group] = max(eq.gaps[group], compare_end(loops, state, eq))
             square += add_path(loops, layout.slots, group, path, eq)
-            if wishes.centres.shape[1] > 0:
-                square += add_centres(loops, layout.slots, group, path, state, wishes.centres[row], eq)
+            if problem.centres.shape[1] > 0:
+                square += add_centres(loops, layout.slots, group, path, state, problem.centres[row], eq)
     return square

@@ -8,10 +8,24 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import allocator, routine
-from ..sqp import EXCESS, GAP, LIMITS, MOTIONS, RANK, REACH, VALUE, Curve, Pace, Slope, new_curve, new_pace, new_slope
+from ..sqp import (
+    EXCESS,
+    GAP,
+    LIMITS,
+    MOTIONS,
+    RANK,
+    REACH,
+    VALUE,
+    Hessian,
+    Linearisation,
+    StepControl,
+    new_hessian,
+    new_linearisation,
+    new_step_control,
+)
 from .loops import BALL, Floats, Ints, Layout, Loops
 from .path_kinematics import Equations, State, compare_end, end_path, new_equations, pose_cone, walk_path
-from .pose_objective import Aim, Pull, look_at_aim
+from .pose_objective import PoseGradient, PoseObjective, pose_gradient
 
 DEPENDENT = 1e-6
 """What is left of an equation that follows from the others: descriptions are typed with as many digits."""
@@ -20,23 +34,23 @@ SHARED = 0.01
 """By what entries of unknowns that paths have in common count less as pivots: they couple the paths' equations."""
 
 
-class View(NamedTuple):
-    """What a configuration looks like to first order: its unknowns are the motions that the loops leave free."""
+class FreeMotions(NamedTuple):
+    """The motions that the loops leave free at a configuration, and objective and limits linearised in them."""
 
-    slope: Slope
+    linear: Linearisation
     basis: Floats  # (columns, columns): free motions, one a column
     shift: Floats  # (columns,): what would close the loops
     transform: Floats  # (rows, rows): how pivot rows are made of the equations
     pivots: Ints  # (rows,): column of each
 
 
-class Desk(NamedTuple):
-    """Room to work in."""
+class Workspace(NamedTuple):
+    """Scratch memory of one thread."""
 
     eq: Equations
-    aim: Pull
-    curve: Curve
-    pace: Pace
+    gradient: PoseGradient
+    hessian: Hessian
+    control: StepControl
     gaps: Floats  # (paths, 6): between the ends of each path and of the first
     A: Floats  # (rows, columns + 1 + rows)
     row: Floats  # (columns,)
@@ -49,25 +63,25 @@ class Desk(NamedTuple):
 
 
 @allocator
-def new_view(loops: Loops, rows: int) -> View:
-    """Room for what is seen of one configuration."""
+def new_free_motions(loops: Loops, rows: int) -> FreeMotions:
+    """Memory for the linearisation of one configuration."""
     n = len(loops.lo)
-    slope = new_slope(n, 2 * n + len(loops.cone_angles))
-    return View(slope, np.zeros((n, n)), np.zeros(n), np.zeros((rows, rows)), np.zeros(rows, np.int64))
+    linear = new_linearisation(n, 2 * n + len(loops.cone_angles))
+    return FreeMotions(linear, np.zeros((n, n)), np.zeros(n), np.zeros((rows, rows)), np.zeros(rows, np.int64))
 
 
 @allocator
-def new_desk(loops: Loops, layout: Layout, rows: int) -> Desk:
-    """Room to work in, for one thread."""
+def new_workspace(loops: Loops, layout: Layout, rows: int) -> Workspace:
+    """Scratch memory of one thread."""
     n, paths = len(loops.lo), len(loops.paths) - 1
     used = np.zeros(n, np.int64)
     for r in range(len(loops.row_columns)):
         used[loops.row_columns[r]] += 2 if r < loops.visit_rows[loops.paths[1]] else 1  # the first is in all equations
-    return Desk(
+    return Workspace(
         new_equations(loops, layout),
-        Pull(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
-        new_curve(n, 2 * n + len(loops.cone_angles)),
-        new_pace(),
+        PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
+        new_hessian(n, 2 * n + len(loops.cone_angles)),
+        new_step_control(),
         np.zeros((paths, 6)),
         np.zeros((rows, n + 1 + rows)),
         np.zeros(n),
@@ -81,9 +95,9 @@ def new_desk(loops: Loops, layout: Layout, rows: int) -> Desk:
 
 
 @routine
-def walk_all(loops: Loops, state: State, desk: Desk) -> float:
+def walk_all(loops: Loops, state: State, work: Workspace) -> float:
     """Pose the end effector by the first path, and compare the ends of the others with it; the largest gap."""
-    eq, gap = desk.eq, 0.0
+    eq, gap = work.eq, 0.0
     for path in range(len(loops.paths) - 1):
         last = loops.paths[path + 1]
         walk_path(loops, path, last, state, eq)
@@ -95,14 +109,14 @@ def walk_all(loops: Loops, state: State, desk: Desk) -> float:
         else:
             gap = max(gap, compare_end(loops, state, eq))
             for i in range(6):
-                desk.gaps[path, i] = eq.e[i]
+                work.gaps[path, i] = eq.e[i]
     return gap
 
 
 @routine
-def add_force(loops: Loops, path: int, force: Floats, desk: Desk, out: Floats) -> None:
+def add_force(loops: Loops, path: int, force: Floats, work: Workspace, out: Floats) -> None:
     """What a force and moment at the end of a path do at every coordinate, added to `out`."""
-    rows, columns = desk.eq.rows, loops.row_columns
+    rows, columns = work.eq.rows, loops.row_columns
     for r in range(loops.visit_rows[loops.paths[path]], loops.visit_rows[loops.paths[path + 1]]):
         a = rows[r]
         share = a[0] * force[0] + a[1] * force[1] + a[2] * force[2]
@@ -110,20 +124,22 @@ def add_force(loops: Loops, path: int, force: Floats, desk: Desk, out: Floats) -
 
 
 @routine
-def look(loops: Loops, row: int, want: Aim, state: State, desk: Desk, view: View) -> None:
+def linearise(
+    loops: Loops, row: int, objective: PoseObjective, state: State, work: Workspace, view: FreeMotions
+) -> None:
     """Look at a configuration."""
-    slope, n = view.slope, len(loops.lo)
-    basis, here, g, metric = view.basis, desk.here, slope.g, slope.metric
-    gap = walk_all(loops, state, desk)
-    slope.scalars[VALUE], held = look_at_aim(want, want.targets[row], state.X, desk.aim)
+    linear, n = view.linear, len(loops.lo)
+    basis, here, g, metric = view.basis, work.here, linear.g, linear.metric
+    gap = walk_all(loops, state, work)
+    linear.scalars[VALUE], held = pose_gradient(objective, objective.targets[row], state.X, work.gradient)
     for k in range(held):
-        gap = max(gap, abs(desk.aim.errors[k]))
-    slope.scalars[GAP] = gap
+        gap = max(gap, abs(work.gradient.errors[k]))
+    linear.scalars[GAP] = gap
     for j in range(n):
         here[j] = 0.0
-    add_force(loops, 0, desk.aim.force, desk, desk.here)
-    eliminate(lay_out(loops, held, desk), n, desk, view)
-    for a in range(slope.counts[MOTIONS]):
+    add_force(loops, 0, work.gradient.force, work, work.here)
+    eliminate(lay_out(loops, held, work), n, work, view)
+    for a in range(linear.counts[MOTIONS]):
         g[a] = 0.0
         for j in range(n):
             g[a] += basis[j, a] * here[j]
@@ -131,19 +147,19 @@ def look(loops: Loops, row: int, want: Aim, state: State, desk: Desk, view: View
             metric[a, b] = 0.0
             for j in range(n):
                 metric[a, b] += basis[j, a] * basis[j, b]
-    look_at_limits(loops, want.margin, state, desk, view)
+    linearise_limits(loops, objective.margin, state, work, view)
 
 
 @routine
-def lay_out(loops: Loops, held: int, desk: Desk) -> int:
+def lay_out(loops: Loops, held: int, work: Workspace) -> int:
     """The equations of the loops and of what is held, with an identity beside them; how many."""
-    paths, n, A, eq = len(loops.paths) - 1, len(loops.lo), desk.A, desk.eq
+    paths, n, A, eq = len(loops.paths) - 1, len(loops.lo), work.A, work.eq
     first = 6 * (paths - 1)
-    rows, holds = eq.rows, desk.aim.holds
+    rows, holds = eq.rows, work.gradient.holds
     for r in range(first + held):
         for j in range(A.shape[1]):
             A[r, j] = 0.0
-        A[r, n] = -desk.gaps[1 + r // 6, r % 6] if r < first else -desk.aim.errors[r - first]
+        A[r, n] = -work.gaps[1 + r // 6, r % 6] if r < first else -work.gradient.errors[r - first]
         A[r, n + 1 + r] = 1.0
     for path in range(paths):
         for r in range(loops.visit_rows[loops.paths[path]], loops.visit_rows[loops.paths[path + 1]]):
@@ -160,10 +176,10 @@ def lay_out(loops: Loops, held: int, desk: Desk) -> int:
 
 
 @routine
-def eliminate(rows: int, n: int, desk: Desk, view: View) -> None:
+def eliminate(rows: int, n: int, work: Workspace, view: FreeMotions) -> None:
     """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what closes the loops."""
-    A, rank, width = desk.A, 0, n + 1 + rows
-    taken, used, filled_at, basis, shift, pivots = desk.row, desk.used, desk.filled, view.basis, view.shift, view.pivots
+    A, rank, width = work.A, 0, n + 1 + rows
+    taken, used, filled_at, basis, shift, pivots = work.row, work.used, work.filled, view.basis, view.shift, view.pivots
     for j in range(n):
         shift[j] = 0.0
         taken[j] = 0.0  # 1 for pivot columns
@@ -205,50 +221,50 @@ def eliminate(rows: int, n: int, desk: Desk, view: View) -> None:
         shift[pivots[r]] = A[r, n]
         for i in range(rows):
             view.transform[r, i] = A[r, n + 1 + i]
-    view.slope.counts[MOTIONS], view.slope.counts[RANK] = motions, rank
+    view.linear.counts[MOTIONS], view.linear.counts[RANK] = motions, rank
 
 
 @routine
-def look_at_limits(loops: Loops, margin: float, state: State, desk: Desk, view: View) -> None:
+def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace, view: FreeMotions) -> None:
     """Excess and gradient of every limit within reach."""
-    slope = view.slope
-    basis, shift, G, row = view.basis, view.shift, slope.G, desk.row
+    linear = view.linear
+    basis, shift, G, row = view.basis, view.shift, linear.G, work.row
     n, k, excess = len(loops.lo), 0, -math.inf
     for j in range(n):
         for side in range(2):
             h = loops.lo[j] + margin - state.q[j] if side == 0 else state.q[j] - loops.hi[j] + margin
-            if h > -REACH and desk.used[j] > 0:
-                for a in range(slope.counts[MOTIONS]):
+            if h > -REACH and work.used[j] > 0:
+                for a in range(linear.counts[MOTIONS]):
                     G[k, a] = -basis[j, a] if side == 0 else basis[j, a]
-                slope.drift[k] = -shift[j] if side == 0 else shift[j]
-                slope.h[k], slope.which[k] = h, 2 * j + side
+                linear.drift[k] = -shift[j] if side == 0 else shift[j]
+                linear.h[k], linear.which[k] = h, 2 * j + side
                 excess = max(excess, h)
                 k += 1
     for cone in range(len(loops.cone_angles)):
-        h = cone_excess(loops, cone, margin, state, desk)
-        if h > -REACH and desk.used[loops.columns[loops.cone_units[cone, 0]]] > 0:
+        h = cone_excess(loops, cone, margin, state, work)
+        if h > -REACH and work.used[loops.columns[loops.cone_units[cone, 0]]] > 0:
             for j in range(n):
                 row[j] = 0.0
-            add_cone(loops, cone, 1.0, desk, desk.row)
-            for a in range(slope.counts[MOTIONS]):
+            add_cone(loops, cone, 1.0, work, work.row)
+            for a in range(linear.counts[MOTIONS]):
                 G[k, a] = 0.0
                 for j in range(n):
                     G[k, a] += row[j] * basis[j, a]
-            slope.drift[k] = 0.0
+            linear.drift[k] = 0.0
             for j in range(n):
-                slope.drift[k] += row[j] * shift[j]
-            slope.h[k], slope.which[k] = h, 2 * n + cone
+                linear.drift[k] += row[j] * shift[j]
+            linear.h[k], linear.which[k] = h, 2 * n + cone
             excess = max(excess, h)
             k += 1
-    slope.counts[LIMITS] = k
-    slope.scalars[EXCESS] = excess
+    linear.counts[LIMITS] = k
+    linear.scalars[EXCESS] = excess
 
 
 @routine
-def cone_excess(loops: Loops, cone: int, margin: float, state: State, desk: Desk) -> float:
+def cone_excess(loops: Loops, cone: int, margin: float, state: State, work: Workspace) -> float:
     """Excess over a cone; its joint is posed for `add_cone`."""
-    pose_cone(loops, cone, state, desk.eq)
-    moved, stayed = desk.eq.twist[:3], desk.eq.twist[3:]
+    pose_cone(loops, cone, state, work.eq)
+    moved, stayed = work.eq.twist[:3], work.eq.twist[3:]
     x = moved[1] * stayed[2] - moved[2] * stayed[1]
     y = moved[2] * stayed[0] - moved[0] * stayed[2]
     z = moved[0] * stayed[1] - moved[1] * stayed[0]
@@ -257,9 +273,9 @@ def cone_excess(loops: Loops, cone: int, margin: float, state: State, desk: Desk
 
 
 @routine
-def add_cone(loops: Loops, cone: int, factor: float, desk: Desk, out: Floats) -> None:
+def add_cone(loops: Loops, cone: int, factor: float, work: Workspace, out: Floats) -> None:
     """The gradient of a cone's excess, times a factor, added to `out`."""
-    eq = desk.eq
+    eq = work.eq
     a, b = eq.twist[:3], eq.twist[3:]
     x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     sine = math.sqrt(x * x + y * y + z * z)

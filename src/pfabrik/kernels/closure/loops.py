@@ -14,6 +14,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# What weights of a rotation are about: the axes of the base; those of the target, of which the first two turn its z
+# axis (the tilt); or axes of which the third is half way between the z axes of base and platform, about which the
+# platform yaws: the twist about z has its gradient there.
+BASE_AXES, TARGET_AXES, HALF_WAY = 0, 1, 2
+
 # Unit motions: about an axis, along an axis, about a point.
 TURN, SLIDE, BALL = 0, 1, 2
 
@@ -43,7 +48,7 @@ class Loops(NamedTuple):
     cone_slides: Ints  # (cones, 2): first and last of the slides that move the line
     slides: Ints  # coordinate of each such slide
     slide_axes: Floats  # (slides, 3): how it moves the line
-    marks: Ints  # (marks, 2): visit before which a joint's centre is posed, and the joint's place in Wishes.centres
+    marks: Ints  # (marks, 2): visit before which a joint's centre is posed, and the place in ClosureProblem.centres
     path_marks: Ints  # (paths + 1,): first mark of each path
 
 
@@ -54,13 +59,13 @@ class Layout(NamedTuple):
     sizes: Ints  # (groups,): free coordinates of each group
 
 
-class Wishes(NamedTuple):
+class ClosureProblem(NamedTuple):
     """What is asked beyond closed loops. Weights multiply squares; lengths in L, angles in radians."""
 
     weights: Floats  # (columns,): of the distance of each free coordinate from its anchor
     anchors: Floats  # (n, columns)
     platform: Floats  # (6,): weights of the pose's distance from its target, position then rotation; LOCKED holds it
-    framed: int  # 1: the weights of the rotation are about the target's own axes, not the base's
+    frame: int  # what the weights of the rotation are about: BASE_AXES, TARGET_AXES or HALF_WAY
     targets: Floats  # (n, 4, 4)
     centres: Floats  # (n, joints, 3): where joint centres are wished to be; NaN where they are not
     limits: int  # 1: limits are to be kept

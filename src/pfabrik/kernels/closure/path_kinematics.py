@@ -36,6 +36,7 @@ class Equations(NamedTuple):
     G: Floats  # (6, 7): the platform's equations, right-hand side last
     S: Floats  # (6, 7): the same, being solved
     twist: Floats  # (6,)
+    frame: Floats  # (3, 3): axes that the platform turns about, one a column
     gaps: Floats  # (groups,)
     excesses: Floats
     misses: Floats
@@ -43,13 +44,13 @@ class Equations(NamedTuple):
 
 @allocator
 def new_state(loops: Loops) -> State:
-    """Room for a configuration."""
+    """Memory for a configuration."""
     return State(np.zeros(len(loops.lo)), np.zeros((len(loops.kinds), 4)), np.zeros((3, 4)))
 
 
 @allocator
 def new_equations(loops: Loops, layout: Layout) -> Equations:
-    """Room for the equations of one thread."""
+    """Memory for the equations of one thread."""
     groups, m, rows = len(loops.groups) - 1, max(1, layout.sizes.max()), len(loops.row_columns)
     return Equations(
         np.zeros((rows, 6)),
@@ -65,6 +66,7 @@ def new_equations(loops: Loops, layout: Layout) -> Equations:
         np.zeros((6, 7)),
         np.zeros((6, 7)),
         np.zeros(6),
+        np.zeros((3, 3)),
         np.zeros(groups),
         np.zeros(groups),
         np.zeros(groups),

@@ -1,4 +1,4 @@
-"""What a search brings near: an end effector to its target, in what counts of a pose, with some of it held."""
+"""The objective of a search: squares of the distance of an end effector from its target, with some of it held."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ import math
 from typing import NamedTuple
 
 from .._jit import routine
-from ..rotations import difference
+from ..rotations import UPSIDE_DOWN, difference, yaw_difference
 from ..vectors import Vec, cross, dot, norm, scale
-from .loops import LOCKED, Floats
+from .loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, Floats
 
 ALIGNED = 1e-9
 """Sine below which two directions have no axis across them."""
 
 
-class Aim(NamedTuple):
+class PoseObjective(NamedTuple):
     """What is to come near: lengths in L."""
 
     targets: Floats  # (n, 4, 4)
     platform: Floats  # (6,): weights of the squares of position and rotation; 0 for what does not count; LOCKED holds
-    framed: int  # 1: of the rotation only the direction of the platform's z axis counts
+    frame: int  # of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY
     margin: float  # by how much inside their limits coordinates stay
     near: float  # limits farther away are not looked at when multipliers are asked for
     max_iterations: int
 
 
-class Pull(NamedTuple):
-    """What an aim asks of the end effector where it is."""
+class PoseGradient(NamedTuple):
+    """The gradient of the objective in the twist of the end effector, and the components of the twist that are held."""
 
     force: Floats  # (6,): gradient of the objective in its twist
     holds: Floats  # (6, 6): what of its twist is held, one a row
@@ -36,40 +36,49 @@ class Pull(NamedTuple):
 
 
 @routine
-def look_at_aim(want: Aim, target: Floats, X: Floats, pull: Pull) -> tuple[float, int]:
+def pose_gradient(objective: PoseObjective, target: Floats, X: Floats, gradient: PoseGradient) -> tuple[float, int]:
     """The objective, and how many components of the twist are held."""
-    w, force, unit = pull.turn, pull.force, pull.unit[0]
+    w, force, unit = gradient.turn, gradient.force, gradient.unit[0]
     difference(X, target, w[3:])
     value, held = 0.0, 0
     for i in range(6):
         force[i] = 0.0
         if i < 3:
             w[i] = X[i, 3] - target[i, 3]
-        elif want.framed == 1:
+        elif objective.frame != BASE_AXES:
             continue
-        if want.platform[i] == LOCKED:
-            held = hold(pull, held, i, w[i])
+        if objective.platform[i] == LOCKED:
+            held = hold(gradient, held, i, w[i])
         else:
-            value += 0.5 * unit * want.platform[i] * w[i] * w[i]
-            force[i] = unit * want.platform[i] * w[i]
-    if want.framed == 1 and want.platform[3] == LOCKED:
-        held = hold_tilt(target, X, pull, held)
-    elif want.framed == 1 and want.platform[3] > 0.0:
-        value += tilt(target, unit * want.platform[3], X, force)
+            value += 0.5 * unit * objective.platform[i] * w[i] * w[i]
+            force[i] = unit * objective.platform[i] * w[i]
+    if objective.frame == TARGET_AXES and objective.platform[3] == LOCKED:
+        held = hold_tilt(target, X, gradient, held)
+    elif objective.frame == TARGET_AXES and objective.platform[3] > 0.0:
+        value += tilt(target, unit * objective.platform[3], X, force)
+    elif objective.frame == HALF_WAY and objective.platform[5] == LOCKED:
+        held = hold(gradient, held, 5, yaw_difference(X, target))
+        for i in range(3):
+            gradient.holds[held - 1, 3 + i] = yaw_gradient(X, i)
+    elif objective.frame == HALF_WAY and objective.platform[5] > 0.0:
+        off, weight = yaw_difference(X, target), unit * objective.platform[5]
+        value += 0.5 * weight * off * off
+        for i in range(3):
+            force[3 + i] += weight * off * yaw_gradient(X, i)
     return value, held
 
 
 @routine
-def hold(pull: Pull, held: int, component: int, error: float) -> int:
+def hold(gradient: PoseGradient, held: int, component: int, error: float) -> int:
     """Note one more component of the twist that is held."""
-    pull.errors[held] = error
+    gradient.errors[held] = error
     for i in range(6):
-        pull.holds[held, i] = 1.0 if i == component else 0.0
+        gradient.holds[held, i] = 1.0 if i == component else 0.0
     return held + 1
 
 
 @routine
-def hold_tilt(target: Floats, X: Floats, pull: Pull, held: int) -> int:
+def hold_tilt(target: Floats, X: Floats, gradient: PoseGradient, held: int) -> int:
     """The z axis keeps the target's direction: it has no part along the target's x and y axes.
 
     The opposite direction has none either. So a z axis that is farther away than a right angle is asked to turn by the
@@ -77,22 +86,28 @@ def hold_tilt(target: Floats, X: Floats, pull: Pull, held: int) -> int:
     """
     axis, angle = turn_of_tilt(target, X)
     if angle > 0.5 * math.pi:
-        held = hold(pull, held, 3, angle)
-        held = hold(pull, held, 3, 0.0)
+        held = hold(gradient, held, 3, angle)
+        held = hold(gradient, held, 3, 0.0)
         sway = cross(axis, (X[0, 2], X[1, 2], X[2, 2]))
         for i in range(3):
-            pull.holds[held - 2, 3 + i] = -axis[i]
-            pull.holds[held - 1, 3 + i] = sway[i]
+            gradient.holds[held - 2, 3 + i] = -axis[i]
+            gradient.holds[held - 1, 3 + i] = sway[i]
         return held
     for k in range(2):
         off = 0.0
         for i in range(3):
             off += target[i, k] * X[i, 2]
-        held = hold(pull, held, 3, off)
+        held = hold(gradient, held, 3, off)
         for i in range(3):
             a, b = (i + 1) % 3, (i + 2) % 3
-            pull.holds[held - 1, 3 + i] = X[a, 2] * target[b, k] - X[b, 2] * target[a, k]
+            gradient.holds[held - 1, 3 + i] = X[a, 2] * target[b, k] - X[b, 2] * target[a, k]
     return held
+
+
+@routine
+def yaw_gradient(X: Floats, axis: int) -> float:
+    """How fast the platform yaws as it turns about an axis of the base: (z + z') / (1 + z z'), of both z axes."""
+    return (X[axis, 2] + (1.0 if axis == 2 else 0.0)) / max(1.0 + X[2, 2], UPSIDE_DOWN)
 
 
 @routine

@@ -102,6 +102,11 @@ LENGTH, SPAN, POINT_END, HOME_X = 0, 1, 2, 3  # HOME_X and the two behind it: th
 ON_STRUTS = 6  # 1: every branch is a strut that may change its length, and what carries it may move
 
 
+# Columns of Rows.counters, and of Rows.measures.
+ITERATIONS, ROUNDS, HELD = 0, 1, 2
+POSITION_ERROR, ROTATION_ERROR, RESIDUAL, LIMIT_EXCESS, ACTUATOR_ERROR = 0, 1, 2, 3, 4
+
+
 class Rows(NamedTuple):
     """The answers of a batch, row by row."""
 

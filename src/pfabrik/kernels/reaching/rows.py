@@ -11,7 +11,25 @@ from ..vectors import copy_row, copy_table, put, vec
 from .exact import branch_mode
 from .frames import move_carriers, orthonormalise
 from .measure import read_coordinate
-from .plan import HOLD_NOTHING, LENGTH, POINT_END, REACHED, Configuration, Floats, Plan, Rows, Seeds, Work
+from .plan import (
+    HELD,
+    HOLD_NOTHING,
+    ITERATIONS,
+    LENGTH,
+    LIMIT_EXCESS,
+    POINT_END,
+    POSITION_ERROR,
+    REACHED,
+    RESIDUAL,
+    ROTATION_ERROR,
+    ROUNDS,
+    Configuration,
+    Floats,
+    Plan,
+    Rows,
+    Seeds,
+    Work,
+)
 from .search import place_ends
 
 # Largest deviation of R^T R from I in a target, and below which it is machine noise.
@@ -162,10 +180,10 @@ def is_beyond_horizon(target: Floats, wanted: Floats) -> bool:
 def write_reached(i: int, gap: float, excess: float, rows: Rows) -> None:
     """Status, counters and measures of a row that took one iteration and has its target's own pose."""
     rows.status[i] = REACHED
-    rows.counters[i, 0] = 1
-    rows.counters[i, 1] = 0
-    rows.counters[i, 2] = HOLD_NOTHING
-    rows.measures[i, 0] = 0.0
-    rows.measures[i, 1] = 0.0
-    rows.measures[i, 2] = gap
-    rows.measures[i, 3] = excess
+    rows.counters[i, ITERATIONS] = 1
+    rows.counters[i, ROUNDS] = 0
+    rows.counters[i, HELD] = HOLD_NOTHING
+    rows.measures[i, POSITION_ERROR] = 0.0
+    rows.measures[i, ROTATION_ERROR] = 0.0
+    rows.measures[i, RESIDUAL] = gap
+    rows.measures[i, LIMIT_EXCESS] = excess

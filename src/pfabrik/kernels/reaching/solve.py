@@ -13,16 +13,23 @@ from .measure import measure_all, pose_errors
 from .passes import reach_chain_directly
 from .plan import (
     FAILED,
+    HELD,
     HOLD_NOTHING,
     HOLD_ORIENTATION,
     HOME_X,
     INVALID,
+    ITERATIONS,
     LENGTH,
+    LIMIT_EXCESS,
     ON_STRUTS,
     PENDING,
     POINT_END,
+    POSITION_ERROR,
     PROJECTED,
     REACHED,
+    RESIDUAL,
+    ROTATION_ERROR,
+    ROUNDS,
     Configuration,
     Floats,
     Plan,
@@ -155,8 +162,8 @@ def write_column(plan: Plan, i: int, column: int, now: Configuration, table: Flo
 def write_answer(plan: Plan, i: int, now: Configuration, wanted: Floats, target: Floats, rows: Rows) -> None:
     """The answer of row `i`: the configuration, measured."""
     write_row(plan, i, now, rows)
-    rows.measures[i, 0], rows.measures[i, 1] = pose_errors(plan, now.pose, wanted, target)
-    rows.measures[i, 2], rows.measures[i, 3] = measure_all(plan, now)
+    rows.measures[i, POSITION_ERROR], rows.measures[i, ROTATION_ERROR] = pose_errors(plan, now.pose, wanted, target)
+    rows.measures[i, RESIDUAL], rows.measures[i, LIMIT_EXCESS] = measure_all(plan, now)
 
 
 @routine
@@ -179,7 +186,7 @@ def solve_row(
     copy_table(wanted, now.pose)
     reached, iterations = reach_pose(plan, now, work, settings)
     rounds = 0
-    rows.counters[i, 2] = HOLD_NOTHING
+    rows.counters[i, HELD] = HOLD_NOTHING
     if reached and settings.exact == 0:
         reached = close_loops(plan, now, work, settings)
     if not reached and settings.max_rounds == 0:
@@ -201,14 +208,14 @@ def solve_row(
             rounds += more_rounds
             if settings.nearest == 1 and plan.scalars[ON_STRUTS] == 1.0:
                 reached = find_nearest(plan, now, safe, wanted, hold, settings, search)
-            rows.counters[i, 2] = HOLD_NOTHING if plan.scalars[POINT_END] == 1.0 else hold
+            rows.counters[i, HELD] = HOLD_NOTHING if plan.scalars[POINT_END] == 1.0 else hold
             if reached or hold == HOLD_NOTHING or plan.scalars[POINT_END] == 1.0:
                 break
             hold = HOLD_NOTHING
         if not reached:
             step_back(plan, safe, wanted, now, work, settings)
-    rows.counters[i, 0] = iterations
-    rows.counters[i, 1] = rounds
+    rows.counters[i, ITERATIONS] = iterations
+    rows.counters[i, ROUNDS] = rounds
     write_answer(plan, i, now, wanted, targets[i], rows)
     rows.status[i] = judge_row(plan, i, settings, rows)
 
@@ -247,11 +254,14 @@ def close_loops(plan: Plan, now: Configuration, work: Work, settings: Settings) 
 def judge_row(plan: Plan, i: int, settings: Settings, rows: Rows) -> int:
     """The status a row has earned by its measures."""
     if (
-        rows.measures[i, 2] > 10.0 * settings.slack
-        or rows.measures[i, 3] * plan.scalars[LENGTH] > 10.0 * settings.slack
+        rows.measures[i, RESIDUAL] > 10.0 * settings.slack
+        or rows.measures[i, LIMIT_EXCESS] * plan.scalars[LENGTH] > 10.0 * settings.slack
     ):
         return FAILED
-    if rows.measures[i, 0] <= settings.tolerance and rows.measures[i, 1] <= settings.rotation_tolerance:
+    if (
+        rows.measures[i, POSITION_ERROR] <= settings.tolerance
+        and rows.measures[i, ROTATION_ERROR] <= settings.rotation_tolerance
+    ):
         return REACHED
     return PROJECTED
 

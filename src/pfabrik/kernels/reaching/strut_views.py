@@ -13,7 +13,7 @@ import numpy as np
 
 from .._jit import allocator, routine
 from ..closure.loops import Ints
-from ..qp import Programme, new_programme
+from ..qp import QP, new_qp
 from ..sqp import (
     CLOSED,
     EXCESS,
@@ -26,15 +26,15 @@ from ..sqp import (
     REACH,
     RESTORING,
     VALUE,
-    Curve,
-    Pace,
-    Slope,
+    Hessian,
+    Linearisation,
+    StepControl,
     is_closed,
     longest,
-    new_curve,
-    new_pace,
-    new_slope,
-    way_back,
+    new_hessian,
+    new_linearisation,
+    new_step_control,
+    restoring_step,
 )
 from ..vectors import Vec, add, cross, dot, move, norm, scale, sub, vec
 from .frames import move_carriers, rotation_between, turn_pose_by_vector
@@ -58,11 +58,11 @@ class Descent(NamedTuple):
     nearest: Configuration
     best: Configuration
     trial: Configuration
-    first: Slope
-    second: Slope
-    curve: Curve
-    pace: Pace
-    p: Programme
+    first: Linearisation
+    second: Linearisation
+    hessian: Hessian
+    control: StepControl
+    p: QP
     columns: Ints  # (6 + trunk joints,): unknown of each motion, or -1 for one that is held
     row: Floats  # (6 + trunk joints,): a gradient in all motions
     here: Floats
@@ -81,11 +81,11 @@ def new_descent(plan: Plan) -> Descent:
         new_configuration(plan),
         new_configuration(plan),
         new_configuration(plan),
-        new_slope(n, k),
-        new_slope(n, k),
-        new_curve(n, k),
-        new_pace(),
-        new_programme(n, k),
+        new_linearisation(n, k),
+        new_linearisation(n, k),
+        new_hessian(n, k),
+        new_step_control(),
+        new_qp(n, k),
         np.zeros(n, np.int64),
         np.zeros(n),
         np.zeros(n),
@@ -200,27 +200,29 @@ def trunk_excess(plan: Plan, j: int, now: Configuration, side: int) -> float:
 
 
 @routine
-def enter_limit(search: Descent, slope: Slope, k: int, h: float, number: int) -> int:
+def enter_limit(search: Descent, linear: Linearisation, k: int, h: float, number: int) -> int:
     """Note a limit whose gradient in all motions is in `row`; the next free place."""
-    slope.h[k], slope.which[k] = h, number
-    slope.scalars[EXCESS] = max(slope.scalars[EXCESS], h)
+    linear.h[k], linear.which[k] = h, number
+    linear.scalars[EXCESS] = max(linear.scalars[EXCESS], h)
     for i in range(search.row.shape[0]):
         if search.columns[i] >= 0:
-            slope.G[k, search.columns[i]] = search.row[i]
+            linear.G[k, search.columns[i]] = search.row[i]
         search.row[i] = 0.0
     return k + 1
 
 
 @routine
-def look(plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, slope: Slope) -> None:
+def linearise(
+    plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, linear: Linearisation
+) -> None:
     """Objective and limits at a pose, to first order."""
     n, B, C = search.row.shape[0], plan.branches.shape[0], plan.cones.shape[0]
     zero = (0.0, 0.0, 0.0)
-    slope.scalars[VALUE] = objective(plan, now, wanted, weight, search, search.row)
-    slope.scalars[GAP], slope.scalars[EXCESS] = 0.0, -math.inf
+    linear.scalars[VALUE] = objective(plan, now, wanted, weight, search, search.row)
+    linear.scalars[GAP], linear.scalars[EXCESS] = 0.0, -math.inf
     for i in range(n):
         if search.columns[i] >= 0:
-            slope.g[search.columns[i]] = search.row[i]
+            linear.g[search.columns[i]] = search.row[i]
         search.row[i] = 0.0
     k = 0
     for b in range(B):
@@ -228,25 +230,27 @@ def look(plan: Plan, now: Configuration, wanted: Floats, weight: float, search: 
             h, g = strut_excess(plan, b, now, side)
             if h > -REACH:
                 add_line(plan, b, now, g, zero, zero, 1.0, search.row)
-                k = enter_limit(search, slope, k, h, 2 * b + side)
+                k = enter_limit(search, linear, k, h, 2 * b + side)
         for c in range(plan.branches[b]["cone_first"], plan.branches[b]["cone_last"]):
             h, g, on_carrier, on_platform = cone_excess(plan, b, c, now)
             if h > -REACH:
                 add_line(plan, b, now, g, on_carrier, on_platform, 1.0, search.row)
-                k = enter_limit(search, slope, k, h, 2 * B + c)
+                k = enter_limit(search, linear, k, h, 2 * B + c)
     for j in range(plan.trunk_joints.shape[0]):
         for side in range(2):
             h = trunk_excess(plan, j, now, side)
             if h > -REACH:
                 search.row[6 + j] = -1.0 if side == 0 else 1.0
-                k = enter_limit(search, slope, k, h, 2 * B + C + 2 * j + side)
-    slope.counts[LIMITS] = k
+                k = enter_limit(search, linear, k, h, 2 * B + C + 2 * j + side)
+    linear.counts[LIMITS] = k
 
 
 @routine
-def pull(plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, out: Floats) -> None:
+def lagrangian_gradient(
+    plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, out: Floats
+) -> None:
     """Gradient of the Lagrangian in all motions, but for ranges of trunk joints, which have no curvature."""
-    multipliers, B = search.curve.multipliers, plan.branches.shape[0]
+    multipliers, B = search.hessian.multipliers, plan.branches.shape[0]
     zero = (0.0, 0.0, 0.0)
     objective(plan, now, wanted, weight, search, out)
     for b in range(B):
@@ -261,10 +265,10 @@ def pull(plan: Plan, now: Configuration, wanted: Floats, weight: float, search: 
 
 
 @routine
-def feel_curvature(plan: Plan, wanted: Floats, weight: float, search: Descent, slope: Slope) -> float:
+def lagrangian_hessian(plan: Plan, wanted: Floats, weight: float, search: Descent, linear: Linearisation) -> float:
     """Curvature of the objective and of the active limits, by differences of gradients; the largest on its diagonal."""
-    n, H, columns = search.row.shape[0], search.curve.H, search.columns
-    pull(plan, search.best, wanted, weight, search, search.here)
+    n, H, columns = search.row.shape[0], search.hessian.H, search.columns
+    lagrangian_gradient(plan, search.best, wanted, weight, search, search.here)
     largest = 0.0
     for i in range(n):
         if columns[i] < 0:
@@ -273,12 +277,12 @@ def feel_curvature(plan: Plan, wanted: Floats, weight: float, search: Descent, s
         search.row[i] = PROBE
         move_all(plan, search.row, 1.0, search.trial)
         search.row[i] = 0.0
-        pull(plan, search.trial, wanted, weight, search, search.there)
+        lagrangian_gradient(plan, search.trial, wanted, weight, search, search.there)
         for j in range(n):
             if columns[j] >= 0:
                 H[columns[j], columns[i]] = (search.there[j] - search.here[j]) / PROBE
         largest = max(largest, abs(H[columns[i], columns[i]]))
-    for a in range(slope.counts[MOTIONS]):
+    for a in range(linear.counts[MOTIONS]):
         for b in range(a):
             H[a, b] = H[b, a] = 0.5 * (H[a, b] + H[b, a])
     return largest
@@ -317,14 +321,16 @@ def take(plan: Plan, search: Descent, x: Floats, now: Configuration) -> float:
 
 
 @routine
-def restore(plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, slope: Slope) -> bool:
+def restore_feasibility(
+    plan: Plan, now: Configuration, wanted: Floats, weight: float, search: Descent, linear: Linearisation
+) -> bool:
     """Bring a pose within all limits, by the shortest way; it is looked at where it ends."""
     for _step in range(RESTORING):
-        look(plan, now, wanted, weight, search, slope)
-        if is_closed(slope, CLOSED):
+        linearise(plan, now, wanted, weight, search, linear)
+        if is_closed(linear, CLOSED):
             return True
-        if not way_back(slope, search.p):
+        if not restoring_step(linear, search.p):
             return False
         take(plan, search, search.p.x, now)
-    look(plan, now, wanted, weight, search, slope)
-    return is_closed(slope, NEARLY_CLOSED)
+    linearise(plan, now, wanted, weight, search, linear)
+    return is_closed(linear, NEARLY_CLOSED)

@@ -10,7 +10,17 @@ from ..vectors import add, cross, norm, scale, sub, vec
 from .frames import turn_pose_by_vector
 from .plan import HOLD_ORIENTATION, HOLD_POSITION, LENGTH, Configuration, Floats, Plan, Settings
 from .project import copy_configuration
-from .strut_views import Descent, feel_curvature, move_all, number_motions, objective, restore, step_to, take, unit_of
+from .strut_views import (
+    Descent,
+    lagrangian_hessian,
+    move_all,
+    number_motions,
+    objective,
+    restore_feasibility,
+    step_to,
+    take,
+    unit_of,
+)
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
@@ -41,22 +51,22 @@ SAME = 1e-7
 @routine
 def descend(plan: Plan, wanted: Floats, weight: float, search: Descent) -> bool:
     """From `best`, a pose that has what is held, down to the nearest; False where it finds no feasible one."""
-    view, other, curve, pace, p = search.first, search.second, search.curve, search.pace, search.p
+    view, other, hessian, control, p = search.first, search.second, search.hessian, search.control, search.p
     search.unit[0] = 1.0
     value = objective(plan, search.best, wanted, weight, search, search.here)
     search.unit[0] = 1.0 / max(math.sqrt(2.0 * value), 1e-12)
-    if not restore(plan, search.best, wanted, weight, search, view):
+    if not restore_feasibility(plan, search.best, wanted, weight, search, view):
         return False
-    begin_descent(view, curve, pace)
-    while pace.counts[DONE] == 0:
-        pace.scalars[LARGEST] = feel_curvature(plan, wanted, weight, search, view)
+    begin_descent(view, hessian, control)
+    while control.counts[DONE] == 0:
+        control.scalars[LARGEST] = lagrangian_hessian(plan, wanted, weight, search, view)
         led_down = False
-        while not led_down and pace.counts[DONE] == 0:
-            if plan_step(view, curve, pace, MOST_STEPS, p):
+        while not led_down and control.counts[DONE] == 0:
+            if plan_step(view, hessian, control, MOST_STEPS, p):
                 copy_configuration(plan, search.best, search.trial)
                 share = take(plan, search, p.x, search.trial)
-                feasible = restore(plan, search.trial, wanted, weight, search, other)
-                led_down = judge_step(view, other, feasible, share, pace)
+                feasible = restore_feasibility(plan, search.trial, wanted, weight, search, other)
+                led_down = judge_step(view, other, feasible, share, control)
                 if led_down:
                     copy_configuration(plan, search.trial, search.best)
                     view, other = other, view
@@ -138,12 +148,12 @@ def find_nearest(
     """
     weight = (settings.rotation_length / plan.scalars[LENGTH]) ** 2
     n = number_motions(plan, hold, search)
-    for slope in (search.first, search.second):
-        slope.counts[MOTIONS] = n
+    for linear in (search.first, search.second):
+        linear.counts[MOTIONS] = n
         for a in range(n):
             for b in range(a):
-                slope.metric[a, b] = 0.0
-            slope.metric[a, a] = 1.0
+                linear.metric[a, b] = 0.0
+            linear.metric[a, a] = 1.0
     arms = plan.trunk_joints.shape[0] > 0
     copy_configuration(plan, safe, search.nearest)
     hits, least = 0, math.inf
