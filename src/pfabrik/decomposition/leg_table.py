@@ -124,10 +124,16 @@ def _forms(mechanism: Mechanism) -> list[LegForm]:
 
 
 def _aimed(legs: Records, asked: Records) -> Records:
-    """Legs with the angles of those endings asked for that coordinates are among, or that keep a rod from spinning."""
+    """Legs with the angles of those endings asked for that coordinates are among, or that keep a rod from spinning.
+
+    And of two crossed hinges that cannot point the rod anywhere, for they are not square to each other, or it to them:
+    only their angles tell whether there are any.
+    """
     legs = legs.copy()
     for end, start in (("foot", K.FOOT), ("head", K.HEAD)):
-        wanted = (legs["twists"] == 1) & (legs[end] == K.CROSS)
+        outer, inner = legs[f"{end}_axes"][:, 0], legs[f"{end}_axes"][:, 1]
+        along = np.maximum(np.abs((inner * outer).sum(axis=1)), np.abs((inner * legs["line"]).sum(axis=1)))
+        wanted = ((legs["twists"] == 1) | (along > TOLERANCES.alignment)) & (legs[end] == K.CROSS)
         wanted[asked["leg"][(asked["place"] >= start) & (asked["place"] < start + 3)]] = True
         legs[f"{end}_aimed"] = wanted & (legs["kind"] == K.ROD)
     return legs
