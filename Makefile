@@ -1,12 +1,14 @@
 # Needs make and Python >= 3.11; everything else is installed into .venv, inside this folder.
 PYTHON ?= python3
 BIN := .venv/bin
+# What a run of the machines needs, and with it what tests and checks need.
+READY := .venv/.ready
 STAMP := .venv/.installed
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 
 .PHONY: demo test test-fast test-interpreted campaign check bench clean
 
-demo: $(STAMP)
+demo: $(READY)
 	@$(BIN)/pfabrik demo
 
 # In parallel: the kernels are compiled first, once, and every worker loads them. The routines that kernels are made of
@@ -41,10 +43,15 @@ clean:
 	rm -rf .venv out build dist htmlcov .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(STAMP): pyproject.toml
+$(READY): pyproject.toml
 	@command -v $(PYTHON) > /dev/null || { echo "'$(PYTHON)' not found; try: make PYTHON=/path/to/python3" >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(v < (3, 11) and "Python >= 3.11 is needed; %s is %d.%d. Try: make PYTHON=python3.12" % (sys.executable, v[0], v[1]))'
-	@echo "installing pfabrik and its tools into .venv" >&2
+	@echo "installing pfabrik into .venv" >&2
 	@$(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --disable-pip-version-check --editable '.[view]'
+	@touch $@
+
+$(STAMP): $(READY)
+	@echo "installing what tests and checks need" >&2
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[view,dev]'
 	@touch $@

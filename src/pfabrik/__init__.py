@@ -48,6 +48,8 @@ _HOMES = {
     "travel": "travel",
     "configuration": "configuration",
     "margins": "answers.margins",
+    "Feasibility": "feasibility",
+    "feasibility": "feasibility",
     "AssemblyModes": "modes.assembly",
     "assembly_modes": "modes.assembly",
     "WorkingModes": "modes.working",
@@ -69,6 +71,7 @@ __all__ = [
     "ActiveLimit",
     "AssemblyModes",
     "Cone",
+    "Feasibility",
     "Joint",
     "Leg",
     "Mechanism",
@@ -88,6 +91,7 @@ __all__ = [
     "configuration",
     "decompose",
     "errors",
+    "feasibility",
     "forward_jacobian",
     "geometric",
     "inverse_jacobian",
@@ -118,6 +122,7 @@ if TYPE_CHECKING:
     from .decomposition.decompose import SubChain, decompose
     from .description.legs import Leg
     from .description.mechanism import Cone, Joint, Mechanism
+    from .feasibility import Feasibility, feasibility
     from .files import load, save
     from .fk import solve_fk
     from .ik import solve_ik

@@ -15,7 +15,7 @@ import pfabrik as pf
 from .progress import progress
 from .table import aligned
 from .track import count_statuses
-from .whole import whole_folder
+from .whole import new_folder, whole_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,13 +53,18 @@ def demo(out: Path, steps: int, quick: bool) -> int:
 
     if find_spec("matplotlib") is None:
         raise click.UsageError("the pictures need matplotlib; install it with: pip install 'pfabrik[view]'")
+    with new_folder(out.resolve()):  # what cannot be written is found before the work begins
+        runs = []
+    for case in sorted(cases(), key=lambda case: case.mechanism.end_effector_is_joint):  # quickest to compile first
+        runs.append(follow(case, QUICK_STEPS if quick else steps))
+        with whole_folder(out) as folder:
+            draw(runs[-1], folder)
+        click.echo(f"wrote {out / case.key}.png", err=True)
     with whole_folder(out) as folder:
-        runs = [follow(case, QUICK_STEPS if quick else steps) for case in cases()]
         for run in runs:
             write(run, folder)
-        names = sorted(item.name for item in folder.iterdir())
     click.echo(table(runs))
-    click.echo(f"\nwrote {', '.join(names)} to {out}/")
+    click.echo(f"\nwrote {', '.join(f'{run.key}.png, {run.key}.csv' for run in runs)} to {out}/")
     return 0 if all(holds(run.solution) for run in runs) else 1
 
 
@@ -75,12 +80,17 @@ def follow(case: Case, steps: int) -> Run:
     return Run(case.key, targets, solution, seconds)
 
 
-def write(run: Run, folder: Path) -> None:
-    """The picture and the CSV file of one run."""
+def draw(run: Run, folder: Path) -> None:
+    """The picture of one run."""
     from ..view.tracking import draw_tracking
-    from .pathfile import PathFile, write_track
 
     draw_tracking(run.targets, run.solution, folder / f"{run.key}.png")
+
+
+def write(run: Run, folder: Path) -> None:
+    """The CSV file of one run, with the limits that hold: these take joint coordinates, and more kernels."""
+    from .pathfile import PathFile, write_track
+
     with (folder / f"{run.key}.csv").open("w", newline="", encoding="utf-8") as handle:
         write_track(handle, PathFile(run.targets), run.solution)
 

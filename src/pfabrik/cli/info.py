@@ -14,6 +14,7 @@ import click
 import pfabrik as pf
 
 from ..decomposition.decompose import closure_reason, engine_of
+from ..decomposition.leg_table import leg_table, legs_answer
 from ..description.joint_types import KINDS
 from .mech import MECH, load
 from .table import aligned
@@ -57,7 +58,7 @@ def as_object(mechanism: Mechanism) -> dict[str, object]:
         "mobility": dataclasses.asdict(counted) | {"redundancy": counted.redundancy},
         "joints": [joint_as_object(joint, mechanism) for joint in mechanism.joints],
         "sub_chains": [
-            {"notation": str(chain), "engine": engine_of(mechanism), "why": why(chain, mechanism)}
+            {"notation": str(chain), "engine": shown_engine(mechanism), "why": why(chain, mechanism)}
             for chain in pf.decompose(mechanism)
         ],
     }
@@ -173,16 +174,25 @@ def clean(value: float, scale: float = 1.0) -> float:
 def chain_table(mechanism: Mechanism) -> str:
     """The distinct sub-chains in the field's notation, how often each occurs, the engine that answers, and why."""
     counts = Counter((str(chain), why(chain, mechanism)) for chain in pf.decompose(mechanism))
-    rows = [(str(count), notation, engine_of(mechanism), reason) for (notation, reason), count in counts.items()]
+    engine = shown_engine(mechanism)
+    rows = [(str(count), notation, engine, reason) for (notation, reason), count in counts.items()]
     return aligned(("count", "sub-chain", "engine", "why"), rows)
+
+
+def shown_engine(mechanism: Mechanism) -> str:
+    """The engine that answers first."""
+    return "legs" if legs_answer(mechanism) else engine_of(mechanism)
 
 
 def why(chain: SubChain, mechanism: Mechanism) -> str:
     """Why an engine answers for a sub-chain: for its own sake, or the mechanism's."""
+    if legs_answer(mechanism):
+        return f"closed forms; {engine_of(mechanism)} where they do not reach"
+    for_all, no_legs = closure_reason(mechanism), leg_table(mechanism)
+    told = f"; no closed forms: {no_legs}" if for_all and isinstance(no_legs, str) else ""
     if chain.reason is not None:
-        return chain.reason
-    for_all = closure_reason(mechanism)
-    return "positions alone express it" + (f", but {for_all}" if for_all else "")
+        return chain.reason + told
+    return "positions alone express it" + (f", but {for_all}" if for_all else "") + told
 
 
 def parallelogram_tables(mechanism: Mechanism) -> list[str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -80,6 +81,10 @@ def _without_collection() -> Iterator[None]:
             gc.enable()
 
 
+TICK = 2.0
+"""Seconds between two signs of life while a kernel compiles."""
+
+
 def _name_of(function: Callable[..., Any]) -> str:
     """A kernel as it is announced: its folder and its name."""
     return f"{function.__module__.rpartition('.')[0].rpartition('.')[2]}.{function.__name__}".lstrip(".")
@@ -92,12 +97,21 @@ def _compile_announced(name: str, original: Callable[..., Any], *arguments: Any)
     """
     sys.stderr.write(f"pfabrik: compiling {name} ...")
     sys.stderr.flush()
-    began = time.perf_counter()
+    began, done = time.perf_counter(), threading.Event()
+    threading.Thread(target=_tick, args=(done,), daemon=True).start()
     try:
         with _without_collection():
             return original(*arguments)
     finally:
+        done.set()
         sys.stderr.write(f" {time.perf_counter() - began:.1f} s\n")
+        sys.stderr.flush()
+
+
+def _tick(done: threading.Event) -> None:
+    """A dot on standard error every few seconds, until it is done."""
+    while not done.wait(TICK):
+        sys.stderr.write(".")
         sys.stderr.flush()
 
 

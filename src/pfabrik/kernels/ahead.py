@@ -14,6 +14,9 @@ from .closure.close import close
 from .closure.descend import approach
 from .closure.loops import Closed, ClosureProblem, Layout, Loops
 from .closure.pose_objective import PoseObjective
+from .legs import records as R
+from .legs.answer import answer, measure_rows, read_coordinates
+from .legs.feasibility import feasibility
 from .reaching import plan as P
 from .reaching.solve import solve_by_iteration, solve_directly
 
@@ -40,11 +43,19 @@ _ROWS = (
     P.Rows(*_values("i1 i2 f3 f3 f2 f2 f2")),
 )
 
+_LEGS, _TASK = np.zeros(0, R.LEG), np.zeros(0, R.TASK)
+_LIMITS = (np.zeros(0, R.COORDINATE), np.zeros(0, R.CONE))
+_KNOWN = np.zeros(0, R.COORDINATE)
+
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (solve_directly, _ROWS),
+    (answer, (_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("f3 f3 f2 i1 f3 f2 f2"))),
     (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
     (solve_by_iteration, _ROWS),
     (approach, (_LOOPS, _LAYOUT, PoseObjective(*_values("f3 f1 i f f i")), _CLOSED, np.zeros((0, 0)))),
+    (read_coordinates, (_LEGS, _KNOWN, _TASK, *_values("f3 f2 f2"))),
+    (feasibility, (_LEGS, *_LIMITS, _TASK, *_values("f3 f3 f2 f1 i1"))),
+    (measure_rows, (_LEGS, _TASK, *_values("f3 f2 f2 f3"))),
 )
 """Every kernel with arguments of the types it takes, what most questions need first."""
 

@@ -116,6 +116,11 @@ class ReachingEngine:
         positions_of(self.mechanism, self._compiled, closing.coordinates, rows)
         return Configurations(rows, closing.coordinates)
 
+    def stores(self, found: Configurations) -> bool:
+        """Whether configurations hold the positions that this engine starts from."""
+        own = self._new_rows(0)
+        return found.rows.nodes.shape[1:] == own.nodes.shape[1:] and found.rows.trunks.shape[1:] == own.trunks.shape[1:]
+
     def points(self, found: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]; merged joints share a centre."""
         return joint_points(self._compiled, found.rows)

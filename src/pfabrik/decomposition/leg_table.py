@@ -1,0 +1,331 @@
+"""A mechanism whose every chain is a leg, as the table that the kernels of legs are given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.graph import cone_line
+from ..description.home_mobility import column_joints
+from ..description.joint_types import KINDS
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
+from ..description.task import task_of
+from ..kernels.legs import records as K
+from ..tolerances import TOLERANCES
+from .decompose import decompose, engine_of
+from .legs import Item, LegForm, NoLeg, Pivot, Rod, holds_spin, legs_of_chain
+
+Floats = NDArray[np.float64]
+Records = NDArray[np.void]
+
+_ENDINGS = {"weld": K.WELD, "hinge": K.HINGE, "cross": K.CROSS, "triple": K.TRIPLE, "ball": K.BALL}
+_CARRIERS = {"R": K.CRANK, "P": K.CARRIAGE}
+_NO_BOUNDS = (-math.inf, math.inf)
+
+NO_WAY = "does not lead to the end effector"
+"""The reason of a sub-chain beside every way to the end effector."""
+
+COMPLETED_WITHIN = 2.0
+"""How far what a task leaves open may go from where it began [L or rad]: farther off there may be other completions."""
+
+
+@dataclass(frozen=True, eq=False)
+class LegTable:
+    """Legs as records, in the layout of `kernels.legs.records`.
+
+    Attributes
+    ----------
+    forms : what each record is.
+    limited : every coordinate that has a range.
+    driven : every actuator; its column is that of its value.
+    known : every coordinate that legs tell; its column is that among all joint coordinates.
+    aimed : the legs with the angles of all endings asked for, to be read with `known`.
+    task : one record.
+    limits : (joint, bound) of the limits, those of `limited` (two each), then those of `cones`.
+    """
+
+    forms: tuple[LegForm, ...]
+    legs: Records
+    aimed: Records
+    limited: Records
+    cones: Records
+    driven: Records
+    known: Records
+    task: Records
+    limits: tuple[tuple[str, str], ...]
+
+    @property
+    def home_sides(self) -> Floats:
+        """Which of two solutions each leg takes at home, (1, legs)."""
+        return np.array(self.legs["side"], dtype=float)[None]
+
+    def task_within(self, farthest: float) -> Records:
+        """The task, with what it leaves open going no farther than that [L or rad]."""
+        task = self.task.copy()
+        task["farthest"] = farthest
+        return task
+
+
+@lru_cache(maxsize=64)
+def leg_table(mechanism: Mechanism) -> LegTable | str:
+    """A mechanism's table of legs, or the reason why it has none."""
+    try:
+        return _table(mechanism)
+    except NoLeg as reason:
+        return str(reason)
+
+
+def legs_answer(mechanism: Mechanism) -> bool:
+    """Whether legs in closed form answer first: where they are faster than what would answer without them."""
+    return engine_of(mechanism) == "closure" and isinstance(leg_table(mechanism), LegTable)
+
+
+def _table(mechanism: Mechanism) -> LegTable:
+    if task_of(mechanism).rotations == 1:
+        raise NoLeg("the task sets the yaw alone of the rotation")
+    forms = _forms(mechanism)
+    legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
+    legs["first_row"] = [0, *accumulate(_row_counts(legs))][:-1]
+    told = [(leg, item, place) for leg, form in enumerate(forms) for item, place in _places(form)]
+    _require_all(mechanism, {(item.joint.name, item.place) for _, item, _ in told})
+    known = np.array([_coordinate(mechanism, *each) for each in told], K.COORDINATE)
+    joints = [item.joint for _, item, _ in told]
+    limited = known[[joint.range is not None for joint in joints]]
+    driven = known[[joint.actuated for joint in joints]]
+    driven["column"] = [mechanism.actuator_names.index(joint.name) for joint in joints if joint.actuated]
+    coned = [joint for joint in mechanism.joints if joint.cone is not None]
+    cones = np.array([_cone(mechanism, forms, joint) for joint in coned], K.CONE)
+    aimed = _aimed(legs, known)
+    limits = [(joint.name, bound) for joint in joints if joint.range is not None for bound in ("min", "max")]
+    limits += [(joint.name, "cone") for joint in coned]
+    task = _task(mechanism, legs)
+    legs = _aimed(legs, np.concatenate([limited, driven]))
+    return LegTable(tuple(forms), legs, aimed, limited, cones, driven, known, task, tuple(limits))
+
+
+def _forms(mechanism: Mechanism) -> list[LegForm]:
+    """The legs of all sub-chains."""
+    forms: list[LegForm] = []
+    for chain in decompose(mechanism):
+        if chain.reason == NO_WAY:
+            raise NoLeg(f"sub-chain {chain} {NO_WAY}")
+        try:
+            forms += legs_of_chain(mechanism, chain)
+        except NoLeg as reason:
+            raise NoLeg(f"sub-chain {chain}: {reason}") from None
+    return forms
+
+
+def _aimed(legs: Records, asked: Records) -> Records:
+    """Legs with the angles of those endings asked for that coordinates are among, or that keep a rod from spinning."""
+    legs = legs.copy()
+    for end, start in (("foot", K.FOOT), ("head", K.HEAD)):
+        wanted = (legs["twists"] == 1) & (legs[end] == K.CROSS)
+        wanted[asked["leg"][(asked["place"] >= start) & (asked["place"] < start + 3)]] = True
+        legs[f"{end}_aimed"] = wanted & (legs["kind"] == K.ROD)
+    return legs
+
+
+def _require_all(mechanism: Mechanism, seen: set[tuple[str, int]]) -> None:
+    """Every range and every motor is one that legs tell."""
+    for joint in mechanism.joints:
+        for place in range(len(KINDS[joint.type].coordinates)):
+            if (joint.range is not None or joint.actuated) and (joint.name, place) not in seen:
+                raise NoLeg(f"joint {joint.name} has a motor or a limit that no closed form tells")
+
+
+def _places(form: LegForm) -> Iterator[tuple[Item, int]]:
+    """Items whose coordinates a leg tells, each with its place in the leg's values."""
+    if isinstance(form, Pivot):
+        yield from ((item, K.HEAD + place) for place, item in enumerate(form.slides))
+        if form.ending.kind != "ball":
+            yield from ((item, K.FOOT + place) for place, item in enumerate(form.ending.items))
+        return
+    if form.carrier is not None:
+        yield form.carrier, K.CARRIER
+    if form.slide is not None:
+        yield form.slide, K.SLIDE
+    if holds_spin(form.foot_ending):
+        yield from ((item, K.FOOT + place) for place, item in enumerate(form.foot_ending.items))
+    if holds_spin(form.head_ending):
+        # as the body beyond sees the rod
+        yield from ((item.back, K.HEAD + place) for place, item in enumerate(form.head_ending.items[::-1]))
+
+
+def _coordinate(mechanism: Mechanism, leg: int, item: Item, place: int) -> tuple[float, ...]:
+    """A record of `COORDINATE`, its column that among all joint coordinates."""
+    joint, is_length = item.joint, item.kind == "P"
+    unit = mechanism.characteristic_length if is_length else 1.0
+    home = float(np.ravel(mechanism.home_coordinate(joint.name))[item.place])
+    lo, hi = _NO_BOUNDS if joint.range is None else np.reshape(joint.range, (-1, 2))[item.place].tolist()
+    if joint.along is not None:
+        lo = max(lo, 0.0)
+    index = [each.name for each in mechanism.joints].index(joint.name)
+    column = int(np.searchsorted(column_joints(mechanism), index)) + item.place
+    return (
+        leg,
+        place,
+        column,
+        int(joint.type == "revolute"),
+        item.sense,
+        (lo - home) / unit,
+        (hi - home) / unit,
+        home,
+        unit,
+    )
+
+
+def _record(mechanism: Mechanism, form: LegForm) -> Records:
+    return _rod_record(mechanism, form) if isinstance(form, Rod) else _pivot_record(mechanism, form)
+
+
+def _head_point(mechanism: Mechanism, point: Floats, is_reversed: bool) -> Floats:
+    """A head at home as `frames` map it [L]."""
+    reference = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
+    return point if is_reversed else point - reference
+
+
+def _axes(items: Sequence[Item]) -> Floats:
+    axes = np.zeros((3, 3))
+    for place, item in enumerate(items):
+        axes[place] = item.axis
+    return axes
+
+
+def _pivot_record(mechanism: Mechanism, pivot: Pivot) -> Records:
+    record = np.zeros((), K.LEG)
+    kind = pivot.ending.kind
+    centre = pivot.ending.centre
+    if not pivot.ending.items:
+        centre = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
+    axes = np.eye(3) if kind == "weld" else _axes(pivot.ending.items)
+    record["kind"], record["reversed"], record["foot"] = K.PIVOT, pivot.is_reversed, _ENDINGS[kind]
+    record["foot_point"], record["head_point"] = centre, _head_point(mechanism, centre, pivot.is_reversed)
+    record["foot_axes"], n_slides = axes, len(pivot.slides)
+    record["slides"] = n_slides
+    directions = np.array([item.axis for item in pivot.slides]).reshape(-1, 3)
+    record["slide_rows"][:n_slides] = np.linalg.pinv(directions.T) if n_slides else 0.0
+    record["fixed_rows"][: 3 - n_slides] = np.linalg.svd(directions)[2][n_slides:] if n_slides else np.eye(3)
+    pairs = _axis_pairs(kind, axes)
+    record["axis_rows"], record["upright"] = len(pairs), {"hinge": 1, "weld": 3}.get(kind, 0)
+    for row, (kept, moved) in enumerate(pairs):
+        record["kept"][row], record["moved"][row], record["value"][row] = kept, moved, kept @ moved
+    if kind == "triple":
+        record["side"] = _home_side(axes, axes[2])
+    return record
+
+
+def _axis_pairs(kind: str, axes: Floats) -> list[tuple[Floats, Floats]]:
+    """Pairs of directions, of base and platform, that keep their angle."""
+    x, y, z = axes
+    if kind == "cross":
+        return [(x, y)]
+    if kind == "hinge":
+        return [(across, x) for across in np.linalg.svd(x[None])[2][1:]]
+    return [(x, y), (y, z), (z, x)] if kind == "weld" else []
+
+
+def _home_side(axes: Floats, line: Floats) -> float:
+    """Which of the two solutions of two crossed hinges has them at home: see `kernels.legs.endings.aim`."""
+    return -math.copysign(1.0, axes[0] @ np.cross(axes[1], line))
+
+
+def _rod_record(mechanism: Mechanism, rod: Rod) -> Records:
+    record = np.zeros((), K.LEG)
+    line = rod.head - rod.foot
+    length = np.linalg.norm(line)
+    line = line / length
+    record["kind"], record["reversed"] = K.ROD, rod.is_reversed
+    record["foot_point"], record["length"], record["line"] = rod.foot, length, line
+    record["head_point"] = _head_point(mechanism, rod.head, rod.is_reversed)
+    record["slides"] = rod.slide is not None
+    for end, ending, order in (("foot", rod.foot_ending, 1), ("head", rod.head_ending, -1)):
+        axes = _axes(ending.items[::order])
+        record[end], record[f"{end}_axes"] = _ENDINGS[ending.kind], axes
+        record[f"{end}_side"] = _home_side(axes, line) if ending.kind == "cross" else 0.0
+    ends = (rod.foot_ending, rod.head_ending)
+    record["twists"] = all(map(holds_spin, ends)) and rod.twist is None
+    foot_mark, head_mark = rod.foot_ending.items[-1].axis, rod.head_ending.items[0].axis
+    flat = foot_mark @ head_mark - (line @ foot_mark) * (line @ head_mark)
+    record["twist"] = math.atan2(line @ np.cross(foot_mark, head_mark), flat)
+    record["carrier"] = K.SHARED if rod.is_shared else K.NO_CARRIER
+    if rod.carrier is not None:
+        _put_carrier(record, rod.carrier, rod.foot, line)
+    return record
+
+
+def _put_carrier(record: Records, carrier: Item, foot: Floats, line: Floats) -> None:
+    axis = carrier.axis
+    record["carrier"], record["carrier_axis"] = _CARRIERS[carrier.kind], axis
+    motion = axis
+    if carrier.kind == "R":
+        point = carrier.point + axis * (axis @ (foot - carrier.point))
+        record["carrier_point"], record["spoke"] = point, foot - point
+        record["spoke_across"] = motion = np.cross(axis, foot - point)
+    # the solution at which the foot leaves the line forward, or backward
+    record["side"] = _carrier_side(carrier.kind, float(line @ motion))
+
+
+def _carrier_side(kind: str, forward: float) -> float:
+    """Side of home's solution: of a carriage q = middle +- root, of a crank q = atan2(B, A) +- acos."""
+    return -1.0 if forward >= 0.0 else 1.0
+
+
+def _cone(mechanism: Mechanism, forms: Sequence[LegForm], joint: Joint) -> tuple[object, ...]:
+    """A record of `CONE`: a cone at an end of a rod, fixed to the body which that end is on, about the rod's line."""
+    reason = f"the cone of joint {joint.name} does not limit a rod's line against what its end is on"
+    assert joint.cone is not None
+    start, end = cone_line(mechanism, joint)
+    length = mechanism.characteristic_length
+    for leg, form in enumerate(forms):
+        if isinstance(form, Pivot):
+            continue
+        for place, ending, outer in ((K.FOOT_LINE, form.foot_ending, False), (K.HEAD_LINE, form.head_ending, True)):
+            own = [item for item in ending.items if item.joint is joint]
+            if not own:
+                continue
+            body = own[-1].outward if outer else own[0].inward
+            ends = np.array([start.at, end.at]) / length
+            line = form.head - form.foot
+            off = [np.linalg.norm(np.cross(point - form.foot, line)) for point in ends]
+            is_last = own[-1] is ending.items[-1] if outer else own[0] is ending.items[0]
+            others = {item.joint.name for item in form.items} - {joint.name}
+            if joint.cone.fixed_to != body or max(off) > TOLERANCES.implied or not is_last or end.name not in others:
+                raise NoLeg(reason)
+            sense = math.copysign(1.0, (ends[1] - ends[0]) @ line)
+            half_angle = joint.cone.half_angle
+            least = math.cos(half_angle + TOLERANCES.limit)
+            return leg, place, tuple(sense * np.array(joint.cone.axis)), half_angle, least
+    raise NoLeg(reason)
+
+
+def _task(mechanism: Mechanism, legs: Records) -> Records:
+    task, asked = np.zeros(1, K.TASK), task_of(mechanism)
+    task["length"] = mechanism.characteristic_length
+    task["reference"] = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
+    task["axes"], task["rotations"] = asked.axes, asked.rotations
+    task["unset"] = 0 if mechanism.end_effector_is_joint else 6 - sum(asked.axes) - asked.rotations
+    if mechanism.end_effector_is_joint:
+        task["rotations"] = 3
+    task["rows"], task["farthest"] = sum(_row_counts(legs)), COMPLETED_WITHIN
+    return task
+
+
+def _row_counts(legs: Records) -> list[int]:
+    """How many constraints each leg has."""
+    counts = []
+    for leg in legs:
+        if leg["kind"] == K.PIVOT:
+            counts.append(int(3 - leg["slides"] + leg["axis_rows"]))
+            continue
+        is_rigid = not leg["slides"] and leg["carrier"] in (K.NO_CARRIER, K.SHARED)
+        hinges = int(leg["foot"] == K.HINGE) + int(leg["head"] == K.HINGE)
+        counts.append(int(is_rigid) + hinges + int(leg["twists"]))
+    return counts

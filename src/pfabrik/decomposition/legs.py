@@ -1,0 +1,312 @@
+"""Legs that closed forms answer for: which chains are a rod or a pivot, read from the base or from the platform.
+
+With every joint as hinges (R), slides (P) and balls (S) in series, a chain is
+
+- a rod: at most one carrier (R or P), a foot ending, a rigid or sliding rod, a head ending; the carrier of a rigid
+  rod is turned until the rod reaches;
+- a pivot: slides, then one ending of no length.
+
+Endings are a hinge, two that cross, three through one point, or a ball. Where a chain branches, its first branch places
+the carrier and the others are rods on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.graph import Step
+from ..description.home_mobility import universal_axes
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
+from ..tolerances import TOLERANCES
+from .decompose import SubChain
+
+Floats = NDArray[np.float64]
+Kind = Literal["R", "P", "S"]
+EndingKind = Literal["weld", "hinge", "cross", "triple", "ball"]
+
+NO_AXIS = np.zeros(3)
+MOST_HINGES = 3
+"""Hinges of the largest ending."""
+
+
+class NoLeg(Exception):
+    """Why a chain is no leg that closed forms answer for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """A hinge, slide or ball on a way outward; lengths in L.
+
+    Attributes
+    ----------
+    place : which coordinate of its joint it is.
+    sense : +1 if that coordinate moves the outer body, else -1.
+    inward, outward : the two bodies of the joint, in the order of the way.
+    """
+
+    kind: Kind
+    axis: Floats
+    point: Floats
+    joint: Joint
+    place: int
+    sense: float
+    inward: str
+    outward: str
+
+    @property
+    def back(self) -> Item:
+        """The same, passed the other way."""
+        return replace(self, sense=-self.sense, inward=self.outward, outward=self.inward)
+
+
+@dataclass(frozen=True, eq=False)
+class Ending:
+    """Where a rod ends: its items, in the order in which the leg is read, and the point that all of them meet in.
+
+    Of a single hinge that is its joint's centre.
+    """
+
+    kind: EndingKind
+    items: tuple[Item, ...]
+    centre: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Rod:
+    """A rod and what carries it; see above. `foot` and `head` are points at home [L]."""
+
+    carrier: Item | None
+    foot_ending: Ending
+    slide: Item | None
+    twist: Item | None
+    head_ending: Ending
+    foot: Floats
+    head: Floats
+    is_reversed: bool
+    is_shared: bool = False
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        between = tuple(item for item in (self.carrier, self.slide, self.twist) if item is not None)
+        return (*between, *self.foot_ending.items, *self.head_ending.items)
+
+
+@dataclass(frozen=True, eq=False)
+class Pivot:
+    """Slides and an ending of no length; see above."""
+
+    slides: tuple[Item, ...]
+    ending: Ending
+    is_reversed: bool
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        return (*self.slides, *self.ending.items)
+
+
+LegForm = Rod | Pivot
+
+
+def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
+    """The legs that a sub-chain is: one, or one for each of its branches.
+
+    Raises
+    ------
+    NoLeg : with the reason.
+    """
+    if not chain.parts:
+        raise NoLeg("has no joints")
+    if chain.trunk:
+        return _branched(mechanism, chain)
+    if not all(isinstance(part, Step) for part in chain.parts):
+        raise NoLeg("has a loop of its own")
+    return (_leg(_items(mechanism, chain.steps), most_carriers=1),)
+
+
+def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
+    """Rods on one carrier."""
+    trunk = _items(mechanism, chain.trunk)
+    first, *others = (_items(mechanism, branch) for branch in chain.branches)
+    if len(trunk) != 1:
+        raise NoLeg("several joints carry its branches")
+    main = _rod(trunk[0], first, is_reversed=False)
+    rods = [_rod(None, other, is_reversed=False) for other in others]
+    return (main, *(replace(rod, is_shared=True) for rod in rods))
+
+
+def _items(mechanism: Mechanism, steps: Sequence[Step]) -> list[Item]:
+    """The joints of a way as hinges, slides and balls; slides before hinges that turn about their direction.
+
+    A joint cut at the end effector is a point: a ball without coordinates.
+    """
+    items = [item for step in steps for item in _items_of(mechanism, step)]
+    for end in range(1, len(items)):
+        place = end
+        while place and _swaps(items[place - 1], items[place]):
+            items[place - 1], items[place] = items[place], items[place - 1]
+            place -= 1
+    return items
+
+
+def _items_of(mechanism: Mechanism, step: Step) -> list[Item]:
+    joint, length = step.joint, mechanism.characteristic_length
+    point = np.zeros(3) if joint.at is None else np.array(joint.at) / length
+    bodies = joint.connects if step.forward else joint.connects[::-1]
+
+    def item(kind: Kind, axis: Floats, place: int = 0) -> Item:
+        return Item(kind, axis, point, joint, place, step.sign, *bodies)
+
+    if step.ends or joint.type == "spherical":
+        return [item("S", NO_AXIS)]
+    if joint.type == "universal":
+        found = [item("R", axis, place) for place, axis in enumerate(universal_axes(mechanism, joint))]
+        return found if step.forward else found[::-1]
+    axis = np.array(mechanism.home_axis(joint.name))
+    if joint.type == "cylindrical":
+        found = [item("R", axis, 0), item("P", axis, 1)]
+        return found if step.forward else found[::-1]
+    return [item("R" if joint.type == "revolute" else "P", axis)]
+
+
+def _swaps(inner: Item, outer: Item) -> bool:
+    """Whether a slide on a hinge moves as it would below it."""
+    return inner.kind == "R" and outer.kind == "P" and _parallel(inner, outer)
+
+
+def _parallel(first: Item, second: Item) -> bool:
+    return _area(first.axis, second.axis) <= TOLERANCES.implied
+
+
+def _area(a: Floats, b: Floats) -> float:
+    return float(np.linalg.norm(np.cross(a, b)))
+
+
+def _leg(items: list[Item], most_carriers: int) -> LegForm:
+    """The simplest leg that items in series are: fewest carriers, then read from the base, then the largest endings."""
+    reasons = []
+    for n_carriers in range(most_carriers + 1):
+        for is_reversed in (False, True):
+            own = [item.back for item in items[::-1]] if is_reversed else items
+            for make in (_pivot, _rod_on):
+                try:
+                    return make(own, n_carriers, is_reversed)
+                except NoLeg as reason:
+                    reasons.append(str(reason))
+    raise NoLeg(reasons[-1])
+
+
+def _pivot(items: list[Item], n_carriers: int, is_reversed: bool) -> Pivot:
+    """Slides and one ending; whatever `n_carriers` says, all slides at the foot count."""
+    slides = tuple(item for item in items if item.kind == "P")
+    ending = _ending(items[len(slides) :])
+    if n_carriers or [item.kind for item in items[: len(slides)]] != ["P"] * len(slides) or ending is None:
+        raise NoLeg("no pivot")
+    if slides and np.linalg.svd([item.axis for item in slides])[1].min() < TOLERANCES.alignment:
+        raise NoLeg("slides that are not independent")
+    return Pivot(slides, ending, is_reversed)
+
+
+def _rod_on(items: list[Item], n_carriers: int, is_reversed: bool) -> Rod:
+    return _rod(items[0] if n_carriers else None, items[n_carriers:], is_reversed)
+
+
+def _rod(carrier: Item | None, items: list[Item], is_reversed: bool) -> Rod:
+    """A rod of items in series on a carrier, with the largest endings that fit."""
+    if carrier is not None and carrier.kind == "S":
+        raise NoLeg("a ball carries the rod")
+    sizes = range(MOST_HINGES, 0, -1)
+    reason = "its joints do not meet in two points"
+    for foot_size, head_size in sorted(product(sizes, sizes), key=sum, reverse=True):
+        if foot_size + head_size > len(items):
+            continue
+        foot, head = _ending(items[:foot_size]), _ending(items[len(items) - head_size :])
+        if foot is None or head is None:
+            continue
+        try:
+            return _checked_rod(carrier, foot, items[foot_size : len(items) - head_size], head, is_reversed)
+        except NoLeg as found:
+            reason = str(found)
+    raise NoLeg(reason)
+
+
+def _ending(items: Sequence[Item]) -> Ending | None:
+    """Items as an ending; None where they do not meet in a point."""
+    if not items:
+        return Ending("weld", (), NO_AXIS)
+    if [item.kind for item in items] == ["S"]:
+        return Ending("ball", tuple(items), items[0].point)
+    if any(item.kind != "R" for item in items) or len(items) > MOST_HINGES:
+        return None
+    if len(items) == 1:
+        return Ending("hinge", tuple(items), items[0].point)
+    if any(_parallel(*pair) for pair in pairwise(items)):
+        return None
+    centre = _crossing(items[0], items[1])
+    off = max(_area(centre - item.point, item.axis) for item in items)
+    kind: EndingKind = "cross" if len(items) == 2 else "triple"
+    return Ending(kind, tuple(items), centre) if off <= TOLERANCES.implied else None
+
+
+def _crossing(first: Item, second: Item) -> Floats:
+    """The point of the first of two axes that is nearest to the second."""
+    normal = np.cross(first.axis, second.axis)
+    along = np.cross(second.point - first.point, second.axis) @ normal / (normal @ normal)
+    return np.asarray(first.point + along * first.axis)
+
+
+def _checked_rod(carrier: Item | None, foot: Ending, middle: Sequence[Item], head: Ending, is_reversed: bool) -> Rod:
+    start, end = _ends(foot, head)
+    line = end - start
+    if np.linalg.norm(line) <= TOLERANCES.alignment:
+        raise NoLeg("a rod of no length")
+    line /= np.linalg.norm(line)
+    if any(item.kind == "S" or _area(item.axis, line) > TOLERANCES.implied for item in middle):
+        raise NoLeg("a joint between the ends of its rod that is not along it")
+    slides, twists = ([item for item in middle if item.kind == kind] for kind in "PR")
+    if len(slides) > 1 or len(twists) > 1:
+        raise NoLeg("several joints along its rod")
+    for ending, axes in ((foot, foot.items), (head, head.items[::-1])):
+        if ending.kind in ("hinge", "cross") and _is_singular([item.axis for item in axes], line):
+            raise NoLeg("a hinge along its rod")
+    if carrier is not None:
+        if slides:
+            raise NoLeg("a carrier below a sliding rod")
+        if carrier.kind == "R" and _area(carrier.axis, start - carrier.point) <= TOLERANCES.alignment:
+            raise NoLeg("a crank of no length")
+    slide, twist = (found[0] if found else None for found in (slides, twists))
+    return Rod(carrier, foot, slide, twist, head, start, end, is_reversed)
+
+
+def _is_singular(axes: Sequence[Floats], line: Floats) -> bool:
+    """Whether hinges, in order from their body, cannot aim a line to all sides."""
+    if len(axes) == 1:
+        return _area(axes[0], line) <= TOLERANCES.alignment
+    return bool(abs(np.cross(axes[0], line) @ axes[1]) <= TOLERANCES.alignment)
+
+
+def _ends(foot: Ending, head: Ending) -> tuple[Floats, Floats]:
+    """The two ends of a rod: on a single hinge the point nearest to the other end."""
+    if foot.kind == "hinge" and head.kind == "hinge":
+        first, second = foot.items[0], head.items[0]
+        if _parallel(first, second):
+            return first.point + first.axis * (first.axis @ (second.point - first.point)), second.point
+        return _crossing(first, second), _crossing(second, first)
+    if foot.kind == "hinge":
+        item = foot.items[0]
+        return item.point + item.axis * (item.axis @ (head.centre - item.point)), head.centre
+    if head.kind == "hinge":
+        item = head.items[0]
+        return foot.centre, item.point + item.axis * (item.axis @ (foot.centre - item.point))
+    return foot.centre, head.centre
+
+
+def holds_spin(ending: Ending) -> bool:
+    """Whether an ending keeps a rod from spinning about itself."""
+    return ending.kind in ("hinge", "cross")

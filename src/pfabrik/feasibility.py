@@ -1,0 +1,99 @@
+"""How far targets are inside, or beyond, the limits of a mechanism: for maps, without projecting any."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .decomposition.leg_table import LegTable, leg_table
+from .decomposition.legs import LegForm, Rod
+from .description.mechanism import Mechanism, checked_mechanism
+from .errors import UnsupportedMechanism
+from .kernels.threads import in_blocks
+from .targets import Target, as_targets
+
+ROWS_A_BLOCK = 1024
+
+
+class Feasibility(NamedTuple):
+    """What keeps targets from being reached, or would first.
+
+    Attributes
+    ----------
+    margin : the least margin of all limits, (...,): as of `margins` a share of the room there is, 1 in the middle of a
+        range or on the axis of a cone, 0 on a limit, negative beyond it. Where a rod does not reach, minus the gap as a
+        share of its length; where a leg does not close on the target, minus what is left [L or rad]. NaN for rows that
+        are no poses.
+    binding : which of `limits` it is the margin of, (...,); -1 where there is none.
+    limits : (joint, bound) of every limit: "min", "max" and "cone", as of `margins`; "reach" of a leg's carrier, and
+        "closed" of its first joint.
+    """
+
+    margin: Any
+    binding: Any
+    limits: tuple[tuple[str, str], ...]
+
+
+def feasibility(mechanism: Mechanism, targets: Target) -> Feasibility:
+    """Margins of targets in home's working mode, by legs in closed form; nothing is projected or searched for.
+
+    A target whose margin is positive is reached by `solve_ik`; one whose margin is negative may still be, in another
+    working mode.
+
+    Parameters
+    ----------
+    targets : as of `solve_ik`; what the task leaves open is completed from home.
+
+    Raises
+    ------
+    UnsupportedMechanism : some chain is no leg in closed form; the message says which, and why.
+    InvalidArgument : targets of the wrong shape.
+    """
+    table = leg_table(checked_mechanism(mechanism))
+    if not isinstance(table, LegTable):
+        raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"])
+    from .kernels.legs.feasibility import feasibility as measure
+
+    poses, shape = as_targets(mechanism, targets)
+    margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
+    begin, sides = mechanism.home_pose[None].copy(), table.home_sides
+
+    def run(block: slice) -> None:
+        measure(
+            table.legs,
+            table.limited,
+            table.cones,
+            table.task,
+            poses[block],
+            begin,
+            sides,
+            margin[block],
+            binding[block],
+        )
+
+    in_blocks(run, len(poses), ROWS_A_BLOCK)
+    return Feasibility(_shaped(margin, shape), _shaped(binding, shape), _limits(mechanism))
+
+
+@lru_cache(maxsize=64)
+def _limits(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
+    """Limits in the order of the kernel: ranges and cones, then whether legs reach, then whether they close."""
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
+    reach = tuple((_carrier(form), "reach") for form in table.forms)
+    closed = tuple((form.items[0].joint.name if form.items else "", "closed") for form in table.forms)
+    return table.limits + reach + closed
+
+
+def _carrier(form: LegForm) -> str:
+    """The joint that carries a leg, or its first one."""
+    carrier = form.carrier if isinstance(form, Rod) else None
+    items = (carrier,) if carrier is not None else form.items
+    return items[0].joint.name if items else ""
+
+
+def _shaped(array: NDArray[Any], shape: tuple[int, ...]) -> Any:
+    return array.reshape(shape) if shape else array.item()

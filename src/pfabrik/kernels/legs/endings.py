@@ -1,0 +1,87 @@
+"""What legs are made of: angles of hinges that turn one direction into another, and derivatives by the pose.
+
+Two crossed hinges a, b bring a direction u to w where a . Rot(b, q) u = a . w, which is A cos q + B sin q = C: two
+solutions, told apart by a side; then one hinge does the rest (Paden-Kahan subproblems 1 and 4).
+"""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import routine
+from ..vectors import Vec, add, along, cross, dot, move, put, scale, sub, vec
+from .records import Floats, Record
+
+# Sine of the angle from a dead point, or from aligned hinges, below which a solution is not sure to half its digits.
+SURE = 1e-6
+
+
+@routine
+def turned(v: Vec, axis: Vec, cosine: float, sine: float) -> Vec:
+    """`v` turned about a unit vector."""
+    return along(along(scale(cosine, v), sine, cross(axis, v)), (1.0 - cosine) * dot(axis, v), axis)
+
+
+@routine
+def turned_back(T: Floats, v: Vec) -> Vec:
+    """`v` turned by the inverse of the rotation of `T`."""
+    return (
+        T[0, 0] * v[0] + T[1, 0] * v[1] + T[2, 0] * v[2],
+        T[0, 1] * v[0] + T[1, 1] * v[1] + T[2, 1] * v[2],
+        T[0, 2] * v[0] + T[1, 2] * v[1] + T[2, 2] * v[2],
+    )
+
+
+@routine
+def angle_to(axis: Vec, u: Vec, w: Vec) -> float:
+    """Angle from `u` to `w` about a unit vector, right-handed, in (-pi, pi]; what lies along it does not count."""
+    return math.atan2(dot(axis, cross(u, w)), dot(u, w) - dot(axis, u) * dot(axis, w))
+
+
+@routine
+def either_angle(A: float, B: float, C: float, side: float) -> tuple[float, float, float]:
+    """Cosine and sine of one of the two solutions of A cos q + B sin q = C, and how sure they are.
+
+    q = atan2(B, A) + side acos(C / h), h = hypot(A, B). The last number is the square of the sine of the angle to the
+    double root, negative where there is no solution: then the angle is that of the double root.
+    """
+    square = A * A + B * B
+    if not square > 0.0:
+        return 1.0, 0.0, -1.0
+    rest = square - C * C
+    if rest < 0.0:
+        C = math.copysign(math.sqrt(square), C)
+    root = side * math.sqrt(max(rest, 0.0))
+    return (A * C - B * root) / square, (B * C + A * root) / square, rest / square
+
+
+@routine
+def aim(axes: Floats, u: Vec, w: Vec, side: float, angles: Floats) -> float:
+    """Angles of two crossed hinges that turn `u`, given at home, into `w`, into angles[:2]; how sure they are."""
+    a, b = (axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])
+    bu = dot(b, u)
+    cosine, sine, sure = either_angle(dot(a, along(u, -bu, b)), dot(a, cross(b, u)), dot(a, w) - dot(a, b) * bu, side)
+    angles[0] = angle_to(a, turned(u, b, cosine, sine), w)
+    angles[1] = math.atan2(sine, cosine)
+    return sure
+
+
+@routine
+def spin_angle(T: Floats, axis: Vec) -> float:
+    """Angle of a rotation about `axis`, its own axis, in (-pi, pi]."""
+    sine = axis[0] * (T[2, 1] - T[1, 2]) + axis[1] * (T[0, 2] - T[2, 0]) + axis[2] * (T[1, 0] - T[0, 1])
+    return math.atan2(sine, T[0, 0] + T[1, 1] + T[2, 2] - 1.0)
+
+
+@routine
+def put_pose_slope(leg: Record, frame: Floats, a: Vec, c: Vec, slope: Floats) -> None:
+    """Derivative (6,) of a . dH + c . w by the platform's velocity (at its reference point) and angular velocity.
+
+    dH and w are those of the head as `frame` has them: the platform's, or the base's as seen from the platform.
+    """
+    arm = sub(move(frame, vec(leg["head_point"])), vec(frame[3]))
+    spin = add(cross(arm, a), c)
+    if leg["reversed"] == 1:
+        a, spin = scale(-1.0, turned_back(frame, a)), scale(-1.0, turned_back(frame, spin))
+    put(slope[:3], a)
+    put(slope[3:], spin)

@@ -1,0 +1,97 @@
+"""How far poses are inside, or beyond, the limits of legs in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._jit import kernel, routine
+from ..vectors import angle_between, vec
+from .answer import CLOSE, KEPT, complete, deviation, load, put_rows
+from .records import CARRIAGE, CRANK, N_VALUES, ROD, SLIDE, Floats, Record, Records
+
+
+@routine
+def share_of(off: float, room: float) -> float:
+    """Distance from a bound as a share of the room there is: of half the range, or of a cone's half angle."""
+    if room > 0.0:
+        return off / room
+    return 0.0 if abs(off) <= KEPT else math.copysign(math.inf, off)
+
+
+@routine
+def least_margin(limited: Records, cones: Records, values: Floats) -> tuple[float, int]:
+    """The least share of any limit, and which it is: two of each range, then cones; -1 where there is none."""
+    least, binding = math.inf, -1
+    for i in range(limited.shape[0]):
+        lo, hi, value = limited[i]["lo"], limited[i]["hi"], deviation(limited[i], values)
+        below, above = share_of(value - lo, 0.5 * (hi - lo)), share_of(hi - value, 0.5 * (hi - lo))
+        if min(below, above) < least:
+            least, binding = min(below, above), 2 * i + (1 if above < below else 0)
+    for i in range(cones.shape[0]):
+        own, place = values[cones[i]["leg"]], cones[i]["place"]
+        angle = angle_between(vec(cones[i]["axis"]), (own[place], own[place + 1], own[place + 2]))
+        share = share_of(cones[i]["half_angle"] - angle, cones[i]["half_angle"])
+        if share < least:
+            least, binding = share, 2 * limited.shape[0] + i
+    return least, binding
+
+
+@kernel
+def feasibility(
+    legs: Records,
+    limited: Records,
+    cones: Records,
+    task: Records,
+    targets: Floats,
+    begins: Floats,
+    sides: Floats,
+    margins: Floats,
+    bindings: NDArray[np.int64],
+) -> None:
+    """Fill the least margin of each target (n, 4, 4) [length], and which limit it is of.
+
+    After the limits of `least_margin` come, for each leg, that it reaches (margin: minus the gap, as a share of the
+    rod) and, for each, that it closes (minus its largest constraint). NaN and -1 where a target is no pose.
+    """
+    n_legs, n_rows = legs.shape[0], task[0]["rows"]
+    frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
+    follow, rows, slopes = np.zeros((n_legs, 6)), np.zeros(n_rows), np.zeros((n_rows, 6))
+    pose, motions, normal = np.zeros((4, 4)), np.zeros((7, 6)), np.zeros((7, 8))
+    n_limits = 2 * limited.shape[0] + cones.shape[0]
+    for row in range(targets.shape[0]):
+        margins[row], bindings[row] = math.nan, -1
+        if not load(targets[row], begins[0], task[0], pose):
+            continue
+        closed = complete(legs, task[0], sides[0], frames, values, lines, follow, rows, slopes, motions, normal, pose)
+        least, binding = least_margin(limited, cones, values)
+        if not closed:
+            put_rows(legs, frames, values, lines, rows)
+            for k in range(n_legs):
+                share = reach_of(legs[k], values[k])
+                if share < -CLOSE and share < least:
+                    least, binding = share, n_limits + k
+                share = -largest_row(legs, rows, k)
+                if share < -CLOSE and share < least:
+                    least, binding = share, n_limits + n_legs + k
+        margins[row], bindings[row] = least, binding
+
+
+@routine
+def reach_of(leg: Record, own: Floats) -> float:
+    """Minus the gap that a leg leaves where its carrier does not reach, as a share of its rod."""
+    if leg["kind"] == ROD and (leg["carrier"] == CRANK or leg["carrier"] == CARRIAGE):
+        return -abs(own[SLIDE]) / leg["length"]
+    return 0.0
+
+
+@routine
+def largest_row(legs: Records, rows: Floats, k: int) -> float:
+    """The largest constraint of a leg [L or rad]."""
+    last = legs[k + 1]["first_row"] if k + 1 < legs.shape[0] else rows.shape[0]
+    worst = 0.0
+    for i in range(legs[k]["first_row"], last):
+        worst = max(worst, abs(rows[i]))
+    return worst

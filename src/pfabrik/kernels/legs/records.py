@@ -1,0 +1,98 @@
+"""A mechanism as a table of legs: what the kernels are given.
+
+Lengths are divided by the characteristic length L, angles are in radians, axes are unit vectors; all of it at home, in
+base coordinates. A leg read from the base ends on the platform; one that is reversed is read from the platform and
+ends on the base. Its *foot* is the end it is read from, its *head* the other one.
+
+A rod is [carrier] + foot ending + rigid or sliding rod + head ending; a pivot is [slides] + one ending of no length.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+Records: TypeAlias = NDArray[np.void]
+Record: TypeAlias = Any  # one of them: its fields are numbers and arrays
+
+ROD, PIVOT = 0, 1
+# What carries the foot: nothing, a hinge, a slide; or what carries the rod before (a second forearm).
+NO_CARRIER, CRANK, CARRIAGE, SHARED = 0, 1, 2, 3
+# Endings: a weld, a hinge, two hinges that cross, three hinges through one point, a ball.
+WELD, HINGE, CROSS, TRIPLE, BALL = 0, 1, 2, 3, 4
+
+_vector = ("f8", (3,))
+
+LEG = np.dtype(
+    [
+        ("kind", "i8"),
+        ("reversed", "i8"),
+        ("carrier", "i8"),
+        ("slides", "i8"),  # 1: a rod that changes its length; of a pivot, how many slides there are
+        ("twists", "i8"),  # 1: both endings hold the rod against spinning about itself
+        ("foot", "i8"),  # ending of a rod's foot, or of a pivot
+        ("head", "i8"),
+        ("foot_aimed", "i8"),  # 1: the angles of this ending are asked for
+        ("head_aimed", "i8"),
+        ("carrier_axis", *_vector),
+        ("carrier_point", *_vector),  # of a crank: where on its axis the spoke stands
+        ("spoke", *_vector),  # from there to the foot
+        ("spoke_across", *_vector),  # the spoke a quarter turn on
+        ("side", "f8"),  # which of two solutions is home's: of the carrier, or of a pivot's three hinges
+        ("foot_point", *_vector),
+        ("head_point", *_vector),  # as `frames` map it: seen from the reference point, if not reversed
+        ("length", "f8"),
+        ("line", *_vector),  # unit vector from foot to head
+        ("foot_axes", "f8", (3, 3)),  # hinges in order from the body that the foot is on
+        ("head_axes", "f8", (3, 3)),  # hinges in order from the body that the head is on
+        ("foot_side", "f8"),  # which of the two ways to aim two crossed hinges is home's
+        ("head_side", "f8"),
+        ("twist", "f8"),  # angle between the marks of the two endings, about the line
+        ("slide_rows", "f8", (3, 3)),  # of a pivot: the first `slides` give these from the centre's displacement
+        ("fixed_rows", "f8", (3, 3)),  # of a pivot: directions in which its centre cannot move, 3 - slides of them
+        ("axis_rows", "i8"),  # of a pivot: how many conditions kept . R moved = value its ending makes
+        ("kept", "f8", (3, 3)),
+        ("moved", "f8", (3, 3)),
+        ("value", *_vector),
+        ("first_row", "i8"),  # place of its first constraint among all
+        ("upright", "i8"),  # of a pivot: how many of its `foot_axes` R must not turn over
+    ]
+)
+
+# What is told of a leg at a pose: places in its row of `values`.
+CARRIER, FOOT, SLIDE, HEAD = 0, 1, 4, 5  # three angles at FOOT and at HEAD; the slides of a pivot at HEAD
+FOOT_LINE, HEAD_LINE = 8, 11  # the rod's direction as seen by the body its foot, or its head, is on
+COSINE, SINE = 14, 15  # of the crank's angle
+N_VALUES = 16
+
+COORDINATE = np.dtype(
+    [
+        ("leg", "i8"),
+        ("place", "i8"),  # in the leg's values
+        ("column", "i8"),  # among what is filled with it: actuators, or joint coordinates
+        ("turns", "i8"),  # 1: an angle that counts into its range by whole turns
+        ("sense", "f8"),  # deviation from home = sense * value
+        ("lo", "f8"),  # of the deviation [L or rad]
+        ("hi", "f8"),
+        ("home", "f8"),  # [length or rad]
+        ("unit", "f8"),  # L for lengths, 1 for angles
+    ]
+)
+
+CONE = np.dtype([("leg", "i8"), ("place", "i8"), ("axis", *_vector), ("half_angle", "f8"), ("least_cosine", "f8")])
+"""`axis` as seen by the body, toward the head; `least_cosine` is that of the half angle and its tolerance."""
+
+TASK = np.dtype(
+    [
+        ("length", "f8"),
+        ("reference", *_vector),  # at home [L]
+        ("axes", "i8", (3,)),  # 1: this coordinate of the position is set
+        ("rotations", "i8"),  # 3: the rotation is set, 2: the direction of the z axis, 0: nothing
+        ("unset", "i8"),  # how many coordinates of the pose are not
+        ("rows", "i8"),  # how many constraints the legs have
+        ("farthest", "f8"),  # what is not set may not go farther from where it began [L or rad]
+    ]
+)

@@ -1,0 +1,249 @@
+"""A rod between its foot, which a hinge or a slide may carry, and its head, at a pose.
+
+With F the foot, H the head, l = H - F, u = l / |l|, each rod leaves some of these constraints on the pose:
+
+- `length`, rigid rods that no carrier is turned for: |l| - length;
+- `foot`, a foot on one hinge n: n . l;
+- `head`, a head on one hinge m: m . l;
+- `twist`, both ends keep the rod from spinning: the angle about u between marks that go with its ends, less home's.
+
+The derivative of each is a . (dH - dF) + b . W + c . w, with W and w the angular velocities of the bodies of foot and
+head.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import routine
+from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec, wrap
+from .endings import aim, angle_to, either_angle, put_pose_slope, turned, turned_back
+from .records import (
+    CARRIAGE,
+    CARRIER,
+    COSINE,
+    CRANK,
+    FOOT,
+    FOOT_LINE,
+    HEAD,
+    HEAD_LINE,
+    HINGE,
+    NO_CARRIER,
+    SHARED,
+    SINE,
+    SLIDE,
+    Floats,
+    Record,
+)
+
+NOWHERE: Vec = (0.0, 0.0, 0.0)
+
+
+@routine
+def carry(rod: Record, head: Vec, side: float, own: Floats) -> float:
+    """Turn the crank, or move the carriage, until the rod reaches the head; how far from a dead point, see `SURE`.
+
+    A crank: |o + spoke cos q + across sin q - H| = length; a carriage: |F + q a - H| = length. Where none reaches, it
+    stays where it comes nearest.
+    """
+    if rod["carrier"] == CRANK:
+        x, spoke = sub(head, vec(rod["carrier_point"])), vec(rod["spoke"])
+        C = 0.5 * (dot(x, x) + dot(spoke, spoke) - rod["length"] * rod["length"])
+        cosine, sine, sure = either_angle(dot(spoke, x), dot(vec(rod["spoke_across"]), x), C, side)
+        own[COSINE], own[SINE] = cosine, sine
+        own[CARRIER] = math.atan2(sine, cosine)
+        return sure
+    x = sub(head, vec(rod["foot_point"]))
+    middle = dot(x, vec(rod["carrier_axis"]))
+    square = rod["length"] * rod["length"]
+    rest = square - dot(x, x) + middle * middle
+    own[CARRIER] = middle + side * math.sqrt(max(rest, 0.0))
+    return rest / square
+
+
+@routine
+def carried_foot(rod: Record, carrier: Record, own: Floats) -> Vec:
+    """Where the foot is, with the carrier (the rod's, or the one it shares) as `own` says."""
+    if carrier["carrier"] == NO_CARRIER:
+        return vec(rod["foot_point"])
+    if carrier["carrier"] == CARRIAGE:
+        return along(vec(rod["foot_point"]), own[CARRIER], vec(carrier["carrier_axis"]))
+    if rod["carrier"] == SHARED:
+        point = vec(carrier["carrier_point"])
+        arm = turned(sub(vec(rod["foot_point"]), point), vec(carrier["carrier_axis"]), own[COSINE], own[SINE])
+        return add(point, arm)
+    arm = along(scale(own[COSINE], vec(rod["spoke"])), own[SINE], vec(rod["spoke_across"]))
+    return add(vec(rod["carrier_point"]), arm)
+
+
+@routine
+def carried(carrier: Record, own: Floats, v: Vec, sense: float) -> Vec:
+    """A direction turned with the crank, or back (sense -1)."""
+    if carrier["carrier"] != CRANK:
+        return v
+    return turned(v, vec(carrier["carrier_axis"]), own[COSINE], sense * own[SINE])
+
+
+@routine
+def place_rod(
+    rod: Record, carrier: Record, frame: Floats, side: float, lead: Floats, own: Floats, line: Floats
+) -> float:
+    """Fill a rod's values, and the present `line` from foot to head; how sure they are, see `SURE`.
+
+    Parameters
+    ----------
+    carrier, lead : the rod whose carrier it is on and that rod's values; its own if it shares none.
+    """
+    head, sure = move(frame, vec(rod["head_point"])), 1.0
+    if rod["carrier"] == CRANK or rod["carrier"] == CARRIAGE:
+        sure = carry(rod, head, side, own)
+    span = sub(head, carried_foot(rod, carrier, lead))
+    length = norm(span)
+    u, home = scale(1.0 / length, span), vec(rod["line"])
+    foot_line, head_line = carried(carrier, lead, u, -1.0), turned_back(frame, u)
+    put(line, span)
+    put(own[FOOT_LINE:HEAD_LINE], foot_line)
+    put(own[HEAD_LINE:COSINE], head_line)
+    own[SLIDE] = length - rod["length"]
+    if rod["foot_aimed"] == 1:
+        sure = min(sure, aim_end(rod["foot"], rod["foot_axes"], home, foot_line, rod["foot_side"], own[FOOT:SLIDE]))
+    if rod["head_aimed"] == 1:
+        sure = min(sure, aim_end(rod["head"], rod["head_axes"], home, head_line, rod["head_side"], own[HEAD:FOOT_LINE]))
+    return sure
+
+
+@routine
+def aim_end(ending: int, axes: Floats, home: Vec, line: Vec, side: float, angles: Floats) -> float:
+    """Angles of the hinges at an end of a rod, from the body they are on; how sure they are."""
+    if ending == HINGE:
+        angles[0] = angle_to((axes[0, 0], axes[0, 1], axes[0, 2]), home, line)
+        return 1.0
+    return aim(axes, home, line, side, angles)
+
+
+@routine
+def mark(ending: int, axes: Floats, angles: Floats) -> Vec:
+    """A direction that goes with an end of a rod, as seen by the body it is on: the last hinge."""
+    first = (axes[0, 0], axes[0, 1], axes[0, 2])
+    if ending == HINGE:
+        return first
+    return turned((axes[1, 0], axes[1, 1], axes[1, 2]), first, math.cos(angles[0]), math.sin(angles[0]))
+
+
+@routine
+def spin_rate(ending: int, first: Vec, last: Vec, u: Vec) -> tuple[Vec, Vec]:
+    """Rate at which an end of a rod spins about u, by du and by the angular velocity of its body.
+
+    A hinge n: of the part of n across u. Two hinges: of the rod itself, with q1' = b . y / D, q2' = -a . y / D,
+    y = du - W x u, D = (a x u) . b.
+    """
+    if ending == HINGE:
+        lengthwise = dot(first, u)
+        flat = along(first, -lengthwise, u)
+        across = scale(1.0 / dot(flat, flat), cross(u, flat))
+        return scale(-lengthwise, across), cross(first, across)
+    D = dot(cross(first, u), last)
+    by_line = scale(1.0 / D, along(scale(dot(first, u), last), -dot(last, u), first))
+    return by_line, sub(u, cross(u, by_line))
+
+
+@routine
+def twist_rate(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, u: Vec) -> tuple[Vec, Vec, Vec]:
+    """Derivative of the twist of a rod by du, W and w."""
+    foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
+    head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
+    first_foot = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
+    first_head = turn(frame, vec(rod["head_axes"][0]))
+    foot_line, foot_body = spin_rate(rod["foot"], first_foot, foot, u)
+    head_line, head_body = spin_rate(rod["head"], first_head, head, u)
+    return sub(head_line, foot_line), scale(-1.0, foot_body), head_body
+
+
+@routine
+def put_slope(
+    rod: Record, carrier: Record, frame: Floats, lead: Floats, follow: Floats, a: Vec, b: Vec, c: Vec, slope: Floats
+) -> None:
+    """Derivative (6,) of a . (dH - dF) + b . W + c . w by the platform's velocity and angular velocity.
+
+    Parameters
+    ----------
+    follow : derivative of the carrier's coordinate (6,).
+    """
+    put_pose_slope(rod, frame, a, c, slope)
+    if carrier["carrier"] != NO_CARRIER:
+        by_carrier = carrier_rate(rod, carrier, lead, a, b)
+        for i in range(6):
+            slope[i] += by_carrier * follow[i]
+
+
+@routine
+def carrier_rate(rod: Record, carrier: Record, lead: Floats, a: Vec, b: Vec) -> float:
+    """Derivative of - a . F + b . W by the carrier's coordinate."""
+    axis = vec(carrier["carrier_axis"])
+    if carrier["carrier"] == CARRIAGE:
+        return -dot(a, axis)
+    arm = sub(carried_foot(rod, carrier, lead), vec(carrier["carrier_point"]))
+    return dot(b, axis) - dot(a, cross(axis, arm))
+
+
+@routine
+def put_follow(rod: Record, frame: Floats, own: Floats, u: Vec, follow: Floats) -> None:
+    """Derivative (6,) of the coordinate of a carrier that keeps the rod's length."""
+    put_pose_slope(rod, frame, u, NOWHERE, follow)
+    rate = carrier_rate(rod, rod, own, u, NOWHERE)
+    for i in range(6):
+        follow[i] /= -rate
+
+
+@routine
+def rod_rows(
+    rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, line: Floats, rows: Floats
+) -> None:
+    """Fill a rod's constraints."""
+    n, span = rod["first_row"], vec(line)
+    if rod["slides"] == 0 and (rod["carrier"] == NO_CARRIER or rod["carrier"] == SHARED):
+        rows[n] = own[SLIDE]
+        n += 1
+    if rod["foot"] == HINGE:
+        rows[n] = norm(span) * dot(vec(rod["foot_axes"][0]), vec(own[FOOT_LINE:HEAD_LINE]))
+        n += 1
+    if rod["head"] == HINGE:
+        rows[n] = norm(span) * dot(vec(rod["head_axes"][0]), vec(own[HEAD_LINE:COSINE]))
+        n += 1
+    if rod["twists"] == 1:
+        foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
+        head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
+        rows[n] = wrap(angle_to(scale(1.0 / norm(span), span), foot, head) - rod["twist"], 0.0)
+
+
+@routine
+def rod_slopes(
+    rod: Record,
+    carrier: Record,
+    frame: Floats,
+    lead: Floats,
+    own: Floats,
+    line: Floats,
+    follow: Floats,
+    slopes: Floats,
+) -> None:
+    """Fill the derivatives of a rod's constraints, and of its carrier's coordinate (`follow`)."""
+    n, span = rod["first_row"], vec(line)
+    u = scale(1.0 / norm(span), span)
+    if rod["carrier"] == CRANK or rod["carrier"] == CARRIAGE:
+        put_follow(rod, frame, own, u, follow)
+    elif rod["slides"] == 0:
+        put_slope(rod, carrier, frame, lead, follow, u, NOWHERE, NOWHERE, slopes[n])
+        n += 1
+    if rod["foot"] == HINGE:
+        axis = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
+        put_slope(rod, carrier, frame, lead, follow, axis, cross(axis, span), NOWHERE, slopes[n])
+        n += 1
+    if rod["head"] == HINGE:
+        axis = turn(frame, vec(rod["head_axes"][0]))
+        put_slope(rod, carrier, frame, lead, follow, axis, NOWHERE, cross(axis, span), slopes[n])
+        n += 1
+    if rod["twists"] == 1:
+        by_line, b, c = twist_rate(rod, carrier, frame, lead, own, u)
+        by_line = scale(1.0 / norm(span), along(by_line, -dot(by_line, u), u))
+        put_slope(rod, carrier, frame, lead, follow, by_line, b, c, slopes[n])

@@ -1,0 +1,1 @@
+"""Answers in the pose of the platform, its legs in closed form."""

@@ -1,0 +1,88 @@
+"""Between legs in closed form and joint coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..closure.close import HELD, close, closure_of
+from ..closure.configurations import Configurations
+from ..decomposition.leg_table import LegTable
+from ..description.mechanism import Mechanism
+from ..kernels.legs import records as K
+from ..motion.limits import within_turns
+from ..tolerances import TOLERANCES
+
+Floats = NDArray[np.float64]
+
+RESTARTS = 24
+"""Random starts for joints that closed forms do not tell and that do not close from where they began."""
+
+
+def settled(
+    mechanism: Mechanism, table: LegTable, poses: Floats, actuators: Floats, sides: Floats, begin: Floats | None
+) -> Floats:
+    """All joint coordinates, as deviations from home, (n, columns), of platforms and actuators at rest.
+
+    Parameters
+    ----------
+    poses, actuators : (n, 4, 4) [length], (n, n_a).
+    sides : which of its two solutions each leg takes, (n or 1, legs).
+    begin : where to start, (n or 1, columns): what a configuration leaves open (a rod's spin) is nearest to there.
+        None for home.
+    """
+    closure = closure_of(mechanism, whole=False)
+    found = np.zeros((len(poses), len(closure.scale)))
+    if begin is not None:
+        found[:] = begin
+    if not len(poses):
+        return found
+    read_into(table, poses, sides, found)
+    closure.put_actuators(found, actuators)
+    locked = frozenset(mechanism.actuator_names)
+    platform = (*HELD[:3], *((0.0,) * 3)) if mechanism.end_effector_is_joint else HELD
+    closing = close(closure, found, poses, locked=locked, platform=platform)
+    rng = np.random.default_rng(0)
+    for _ in range(RESTARTS):
+        rest = np.flatnonzero(closing.gap > TOLERANCES.position)
+        if not len(rest):
+            break
+        elsewhere = found[rest] + rng.uniform(-np.pi, np.pi, found.shape[1]) * closure.turning * ~closure.idle
+        closure.put_actuators(elsewhere, actuators[rest])
+        tried = close(closure, elsewhere, poses[rest], locked=locked, platform=platform)
+        better = tried.gap < closing.gap[rest]
+        closing.take(rest[better], tried, better)
+    within_turns(mechanism, closing.coordinates)
+    return closing.coordinates
+
+
+def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats) -> None:
+    """Write the coordinates that legs tell at poses (n, 4, 4) [length] into joint coordinates (n, columns)."""
+    from ..kernels.legs.answer import read_coordinates
+
+    read_coordinates(table.aimed, table.known, table.task, np.require(poses, requirements=["C", "W"]), sides, found)
+
+
+def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Floats:
+    """Which of its two solutions each leg takes in configurations, (n, legs); 0 where it has but one."""
+    sides = np.repeat(table.home_sides, len(start), axis=0)
+    choosing = np.flatnonzero(table.home_sides[0])
+    if not len(choosing):
+        return sides
+    closure = closure_of(mechanism, whole=False)
+    places = np.where(table.legs["kind"] == K.PIVOT, K.FOOT, K.CARRIER)
+    own = [table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in choosing]
+    if set(own) <= set(closure.actuated.tolist()):
+        present = np.zeros((len(start), len(closure.scale)))
+        closure.put_actuators(present, start.rows.actuators)
+    else:
+        present = start.coordinates
+    turning = closure.turning[own] > 0.0
+    off = []
+    for factor in (1.0, -1.0):
+        found = np.zeros_like(present)
+        read_into(table, start.rows.poses, factor * sides, found)
+        away = found[:, own] - present[:, own]
+        off.append(np.abs(np.where(turning, np.remainder(away + np.pi, 2.0 * np.pi) - np.pi, away)))
+    sides[:, choosing] *= np.where(off[0] <= off[1], 1.0, -1.0)
+    return sides

@@ -1,0 +1,181 @@
+"""Inverse kinematics of mechanisms whose every chain is a leg in closed form, in front of the engine for all others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..closure.close import Closing, measured
+from ..closure.configurations import Configurations, new_rows, put_rows
+from ..closure.solve import STRANGE, ClosureEngine
+from ..decomposition.leg_table import LegTable
+from ..description.mechanism import Mechanism
+from ..kernels.reaching import plan as P
+from ..kernels.threads import in_blocks
+from ..options import Options
+from ..reaching.solve import ReachingEngine
+from .coordinates import settled, sides_at
+
+Floats = NDArray[np.float64]
+
+ROWS_A_BLOCK = 1024
+
+
+class LegsEngine:
+    """Answers that legs in closed form reach in the working mode they start in; another engine gives all the others.
+
+    The constraints that legs leave on the pose complete what the task leaves open. What is out of reach, beyond a limit
+    or near a dead point, and what asks for another working mode, is answered as if there were no closed forms.
+    """
+
+    def __init__(self, table: LegTable, inner: ReachingEngine | ClosureEngine) -> None:
+        self.mechanism = inner.mechanism
+        self._table, self._inner = table, inner
+
+    def answer(
+        self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+    ) -> Configurations:
+        """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
+        if not options.exact and isinstance(self._inner, ReachingEngine):
+            return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
+        sides = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        rows = new_rows(self.mechanism, len(targets))
+        left = self._reach(targets, start, sides, keep_mode, rows)
+        if left == len(targets):
+            return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
+        others, rest = None, np.flatnonzero(rows.status != P.REACHED)
+        if left:
+            begin = start if start is None or len(start) == 1 else start.at(rest)
+            others = self._inner.answer(targets[rest], self._start(begin), options, keep_mode=keep_mode)
+            put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
+        begins = _begins(self.mechanism, self._table, start, sides)
+        return Configurations(
+            rows, partial(_coordinates, self.mechanism, self._table, rows, sides, begins, rest, others)
+        )
+
+    def follow(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        on_progress: Callable[[int, int], None] | None,
+    ) -> Configurations:
+        """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
+        return self._inner.follow(targets, self._start(start), options, on_progress)
+
+    def advance(self, targets: Floats, start: Configurations, options: Options) -> Configurations:
+        """Go on to targets (n, 4, 4) in the working mode of as many configurations."""
+        return self._inner.advance(targets, self._positioned(start), options)
+
+    def at(self, closing: Closing) -> Configurations:
+        """Configurations found on joint coordinates, as answers whose status is still to be told."""
+        return self._inner.at(closing)
+
+    def points(self, found: Configurations) -> Mapping[str, Floats]:
+        """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
+        return self._inner.points(self._positioned(found))
+
+    def assemble(self, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
+        """Forward kinematics, by the other engine."""
+        return self._inner.assemble(coordinates, values, seeded=seeded)
+
+    def _reach(
+        self, targets: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: P.Rows
+    ) -> int:
+        """Answer the rows that legs reach; how many they do not."""
+        from ..kernels.legs.answer import answer
+
+        table = self._table
+        task = table.task_within(STRANGE) if keep_mode else table.task
+        begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
+
+        def run(block: slice) -> int:
+            return answer(
+                table.legs,
+                table.limited,
+                table.cones,
+                table.driven,
+                task,
+                targets[block],
+                _part(begins, block),
+                _part(sides, block),
+                rows.status[block],
+                rows.poses[block],
+                rows.actuators[block],
+                rows.measures[block],
+            )
+
+        left = sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
+        if start is not None:
+            self._count_turns(start.rows.actuators, rows)
+        return left
+
+    def _count_turns(self, begin: Floats, rows: P.Rows) -> None:
+        """Count the angles of actuators that may turn more than once from those of a start (n or 1, n_a)."""
+        for driven in self._table.driven[(self._table.driven["turns"] == 1)]:
+            lo, hi, column = driven["lo"], driven["hi"], driven["column"]
+            if hi - lo > 2.0 * np.pi:
+                values = rows.actuators[:, column]  # a view
+                nearest = values - 2.0 * np.pi * np.round((values - begin[:, column]) / (2.0 * np.pi))
+                inside = (nearest >= driven["home"] + lo) & (nearest <= driven["home"] + hi)
+                values[:] = np.where(inside, nearest, values)
+
+    def _start(self, start: Configurations | None) -> Configurations | None:
+        return None if start is None else self._positioned(start)
+
+    def _positioned(self, start: Configurations) -> Configurations:
+        """Configurations as the other engine starts from them: with the positions that it stores."""
+        if not isinstance(self._inner, ReachingEngine) or self._inner.stores(start):
+            return start
+        found = self._inner.at(measured(self.mechanism, start.coordinates))
+        found.rows.status[:] = start.rows.status
+        return found
+
+
+def _part(array: Floats, block: slice) -> Floats:
+    """One for all rows, or those of a block; writable, as kernels are compiled for."""
+    own = array if len(array) == 1 else array[block]
+    return np.require(own, requirements=["C", "W"])
+
+
+def _begins(
+    mechanism: Mechanism, table: LegTable, start: Configurations | None, sides: Floats
+) -> Callable[[], Floats | None]:
+    """Gives the joint coordinates of a start, None for home.
+
+    Of a start that knows its coordinates no other way, the pose and the actuators are kept, not how it was found:
+    answers that start from each other would all stay in memory.
+    """
+    if start is None:
+        return lambda: None
+    if start.were_given:
+        given = start.coordinates
+        return lambda: given
+    return partial(settled, mechanism, table, start.rows.poses, start.rows.actuators, sides, None)
+
+
+def _coordinates(
+    mechanism: Mechanism,
+    table: LegTable,
+    rows: P.Rows,
+    sides: Floats,
+    begins: Callable[[], Floats | None],
+    rest: NDArray[np.intp],
+    others: Configurations | None,
+) -> Floats:
+    """Joint coordinates (n, columns) of answers, those of the other engine (`rest`) as it has them."""
+    own = np.setdiff1d(np.arange(len(rows.status)), rest)
+    begin = begins()
+    if begin is not None and len(begin) > 1:
+        begin = begin[own]
+    found = settled(
+        mechanism, table, rows.poses[own], rows.actuators[own], sides if len(sides) == 1 else sides[own], begin
+    )
+    if others is None:
+        return found
+    every = np.empty((len(rows.status), found.shape[1]))
+    every[own], every[rest] = found, others.coordinates
+    return every

@@ -1,0 +1,206 @@
+"""Legs in closed form: what they tell of a pose is what the closure engine measures there."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from pfabrik.closure.configurations import new_rows
+from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.description.home_mobility import end_effector_freedom
+from pfabrik.description.task import task_of
+from pfabrik.engine import engine_of
+from pfabrik.kernels.legs.answer import measure_rows, read_coordinates
+from pfabrik.motion.displacements import home_coordinates
+from pfabrik.options import Options
+from pfabrik.platform.coordinates import sides_at
+from pfabrik.platform.solve import LegsEngine
+
+SERVED = [name for name in pf.catalog() if isinstance(leg_table(pf.load(name)), LegTable)]
+IN_FRONT = [name for name in SERVED if isinstance(engine_of(pf.load(name)), LegsEngine)]
+COMPLETED = [name for name in IN_FRONT if leg_table(pf.load(name)).task["unset"][0]]
+TARGETS = 300
+
+
+@lru_cache
+def machine(name: str) -> pf.Mechanism:
+    return pf.load(name)
+
+
+def table(name: str) -> LegTable:
+    found = leg_table(machine(name))
+    assert isinstance(found, LegTable)
+    return found
+
+
+def poses_around_home(name: str, n: int, shift: float, turn: float, seed: int = 1) -> np.ndarray:
+    """Poses (n, 4, 4) up to `shift` [L] and `turn` [rad] away on each axis."""
+    rng, mechanism = np.random.default_rng(seed), machine(name)
+    poses = np.tile(mechanism.home_pose, (n, 1, 1))
+    poses[:, :3, 3] += rng.uniform(-shift, shift, (n, 3)) * mechanism.characteristic_length
+    poses[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-turn, turn, (n, 3))).as_matrix()
+    return poses
+
+
+@lru_cache
+def both(name: str) -> tuple[np.ndarray, Any, Any]:
+    """Targets in and out of reach, what legs alone reach of them, and what the engine behind answers."""
+    engine = engine_of(machine(name))
+    assert isinstance(engine, LegsEngine)
+    targets = poses_around_home(name, TARGETS, 0.25, 0.45)
+    rows = new_rows(machine(name), TARGETS)
+    engine._reach(targets, None, engine._table.home_sides, False, rows)
+    return targets, rows, engine._inner.answer(targets, None, Options(), keep_mode=False)
+
+
+def off(name: str, actuators: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Largest difference of actuator values, (n,) [L or rad]."""
+    mechanism = machine(name)
+    lengths = [mechanism.joint(each).type == "prismatic" for each in mechanism.actuator_names]
+    units = np.where(lengths, mechanism.characteristic_length, 1.0)
+    return np.abs((actuators - others) / units).max(axis=1)
+
+
+def constraints(name: str, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    own = table(name)
+    rows = np.zeros((len(poses), own.task["rows"][0]))
+    slopes = np.zeros((*rows.shape, 6))
+    measure_rows(own.legs, own.task, poses, own.home_sides, rows, slopes)
+    return rows, slopes
+
+
+@pytest.mark.parametrize("name", IN_FRONT)
+def test_legs_reach_what_the_engine_behind_reaches(name: str) -> None:
+    _, rows, behind = both(name)
+    reached = rows.status == pf.Status.REACHED
+    np.testing.assert_array_equal(reached, behind.rows.status == pf.Status.REACHED)
+    assert reached.any()
+    assert off(name, rows.actuators[reached], behind.rows.actuators[reached]).max() <= 1e-9
+
+
+@pytest.mark.parametrize("name", IN_FRONT)
+def test_answers_of_legs_are_closed_and_within_limits(name: str) -> None:
+    targets, rows, _ = both(name)
+    reached = rows.status == pf.Status.REACHED
+    answers = pf.solve_ik(machine(name), targets[reached])
+    np.testing.assert_array_equal(answers.actuators, rows.actuators[reached])
+    assert pf.closure_residual(answers).max() <= 1e-9 * machine(name).characteristic_length
+    assert all(margin.min() >= -1e-8 for margin in pf.margins(answers).values())
+
+
+@pytest.mark.parametrize("name", SERVED)
+def test_coordinates_told_by_legs_are_those_of_closed_loops(name: str) -> None:
+    own, mechanism = table(name), machine(name)
+    answers = pf.solve_ik(mechanism, poses_around_home(name, 40, 0.1, 0.2, seed=4))
+    at_home = np.asarray(answers.status) == pf.Status.REACHED
+    poses = np.ascontiguousarray(answers.pose[at_home])
+    told = np.zeros((len(poses), len(mechanism.coordinate_names)))
+    read_coordinates(own.aimed, own.known, own.task, poses, own.home_sides, told)
+    columns = own.known["column"]
+    closed = answers.q[at_home] - home_coordinates(mechanism)
+    away = (told - closed)[:, columns] / own.known["unit"]
+    away = np.where(own.known["unit"] == 1.0, np.remainder(away + np.pi, 2 * np.pi) - np.pi, away)
+    assert np.abs(away).max(initial=0.0) <= 1e-9
+
+
+@pytest.mark.parametrize("name", [name for name in SERVED if table(name).task["rows"][0]])
+def test_derivatives_of_constraints_are_their_differences(name: str) -> None:
+    length, step = machine(name).characteristic_length, 1e-6
+    poses = poses_around_home(name, 20, 0.03, 0.08)
+    rows, slopes = constraints(name, poses)
+    assert np.abs(rows).max() > 1e-3
+    for axis in range(6):
+        moved = []
+        for sign in (1.0, -1.0):
+            vector = sign * step * np.eye(3)[axis % 3]
+            other = poses.copy()
+            if axis < 3:
+                other[:, :3, 3] += vector * length
+            else:
+                other[:, :3, :3] = Rotation.from_rotvec(vector).as_matrix() @ other[:, :3, :3]
+            moved.append(constraints(name, other)[0])
+        np.testing.assert_allclose(slopes[:, :, axis], (moved[0] - moved[1]) / (2 * step), atol=1e-7)
+
+
+@pytest.mark.parametrize("name", [name for name in SERVED if table(name).task["rows"][0]])
+def test_constraints_leave_the_freedom_of_the_mechanism(name: str) -> None:
+    rows, slopes = constraints(name, machine(name).home_pose[None].copy())
+    assert np.abs(rows).max() <= 1e-12
+    columns = slice(0, 3) if machine(name).end_effector_is_joint else slice(0, 6)
+    rank = np.linalg.matrix_rank(slopes[0][:, columns], tol=1e-6)
+    assert rank == columns.stop - end_effector_freedom(machine(name), frozenset())
+
+
+@pytest.mark.parametrize("name", COMPLETED)
+def test_completed_poses_have_what_the_task_sets(name: str) -> None:
+    targets, rows, _ = both(name)
+    reached = rows.status == pf.Status.REACHED
+    position, rotation = task_of(machine(name)).errors(rows.poses[reached], targets[reached])
+    assert position.max() <= 1e-12 * machine(name).characteristic_length
+    assert rotation.max() <= 1e-12
+
+
+@pytest.mark.parametrize("name", ["delta", "prs", "agile_eye"])
+def test_a_start_keeps_its_working_mode(name: str) -> None:
+    mechanism = machine(name).without_limits()
+    home = pf.solve_ik(mechanism, mechanism.home_pose)
+    modes = pf.working_modes(mechanism, mechanism.home_pose)
+    others = [each for each in modes if each and np.abs(each.pose - mechanism.home_pose).max() < 1e-6]
+    start = max(others, key=lambda each: off(name, each.actuators[None], home.actuators[None])[0])
+    assert off(name, start.actuators[None], home.actuators[None])[0] > 0.1
+    near = poses_around_home(name, 30, 0.01, 0.02)
+    engine = engine_of(mechanism)
+    assert isinstance(engine, LegsEngine)
+    rows = new_rows(mechanism, len(near))
+    engine._reach(near, start._found, sides_at(mechanism, engine._table, start._found), True, rows)
+    behind = engine._inner.answer(near, start._found, Options(), keep_mode=True)
+    assert (rows.status == pf.Status.REACHED).all()
+    assert off(name, rows.actuators, behind.rows.actuators).max() <= 1e-9
+    answers = pf.solve_ik(mechanism, near, start=start)
+    assert pf.closure_residual(answers).max() <= 1e-9 * mechanism.characteristic_length
+
+
+@pytest.mark.parametrize("name", ["nrpm", "serial_arm"])
+def test_a_chain_that_is_no_leg_is_named_with_the_reason(name: str) -> None:
+    reason = leg_table(machine(name))
+    assert isinstance(reason, str)
+    assert reason.startswith("sub-chain ")
+
+
+@pytest.mark.parametrize("name", ["delta", "rps", "canfield", "stewart", "rrr"])
+def test_feasibility_is_the_least_margin_and_tells_what_is_reached(name: str) -> None:
+    mechanism = machine(name)
+    targets = poses_around_home(name, 120, 0.25, 0.0 if name == "rrr" else 0.45)
+    if name == "rrr":
+        targets[:, 2, 3] = mechanism.home_pose[2, 3]
+    found = pf.feasibility(mechanism, targets)
+    answers = pf.solve_ik(mechanism, targets, options=Options(working_mode="keep"))
+    reached = np.asarray(answers.status) == pf.Status.REACHED
+    np.testing.assert_array_equal(found.margin > 0.0, reached)
+    assert 0 < reached.sum() < len(reached)
+    least = np.min(list(pf.margins(answers[reached]).values()), axis=0)
+    np.testing.assert_allclose(found.margin[reached], least, atol=1e-9)
+    bounds = {found.limits[each][1] for each in found.binding}
+    assert bounds <= {"min", "max", "cone", "reach", "closed"}
+    for row in np.flatnonzero(reached)[:10]:
+        named = pf.margins(answers[row])[found.limits[found.binding[row]]]
+        assert named == pytest.approx(found.margin[row], abs=1e-9)
+
+
+def test_feasibility_of_one_target_is_a_number_and_of_no_pose_unknown() -> None:
+    mechanism = machine("delta")
+    assert pf.feasibility(mechanism, mechanism.home_pose).margin > 0.0
+    broken = np.stack([mechanism.home_pose, np.full((4, 4), np.nan)])
+    found = pf.feasibility(mechanism, broken)
+    assert np.isnan(found.margin[1])
+    assert found.binding[1] == -1
+
+
+def test_feasibility_without_closed_forms_says_why() -> None:
+    with pytest.raises(pf.errors.UnsupportedMechanism, match="no legs in closed form"):
+        pf.feasibility(machine("nrpm"), machine("nrpm").home_pose)
