@@ -195,7 +195,7 @@ def excess_of_joints(mechanism: Mechanism, solution: Solution) -> Array:
     mechanism = with_axes(mechanism)
     moved = deviations(mechanism, solution)
     placed, _ = placed_bodies(mechanism, moved)
-    worst = np.zeros(len(moved[mechanism.joints[0].name]))
+    worst = np.zeros(len(placed[mechanism.base]))
     for joint in mechanism.joints:
         if joint.range is not None:
             values = moved[joint.name] + np.ravel(mechanism.home_coordinate(joint.name))

@@ -121,7 +121,7 @@ def arm_slacks(mechanism: Mechanism, wanted: oracles.Array, values: oracles.Arra
     """Smallest slack of every arm at the swings and extensions among actuator values (n, n_a), shape (n, arms)."""
     column = mechanism.actuator_names.index
     slacks = []
-    for arm in oracles._arms(mechanism):
+    for arm in oracles.arms(mechanism):
         swing, extension = values[:, column(arm.hinge.name)], values[:, column(arm.slide.name)]
         slacks.append(arm.lines(wanted, swing).slack(extension))
     return np.stack(slacks, axis=1)
@@ -134,7 +134,7 @@ def test_redundant_answers_close_and_keep_every_limit() -> None:
     wanted, values = wanted[answer.reached], answer.actuators[answer.reached]
     assert (arm_slacks(mechanism, wanted, values) > -ON_THE_EDGE).all()
     column = mechanism.actuator_names.index
-    for arm in oracles._arms(mechanism):
+    for arm in oracles.arms(mechanism):
         table = arm.lines(wanted, values[:, column(arm.hinge.name)]).table
         extension = values[:, column(arm.slide.name)]
         for j, strut in enumerate(arm.struts):
@@ -218,7 +218,7 @@ def test_a_tip_has_no_orientation() -> None:
 
 def grid_of(mechanism: Mechanism) -> oracles.Array:
     """All candidates of an arm, (c, 2); the arms are alike."""
-    arm = oracles._arms(mechanism)[0]
+    arm = oracles.arms(mechanism)[0]
     sides = [np.linspace(*joint.range, arms.CANDIDATES_A_SIDE) for joint in (arm.hinge, arm.slide)]
     return np.stack(np.meshgrid(*sides, indexing="ij")).reshape(2, -1).T
 
@@ -231,14 +231,14 @@ def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(started: bool
     starts = np.tile([mechanism.home_coordinate(name) for name in mechanism.actuator_names], (len(wanted), 1))
     if started:
         rng = np.random.default_rng(4)
-        for arm in oracles._arms(mechanism):
+        for arm in oracles.arms(mechanism):
             for joint in (arm.hinge, arm.slide):
                 starts[:, column(joint.name)] = rng.uniform(*joint.range, len(wanted))
     answer = pf.geometric.solve_ik(mechanism, wanted, start=SimpleNamespace(actuators=starts) if started else None)
     grid = grid_of(mechanism)
     found = np.ones(len(wanted), bool)
     stayed = 0
-    for arm in oracles._arms(mechanism):
+    for arm in oracles.arms(mechanism):
         columns = [column(arm.hinge.name), column(arm.slide.name)]
         size = np.ptp([arm.hinge.range, arm.slide.range], axis=1)
         keeps = arm.lines(wanted, starts[:, columns[0]]).slack(starts[:, columns[1]]) >= 0

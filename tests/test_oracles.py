@@ -313,7 +313,7 @@ def test_nrpm_margin_agrees_with_another_search_near_the_boundary() -> None:
 
 def test_nrpm_margin_does_not_depend_on_how_finely_it_is_searched() -> None:
     mechanism, targets = sample("nrpm", 100)
-    finer = [oracles._best_arm(arm, targets, cells=240, peaks=6, steps=55)[0] for arm in oracles._arms(mechanism)]
+    finer = [oracles._best_arm(arm, targets, cells=240, peaks=6, steps=55)[0] for arm in oracles.arms(mechanism)]
     assert oracles.margin(mechanism, targets) == pytest.approx(np.min(finer, axis=0), abs=oracles.ACCURACY)
 
 

@@ -213,7 +213,7 @@ def test_a_path_starts_from_a_single_feasible_answer_of_its_machine() -> None:
     other = pf.solve_ik(pf.load("five_bar"), pf.load("five_bar").reference_point)
     unknown = pf.solve_ik(machine, [[np.nan] * 3], options=Options(on_invalid="mark"))[0]
     for seed in (pair, other, unknown, machine.home_pose):
-        with pytest.raises(InvalidArgument, match="seed"):
+        with pytest.raises(InvalidArgument, match="start"):
             pf.track(machine, [machine.reference_point], start=seed)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 import reprlib
-import sys
 from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Literal
@@ -74,7 +74,7 @@ class Options:
         for name in ("tolerance", "rotation_tolerance", "rotation_length", "actuator_tolerance"):
             value = getattr(self, name)
             optional = name in ("tolerance", "rotation_length") and value is None
-            if not optional and not (_is_a(Real, value) and 0.0 < value <= sys.float_info.max):
+            if not optional and not (_is_a(Real, value) and _is_positive(value)):
                 raise InvalidArgument(f"options.{name}", reprlib.repr(value), "a positive number")
         for name in ("max_iterations", "max_rounds"):
             value = getattr(self, name)
@@ -90,6 +90,14 @@ class Options:
 def _is_a(kind: type, value: object) -> bool:
     """Whether a value is such a number; a truth value is none."""
     return isinstance(value, kind) and not isinstance(value, bool)
+
+
+def _is_positive(value: float) -> bool:
+    """Whether a number of any type is positive and, as a float, finite."""
+    try:
+        return 0.0 < float(value) < math.inf
+    except OverflowError:  # an integer or a fraction too large for a float
+        return False
 
 
 def checked_options(options: Options | None) -> Options:

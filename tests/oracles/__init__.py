@@ -7,6 +7,7 @@ feasible pose nearest to a target, `search` a blind search for a configuration t
 from .closed_forms import (
     Array,
     actuators,
+    arms,
     edge,
     inside_targets,
     leg_lengths,
@@ -20,6 +21,7 @@ from .closed_forms import (
 __all__ = [
     "Array",
     "actuators",
+    "arms",
     "edge",
     "inside_targets",
     "leg_lengths",

@@ -39,7 +39,7 @@ def margin(mechanism: Mechanism, targets: Array) -> Array:
         return working_mode_margins(mechanism, targets).max(axis=1)
     if topology == "stewart":
         return _stewart_slacks(mechanism, targets).min(axis=1)
-    return np.min([_best_arm(arm, targets)[0] for arm in _arms(mechanism)], axis=0)
+    return np.min([_best_arm(arm, targets)[0] for arm in arms(mechanism)], axis=0)
 
 
 def reachable(mechanism: Mechanism, targets: Array) -> Bools:
@@ -461,7 +461,7 @@ def _best_arm(
     return tuple(table[:, np.arange(n), winner])
 
 
-def _arms(mechanism: Mechanism) -> list[_Arm]:
+def arms(mechanism: Mechanism) -> list[_Arm]:
     return [_arm(mechanism, joint) for joint in mechanism.joints if joint.type == "revolute"]
 
 
@@ -476,7 +476,7 @@ def _arm(mechanism: Mechanism, hinge: Joint) -> _Arm:
 
 def _nrpm_values(mechanism: Mechanism, targets: Array) -> dict[str, Array]:
     values = {}
-    for arm in _arms(mechanism):
+    for arm in arms(mechanism):
         _, phi, d = _best_arm(arm, targets)
         values[arm.hinge.name], values[arm.slide.name] = phi, d
         table = arm.lines(targets, phi).table
