@@ -437,7 +437,7 @@ def test_a_machine_for_the_closure_engine_is_shown_checked_solved_and_tracked(
 ) -> None:
     path = upu(tmp_path / "upu.toml")
     (tmp_path / "path.csv").write_text("x,y,z\n0,0,131\n3,4,135\n")
-    assert re.search(r"3 +U-P\*-U +closure", run("info", path).stdout)
+    assert re.search(r"3 +U-P\*-U +legs", run("info", path).stdout)
     checked = run("check", path)
     assert (checked.exit_code, checked.stderr) == (0, "")
     ik, fk = run("ik", path, "--position", 3, 4, 135), run("fk", path, 143.003, 143.365, 145.761)

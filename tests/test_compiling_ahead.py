@@ -31,12 +31,8 @@ print(double(float(sys.argv[1])))
 def test_every_kernel_is_compiled_for_the_types_that_questions_have() -> None:
     reported: list[str] = []
     ahead.compile_all(lambda name, seconds: reported.append(name))
-    assert reported == [
-        "reaching.solve_directly",
-        "closure.close",
-        "reaching.solve_by_iteration",
-        "closure.approach",
-    ]
+    assert {"reaching.solve_directly", "legs.answer", "closure.close", "closure.approach"} <= set(reported)
+    assert len(reported) == len(ahead.KERNELS)
     for name in ("stewart", "delta"):
         mechanism = pf.load(name)
         far = pf.solve_ik(mechanism, np.array(mechanism.reference_point) * 3.0)

@@ -81,6 +81,7 @@ def read_path(path: Path, mechanism: Mechanism) -> PathFile:
         raise WrongPath(path, [f"empty; {EXPECTED} in the first line"])
     (header_line, header), *rows = lines
     refuse(path, header_faults(header_line, header, mechanism))
+    note_misspelt(header)
     refuse(path, [fault for number, cells in rows for fault in row_faults(number, header, cells)])
     if not rows:
         raise WrongPath(path, ["no targets below the header"])
@@ -118,6 +119,14 @@ def header_faults(line: int, header: Sequence[str], mechanism: Mechanism) -> lis
     elif not any(name in KNOWN for name in header):
         faults.append(f"line {line}: no column of a pose; {EXPECTED}")
     return faults
+
+
+def note_misspelt(header: Sequence[str]) -> None:
+    """Say so where a further column is named nearly like one of a pose."""
+    for name in header:
+        hint = "" if name in KNOWN else near_miss(name, KNOWN)
+        if hint:
+            click.echo(f"pfabrik: note: column '{name}' goes out as it came in{hint}", err=True)
 
 
 def needed(mechanism: Mechanism) -> list[str]:

@@ -237,7 +237,8 @@ def _search(
 
 def _hits(best: Floats, tried: Floats, hits: NDArray[np.int64]) -> NDArray[np.int64]:
     """How often each leg has ended where it came nearest, (n, groups); 0 for those that reached."""
-    nearer, again = tried < (1.0 - SAME) * best, np.abs(tried - best) <= SAME * best
+    with np.errstate(invalid="ignore", over="ignore"):  # what is endlessly far off is neither nearer nor the same
+        nearer, again = tried < (1.0 - SAME) * best, np.abs(tried - best) <= SAME * best
     counted = np.where(nearer, 1, hits + again)
     return np.where(np.minimum(best, tried) <= TOLERANCES.limit, 0, counted)
 

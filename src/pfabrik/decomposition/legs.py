@@ -208,7 +208,7 @@ def _pivot(items: list[Item], n_carriers: int, is_reversed: bool) -> Pivot:
     ending = _ending(items[len(slides) :])
     if n_carriers or [item.kind for item in items[: len(slides)]] != ["P"] * len(slides) or ending is None:
         raise NoLeg("no pivot")
-    if slides and np.linalg.svd([item.axis for item in slides])[1].min() < TOLERANCES.alignment:
+    if len(slides) > 3 or (slides and np.linalg.svd([item.axis for item in slides])[1].min() < TOLERANCES.alignment):
         raise NoLeg("slides that are not independent")
     return Pivot(slides, ending, is_reversed)
 
@@ -275,6 +275,8 @@ def _checked_rod(carrier: Item | None, foot: Ending, middle: Sequence[Item], hea
     for ending, axes in ((foot, foot.items), (head, head.items[::-1])):
         if ending.kind in ("hinge", "cross") and _is_singular([item.axis for item in axes], line):
             raise NoLeg("a hinge along its rod")
+        if ending.kind == "triple" and any(abs(a.axis @ b.axis) > TOLERANCES.alignment for a, b in pairwise(axes)):
+            raise NoLeg("three hinges through a point that are not square to each other")
     if carrier is not None:
         if slides:
             raise NoLeg("a carrier below a sliding rod")
