@@ -19,17 +19,21 @@ def wrong_among(seeds: range, samples: int) -> dict[int, list[str]]:
 
 @pytest.mark.parametrize("batch", range(BATCHES))
 def test_what_a_machine_can_do_is_reached_from_home_and_nothing_aside_moves(batch: int) -> None:
-    """200 machines in all; of one in some hundreds a single target is missed, none of these."""
+    """200 machines in all."""
     assert not wrong_among(range(25 * batch, 25 * batch + 25), SAMPLES)
+
+
+ACROSS, OVER = (1654, 1722, 2258, 2650, 3088, 3495), (973, 3482)
+"""Machines that move across the base's z axis, so that they tilt and never yaw; and such as tilt upside down."""
+
+
+@pytest.mark.skipif(INTERPRETED, reason="the search takes minutes")
+@pytest.mark.parametrize("seed", [*ACROSS, *OVER])
+def test_a_far_target_is_found_where_the_machine_never_yaws_or_tilts_upside_down(seed: int) -> None:
+    assert not wrong_of(random_case(seed, 8))
 
 
 @pytest.mark.slow
 @pytest.mark.campaign
-def test_of_thousands_of_machines_hardly_any_misses_a_target_and_none_moves_what_is_aside() -> None:
-    wrong = wrong_among(range(1000, 4000), 8)
-    assert not [seed for seed, told in wrong.items() if any("aside" in each for each in told)]
-    assert len(wrong) <= 3000 * MOST_MISSED, wrong
-
-
-MOST_MISSED = 0.003
-"""Share of machines of which one target in eight may be missed: searches end, and some corners are narrow."""
+def test_of_thousands_of_machines_none_misses_a_target_or_moves_what_is_aside() -> None:
+    assert not wrong_among(range(1000, 4000), 8)

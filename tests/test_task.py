@@ -206,6 +206,17 @@ def test_the_yaw_is_the_twist_about_z() -> None:
     np.testing.assert_allclose(completed[:, 2, 2], b[:, 2, 2], rtol=0, atol=1e-12)
 
 
+def test_the_yaw_is_sharp_down_to_where_there_is_none() -> None:
+    rng = np.random.default_rng(7)
+    yaw, way = rng.uniform(-np.pi, np.pi, (2, 200))
+    tilt = np.pi - 10.0 ** rng.uniform(-6, 0, 200)
+    swings = Rotation.from_rotvec(tilt[:, None] * np.stack([np.cos(way), np.sin(way), 0.0 * way], axis=1))
+    level, turned = np.eye(4)[None].repeat(200, axis=0), np.eye(4)[None].repeat(200, axis=0)
+    level[:, :3, :3] = Rotation.from_euler("z", yaw[:, None]).as_matrix()
+    turned[:, :3, :3] = swings.as_matrix() @ level[:, :3, :3]
+    assert Task((True,) * 3, 1).errors(turned, level)[1].max() <= 1e-9
+
+
 def test_a_scara_takes_a_position_and_a_yaw_whatever_the_tilt_of_the_target() -> None:
     mechanism = closure.scara()
     q = np.random.default_rng(2).uniform(-1, 1, (N, 4)) * [2.2, 2.2, 45.0, 3.0]

@@ -111,9 +111,13 @@ def yaws(rotations: Floats) -> Floats:
     """The twists about z (...,) [rad], within half a turn, of matrices (..., 3, 3).
 
     R = S Rz(yaw), where S turns the z axis the shortest way to where it points. A rotation that turns z upside down has
-    none.
+    none; near it, the yaw is told from other entries of the matrix, as nothing cancels in them.
     """
-    return np.arctan2(rotations[..., 1, 0] - rotations[..., 0, 1], rotations[..., 0, 0] + rotations[..., 1, 1])
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(rotations, (-2, -1), (0, 1))
+    turns_most_about_x = xx >= yy
+    z, w = np.where(turns_most_about_x, (zx + xz, zy - yz), (zy + yz, xz - zx))  # half-angle sine and cosine, scaled
+    below = zz < 0.0
+    return np.asarray(np.arctan2(np.where(below, 2.0 * z * w, yx - xy), np.where(below, w * w - z * z, xx + yy)))
 
 
 def random_quaternions(n: int, rng: np.random.Generator) -> Floats:

@@ -9,9 +9,9 @@ import numpy as np
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..kernels.closure.loops import LOCKED
+from ..kernels.closure.loops import BASE_AXES
 from ..poses import pose
-from .close import MARGIN, close, closure_of
+from .close import EVERYTHING_FREE, MARGIN, close, closure_of
 from .descend import approached
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .starts import random_starts
@@ -60,10 +60,11 @@ def chanced_upon(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """
     closure, task = closure_of(mechanism, whole=False), task_of(mechanism)
     coordinates, poses = random_starts(closure, CHANCES, np.random.default_rng(0))
-    platform = [0.0] * 6
-    if follows_task(mechanism) and not has_parasitic_motion(mechanism):
+    rest = task.left_out
+    keeps_rest = follows_task(mechanism) and not has_parasitic_motion(mechanism)
+    if keeps_rest:
         poses = task.completed(poses, np.repeat(mechanism.home_pose[None], CHANCES, axis=0))
-        platform = [LOCKED if weight == 0.0 else 0.0 for weight in task.held]
-    found = close(closure, coordinates, poses, platform=platform, limits=True, margin=MARGIN)
+    platform, frame = (rest.held, rest.frame) if keeps_rest else (EVERYTHING_FREE, BASE_AXES)
+    found = close(closure, coordinates, poses, platform=platform, frame=frame, limits=True, margin=MARGIN)
     feasible = found.feasible
     return found.coordinates[feasible], found.poses[feasible]

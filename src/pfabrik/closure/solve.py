@@ -187,17 +187,19 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
     if not keep_mode:
         at_rest = follows or task.is_whole_pose
         if not at_rest:
-            _start_nearby(closure, found, targets)
+            _start_nearby(closure, found, targets, task.held)
         _search(closure, found, rows, wanted, held, at_rest=at_rest)
-    if not keep_mode and follows and has_parasitic_motion(closure.mechanism):
-        _start_nearby(closure, found, targets)  # in other ways of assembly, where this one does not reach
-        if asks_too_much(closure.mechanism) or len(chanced_upon(closure.mechanism)[0]) < NEARBY:
+    mechanism = closure.mechanism
+    if not keep_mode and follows and (has_parasitic_motion(mechanism) or asks_too_much(mechanism)):
+        held = task.held if has_parasitic_motion(mechanism) else HELD
+        _start_nearby(closure, found, targets, held)  # in other ways of assembly, where this one does not reach
+        if asks_too_much(mechanism) or len(chanced_upon(mechanism)[0]) < NEARBY:
             anywhere = task.completed(targets, begin)
-            _search(closure, found, np.arange(len(targets)), anywhere, task.held, at_rest=False)
+            _search(closure, found, np.arange(len(targets)), anywhere, held, at_rest=False)
     return found
 
 
-def _start_nearby(closure: Closure, found: Closing, targets: Floats) -> None:
+def _start_nearby(closure: Closure, found: Closing, targets: Floats, held: Weights) -> None:
     """Look for what does not reach yet from known configurations whose end effectors are nearest to the targets."""
     coordinates, poses = chanced_upon(closure.mechanism)
     task, rest = task_of(closure.mechanism), np.flatnonzero(~found.feasible)
@@ -209,7 +211,7 @@ def _start_nearby(closure: Closure, found: Closing, targets: Floats) -> None:
         rows, places = rest[waiting], places[waiting]
         start = np.where(closure.idle, found.coordinates[rows], coordinates[places])
         wanted = task.completed(targets[rows], poses[places])
-        found.improve(rows, _close_below(closure, start, wanted, task.held, STEPS))
+        found.improve(rows, _close_below(closure, start, wanted, held, STEPS))
 
 
 def _search(

@@ -51,6 +51,12 @@ class Task:
         """Weights that hold all that counts."""
         return self.weights(LOCKED, LOCKED)
 
+    @property
+    def left_out(self) -> Task:
+        """What does not count: with the tilt goes the yaw, with the yaw the tilt."""
+        x, y, z = self.axes
+        return Task((not x, not y, not z), 3 - self.rotations)
+
     def completed(self, targets: Floats, begin: Floats) -> Floats:
         """Targets (n, 4, 4), with what does not count as it is in other poses (n, 4, 4)."""
         wanted = targets.copy()

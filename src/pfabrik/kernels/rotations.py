@@ -97,9 +97,15 @@ def difference(R: Floats, S: Floats, out: Floats) -> None:
 def yaw_of(X: Floats) -> float:
     """The twist of a rotation about z [rad], within half a turn: of R = S Rz(yaw), where S turns z the shortest way.
 
-    The first three columns of X. Undefined where it turns z upside down.
+    The first three columns of X. Undefined where it turns z upside down; near that from entries that do not cancel.
     """
-    return math.atan2(X[1, 0] - X[0, 1], X[0, 0] + X[1, 1])
+    if X[2, 2] >= 0.0:
+        return math.atan2(X[1, 0] - X[0, 1], X[0, 0] + X[1, 1])
+    if X[0, 0] >= X[1, 1]:
+        z, w = X[2, 0] + X[0, 2], X[2, 1] - X[1, 2]
+    else:
+        z, w = X[2, 1] + X[1, 2], X[0, 2] - X[2, 0]
+    return math.atan2(2.0 * z * w, w * w - z * z)
 
 
 @inlined
