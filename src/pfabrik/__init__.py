@@ -11,6 +11,7 @@ Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, wor
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 Structure  decompose, SubChain; geometric (closed forms of the paper's machines); errors
+Exchange   interop (MuJoCo and URDF, in and out)
 
 Lengths are in the mechanism's own unit, angles in radians; a pose is a 4x4 matrix from platform to base coordinates;
 batch axes come first.
@@ -65,7 +66,7 @@ _HOMES = {
     "warm_up": "warm_up",
 }
 # Modules that are themselves public.
-_MODULES = ("errors", "geometric")
+_MODULES = ("errors", "geometric", "interop")
 
 __all__ = [
     "ActiveLimit",
@@ -94,6 +95,7 @@ __all__ = [
     "feasibility",
     "forward_jacobian",
     "geometric",
+    "interop",
     "inverse_jacobian",
     "load",
     "margins",
@@ -110,7 +112,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from . import errors, geometric
+    from . import errors, geometric, interop
     from .answers.differential import Mobility, Singularity, forward_jacobian, inverse_jacobian, mobility, singularity
     from .answers.limits import ActiveLimit
     from .answers.margins import margins

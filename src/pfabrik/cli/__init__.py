@@ -24,7 +24,12 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
 
 @click.command(
     cls=CommandGroup,
-    subcommands=("catalog", "new", "info", "check", "ik", "fk", "track", "travel", "compile", "demo", "reproduce"),
+    subcommands=(
+        *("catalog", "new", "info", "check"),
+        *("ik", "fk", "track", "travel"),
+        *("export",),
+        *("compile", "demo", "reproduce"),
+    ),
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

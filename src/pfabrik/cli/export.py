@@ -1,0 +1,60 @@
+"""``pfabrik export``: a mechanism as a file for another program. Each target is an option of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import pfabrik as pf
+
+from .mech import MECH, STANDARD_INPUT, load
+from .whole import whole_file
+
+if TYPE_CHECKING:
+    from ..description.mechanism import Mechanism
+
+
+def mjcf(mechanism: Mechanism) -> str:
+    """A MuJoCo model."""
+    return pf.interop.to_mjcf(mechanism)
+
+
+TARGETS: dict[str, tuple[Callable[[Mechanism], str], str]] = {
+    "mjcf": (mjcf, "A MuJoCo model, which starts closed; what weighs and drives it is made up."),
+}
+"""Name of an option -> the text that a mechanism becomes, and what the help says of it."""
+
+
+def one_option_each(command: Callable[..., Any]) -> Callable[..., Any]:
+    """An option for every target, which takes the file to write."""
+    for name, (_, said) in reversed(TARGETS.items()):
+        command = click.option(f"--{name}", type=click.Path(path_type=Path), metavar="FILE", help=said)(command)
+    return command
+
+
+@click.command()
+@click.argument("mech", type=MECH)
+@one_option_each
+@click.option("--force", is_flag=True, help="Replace files that exist.")
+def export(mech: str, force: bool, **files: Path | None) -> int:
+    """Write a mechanism for another program.
+
+    One file for each option that is given; - is standard output.
+    """
+    wanted = {name: path for name, path in files.items() if path is not None}
+    if not wanted:
+        raise click.UsageError(f"say what to write: {', '.join(f'--{name} FILE' for name in TARGETS)}")
+    for path in wanted.values():
+        if path.exists() and not force:
+            raise click.ClickException(f"{path}: exists already; --force replaces it")
+    mechanism = load(mech)
+    for name, path in wanted.items():
+        text = TARGETS[name][0](mechanism)
+        with whole_file(path, [] if mech == STANDARD_INPUT else [Path(mech)]) as handle:
+            handle.write(text)
+        if path != Path("-"):
+            click.echo(f"wrote {path}", err=True)
+    return 0

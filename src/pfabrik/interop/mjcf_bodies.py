@@ -1,0 +1,152 @@
+"""The bodies of a MuJoCo model: where they are, what joints they hang on, what they weigh, and what is seen of them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.home_mobility import universal_axes
+from ..description.joint_types import KINDS
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
+from .cuts import Branch, CutTree, unique
+from .physics import Physics
+
+REFERENCE_POINT = "reference_point"
+"""Name of the site that targets place."""
+
+THICKNESS = 0.015
+"""Radius of what is drawn of a link [L]."""
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names of the sites of a model.
+
+    Attributes
+    ----------
+    sites : joint -> the site at its centre, on its first body.
+    ends : joint that is cut -> the site at its centre on its second body.
+    reference : of the site at the reference point.
+    """
+
+    sites: Mapping[str, str]
+    ends: Mapping[str, str]
+    reference: str
+
+
+def names_of(mechanism: Mechanism, tree: CutTree) -> Names:
+    """Names for all sites: those of their joints."""
+    taken = {joint.name for joint in mechanism.joints}
+    sites = {name: name for name in taken}
+    ends = {joint.name: unique(f"{joint.name}:end", taken) for joint in tree.cuts}
+    return Names(sites, ends, unique(REFERENCE_POINT, taken))
+
+
+def vector(values: Floats) -> str:
+    """Numbers as an attribute, each the shortest that reads back as it is."""
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def as_attributes(values: Mapping[str, float]) -> dict[str, str]:
+    """Numbers by name as attributes."""
+    return {name: repr(value) for name, value in values.items()}
+
+
+def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, physics: Physics) -> ET.Element:
+    """All bodies as a tree, the base fixed to the world; frames parallel at home, each at the joint it hangs on."""
+    world = ET.Element("worldbody")
+    elements = {mechanism.base: ET.SubElement(world, "body", name=mechanism.base)}
+    origins = {mechanism.base: np.zeros(3)}
+    points = _points(mechanism, metres)
+    for branch in tree.branches:
+        parent, at = origins[branch.parent], branch.joint.at
+        origin = parent if at is None else np.array(at) * metres
+        body = ET.SubElement(elements[branch.parent], "body", name=branch.body, pos=vector(origin - parent))
+        elements[branch.body], origins[branch.body] = body, origin
+        for attributes in _joints(mechanism, branch, metres, physics):
+            ET.SubElement(body, "joint", attributes)
+        body.append(_inertial(branch.body, points.get(branch.body, [origin]), origin, physics))
+    for name in mechanism.bodies:
+        elements[name].extend(_drawn(points[name], origins[name], physics))
+    for site, body_name, point in _sites(mechanism, tree, names, metres):
+        place = vector(point - origins[body_name])
+        ET.SubElement(elements[body_name], "site", name=site, pos=place, size=repr(2.0 * THICKNESS * physics.length))
+    return world
+
+
+def _points(mechanism: Mechanism, metres: float) -> Mapping[str, list[Floats]]:
+    """Body -> the joint centres on it, and the reference point on the end effector, at home [m]."""
+    points: dict[str, list[Floats]] = defaultdict(list)
+    for joint in mechanism.joints:
+        if joint.at is not None:
+            for body in joint.connects:
+                points[body].append(np.array(joint.at) * metres)
+    points[mechanism.end_effector_body].append(np.array(mechanism.reference_point) * metres)
+    return {body: points[body] or [np.zeros(3)] for body in mechanism.bodies}
+
+
+def _sites(mechanism: Mechanism, tree: CutTree, names: Names, metres: float) -> Iterator[tuple[str, str, Floats]]:
+    """Every site: its name, its body and where it is at home [m]."""
+    reference = np.array(mechanism.reference_point) * metres
+    for joint in mechanism.joints:
+        place = reference if joint.at is None else np.array(joint.at) * metres
+        if joint.at is not None or joint in tree.cuts:
+            yield names.sites[joint.name], joint.connects[0], place
+        if joint in tree.cuts:
+            yield names.ends[joint.name], joint.connects[1], place
+    yield names.reference, mechanism.end_effector_body, reference
+
+
+def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physics) -> Iterator[dict[str, str]]:
+    """Attributes of the joints that a body hangs on, from its parent outward: one for each coordinate, or a ball."""
+    joint = branch.joint
+    if joint.type == "spherical":
+        yield {"name": joint.name, "type": "ball"} | as_attributes(physics.joint(True, False))
+        return
+    kinds = KINDS[joint.type].coordinates
+    pairs = (joint.range,) if len(kinds) == 1 else joint.range or (None,) * len(kinds)
+    homes = np.ravel(mechanism.home_coordinate(joint.name))
+    order = range(len(kinds))
+    for index in order if branch.forward else reversed(order):
+        turning = kinds[index] == "angle"
+        unit = 1.0 if turning else metres
+        attributes = {
+            "name": joint.name if len(kinds) == 1 else f"{joint.name}[{index}]",
+            "type": "hinge" if turning else "slide",
+            "axis": vector(_axes(mechanism, joint)[index] * (1.0 if branch.forward else -1.0)),
+        }
+        if homes[index]:
+            attributes["ref"] = repr(float(homes[index]) * unit)
+        if pairs[index] is not None:
+            attributes["range"] = vector(np.array(pairs[index]) * unit)
+        yield attributes | as_attributes(physics.joint(turning, joint.actuated))
+
+
+def _axes(mechanism: Mechanism, joint: Joint) -> Floats:
+    """The axes of a joint's coordinates at home, (coordinates, 3)."""
+    if joint.type == "universal":
+        return universal_axes(mechanism, joint)
+    return np.array([mechanism.home_axis(joint.name)] * len(KINDS[joint.type].coordinates))
+
+
+def _inertial(body: str, points: list[Floats], origin: Floats, physics: Physics) -> ET.Element:
+    mass, centre, moment = physics.inertia(body, np.array(points))
+    place = vector(centre - origin)
+    return ET.Element("inertial", mass=repr(mass), pos=place, diaginertia=vector(np.full(3, moment)))
+
+
+def _drawn(points: list[Floats], origin: Floats, physics: Physics) -> Iterator[ET.Element]:
+    """Thin rods from the middle of a body to its joints; they touch nothing and weigh nothing."""
+    middle = np.mean(points, axis=0)
+    radius = THICKNESS * physics.length
+    for point in points:
+        if np.linalg.norm(point - middle) > radius:
+            ends = vector(np.concatenate([middle - origin, point - origin]))
+            through = {"contype": "0", "conaffinity": "0", "mass": "0", "group": "1"}
+            yield ET.Element("geom", {"type": "capsule", "fromto": ends, "size": repr(radius), **through})

@@ -1,0 +1,145 @@
+"""A mechanism as a MuJoCo model that starts closed: a tree of bodies, and equalities where loops are cut."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..poses import as_floats
+from .cuts import CutTree, cut_tree
+from .mjcf_bodies import Names, as_attributes, bodies, names_of, vector
+from .physics import STEP, Physics, physics
+from .units import metres_of
+
+NOTE = "pfabrik."
+"""How the names of custom elements begin that hold what MuJoCo has no word for."""
+
+CLOSING_TIME = 2.5 * STEP
+"""Time constant by which equalities close what opens [s]: MuJoCo asks for two steps at least."""
+
+
+def to_mjcf(
+    mechanism: Mechanism,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    masses: Mapping[str, float] | None = None,
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+) -> str:
+    """A mechanism as a MuJoCo model, which starts closed, at home, and stays closed.
+
+    Lengths become metres, and every joint counts as it does in the mechanism: `qpos` of a hinge or slide is the
+    coordinate [rad or m]. Loops are cut at ball joints, which become `connect`; a loop without one gets a twin of a
+    body, of hardly any mass, welded to it. Sites are at all joints and at the reference point; actuated joints have
+    position servos; there is a keyframe `home`. Cones, which MuJoCo does not know, are told in comments and kept in
+    custom elements, as are base, end effector and task.
+
+    Parameters
+    ----------
+    path : the file to write; None writes none.
+    masses : body -> its mass [kg]. Those not given are made up, in proportion to the machine: what the model weighs,
+        and so every force in it, means nothing until they are.
+    gravity : [m/s²]; none by default, for with masses made up, its forces would be too.
+
+    Returns
+    -------
+    The text of the model.
+
+    Raises
+    ------
+    UnknownName, InvalidArgument : a mass of no body, or not positive; gravity that is no vector; a unit of length
+        that is not known.
+    """
+    metres = metres_of(checked_mechanism(mechanism).length_unit)
+    pull = as_floats("gravity", gravity, "three numbers [m/s²]")
+    weights = physics(mechanism, metres, masses)
+    text = _text(mechanism, metres, weights, pull)
+    if path is not None:
+        Path(path).write_text(text, encoding="utf-8")
+    return text
+
+
+def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats) -> str:
+    """The whole model, element by element."""
+    tree = cut_tree(mechanism)
+    names = names_of(mechanism, tree)
+    root = ET.Element("mujoco", model=mechanism.name)
+    for comment in _comments(mechanism, physics):
+        root.append(ET.Comment(f" {comment} ".replace("--", "- -")))
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    ET.SubElement(
+        root, "option", timestep=repr(STEP), integrator="implicitfast", tolerance="1e-12", gravity=vector(gravity)
+    )
+    custom = ET.SubElement(root, "custom")
+    for name, text in _notes(mechanism):
+        ET.SubElement(custom, "text", name=NOTE + name, data=text)
+    root.append(bodies(mechanism, tree, names, metres, physics))
+    root.append(_equalities(tree, names, physics))
+    root.append(_servos(mechanism, metres, physics))
+    home = " ".join(repr(value) for value in _home(mechanism, metres))
+    ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="home", ctrl=home)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _comments(mechanism: Mechanism, physics: Physics) -> Iterator[str]:
+    """What a reader of the file should know."""
+    yield f"'{mechanism.name}', written by pfabrik: lengths in m, where its own file has {mechanism.length_unit}"
+    made_up = [body for body in mechanism.bodies if body not in physics.given and body != mechanism.base]
+    if made_up:
+        yield f"masses are made up, in proportion to the machine, of {', '.join(made_up)}"
+    for joint in mechanism.joints:
+        if joint.cone is not None:
+            half_angle = f"{np.degrees(joint.cone.half_angle):.6g} deg"
+            yield f"a limit that MuJoCo does not keep: the cone of {joint.name}, {half_angle} about {joint.cone.axis}"
+
+
+def _notes(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
+    """What MuJoCo has no word for, for who reads the model back."""
+    yield "base", mechanism.base
+    yield "end_effector", mechanism.end_effector
+    yield "task", " ".join(mechanism.task)
+    for joint in mechanism.joints:
+        if joint.cone is not None:
+            cone = joint.cone
+            yield f"cone.{joint.name}", f"{vector(np.array(cone.axis))} {cone.half_angle!r} {cone.fixed_to}"
+
+
+def _equalities(tree: CutTree, names: Names, physics: Physics) -> ET.Element:
+    """What keeps the loops closed; stiff, for the kinematics are what counts."""
+    stiff = {"solref": f"{CLOSING_TIME!r} 1", "solimp": f"0.999 0.9999 {1e-3 * physics.length!r}"}
+    equality = ET.Element("equality")
+    for joint in tree.cuts:
+        kind = "connect" if joint.type == "spherical" else "weld"
+        site1, site2 = names.sites[joint.name], names.ends[joint.name]
+        ET.SubElement(equality, kind, {"name": joint.name, "site1": site1, "site2": site2, **stiff})
+    for branch in tree.branches:
+        if branch.twin_of is not None:
+            ET.SubElement(equality, "weld", {"body1": branch.twin_of, "body2": branch.body, **stiff})
+    return equality
+
+
+def _servos(mechanism: Mechanism, metres: float, physics: Physics) -> ET.Element:
+    """A position servo for every actuated joint."""
+    actuator = ET.Element("actuator")
+    for name in mechanism.actuator_names:
+        joint = mechanism.joint(name)
+        turning = joint.type == "revolute"
+        gains = as_attributes(physics.servo(turning))
+        servo = ET.SubElement(actuator, "position", {"name": name, "joint": name, **gains})
+        if joint.range is not None:
+            servo.set("ctrlrange", vector(np.array(joint.range) * (1.0 if turning else metres)))
+    return actuator
+
+
+def _home(mechanism: Mechanism, metres: float) -> Iterator[float]:
+    """The actuated coordinates at home [rad or m]."""
+    for name in mechanism.actuator_names:
+        turning = mechanism.joint(name).type == "revolute"
+        yield float(np.ravel(mechanism.home_coordinate(name))[0]) * (1.0 if turning else metres)
