@@ -165,6 +165,22 @@ def test_a_start_keeps_its_working_mode(name: str) -> None:
     assert pf.closure_residual(answers).max() <= 1e-9 * mechanism.characteristic_length
 
 
+@pytest.mark.parametrize("name", ["delta", "rps", "canfield"])
+def test_an_answer_starts_the_next_one_as_its_joint_coordinates_do(name: str) -> None:
+    mechanism = machine(name)
+    before = pf.solve_ik(mechanism, mechanism.home_pose)
+    for target in poses_around_home(name, 4, 0.05, 0.02, seed=4):
+        found = pf.solve_ik(mechanism, target, start=before)
+        again = pf.solve_ik(mechanism, target, start=before.q)
+        assert found and again
+        np.testing.assert_allclose(
+            found.actuators, again.actuators, rtol=0, atol=1e-9 * (1.0 + abs(again.actuators)).max()
+        )
+        np.testing.assert_allclose(found.pose, again.pose, rtol=0, atol=1e-9 * mechanism.characteristic_length)
+        assert pf.closure_residual(found) <= 1e-9 * mechanism.characteristic_length
+        before = found
+
+
 @pytest.mark.parametrize("name", ["nrpm", "serial_arm"])
 def test_a_chain_that_is_no_leg_is_named_with_the_reason(name: str) -> None:
     reason = leg_table(machine(name))

@@ -102,6 +102,11 @@ def _is_positive(value: float) -> bool:
 
 def checked_options(options: Options | None) -> Options:
     """The options to use, the usual ones for None; InvalidArgument for anything else."""
-    if not isinstance(options, Options | None):
+    if options is None:
+        return USUAL
+    if not isinstance(options, Options):
         raise InvalidArgument("options", type(options).__name__, "Options, or None")
-    return options or Options()
+    return options
+
+
+USUAL = Options()

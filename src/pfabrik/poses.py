@@ -87,7 +87,7 @@ def _batch(shape: tuple[int, ...]) -> str:
 
 def as_floats(name: str, value: Any, expected: str) -> Floats:
     """`value` as an array of float64; InvalidArgument for text, ragged nests, complex, boolean and masked values."""
-    if np.ma.is_masked(value):
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise InvalidArgument(name, "an array with masked values", expected)
     try:
         array = np.asarray(value)
@@ -95,7 +95,12 @@ def as_floats(name: str, value: Any, expected: str) -> Floats:
         raise InvalidArgument(name, "a ragged nest of sequences", expected) from error
     if array.dtype.kind not in "iuf":
         raise InvalidArgument(name, f"{type(value).__name__} of dtype {array.dtype}", expected)
+    if array.dtype is DOUBLE and array.flags.carray:
+        return array
     return np.require(array, np.float64, ["C", "W"])  # the one memory layout that kernels are compiled for
+
+
+DOUBLE = np.dtype(np.float64)
 
 
 def _from_quaternion(name: str, value: Floats) -> Floats:

@@ -18,6 +18,7 @@ from ..kernels.threads import in_blocks
 from ..options import Options
 from ..reaching.solve import ReachingEngine
 from .coordinates import settled, sides_at
+from .one import LegAnswer, OneTarget
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +34,9 @@ class LegsEngine:
 
     def __init__(self, table: LegTable, inner: ReachingEngine | ClosureEngine) -> None:
         self.mechanism = inner.mechanism
-        self._table, self._inner = table, inner
+        self._table, self._inner, self._one = table, inner, OneTarget(self.mechanism, table)
+        driven = table.driven
+        self._turning = driven[(driven["turns"] == 1) & (driven["hi"] - driven["lo"] > 2.0 * np.pi)]
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -41,6 +44,10 @@ class LegsEngine:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
         if not options.exact and isinstance(self._inner, ReachingEngine):
             return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
+        if len(targets) == 1 and (start is None or isinstance(start, LegAnswer)):
+            found = self._reach_one(targets, start, keep_mode)
+            if found is not None:
+                return found
         sides = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
         rows = new_rows(self.mechanism, len(targets))
         left = self._reach(targets, start, sides, keep_mode, rows)
@@ -82,6 +89,16 @@ class LegsEngine:
         """Forward kinematics, by the other engine."""
         return self._inner.assemble(coordinates, values, seeded=seeded)
 
+    def _reach_one(self, target: Floats, start: LegAnswer | None, keep_mode: bool) -> LegAnswer | None:
+        """Answer one target from home or from an answer before, if legs reach it."""
+        one, rows = self._one, self._one.new_rows()
+        begin, sides = (one.home, one.home_sides) if start is None else (start.rows.poses, start.sides)
+        if not one.reach(target, begin, sides, rows, nearby=keep_mode):
+            return None
+        if start is not None:
+            self._count_turns(start.rows.actuators, rows)
+        return LegAnswer(self.mechanism, self._table, rows, sides, _begins(self.mechanism, self._table, start, sides))
+
     def _reach(
         self, targets: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: P.Rows
     ) -> int:
@@ -115,13 +132,11 @@ class LegsEngine:
 
     def _count_turns(self, begin: Floats, rows: P.Rows) -> None:
         """Count the angles of actuators that may turn more than once from those of a start (n or 1, n_a)."""
-        for driven in self._table.driven[(self._table.driven["turns"] == 1)]:
-            lo, hi, column = driven["lo"], driven["hi"], driven["column"]
-            if hi - lo > 2.0 * np.pi:
-                values = rows.actuators[:, column]  # a view
-                nearest = values - 2.0 * np.pi * np.round((values - begin[:, column]) / (2.0 * np.pi))
-                inside = (nearest >= driven["home"] + lo) & (nearest <= driven["home"] + hi)
-                values[:] = np.where(inside, nearest, values)
+        for driven in self._turning:
+            values = rows.actuators[:, driven["column"]]  # a view
+            nearest = values - 2.0 * np.pi * np.round((values - begin[:, driven["column"]]) / (2.0 * np.pi))
+            inside = (nearest >= driven["home"] + driven["lo"]) & (nearest <= driven["home"] + driven["hi"])
+            values[:] = np.where(inside, nearest, values)
 
     def _start(self, start: Configurations | None) -> Configurations | None:
         return None if start is None else self._positioned(start)

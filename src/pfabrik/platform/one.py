@@ -1,0 +1,70 @@
+"""One target at a time: what the kernel of the legs takes, prepared once for each machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from ..arrays import Floats
+from ..closure.configurations import Configurations
+from ..closure.solve import STRANGE
+from ..decomposition.leg_table import LegTable
+from ..description.mechanism import Mechanism
+from ..kernels.reaching import plan as P
+from .coordinates import settled
+
+
+class LegAnswer(Configurations):
+    """One target that legs reach, and which of its two solutions each leg takes there, (1, legs)."""
+
+    def __init__(
+        self, mechanism: Mechanism, table: LegTable, rows: P.Rows, sides: Floats, begin: Callable[[], Floats | None]
+    ) -> None:
+        """Wrap an answer; `begin` gives the joint coordinates from which its own are the nearest, None for home."""
+        super().__init__(rows, lambda: settled(mechanism, table, rows.poses, rows.actuators, sides, begin()))
+        self.sides = sides
+
+
+class OneTarget:
+    """A machine of legs, asked for one target after the other.
+
+    What takes microseconds beside the legs' own is done once: a question is one call, and its answer a few arrays.
+    """
+
+    def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
+        self._n_actuators = len(mechanism.actuator_names)
+        self._machine = table.legs, table.limited, table.cones, table.driven
+        self._task, self._task_nearby = table.task, table.task_within(STRANGE)
+        self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
+
+    @cached_property
+    def _kernel(self) -> Callable[..., int]:
+        from ..kernels.legs.answer import answer
+
+        return answer
+
+    def new_rows(self) -> P.Rows:
+        """Room for one answer."""
+        return P.Rows(
+            np.empty(1, np.int64),
+            np.zeros((1, 3), np.int64),
+            np.empty((1, 4, 4)),
+            np.empty((1, 0, 3)),
+            np.empty((1, 0)),
+            np.empty((1, self._n_actuators)),
+            np.zeros((1, 5)),
+        )
+
+    def reach(self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool) -> bool:
+        """Answer a target (1, 4, 4) if legs on these sides (1, legs) reach it; whether they do.
+
+        Parameters
+        ----------
+        begin : the pose from which it is completed, (1, 4, 4); only `nearby`, if so asked.
+        """
+        task = self._task_nearby if nearby else self._task
+        return not self._kernel(
+            *self._machine, task, target, begin, sides, rows.status, rows.poses, rows.actuators, rows.measures
+        )
