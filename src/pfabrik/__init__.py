@@ -64,6 +64,8 @@ _HOMES = {
     "singularity": "answers.differential",
     "solve_fk": "fk",
     "warm_up": "warm_up",
+    "Workspace": "workspace.result",
+    "workspace": "workspace.ask",
 }
 # Modules that are themselves public.
 _MODULES = ("errors", "geometric", "interop")
@@ -85,6 +87,7 @@ __all__ = [
     "Track",
     "Travel",
     "WorkingModes",
+    "Workspace",
     "__version__",
     "assembly_modes",
     "catalog",
@@ -109,6 +112,7 @@ __all__ = [
     "travel",
     "warm_up",
     "working_modes",
+    "workspace",
 ]
 
 if TYPE_CHECKING:
@@ -135,6 +139,8 @@ if TYPE_CHECKING:
     from .track import track
     from .travel import Travel, travel
     from .warm_up import warm_up
+    from .workspace.ask import workspace
+    from .workspace.result import Workspace
 
 
 def __getattr__(name: str) -> Any:

@@ -13,6 +13,7 @@ __all__ = [
     "Fault",
     "InvalidArgument",
     "InvalidMechanism",
+    "MissingLibrary",
     "MobilityWarning",
     "NoClosedForm",
     "PfabrikError",
@@ -181,3 +182,18 @@ class UnknownName(PfabrikError, KeyError):
 
     def __str__(self) -> str:
         return self._text
+
+
+class MissingLibrary(PfabrikError, ImportError):
+    """Something optional that is not installed; the message is the command that installs it.
+
+    Attributes
+    ----------
+    what : what needs it.
+    library : what is missing.
+    command : what installs it.
+    """
+
+    def __init__(self, what: str, library: str, command: str) -> None:
+        self.what, self.library, self.command = what, library, command
+        super().__init__(f"{what} need{'' if what.endswith('s') else 's'} {library}; install it with: {command}")

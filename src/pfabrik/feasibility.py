@@ -8,11 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .answers.starts import Start, start_of
 from .decomposition.leg_table import LegTable, leg_table
 from .decomposition.legs import LegForm, Rod
 from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism
 from .kernels.threads import in_blocks
+from .platform.coordinates import sides_at
 from .targets import Target, as_targets
 
 ROWS_A_BLOCK = 1024
@@ -37,15 +39,16 @@ class Feasibility(NamedTuple):
     limits: tuple[tuple[str, str], ...]
 
 
-def feasibility(mechanism: Mechanism, targets: Target) -> Feasibility:
-    """Margins of targets in home's working mode, by legs in closed form; nothing is projected or searched for.
+def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = None) -> Feasibility:
+    """Margins of targets in one working mode, by legs in closed form; nothing is projected or searched for.
 
     A target whose margin is positive is reached by `solve_ik`; one whose margin is negative may still be, in another
     working mode.
 
     Parameters
     ----------
-    targets : as of `solve_ik`; what the task leaves open is completed from home.
+    targets : as of `solve_ik`; what the task leaves open is completed from the start.
+    start : a single Solution or joint vector q whose working mode is meant; default home's.
 
     Raises
     ------
@@ -60,6 +63,10 @@ def feasibility(mechanism: Mechanism, targets: Target) -> Feasibility:
     poses, shape = as_targets(mechanism, targets)
     margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
     begin, sides = mechanism.home_pose[None].copy(), table.home_sides
+    if start is not None:
+        found = start_of(mechanism, start, ())
+        assert found is not None
+        begin, sides = np.require(found.rows.poses, requirements=["C", "W"]), sides_at(mechanism, table, found)
 
     def run(block: slice) -> None:
         measure(

@@ -1,0 +1,1 @@
+"""How big a workspace is, what bounds it, and where it is singular."""

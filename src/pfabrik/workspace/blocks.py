@@ -1,0 +1,88 @@
+"""Measuring many points: in blocks, here or on the workers of an executor, telling how far it is."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from concurrent.futures import Executor
+from functools import lru_cache
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .verdicts import Question
+
+POSES_A_BLOCK = 1 << 14
+"""Poses of a block: enough to be worth sending to another process."""
+
+SLOWER = 64
+"""How many times longer a pose takes that no closed form answers, at least: its blocks are as much smaller."""
+
+LOOKS = 4
+"""Looks at each cell of the border for the places where it crosses edges, about."""
+
+OnProgress = Callable[[int, int], None]
+
+
+class Measure:
+    """Measures the points of a question, and tells whoever wants to know how far it is.
+
+    Attributes
+    ----------
+    total : about how many points there will be, as far as can be told.
+    """
+
+    def __init__(self, question: Question, executor: Executor | None, on_progress: OnProgress | None) -> None:
+        self.question = question
+        self.total = 0
+        self._done = 0
+        self._executor, self._on_progress = executor, on_progress
+        self._sent = b"" if executor is None else pickle.dumps(question)
+        slower = 1 if question.has_margins else SLOWER
+        self._points_a_block = max(1, POSES_A_BLOCK // (slower * len(question.turns)))
+
+    def __call__(self, points: Floats) -> tuple[Floats, Ints]:
+        """Margins and bindings of points (n, d), as of `Question.measure`."""
+        blocks = [points[i : i + self._points_a_block] for i in range(0, len(points), self._points_a_block)]
+        if self._executor is None:
+            found = [self._told(self.question.measure(block), len(block)) for block in blocks]
+        else:
+            found = self._elsewhere(self._executor, blocks)
+        margins, bindings = [np.zeros(0)], [np.zeros(0, np.int64)]
+        for margin, binding in found:
+            margins.append(margin)
+            bindings.append(binding)
+        return np.concatenate(margins), np.concatenate(bindings)
+
+    def expect(self, cells: int, width: int, d: int) -> None:
+        """Count in what is still to come where so many cells of a width are at the border."""
+        ahead, points = 0, cells * 2**d
+        while width > 1:
+            ahead, points, width = ahead + points, points * 2 ** (d - 1), width // 2
+        self.total = self._done + ahead + LOOKS * points // 2**d
+
+    def _elsewhere(self, executor: Executor, blocks: list[Floats]) -> list[tuple[Floats, Ints]]:
+        """The blocks on an executor's workers; what has not begun is dropped where one fails, or is interrupted."""
+        futures = [executor.submit(measure_block, self._sent, block) for block in blocks]
+        try:
+            return [self._told(future.result(), len(block)) for future, block in zip(futures, blocks, strict=True)]
+        finally:
+            for future in futures:
+                future.cancel()
+
+    def _told(self, found: tuple[Floats, Ints], n: int) -> tuple[Floats, Ints]:
+        self._done += n
+        if self._on_progress is not None:
+            self._on_progress(self._done, max(self._done, self.total))
+        return found
+
+
+def measure_block(sent: bytes, points: Floats) -> tuple[Floats, Ints]:
+    """A block on a worker; the question, which many blocks share, is unpacked once."""
+    return _question(sent).measure(points)
+
+
+@lru_cache(maxsize=4)
+def _question(sent: bytes) -> Question:
+    question: Question = pickle.loads(sent)
+    return question

@@ -1,0 +1,205 @@
+"""Pictures of workspaces: the border, each face in the colour of the limit that forms it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints
+from ..extras import require
+from .words import in_words
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .result import Workspace
+
+COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#f0e442")
+"""Colours that colour-blind people can tell apart, after Okabe and Ito; of the limits that form most of the border."""
+
+REST = "#b0b0b0"
+"""Of all other limits together."""
+
+MOST_FACES = 40_000
+"""Faces of a mesh that are drawn one by one; of a finer one, vertices that are near each other are drawn as one."""
+
+LIGHT = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
+DARKEST = 0.55
+"""How bright faces are that look away from the light."""
+
+WITHIN = "#eef3f7"
+"""What is within reach, in a plane."""
+
+Group: TypeAlias = tuple[str, str, list[int]]
+"""What a colour stands for, the colour, and the limits that have it."""
+
+Strings: TypeAlias = NDArray[np.str_]
+
+SIZE = (6.4, 4.8)
+ELEVATION, AZIMUTH = 24.0, -58.0
+SMALL = 8.0
+
+
+def plot(found: Workspace, axes: Axes | None = None) -> Axes:
+    """Draw a workspace on matplotlib axes, or on those of a new figure, which is `axes.figure`."""
+    require("pictures", "matplotlib", "plot")
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    d = len(found.names)
+    if axes is None:
+        figure = Figure(figsize=SIZE, dpi=150, layout="constrained")
+        axes = figure.add_subplot(projection="3d" if d == 3 else None)
+    groups = _groups(found)
+    (_draw_solid if d == 3 else _draw_plane)(axes, found, groups)
+    handles = [Line2D([], [], color=colour, linewidth=4, label=label) for label, colour, _ in groups]
+    if handles:
+        anchor = (1.12 if d == 3 else 1.02, 0.5)
+        legend = axes.legend(
+            handles=handles,
+            loc="center left",
+            bbox_to_anchor=anchor,
+            frameon=False,
+            fontsize=SMALL,
+            title_fontsize=SMALL,
+        )
+        legend.set_title("border formed by")
+    axes.set_title(_title(found), fontsize=SMALL + 1)
+    return axes
+
+
+def _groups(found: Workspace) -> list[Group]:
+    """Limits that share a colour: each its own where there are colours enough; else those of joints that are copies."""
+    shares = {limit: [limit] for limit in found.shares}
+    if len(shares) > len(COLOURS):
+        shares = {}
+        for joint, bound in found.shares:
+            shares.setdefault((joint.rstrip("0123456789"), bound), []).append((joint, bound))
+    groups: list[Group] = []
+    order = sorted(shares.items(), key=lambda item: -sum(found.shares[limit] for limit in item[1]))
+    for colour, ((name, bound), limits) in zip(COLOURS, order, strict=False):
+        copies = sorted(joint[len(name) :] for joint, _ in limits)
+        label = f"{name}{', '.join(copies)} {bound}".strip()
+        groups.append((label, colour, [found.limits.index(limit) for limit in limits]))
+    rest = [found.limits.index(limit) for _, limits in order[len(COLOURS) :] for limit in limits]
+    return [*groups, (f"{len(rest)} other limits", REST, rest)] if rest else groups
+
+
+def _face_colours(found: Workspace, groups: list[Group]) -> Strings:
+    colours = np.full(len(found.limits), REST)
+    for _, colour, limits in groups:
+        colours[limits] = colour
+    return colours
+
+
+def _draw_plane(axes: Any, found: Workspace, groups: list[Group]) -> None:
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    points = _shown(found, found.vertices)
+    segments = points[found.faces]
+    loops = _loops(found.faces)
+    if loops:
+        ends = [np.vstack([points[loop], points[loop[:1]]]) for loop in loops]
+        codes = [[Path.MOVETO, *[Path.LINETO] * (len(end) - 2), Path.CLOSEPOLY] for end in ends]
+        axes.add_patch(PathPatch(Path(np.concatenate(ends), np.concatenate(codes)), facecolor=WITHIN, edgecolor="none"))
+    axes.add_collection(
+        LineCollection(
+            list(segments),
+            colors=_face_colours(found, groups)[found.face_limit].tolist(),
+            linewidths=1.8,
+            capstyle="round",
+        )
+    )
+    axes.set(**dict(zip(("xlabel", "ylabel"), _labels(found), strict=True)))
+    axes.autoscale_view()
+    axes.margins(0.06)
+    axes.tick_params(labelsize=SMALL)
+    if len(set(found.units)) == 1:
+        axes.set_aspect("equal")
+
+
+def _draw_solid(axes: Any, found: Workspace, groups: list[Group]) -> None:
+    from matplotlib.colors import to_rgb
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+    vertices, faces, limits = _thinned(_shown(found, found.vertices), found.faces, found.face_limit)
+    spans = np.ptp(vertices, axis=0) if len(vertices) else np.ones(3)
+    box = spans if len(set(found.units)) == 1 else np.ones(3)
+    corners = vertices[faces]
+    scaled = corners / spans * box
+    normals = _smooth(np.cross(scaled[:, 1] - scaled[:, 0], scaled[:, 2] - scaled[:, 0]), faces, len(vertices))
+    bright = DARKEST + (1.0 - DARKEST) * 0.5 * (1.0 + normals @ LIGHT)
+    palette = np.array([to_rgb(colour) for colour in _face_colours(found, groups).tolist()])
+    colours = palette[limits] * bright[:, None]
+    axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.2))
+    if len(vertices):
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(tuple(box / box.max()), zoom=0.86)
+    axes.view_init(ELEVATION, AZIMUTH)
+    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), _labels(found), strict=True)))
+    axes.tick_params(labelsize=SMALL)
+    axes.locator_params(nbins=5)
+
+
+def _shown(found: Workspace, points: Floats) -> Floats:
+    """Coordinates as people read them: angles in degrees."""
+    return points * np.where([unit == "rad" for unit in found.units], 180.0 / np.pi, 1.0)
+
+
+def _labels(found: Workspace) -> list[str]:
+    return [f"{name} [{'deg' if unit == 'rad' else unit}]" for name, unit in zip(found.names, found.units, strict=True)]
+
+
+def _title(found: Workspace) -> str:
+    return f"{found.mechanism.name}: {in_words(found)}"
+
+
+def _smooth(normals: Floats, faces: Ints, n: int) -> Floats:
+    """Unit normals of faces, each the mean of those around its corners: so that slivers do not show."""
+    around = np.zeros((n, 3))
+    for corner in faces.T:
+        np.add.at(around, corner, normals)
+    mean = around[faces].sum(axis=1)
+    lengths = np.linalg.norm(mean, axis=1, keepdims=True)
+    return np.asarray(np.divide(mean, lengths, out=np.zeros_like(mean), where=lengths > 0.0))
+
+
+def _loops(segments: Ints) -> list[list[int]]:
+    """Closed ways along segments (f, 2), each by the places it leads over."""
+    following: dict[int, list[int]] = {}
+    for start, end in segments.tolist():
+        following.setdefault(start, []).append(end)
+    loops = []
+    while following:
+        start = next(iter(following))
+        loop, here = [], start
+        while here in following:
+            loop.append(here)
+            after = following[here].pop()
+            if not following[here]:
+                del following[here]
+            here = after
+        loops.append(loop)
+    return loops
+
+
+def _thinned(vertices: Floats, faces: Ints, limits: Ints) -> tuple[Floats, Ints, Ints]:
+    """A mesh with no more faces than are worth drawing: vertices in the same small box become their middle."""
+    cells = 2.0 * np.cbrt(max(len(vertices), 1))
+    while len(faces) > MOST_FACES:
+        span = np.ptp(vertices, axis=0)
+        low = vertices.min(axis=0)
+        boxes = np.floor((vertices - low) / np.where(span > 0.0, span, 1.0) * cells).astype(np.int64)
+        _, group = np.unique(boxes @ np.array([1, 1 << 20, 1 << 40]), return_inverse=True)
+        counts = np.bincount(group)
+        vertices = np.stack([np.bincount(group, column) / counts for column in vertices.T], axis=1)
+        faces = group[faces]
+        whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+        faces, limits = faces[whole], limits[whole]
+        cells *= 0.8
+    return vertices, faces, limits

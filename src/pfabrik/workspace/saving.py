@@ -1,0 +1,99 @@
+"""Workspaces as files: a mesh for other programs, or all that is known of it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..arrays import Ints
+from ..errors import InvalidArgument
+from ..writing import whole_path
+
+if TYPE_CHECKING:
+    from .result import Workspace
+
+
+def save(found: Workspace, path: str | PathLike[str]) -> None:
+    """Write a workspace in the format that the ending says; the file is there whole, or not at all."""
+    write = _FORMATS.get(Path(path).suffix.lower())
+    if write is None:
+        raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(_FORMATS)}")
+    content = write(found)
+    with whole_path(path) as part:
+        part.write_bytes(content)
+
+
+def _as_npz(found: Workspace) -> bytes:
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        coordinates=np.array(found.names),
+        units=np.array(found.units),
+        resolution=found.resolution,
+        vertices=found.vertices,
+        faces=found.faces,
+        face_limit=found.face_limit,
+        limits=np.array(found.limits),
+        size=found.size,
+        uncertainty=found.uncertainty,
+    )
+    return buffer.getvalue()
+
+
+def _as_stl(found: Workspace) -> bytes:
+    """Binary STL: triangles with their normals, in the mechanism's unit."""
+    corners = found.vertices[_triangles(found)]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
+    rows = np.zeros(len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    rows["normal"], rows["corners"] = normals, corners
+    header = f"workspace of {found.mechanism.name}".encode("ascii", "replace")[:80].ljust(80)
+    return header + len(rows).to_bytes(4, "little") + rows.tobytes()
+
+
+def _as_ply(found: Workspace) -> bytes:
+    """Binary PLY: vertices, and triangles with the number of the limit that forms each; comments name it."""
+    faces = _triangles(found)
+    vertices = np.asarray(found.vertices, "<f8")
+    rows = np.zeros(len(faces), [("n", "u1"), ("places", "<i4", 3), ("limit", "<i4")])
+    rows["n"], rows["places"], rows["limit"] = 3, faces, found.face_limit
+    limits = [f"comment limit {i}: {' '.join(found.limits[i])}" for i in np.unique(found.face_limit).tolist()]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        *limits,
+        f"element vertex {len(vertices)}",
+        *(f"property double {axis}" for axis in "xyz"),
+        f"element face {len(rows)}",
+        "property list uchar int vertex_indices",
+        "property int limit",
+        "end_header",
+    ]
+    return "\n".join([*header, ""]).encode("utf-8") + vertices.tobytes() + rows.tobytes()
+
+
+def _triangles(found: Workspace) -> Ints:
+    if len(found.names) != 3:
+        raise InvalidArgument("path", "a format for triangles", ".npz or .csv: a workspace in a plane has none")
+    return found.faces
+
+
+def _as_csv(found: Workspace) -> bytes:
+    """Points of the border, one a row, with the limit that forms it there; angles in radians, named so."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    named = [f"{name}_rad" if unit == "rad" else name for name, unit in zip(found.names, found.units, strict=True)]
+    writer.writerow([*named, "joint", "bound"])
+    for point, limit in zip(found.vertices.tolist(), found.vertex_limit.tolist(), strict=True):
+        writer.writerow([*map(repr, point), *found.limits[limit]])
+    return text.getvalue().encode("utf-8")
+
+
+_FORMATS: dict[str, Callable[[Workspace], bytes]] = {".npz": _as_npz, ".stl": _as_stl, ".ply": _as_ply, ".csv": _as_csv}

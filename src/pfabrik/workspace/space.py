@@ -1,0 +1,235 @@
+"""Which coordinates of a pose a workspace is looked at over, and the poses that they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.mechanism import Mechanism
+from ..description.task import task_of
+from ..errors import InvalidArgument, UnknownName
+from ..motion.displacements import columns, home_coordinates
+from ..motion.first_order import generic_of
+from ..poses import SupportsMatrix, is_rotation
+from ..rotations import from_rotvec
+from ..targets import as_targets
+from ..tolerances import TOLERANCES
+
+POSITIONS = ("x", "y", "z")
+TURNS = ("tilt_x", "tilt_y", "yaw")
+"""Rotations: a tilt vector in the base's x, y plane, about which the platform is turned by its length [rad], after a
+twist about z. R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw) R_0, with R_0 the orientation held."""
+
+MOST = 3
+"""Coordinates that a workspace can be looked at over."""
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """The coordinates of a map, and what is fixed.
+
+    Attributes
+    ----------
+    names : of the coordinates that vary: of the pose, or "pivot[0]", "pivot[1]" of the joint `joint`.
+    start : their values where the mechanism starts, (d,) [length or rad].
+    held : every coordinate of the pose by name, those that vary at their values at the start.
+    rotation : R_0, (3, 3).
+    joint : the joint whose coordinates they are, or None for those of the pose.
+    """
+
+    mechanism: Mechanism
+    names: tuple[str, ...]
+    start: Floats
+    held: Mapping[str, float]
+    rotation: Floats
+    joint: str | None = None
+
+    @property
+    def is_angle(self) -> tuple[bool, ...]:
+        return tuple(self.joint is not None or name in TURNS for name in self.names)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The unit of each coordinate: that of lengths, or "rad"."""
+        return tuple("rad" if turns else self.mechanism.length_unit for turns in self.is_angle)
+
+    @property
+    def period(self) -> Floats:
+        """Beyond half of what a coordinate repeats itself, (d,) [rad]; inf for lengths."""
+        return np.where(self.is_angle, 2.0 * np.pi, np.inf)
+
+    def with_fixed(self, fixed: Mapping[str, float]) -> Space:
+        """With coordinates fixed that vary here."""
+        checked = _checked_fixed(fixed, self.names)
+        names = tuple(name for name in self.names if name not in checked)
+        if self.joint is not None or not checked or len(names) < 2:
+            raise InvalidArgument(
+                "fixed", ", ".join(checked) or "nothing", "coordinates of a pose that leave two or more"
+            )
+        kept = [self.names.index(name) for name in names]
+        return replace(self, names=names, start=self.start[kept], held={**self.held, **checked})
+
+    def poses(self, coordinates: Floats) -> Floats:
+        """Targets (n, 4, 4) in the base frame at coordinates (n, d)."""
+        if self.joint is not None:
+            return as_targets(self.mechanism, {self.joint: coordinates})[0]
+        value = {name: np.full(len(coordinates), held) for name, held in self.held.items()}
+        value |= dict(zip(self.names, coordinates.T, strict=True))
+        poses = np.zeros((len(coordinates), 4, 4))
+        poses[:, 3, 3] = 1.0
+        poses[:, :3, 3] = np.stack([value[name] for name in POSITIONS], axis=1)
+        if any(value[name].any() for name in TURNS):
+            none = np.zeros(len(coordinates))
+            tilted = from_rotvec(np.stack([value["tilt_x"], value["tilt_y"], none], axis=1))
+            poses[:, :3, :3] = tilted @ from_rotvec(np.stack([none, none, value["yaw"]], axis=1)) @ self.rotation
+        else:
+            poses[:, :3, :3] = self.rotation
+        return poses
+
+
+def space_of(
+    mechanism: Mechanism,
+    over: Sequence[str] | None,
+    fixed: Mapping[str, float] | None,
+    orientation: Any,
+    start: Floats,
+) -> Space:
+    """The space that a question is about.
+
+    Parameters
+    ----------
+    start : the pose (4, 4) that coordinates start from where they are not fixed.
+
+    Raises
+    ------
+    UnknownName, InvalidArgument : coordinates that there are none of, or none left to vary; an orientation that is no
+        rotation, or that the task has no place for.
+    """
+    joint = _carrying_joint(mechanism)
+    known = (*POSITIONS, *TURNS, *(_coordinate_names(mechanism, joint) if joint else ()))
+    fixed = _checked_fixed(fixed, known)
+    asked = _checked_over(over, known, fixed)
+    if joint is not None and _is_about(joint, asked, fixed, orientation):
+        return _of_joint(mechanism, joint, asked, fixed)
+    rotation = _rotation(mechanism, orientation, start)
+    held = {name: float(value) for name, value in zip(POSITIONS, start[:3, 3], strict=True)} | dict.fromkeys(TURNS, 0.0)
+    held |= fixed
+    names = tuple(name for name in _free(mechanism) if name not in fixed) if asked is None else asked
+    if asked is None:
+        places = tuple(name for name in names if name in POSITIONS)
+        names = places if len(places) > 1 or len(names) > MOST else names
+        if not places:
+            names = tuple(name for name in names if name in TURNS)
+    if not 2 <= len(names) <= MOST:
+        expected = f"two or three coordinates to look over, of those that move: {', '.join(_free(mechanism))}"
+        raise InvalidArgument("over", ", ".join(names) or "no coordinate", expected)
+    _require_task(mechanism, "over", names)
+    _require_task(mechanism, "fixed", [name for name in fixed if name not in names])
+    return Space(mechanism, names, np.array([held[name] for name in names]), held, rotation)
+
+
+def _free(mechanism: Mechanism) -> tuple[str, ...]:
+    """Coordinates of the task that the end effector can change."""
+    task, directions = task_of(mechanism), generic_of(mechanism).directions
+    moves = np.linalg.norm(directions, axis=1) > TOLERANCES.alignment
+    rank = int((np.linalg.svd(directions[:3], compute_uv=False) > TOLERANCES.alignment).sum())
+    if rank < moves[:3].sum() and rank == directions.shape[1]:
+        raise InvalidArgument(
+            "mechanism",
+            f"an end effector that moves in {rank} of the directions x, y, z, none of them along an axis of the base",
+            "a base frame turned so that it moves along its axes",
+        )
+    places = [name for name, counts, free in zip(POSITIONS, task.axes, moves, strict=False) if counts and free]
+    turned = moves[3:] if len(moves) > 3 else np.zeros(3, bool)
+    counts = {3: (True, True, True), 2: (True, True, False), 1: (False, False, True), 0: (False,) * 3}[task.rotations]
+    return (*places, *(name for name, each, free in zip(TURNS, counts, turned, strict=True) if each and free))
+
+
+def _require_task(mechanism: Mechanism, argument: str, names: Sequence[str]) -> None:
+    task = task_of(mechanism)
+    sets = {name for name, counts in zip(POSITIONS, task.axes, strict=True) if counts}
+    sets |= set({3: TURNS, 2: TURNS[:2], 1: TURNS[2:], 0: ()}[task.rotations])
+    for name in names:
+        if name not in sets:
+            expected = f"coordinates within the task, {' '.join(mechanism.task)}: what it leaves out follows by itself"
+            raise InvalidArgument(argument, f"'{name}'", expected)
+
+
+def _rotation(mechanism: Mechanism, orientation: Any, start: Floats) -> Floats:
+    if orientation is None:
+        return np.ascontiguousarray(start[:3, :3])
+    if isinstance(orientation, SupportsMatrix):
+        orientation = orientation.as_matrix()
+    try:
+        matrix = np.array(orientation, dtype=float)
+    except (TypeError, ValueError):
+        matrix = np.zeros(0)
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or not is_rotation(matrix):
+        raise InvalidArgument(
+            "orientation", repr(orientation), "a rotation: a matrix (3, 3), a SciPy Rotation, or 'any'"
+        )
+    if not task_of(mechanism).rotations:
+        raise InvalidArgument("orientation", "a rotation", "None: the task sets none, it follows from the mechanism")
+    return matrix
+
+
+def _checked_fixed(fixed: Mapping[str, float] | None, known: Sequence[str]) -> dict[str, float]:
+    if fixed is not None and not isinstance(fixed, Mapping):
+        raise InvalidArgument("fixed", type(fixed).__name__, "coordinates by name, such as {'z': 200}")
+    checked = {}
+    for name, value in (fixed or {}).items():
+        if name not in known:
+            raise UnknownName("coordinate", name, known)
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
+            raise InvalidArgument(f"fixed['{name}']", repr(value), "a finite number")
+        checked[name] = float(value)
+    return checked
+
+
+def _checked_over(
+    over: Sequence[str] | None, known: Sequence[str], fixed: Mapping[str, float]
+) -> tuple[str, ...] | None:
+    if over is None:
+        return None
+    names = (over,) if isinstance(over, str) else tuple(over)
+    for name in names:
+        if name not in known:
+            raise UnknownName("coordinate", str(name), known)
+        if name in fixed:
+            raise InvalidArgument("over", f"'{name}', which is fixed", "coordinates that may vary")
+    if len(set(names)) < len(names):
+        raise InvalidArgument("over", ", ".join(names), "every coordinate once")
+    return names
+
+
+def _carrying_joint(mechanism: Mechanism) -> str | None:
+    """The universal joint that alone connects base and end effector, whose two angles then say the whole pose."""
+    between = {mechanism.base, mechanism.end_effector}
+    joints = [joint.name for joint in mechanism.joints if set(joint.connects) == between and joint.type != "fixed"]
+    (name, *more) = joints or ("",)
+    if more or not name or any(task_of(mechanism).axes):
+        return None
+    return name if mechanism.joint(name).type == "universal" else None
+
+
+def _coordinate_names(mechanism: Mechanism, joint: str) -> tuple[str, ...]:
+    return tuple(f"{joint}[{place}]" for place in range(2))
+
+
+def _is_about(joint: str, asked: Sequence[str] | None, fixed: Mapping[str, float], orientation: Any) -> bool:
+    """Whether a question is about the coordinates of the joint that carries the end effector."""
+    if asked is None:
+        return orientation is None and not set(fixed) & {*POSITIONS, *TURNS}
+    return all(name.startswith(f"{joint}[") for name in asked)
+
+
+def _of_joint(mechanism: Mechanism, joint: str, asked: Sequence[str] | None, fixed: Mapping[str, float]) -> Space:
+    names = _coordinate_names(mechanism, joint)
+    if fixed or (asked is not None and set(asked) != set(names)):
+        raise InvalidArgument("over", ", ".join(asked or fixed), f"all coordinates of '{joint}': {', '.join(names)}")
+    home = home_coordinates(mechanism)[columns(mechanism)[joint]]
+    return Space(mechanism, names, home, {}, np.eye(3), joint)

@@ -1,0 +1,189 @@
+"""A closed mesh of the border, by marching cubes (in the plane: squares).
+
+The border crosses each side of a cube in segments, which the four corners of that side decide alone. Those of all six
+sides make loops, and the loops are filled with triangles. So cubes agree on what they share, and the mesh is closed:
+each edge of it is in exactly two triangles, once in each direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..arrays import Floats, Ints, Mask
+from .blocks import Measure
+from .lattice import Lattice, codes, corners, places_of
+from .refining import Cells
+
+CLOSE = 1e-3
+"""How exactly a vertex is on the border [steps of the lattice]."""
+
+MOST_LOOKS = 40
+"""Looks at an edge after which its vertex is left where it is: halving alone takes ten."""
+
+Edge: TypeAlias = tuple[int, int]
+Face: TypeAlias = tuple[Edge, ...]
+
+
+class Mesh(NamedTuple):
+    """A closed mesh: triangles that turn right-handed as seen from outside; segments with the inside on their left.
+
+    Attributes
+    ----------
+    vertices : (v, d), just inside the border.
+    faces : (f, d) places of vertices.
+    limits : which limit forms the border at each vertex, (v,).
+    inner : codes of the lattice points within reach that vertices are beside, (v,).
+    """
+
+    vertices: Floats
+    faces: Ints
+    limits: Ints
+    inner: Ints
+
+    @property
+    def size(self) -> float:
+        """What it encloses: area or volume."""
+        return float(self.shares.sum())
+
+    @property
+    def shares(self) -> Floats:
+        """What each face adds to the area or volume enclosed, (f,)."""
+        if not len(self.faces):
+            return np.zeros(0)
+        ends = (self.vertices - self.vertices.mean(axis=0))[self.faces]
+        return np.asarray(np.linalg.det(ends)) / (2.0 if self.vertices.shape[1] == 2 else 6.0)
+
+    @property
+    def face_sizes(self) -> Floats:
+        """Length or area of each face, (f,)."""
+        ends = self.vertices[self.faces]
+        sides = ends[:, 1:] - ends[:, :1]
+        if self.vertices.shape[1] == 2:
+            return np.asarray(np.linalg.norm(sides[:, 0], axis=1))
+        return np.asarray(0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1))
+
+    def among(self, chosen: Mask) -> Mesh:
+        """The faces all of whose vertices, (v,), are chosen, and these alone."""
+        faces = self.faces[chosen[self.faces].all(axis=1)]
+        used, back = np.unique(faces, return_inverse=True)
+        return Mesh(self.vertices[used], back.reshape(faces.shape), self.limits[used], self.inner[used])
+
+
+def mesh_of(lattice: Lattice, cells: Cells) -> Mesh:
+    """The mesh of the border through cells that it does not leave."""
+    d = lattice.d
+    low = codes(cells.lows[:, None] + cells.width * corners(d))
+    case = ((cells.margins >= 0.0) << np.arange(2**d)).sum(axis=1)
+    order = np.argsort(case, kind="stable")
+    starts = np.searchsorted(case[order], np.arange(2 ** (2**d) + 1))
+    edges = [np.zeros((0, d), np.int64)]
+    for which in np.unique(case).tolist():
+        own = low[order[starts[which] : starts[which + 1]]]
+        for face in _faces(which, d):
+            edges.append(np.stack([(own[:, a] << d) + (a ^ b) for a, b in face], axis=1))
+    distinct, faces = np.unique(np.concatenate(edges), return_inverse=True)
+    vertices, limits, inner = _vertices(lattice, distinct, cells.width)
+    return Mesh(vertices, faces.reshape(-1, d), limits, inner)
+
+
+@lru_cache(maxsize=512)
+def _faces(case: int, d: int) -> tuple[Face, ...]:
+    """The faces that the border has in a cell: each by the edges, from lower to higher corner, that it has vertices on.
+
+    Parameters
+    ----------
+    case : bit k says whether corner k is within.
+    """
+    if d == 2:
+        return tuple(_segments(case, (0, 2, 3, 1)))
+    following = dict(segment for side in _SIDES for segment in _segments(case, side))
+    faces: list[Face] = []
+    while following:
+        first, after = following.popitem()
+        loop = [first]
+        while after != first:
+            loop.append(after)
+            after = following.pop(after)
+        faces += [(loop[0], *pair) for pair in pairwise(loop[1:])]
+    return tuple(faces)
+
+
+_SIDES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+"""The corners of each side of a cube, in turn, right-handed as seen from outside."""
+
+
+def _segments(case: int, side: Sequence[int]) -> Iterator[tuple[Edge, Edge]]:
+    """How the border crosses a square, given by its corners in turn: from edge to edge, what is within on its left.
+
+    Where opposite corners are within, they are kept apart: whoever looks at the square decides the same.
+    """
+    within = [bool(case >> corner & 1) for corner in side]
+    edges = [(min(pair), max(pair)) for pair in zip(side, (*side[1:], side[0]), strict=True)]
+    for k in range(4):
+        if within[k] and not within[k - 1]:  # comes in by the edge before corner k, and leaves by the next way out
+            leaving = next(m for m in range(k, k + 4) if not within[(m + 1) % 4])
+            yield edges[leaving % 4], edges[k - 1]
+
+
+def _vertices(lattice: Lattice, edges: Ints, width: int) -> tuple[Floats, Ints, Ints]:
+    """Where the border crosses edges (e,), what forms it there, and the codes of the ends within."""
+    d = lattice.d
+    ways = (edges & (2**d - 1))[:, None] >> np.arange(d)[::-1] & 1
+    first = places_of(edges >> d, d)
+    ends = np.stack([first, first + width * ways])
+    code = codes(ends)
+    margins = lattice.margins(code)
+    within = (margins[1] >= 0.0).astype(np.int64)
+    every = np.arange(len(edges))
+    inner, outer = (lattice.coordinates(ends[side, every]) for side in (within, 1 - within))
+    points, limits = crossings(
+        lattice.measure, inner, outer, margins[within, every], margins[1 - within, every], CLOSE / width
+    )
+    return points, limits, code[within, every]
+
+
+def crossings(
+    measure: Measure, inner: Floats, outer: Floats, inside: Floats, outside: Floats, close: float
+) -> tuple[Floats, Ints]:
+    """The last points within on the ways from points within to points beyond, (n, d), and what is exceeded next, (n,).
+
+    Parameters
+    ----------
+    inside, outside : the margins at both ends, (n,).
+    close : how exactly they are told [share of the way].
+    """
+    near, far = np.zeros(len(inner)), np.ones(len(inner))
+    inside, outside = inside.copy(), outside.copy()
+    limits, halve = np.full(len(inner), -1), np.zeros(len(inner), bool)
+    rows = np.arange(len(inner))
+    for _ in range(MOST_LOOKS):
+        rows = rows[far[rows] - near[rows] > close]
+        if not len(rows):
+            break
+        wide = far[rows] - near[rows]
+        at = near[rows] + wide * _share(inside[rows], outside[rows], halve[rows], close / wide)
+        found, binding = measure(inner[rows] + at[:, None] * (outer - inner)[rows])
+        kept = found >= 0.0
+        near[rows[kept]], inside[rows[kept]] = at[kept], found[kept]
+        far[rows[~kept]], outside[rows[~kept]] = at[~kept], found[~kept]
+        limits[rows[~kept]] = binding[~kept]
+        halve[rows] = far[rows] - near[rows] > 0.5 * wide
+    unknown = np.flatnonzero(limits < 0) if measure.question.has_margins else np.arange(len(inner))
+    beyond = (inner + far[:, None] * (outer - inner))[unknown]
+    if len(unknown):
+        limits[unknown] = measure.question.name_limits(beyond)
+    return inner + near[:, None] * (outer - inner), limits
+
+
+def _share(inside: Floats, outside: Floats, halve: Mask, close: Floats) -> Floats:
+    """Where to look next: half way, or just beyond where margins would be zero if they fell evenly."""
+    with np.errstate(invalid="ignore"):
+        even = inside / (inside - outside)
+    usable = np.isfinite(even) & ~halve
+    beyond = np.where(even < 0.5, 0.45, -0.45) * close
+    return np.asarray(np.where(usable, np.clip(even + beyond, 0.4 * close, 1.0 - 0.4 * close), 0.5))

@@ -1,0 +1,38 @@
+"""How far a long question is: a bar on a terminal, once it has taken a while."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from .blocks import OnProgress
+
+PATIENCE = 2.0
+"""Seconds before anything is said."""
+
+
+@contextmanager
+def telling(label: str, on_progress: OnProgress | None) -> Iterator[OnProgress | None]:
+    """What to call with (done, total): what the caller gave, else a bar on stderr; None where nobody would see it."""
+    if on_progress is not None or not sys.stderr.isatty():
+        yield on_progress
+        return
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    began, task = time.monotonic(), TaskID(0)
+    bar = Progress(console=Console(stderr=True), transient=True)
+
+    def tell(done: int, total: int) -> None:
+        if not bar.tasks and time.monotonic() - began > PATIENCE:
+            bar.add_task(label, total=None)
+            bar.start()
+        if bar.tasks:
+            bar.update(task, completed=done, total=total)
+
+    try:
+        yield tell
+    finally:
+        bar.stop()

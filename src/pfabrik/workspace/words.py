@@ -1,0 +1,24 @@
+"""Sizes in words."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .result import Workspace
+
+
+def in_words(found: Workspace) -> str:
+    """The size of a workspace, to the digit that is uncertain: "4,970,000 ± 2,000 mm³"."""
+    return (
+        f"{rounded(found.size, found.uncertainty)} ± {rounded(found.uncertainty, found.uncertainty)} {found.size_unit}"
+    )
+
+
+def rounded(value: float, uncertainty: float) -> str:
+    """A number to the first digit of its uncertainty."""
+    if not uncertainty > 0.0:
+        return f"{value:,.6g}"
+    digits = -math.floor(math.log10(uncertainty))
+    return f"{round(value, digits):,.{max(digits, 0)}f}"
