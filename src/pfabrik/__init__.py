@@ -8,6 +8,7 @@
 
 Describe   load, save, catalog; Mechanism, Joint, Cone, Leg
 Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, working_modes; pose, Options
+           Solver (one machine, asked again and again)
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 Structure  decompose, SubChain; geometric (closed forms of the paper's machines); errors
@@ -63,6 +64,7 @@ _HOMES = {
     "forward_jacobian": "answers.differential",
     "singularity": "answers.differential",
     "solve_fk": "fk",
+    "Solver": "solver",
     "warm_up": "warm_up",
     "Workspace": "workspace.result",
     "workspace": "workspace.ask",
@@ -82,6 +84,7 @@ __all__ = [
     "Options",
     "Singularity",
     "Solution",
+    "Solver",
     "Status",
     "SubChain",
     "Track",
@@ -136,6 +139,7 @@ if TYPE_CHECKING:
     from .modes.working import WorkingModes, working_modes
     from .options import Options
     from .poses import pose
+    from .solver import Solver
     from .track import track
     from .travel import Travel, travel
     from .warm_up import warm_up

@@ -42,7 +42,11 @@ def solve_ik(
     options = checked_options(options)
     targets, shape = as_targets(mechanism, target)
     begin = start_of(mechanism, start, shape)
-    keep_mode = (options.working_mode or ("any" if begin is None else "keep")) == "keep"
-    found = engine_of(mechanism).answer(targets, begin, options, keep_mode=keep_mode)
+    found = engine_of(mechanism).answer(targets, begin, options, keep_mode=keeps_mode(options, begin))
     refuse_invalid(targets, shape, found.rows.status, options)
     return Solution(mechanism, found, shape, Wanted(targets.copy(), options.hold, options.rotation_length))
+
+
+def keeps_mode(options: Options, start: object) -> bool:
+    """Whether answers stay in the working mode of a start, or of home where there is none."""
+    return (options.working_mode or ("any" if start is None else "keep")) == "keep"

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.configurations import Configurations
 from ..closure.solve import STRANGE
-from ..decomposition.leg_table import LegTable
+from ..decomposition.leg_table import LegTable, Records
 from ..description.mechanism import Mechanism
 from ..kernels.reaching import plan as P
 from .coordinates import settled
@@ -35,8 +37,8 @@ class OneTarget:
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators = len(mechanism.actuator_names)
-        self._machine = table.legs, table.limited, table.cones, table.driven
-        self._task, self._task_nearby = table.task, table.task_within(STRANGE)
+        machine = table.legs, table.limited, table.cones, table.driven
+        self._anywhere, self._nearby = (*machine, table.task), (*machine, table.task_within(STRANGE))
         self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
 
     @cached_property
@@ -57,14 +59,25 @@ class OneTarget:
             np.zeros((1, 5)),
         )
 
-    def reach(self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool) -> bool:
-        """Answer a target (1, 4, 4) if legs on these sides (1, legs) reach it; whether they do.
+    def reach(self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool) -> int:
+        """Answer a target (1, 4, 4) if legs on these sides (1, legs) reach it; 0 where they do.
 
         Parameters
         ----------
         begin : the pose from which it is completed, (1, 4, 4); only `nearby`, if so asked.
         """
-        task = self._task_nearby if nearby else self._task
-        return not self._kernel(
-            *self._machine, task, target, begin, sides, rows.status, rows.poses, rows.actuators, rows.measures
-        )
+        return self._kernel(*self._given(nearby), target, begin, sides, *_filled(rows))
+
+    def prepared(
+        self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool
+    ) -> Callable[[], int]:
+        """`reach` with all that it takes."""
+        return partial(self._kernel, *self._given(nearby), target, begin, sides, *_filled(rows))
+
+    def _given(self, nearby: bool) -> tuple[Records, ...]:
+        return self._nearby if nearby else self._anywhere
+
+
+def _filled(rows: P.Rows) -> tuple[NDArray[Any], ...]:
+    """What the kernel fills of an answer."""
+    return rows.status, rows.poses, rows.actuators, rows.measures

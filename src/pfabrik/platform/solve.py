@@ -63,6 +63,21 @@ class LegsEngine:
             rows, partial(_coordinates, self.mechanism, self._table, rows, sides, begins, rest, others)
         )
 
+    def prepared(
+        self, target: Floats, start: Configurations | None, options: Options, rows: P.Rows, *, keep_mode: bool
+    ) -> Callable[[], int] | None:
+        """A call that answers what stands in `target`, (1, 4, 4), into `rows`; it returns 0 where legs reach it.
+
+        None where others answer first.
+        """
+        if (not options.exact and isinstance(self._inner, ReachingEngine)) or (
+            start is not None and len(self._turning)
+        ):
+            return None
+        one, begin = self._one, self._one.home if start is None else start.rows.poses
+        sides = one.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        return one.prepared(target, begin, sides, rows, nearby=keep_mode)
+
     def follow(
         self,
         targets: Floats,
@@ -93,7 +108,7 @@ class LegsEngine:
         """Answer one target from home or from an answer before, if legs reach it."""
         one, rows = self._one, self._one.new_rows()
         begin, sides = (one.home, one.home_sides) if start is None else (start.rows.poses, start.sides)
-        if not one.reach(target, begin, sides, rows, nearby=keep_mode):
+        if one.reach(target, begin, sides, rows, nearby=keep_mode):
             return None
         if start is not None:
             self._count_turns(start.rows.actuators, rows)

@@ -1,0 +1,146 @@
+"""A prepared solver: the answers of `solve_ik` and `solve_fk`, in arrays that stay."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from pfabrik import Options, Status
+from pfabrik.errors import InvalidArgument
+
+MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]
+
+
+def targets(mechanism: pf.Mechanism, n: int, shift: float, seed: int = 2) -> np.ndarray:
+    """Poses (n, 4, 4) up to `shift` [L] from home, a little turned."""
+    rng, poses = np.random.default_rng(seed), np.tile(mechanism.home_pose, (n, 1, 1))
+    poses[:, :3, 3] += rng.uniform(-shift, shift, (n, 3)) * mechanism.characteristic_length
+    poses[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-0.1, 0.1, (n, 3))).as_matrix()
+    return poses
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_answers_and_statuses_are_those_of_single_calls(name: str) -> None:
+    mechanism = pf.load(name)
+    solver = pf.Solver(mechanism)
+    seen = set()
+    for target in [mechanism.home_pose, *targets(mechanism, 4, 0.05), *targets(mechanism, 2, 1.0)]:
+        expected = pf.solve_ik(mechanism, target)
+        assert solver.ik(target) is solver.status is expected.status
+        np.testing.assert_array_equal(solver.pose, expected.pose)
+        np.testing.assert_array_equal(solver.actuators, expected.actuators)
+        assert solver.solution.to_dict() == expected.to_dict()
+        seen.add(expected.status)
+    assert Status.REACHED in seen
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_forward_answers_and_jacobians_are_those_of_single_calls(name: str) -> None:
+    mechanism = pf.load(name)
+    solver = pf.Solver(mechanism)
+    for share in (0.0, 0.02, 5.0):
+        values = pf.solve_ik(mechanism, mechanism.home_pose).actuators + share
+        expected = pf.solve_fk(mechanism, values)
+        assert solver.fk(values) is solver.status is expected.status
+        np.testing.assert_array_equal(solver.pose, expected.pose)
+        np.testing.assert_array_equal(solver.actuators, expected.actuators)
+        np.testing.assert_array_equal(solver.jacobian(), pf.forward_jacobian(expected))
+
+
+@pytest.mark.parametrize("target", ["position", "list", "transposed", "joint"])
+def test_any_kind_of_target_is_taken(target: str) -> None:
+    mechanism = pf.load("ankle_ups" if target == "joint" else "delta")
+    pose = np.array(mechanism.home_pose)
+    given = {
+        "position": pose[:3, 3].tolist(),
+        "list": pose.tolist(),
+        "transposed": np.asfortranarray(pose),
+        "joint": {"pivot": (0.1, 0.05)},
+    }[target]
+    solver = pf.Solver(mechanism)
+    assert solver.ik(given) is Status.REACHED
+    np.testing.assert_array_equal(solver.actuators, pf.solve_ik(mechanism, given).actuators)
+
+
+def test_views_stay_and_are_overwritten_and_the_solution_is_not() -> None:
+    mechanism = pf.load("delta")
+    solver = pf.Solver(mechanism)
+    first, second = targets(mechanism, 2, 0.05)
+    solver.ik(first)
+    pose, actuators, jacobian, kept = solver.pose, solver.actuators, solver.jacobian(), solver.solution
+    before = actuators.copy()
+    solver.ik(second)
+    assert solver.pose is pose and solver.actuators is actuators
+    assert (actuators != before).any()
+    np.testing.assert_array_equal(actuators, solver.solution.actuators)
+    solver.jacobian()
+    np.testing.assert_array_equal(jacobian, pf.forward_jacobian(solver.solution))
+    np.testing.assert_array_equal(kept.actuators, before)
+    for view in (pose, actuators, jacobian):
+        with pytest.raises(ValueError, match="read-only"):
+            view[0] = 0.0
+
+
+def test_a_target_that_changes_afterwards_does_not_change_the_answer() -> None:
+    mechanism = pf.load("delta")
+    solver, target = pf.Solver(mechanism), targets(mechanism, 1, 0.05)[0]
+    solver.ik(target)
+    before = target.copy()
+    target[:3, 3] = np.nan
+    np.testing.assert_array_equal(solver.solution.actuators, pf.solve_ik(mechanism, before).actuators)
+
+
+def test_a_start_keeps_its_working_mode() -> None:
+    mechanism = pf.load("delta").without_limits()
+    modes = pf.working_modes(mechanism, mechanism.home_pose)
+    home = pf.solve_ik(mechanism, mechanism.home_pose)
+    other = max((mode for mode in modes if mode), key=lambda mode: np.abs(mode.actuators - home.actuators).max())
+    solver = pf.Solver(mechanism, start=other)
+    for target in targets(mechanism, 3, 0.02):
+        assert solver.ik(target) is Status.REACHED
+        np.testing.assert_array_equal(solver.actuators, pf.solve_ik(mechanism, target, start=other).actuators)
+        assert np.abs(solver.actuators - other.actuators).max() < 0.1
+
+
+def test_options_hold_for_every_question() -> None:
+    mechanism = pf.load("stewart")
+    far = pf.pose(np.array(mechanism.reference_point) * 1.5, rpy=[0.0, 0.2, 0.0])
+    solver = pf.Solver(mechanism, options=Options(hold="position", on_invalid="mark"))
+    assert solver.ik(far) is Status.PROJECTED
+    np.testing.assert_array_equal(solver.pose, pf.solve_ik(mechanism, far, options=Options(hold="position")).pose)
+    assert solver.ik(np.full((4, 4), np.nan)) is Status.INVALID
+    assert np.isnan(solver.actuators).all()
+
+
+@pytest.mark.parametrize("name", ["delta", "stewart"])
+def test_a_refused_question_leaves_no_answer(name: str) -> None:
+    mechanism = pf.load(name)
+    solver = pf.Solver(mechanism)
+    assert solver.status is Status.INVALID
+    refused = [
+        (solver.ik, 2.0 * np.eye(4), "matrix that is not a rotation|last row"),
+        (solver.ik, np.full((4, 4), np.nan), "not finite"),
+        (solver.ik, np.zeros(5), "target: found shape"),
+        (solver.ik, np.tile(mechanism.home_pose, (2, 1, 1)), "target: found batch shape .2,.; expected one at a time"),
+        (solver.fk, np.zeros(2), "actuators: found shape"),
+        (solver.fk, np.zeros((2, len(mechanism.actuator_names))), "expected one at a time"),
+    ]
+    for ask, given, told in refused:
+        assert solver.ik(np.array(mechanism.home_pose)) is Status.REACHED
+        with pytest.raises(InvalidArgument, match=told):
+            ask(given)
+        assert solver.status is Status.INVALID
+        assert np.isnan(solver.pose).all() and np.isnan(solver.actuators).all()
+        with pytest.raises(InvalidArgument, match="solution: found no answer"):
+            solver.jacobian()
+
+
+def test_what_is_no_mechanism_or_no_single_start_is_refused() -> None:
+    with pytest.raises(InvalidArgument, match="mechanism: found str"):
+        pf.Solver("delta")  # type: ignore[arg-type]
+    mechanism = pf.load("delta")
+    batch = pf.solve_ik(mechanism, np.tile(mechanism.home_pose, (2, 1, 1)))
+    with pytest.raises(InvalidArgument, match="start: found batch shape"):
+        pf.Solver(mechanism, start=batch)
