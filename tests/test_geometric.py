@@ -616,12 +616,6 @@ def test_wrong_calls_are_told() -> None:
 # --- the cache -------------------------------------------------------------------------------------------------------
 
 
-def test_a_closed_form_is_keyed_by_its_own_folder_and_the_kernels() -> None:
-    folder = Path(targets.__file__).parent
-    assert _jit._digest_for(closed_form(pf.load("nrpm")).kernel) == (_jit._DIGEST, _jit._sources_digest(folder))
-    assert _jit._digest_for(some_targets) == (_jit._DIGEST,)
-
-
 def load(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
@@ -638,7 +632,10 @@ def test_an_edit_beside_a_closed_form_or_in_the_kernels_makes_its_cache_stale(
         (tmp_path / folder).mkdir()
     (tmp_path / "kernels" / "_jit.py").write_bytes(Path(_jit.__file__).read_bytes())
     caller = tmp_path / "closed" / "caller.py"
-    caller.write_text("def double(x):\n    return 2.0 * x\n")
+    for part in ("kernels/vectors.py", "closed/part.py"):
+        (tmp_path / part).touch()
+    uses = "    from ..kernels import vectors\n    from .part import share\n"
+    caller.write_text(f"def double(x):\n    return 2.0 * x\n\ndef triple(x):\n{uses}")
     monkeypatch.setenv("NUMBA_CACHE_DIR", "")
     kernels = []  # all kept: a module that cannot be imported by name is found only while one of them lives
     for _ in range(2):

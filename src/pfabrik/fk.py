@@ -8,16 +8,14 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .answers.solution import Solution, Status
+from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .arrays import Floats
-from .closure.assemble import actuator_errors
-from .closure.close import Closing, closure_of, measured
-from .closure.configurations import Configurations, joint_coordinates
+from .closure.assemble import judged
+from .closure.close import measured
 from .description.mechanism import Mechanism, checked_mechanism
 from .engine import engine_of
 from .errors import InvalidArgument, UnknownName
-from .kernels.reaching.plan import ACTUATOR_ERROR
 from .options import Options, checked_options
 from .poses import as_floats
 from .tolerances import TOLERANCES
@@ -63,16 +61,16 @@ def solve_fk(
         bad = np.flatnonzero(~known)[:5].tolist() if shape else ()
         raise InvalidArgument("actuators", "a value that is not finite", "finite values", rows=bad)
     begin = start_of(mechanism, start, shape)
-    coordinates = np.repeat(joint_coordinates(mechanism, begin), 1 if begin and len(begin) > 1 else len(values), axis=0)
+    first = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(known))
     asked = np.clip(values[known], -HORIZON, HORIZON)
-    closing = engine_of(mechanism).assemble(coordinates[known], asked, seeded=start is not None)
-    found = _judged(mechanism, closing, values[known], options.actuator_tolerance)
+    found = engine_of(mechanism).forward(asked, first, options.actuator_tolerance)
     return Solution(mechanism, found.among(known), shape)
 
 
 def assembled(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:
     """Joint coordinates (n, columns) as the answer to actuated values (n, n_a): measured, not changed."""
-    found = _judged(mechanism, measured(mechanism, coordinates), values, TOLERANCES.position)
+    closing = measured(mechanism, coordinates)
+    found = judged(mechanism, engine_of(mechanism).at(closing), closing, values, TOLERANCES.position)
     return Solution(mechanism, found, (len(values),))
 
 
@@ -102,14 +100,3 @@ def _by_name(names: Sequence[str], actuators: Mapping[str, ArrayLike]) -> Floats
     except ValueError:
         found = f"shapes {', '.join(str(value.shape) for value in values)}"
         raise InvalidArgument("actuators", found, "shapes that agree") from None
-
-
-def _judged(mechanism: Mechanism, closing: Closing, values: Floats, tolerance: float) -> Configurations:
-    """Configurations as answers to actuated values (n, n_a): which are what was asked for, and which are feasible."""
-    found = engine_of(mechanism).at(closing)
-    error = np.abs(actuator_errors(closure_of(mechanism), closing.coordinates, values)).max(axis=1, initial=0.0)
-    found.rows.measures[:, ACTUATOR_ERROR] = error
-    asked, feasible = error <= tolerance, closing.feasible
-    open_or_beyond = np.where((closing.gap <= TOLERANCES.position) & asked, Status.EXCEEDED, Status.FAILED)
-    found.rows.status[:] = np.where(feasible, np.where(asked, Status.REACHED, Status.PROJECTED), open_or_beyond)
-    return found

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
+from ..kernels.reaching import plan as P
 from ..motion.first_order import generic_of
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of, platform_poses
+from .configurations import Configurations
 from .nearest import nearest
 from .starts import same_random_starts
 
@@ -186,3 +188,15 @@ def actuator_errors(closure: Closure, coordinates: Floats, values: Floats) -> Fl
     """How far actuators are from values, (n, n_a) [L or rad]."""
     off = closure.actuators(coordinates) - values
     return np.asarray(off * closure.scale[closure.actuated])
+
+
+def judged(
+    mechanism: Mechanism, found: Configurations, closing: Closing, values: Floats, tolerance: float
+) -> Configurations:
+    """Configurations as answers to actuated values (n, n_a): which are what was asked for, and which are feasible."""
+    error = np.abs(actuator_errors(closure_of(mechanism), closing.coordinates, values)).max(axis=1, initial=0.0)
+    found.rows.measures[:, P.ACTUATOR_ERROR] = error
+    asked, feasible = error <= tolerance, closing.feasible
+    open_or_beyond = np.where((closing.gap <= TOLERANCES.position) & asked, P.EXCEEDED, P.FAILED)
+    found.rows.status[:] = np.where(feasible, np.where(asked, P.REACHED, P.PROJECTED), open_or_beyond)
+    return found

@@ -112,3 +112,9 @@ def _blank(array: NDArray[Any], n: int) -> NDArray[Any]:
 def joint_coordinates(mechanism: Mechanism, start: Configurations | None) -> Floats:
     """Joint coordinates to start from, (n, columns) or (1, columns), as deviations from home; home's are zero."""
     return np.zeros((1, len(closure_of(mechanism).scale))) if start is None else start.coordinates
+
+
+def coordinates_for(mechanism: Mechanism, start: Configurations | None, n: int) -> Floats:
+    """The same for each of n rows, (n, columns), copied."""
+    coordinates = joint_coordinates(mechanism, start)
+    return np.repeat(coordinates, 1 if start is not None and len(start) > 1 else n, axis=0)

@@ -18,9 +18,9 @@ from ..motion.limits import within_turns
 from ..options import Options
 from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
-from .assemble import assemble
+from .assemble import assemble, judged
 from .close import HELD, MARGIN, Closing, Closure, close, closure_of, measured, platform_poses
-from .configurations import Configurations, joint_coordinates, new_rows, put_rows, write_closing
+from .configurations import Configurations, coordinates_for, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
 from .known import chanced_upon
 from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
@@ -126,9 +126,11 @@ class ClosureEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         return centres(self.mechanism, found.coordinates)
 
-    def assemble(self, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
-        """Forward kinematics: see `assemble.assemble`."""
-        return assemble(self.mechanism, coordinates, values, seeded=seeded)
+    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+        """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
+        coordinates = coordinates_for(self.mechanism, start, len(values))
+        closing = assemble(self.mechanism, coordinates, values, seeded=start is not None)
+        return judged(self.mechanism, self.at(closing), closing, values, tolerance)
 
 
 def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, keep_mode: bool) -> Configurations:

@@ -1,4 +1,4 @@
-"""The decorators of the compiled code: cached on disk, keyed by the text of every kernel, announced when compiled.
+"""The decorators of the compiled code: cached on disk, keyed by the text it is made of, announced when compiled.
 
 A kernel is what Python calls; its parts (`routine`, `inlined`, `allocator`) are called by compiled code alone. Most of
 the time of compiling grows with the number of functions and of their arguments, so parts are compiled for one set of
@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import gc
 import hashlib
+import re
 import sys
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, TypeVar
@@ -41,32 +42,45 @@ _AttributeTemplate: Any = AttributeTemplate
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-@lru_cache
-def _sources_digest(folder: Path) -> str:
-    """Hash of all sources in a folder: Numba itself does not see an edit in another file's function."""
+_IMPORTS = re.compile(r"^\s*from (\.+)([\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
+
+
+@cache
+def _imported(path: Path) -> tuple[Path, ...]:
+    """The files of this package that a file imports."""
+    found = []
+    for dots, module, names in _IMPORTS.findall(path.read_text(encoding="utf-8")):
+        base = path.parents[len(dots) - 1].joinpath(*module.split("."))
+        found += [base, *(base / name for name in re.findall(r"\w+", names))]
+    files = (each for base in found for each in (base.with_name(f"{base.name}.py"), base / "__init__.py"))
+    return tuple(each for each in files if each.is_file())
+
+
+def _sources_of(path: Path) -> set[Path]:
+    """A file, the files of this package that it imports, and those that these import."""
+    found, waiting = {path}, [path]
+    while waiting:
+        fresh = set(_imported(waiting.pop())) - found
+        found |= fresh
+        waiting += fresh
+    return found
+
+
+def _digest_for(function: Callable[..., Any]) -> str:
+    """Hash of all sources that a compiled function is made of: Numba itself sees no edit of another file."""
     digest = hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
+    for path in sorted(_sources_of(Path(function.__code__.co_filename))):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-_FOLDER = Path(__file__).parent
-_DIGEST = _sources_digest(_FOLDER)
-
-
-def _digest_for(function: Callable[..., Any]) -> tuple[str, ...]:
-    """What a compiled function depends on: the kernels and, elsewhere in the package, the folder it is written in."""
-    folder = Path(function.__code__.co_filename).parent
-    return (_DIGEST, _sources_digest(folder)) if _FOLDER.parent in folder.parents else (_DIGEST,)
-
-
 class _KernelCache(_Cache):  # type: ignore[misc]  # a class only at run time
-    """Numba's file cache, made stale by an edit to any file beside the kernel."""
+    """Numba's file cache, made stale by an edit to any file that the kernel is made of."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         # with the version, not the stamp: an index of other sources may hold types there are no more, and is not read
-        self._cache_file._version = (self._cache_file._version, *_digest_for(function))
+        self._cache_file._version = (self._cache_file._version, _digest_for(function))
 
 
 @contextmanager

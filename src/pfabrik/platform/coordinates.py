@@ -12,6 +12,7 @@ from ..description.mechanism import Mechanism
 from ..kernels.legs import records as K
 from ..motion.limits import within_turns
 from ..tolerances import TOLERANCES
+from .table import kernel_table
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +21,13 @@ RESTARTS = 24
 
 
 def settled(
-    mechanism: Mechanism, table: LegTable, poses: Floats, actuators: Floats, sides: Floats, begin: Floats | None
+    mechanism: Mechanism,
+    table: LegTable,
+    poses: Floats,
+    actuators: Floats,
+    sides: Floats,
+    begin: Floats | None,
+    carriers: Floats | None = None,
 ) -> Floats:
     """All joint coordinates, as deviations from home, (n, columns), of platforms and actuators at rest.
 
@@ -30,6 +37,8 @@ def settled(
     sides : which of its two solutions each leg takes, (n or 1, legs).
     begin : where to start, (n or 1, columns): what a configuration leaves open (a rod's spin) is nearest to there.
         None for home.
+    carriers : coordinates of the legs' carriers (n, legs) [L or rad] where they were found otherwise than by closed
+        forms, which tell half their digits near dead points; NaN, or None, where not.
     """
     closure = closure_of(mechanism, whole=False)
     found = np.zeros((len(poses), len(closure.scale)))
@@ -38,6 +47,9 @@ def settled(
     if not len(poses):
         return found
     read_into(table, poses, sides, found)
+    rows = np.flatnonzero(np.isfinite(carriers).all(axis=1)) if carriers is not None else ()
+    if len(rows):
+        found[rows] = _read_with(mechanism, table, poses[rows], sides[rows], carriers[rows], found[rows])
     closure.put_actuators(found, actuators)
     locked = frozenset(mechanism.actuator_names)
     platform = (*HELD[:3], *((0.0,) * 3)) if mechanism.end_effector_is_joint else HELD
@@ -61,6 +73,19 @@ def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats) -> N
     from ..kernels.legs.answer import read_coordinates
 
     read_coordinates(table.aimed, table.known, table.task, np.require(poses, requirements=["C", "W"]), sides, found)
+
+
+def _read_with(
+    mechanism: Mechanism, table: LegTable, poses: Floats, sides: Floats, carriers: Floats, found: Floats
+) -> Floats:
+    """The same into joint coordinates (n, columns), with the carriers where they are told to be."""
+    from ..kernels.platform.nearest import read_configurations
+
+    scaled = poses.copy()
+    scaled[:, :3, 3] /= mechanism.characteristic_length
+    legs = kernel_table(table)._replace(legs=table.aimed)
+    read_configurations(legs, table.known, scaled, carriers, sides, found)
+    return found
 
 
 def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Floats:

@@ -18,7 +18,9 @@ from ..kernels.threads import in_blocks
 from ..options import Options
 from ..reaching.solve import ReachingEngine
 from .coordinates import settled, sides_at
+from .forward import assembled
 from .one import LegAnswer, OneTarget
+from .unreached import Question, answer_unreached
 
 Floats = NDArray[np.float64]
 
@@ -28,8 +30,9 @@ ROWS_A_BLOCK = 1024
 class LegsEngine:
     """Answers that legs in closed form reach in the working mode they start in; another engine gives all the others.
 
-    The constraints that legs leave on the pose complete what the task leaves open. What is out of reach, beyond a limit
-    or near a dead point, and what asks for another working mode, is answered as if there were no closed forms.
+    The constraints that legs leave on the pose complete what the task leaves open. What they do not reach is answered
+    in other working modes, then by the nearest feasible pose, by searches in the platform's pose; what these leave, near
+    dead points above all, as if there were no closed forms.
     """
 
     def __init__(self, table: LegTable, inner: ReachingEngine | ClosureEngine) -> None:
@@ -48,19 +51,26 @@ class LegsEngine:
             found = self._reach_one(targets, start, keep_mode)
             if found is not None:
                 return found
-        sides = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        sides = first
         rows = new_rows(self.mechanism, len(targets))
         left = self._reach(targets, start, sides, keep_mode, rows)
-        if left == len(targets):
+        carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
+        if left and options.projection == "nearest":
+            sides = np.array(np.broadcast_to(sides, (len(targets), sides.shape[1])))
+            poses = self.mechanism.home_pose[None] if start is None else start.rows.poses
+            question = Question(self.mechanism, self._table, targets, poses, options, keep_mode)
+            carriers = answer_unreached(question, rest, sides, rows)
+            rest = np.flatnonzero(rows.status == P.PENDING)
+        if len(rest) == len(targets):
             return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
-        others, rest = None, np.flatnonzero(rows.status != P.REACHED)
-        if left:
+        if len(rest):
             begin = start if start is None or len(start) == 1 else start.at(rest)
             others = self._inner.answer(targets[rest], self._start(begin), options, keep_mode=keep_mode)
             put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
-        begins = _begins(self.mechanism, self._table, start, sides)
+        begins = _begins(self.mechanism, self._table, start, first)
         return Configurations(
-            rows, partial(_coordinates, self.mechanism, self._table, rows, sides, begins, rest, others)
+            rows, partial(_coordinates, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
         )
 
     def prepared(
@@ -100,9 +110,21 @@ class LegsEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         return self._inner.points(self._positioned(found))
 
-    def assemble(self, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
-        """Forward kinematics, by the other engine."""
-        return self._inner.assemble(coordinates, values, seeded=seeded)
+    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+        """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
+        first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        rows, carriers, sides = assembled(self.mechanism, self._table, values, start, first)
+        rest, others = np.flatnonzero(rows.status == P.PENDING), None
+        if len(rest) == len(values):
+            return self._inner.forward(values, start, tolerance)
+        if len(rest):
+            begin = start if start is None or len(start) == 1 else start.at(rest)
+            others = self._inner.forward(values[rest], begin, tolerance)
+            put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
+        begins = _begins(self.mechanism, self._table, start, first)
+        return Configurations(
+            rows, partial(_coordinates, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
+        )
 
     def _reach_one(self, target: Floats, start: LegAnswer | None, keep_mode: bool) -> LegAnswer | None:
         """Answer one target from home or from an answer before, if legs reach it."""
@@ -192,6 +214,7 @@ def _coordinates(
     table: LegTable,
     rows: P.Rows,
     sides: Floats,
+    carriers: Floats | None,
     begins: Callable[[], Floats | None],
     rest: NDArray[np.intp],
     others: Configurations | None,
@@ -202,7 +225,13 @@ def _coordinates(
     if begin is not None and len(begin) > 1:
         begin = begin[own]
     found = settled(
-        mechanism, table, rows.poses[own], rows.actuators[own], sides if len(sides) == 1 else sides[own], begin
+        mechanism,
+        table,
+        rows.poses[own],
+        rows.actuators[own],
+        sides if len(sides) == 1 else sides[own],
+        begin,
+        None if carriers is None else carriers[own],
     )
     if others is None:
         return found

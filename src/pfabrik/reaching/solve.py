@@ -8,9 +8,17 @@ from functools import lru_cache, partial
 import numpy as np
 
 from ..arrays import Floats
-from ..closure.assemble import assemble
+from ..closure.assemble import assemble, judged
 from ..closure.close import Closing, closure_of, platform_poses
-from ..closure.configurations import Configurations, joint_coordinates, new_rows, put_rows, rows_at, write_closing
+from ..closure.configurations import (
+    Configurations,
+    coordinates_for,
+    joint_coordinates,
+    new_rows,
+    put_rows,
+    rows_at,
+    write_closing,
+)
 from ..closure.descend import within_sight
 from ..closure.projection import SAME, kept, project, ways_of
 from ..closure.stretched import Bends
@@ -125,9 +133,13 @@ class ReachingEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]; merged joints share a centre."""
         return joint_points(self._compiled, found.rows)
 
-    def assemble(self, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
-        """Forward kinematics: see `closure.assemble.assemble`."""
-        return assemble(self.mechanism, coordinates, values, seeded=seeded, by_positions=self._by_positions)
+    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+        """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
+        coordinates = coordinates_for(self.mechanism, start, len(values))
+        closing = assemble(
+            self.mechanism, coordinates, values, seeded=start is not None, by_positions=self._by_positions
+        )
+        return judged(self.mechanism, self.at(closing), closing, values, tolerance)
 
     def _by_positions(self, coordinates: Floats, poses: Floats, values: Floats) -> tuple[Floats, Floats]:
         """Legs whose actuators have given values (n, n_a), assembled in positions around platforms (n, 4, 4).

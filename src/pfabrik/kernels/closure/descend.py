@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from .._jit import kernel, routine
+from ..free_motions import FreeMotions, new_free_motions
 from ..qp import QP, apply_inverse, factorise, new_qp, solve_qp
 from ..rotations import turn_ball
 from ..sqp import (
@@ -37,13 +38,11 @@ from ..sqp import (
     restoring_step,
 )
 from .linearise import (
-    FreeMotions,
     Workspace,
     add_cone,
     add_force,
     cone_excess,
     linearise,
-    new_free_motions,
     new_workspace,
     walk_all,
 )
@@ -236,10 +235,10 @@ def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Clo
     the multiplier of the limit, by how much nearer the target comes per unit by which it gives way; else 0.
     """
     rows = 6 * len(loops.paths)  # of all paths but the first, and six that may be held
-    best, trial = new_state(loops), new_state(loops)
+    best, trial, n = new_state(loops), new_state(loops), len(loops.lo)
     first, second, work = (
-        new_free_motions(loops, rows),
-        new_free_motions(loops, rows),
+        new_free_motions(n, rows, 2 * n + len(loops.cone_angles)),
+        new_free_motions(n, rows, 2 * n + len(loops.cone_angles)),
         new_workspace(loops, layout, rows),
     )
     k = len(first.linear.h)

@@ -8,40 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import allocator, routine
-from ..sqp import (
-    EXCESS,
-    GAP,
-    LIMITS,
-    MOTIONS,
-    RANK,
-    REACH,
-    VALUE,
-    Hessian,
-    Linearisation,
-    StepControl,
-    new_hessian,
-    new_linearisation,
-    new_step_control,
-)
-from .loops import BALL, Floats, Ints, Layout, Loops
+from ..free_motions import Elimination, FreeMotions, add_limit, eliminate, new_elimination, project_gradient
+from ..sqp import EXCESS, GAP, LIMITS, MOTIONS, REACH, VALUE, Hessian, StepControl, new_hessian, new_step_control
+from .loops import BALL, Floats, Layout, Loops
 from .path_kinematics import Equations, State, compare_end, end_path, new_equations, pose_cone, walk_path
 from .pose_objective import PoseGradient, PoseObjective, pose_gradient
-
-DEPENDENT = 1e-6
-"""What is left of an equation that follows from the others: descriptions are typed with as many digits."""
-
-SHARED = 0.01
-"""By what entries of unknowns that paths have in common count less as pivots: they couple the paths' equations."""
-
-
-class FreeMotions(NamedTuple):
-    """The motions that the loops leave free at a configuration, and objective and limits linearised in them."""
-
-    linear: Linearisation
-    basis: Floats  # (columns, columns): free motions, one a column
-    shift: Floats  # (columns,): what would close the loops
-    transform: Floats  # (rows, rows): how pivot rows are made of the equations
-    pivots: Ints  # (rows,): column of each
 
 
 class Workspace(NamedTuple):
@@ -52,45 +23,35 @@ class Workspace(NamedTuple):
     hessian: Hessian
     control: StepControl
     gaps: Floats  # (paths, 6): between the ends of each path and of the first
-    A: Floats  # (rows, columns + 1 + rows)
+    elimination: Elimination  # used: by how many paths, the first counted twice: it is in the equations of all
     row: Floats  # (columns,)
     force: Floats  # (paths, 6): what pulls at the end of each path
     balance: Floats  # (rows,): multipliers of the loops and of what is held
     here: Floats  # (columns,)
     there: Floats  # (columns,)
-    used: Ints  # (columns,): how many paths pass each, the first counted twice: it is in the equations of all
-    filled: Ints  # (columns + 1 + rows,): where a row of A is not zero: legs have few unknowns in common
-
-
-@allocator
-def new_free_motions(loops: Loops, rows: int) -> FreeMotions:
-    """Memory for the linearisation of one configuration."""
-    n = len(loops.lo)
-    linear = new_linearisation(n, 2 * n + len(loops.cone_angles))
-    return FreeMotions(linear, np.zeros((n, n)), np.zeros(n), np.zeros((rows, rows)), np.zeros(rows, np.int64))
 
 
 @allocator
 def new_workspace(loops: Loops, layout: Layout, rows: int) -> Workspace:
     """Scratch memory of one thread."""
     n, paths = len(loops.lo), len(loops.paths) - 1
-    used = np.zeros(n, np.int64)
+    elimination = new_elimination(n, rows)
     for r in range(len(loops.row_columns)):
-        used[loops.row_columns[r]] += 2 if r < loops.visit_rows[loops.paths[1]] else 1  # the first is in all equations
+        elimination.used[loops.row_columns[r]] += (
+            2 if r < loops.visit_rows[loops.paths[1]] else 1
+        )  # the first is in all equations
     return Workspace(
         new_equations(loops, layout),
         PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
         new_hessian(n, 2 * n + len(loops.cone_angles)),
         new_step_control(),
         np.zeros((paths, 6)),
-        np.zeros((rows, n + 1 + rows)),
+        elimination,
         np.zeros(n),
         np.zeros((paths, 6)),
         np.zeros(rows),
         np.zeros(n),
         np.zeros(n),
-        used,
-        np.zeros(n + 1 + rows, np.int64),
     )
 
 
@@ -128,8 +89,7 @@ def linearise(
     loops: Loops, row: int, objective: PoseObjective, state: State, work: Workspace, view: FreeMotions
 ) -> None:
     """Look at a configuration."""
-    linear, n = view.linear, len(loops.lo)
-    basis, here, g, metric = view.basis, work.here, linear.g, linear.metric
+    linear, n, here = view.linear, len(loops.lo), work.here
     gap = walk_all(loops, state, work)
     linear.scalars[VALUE], held = pose_gradient(objective, objective.targets[row], state.X, work.gradient)
     for k in range(held):
@@ -138,22 +98,15 @@ def linearise(
     for j in range(n):
         here[j] = 0.0
     add_force(loops, 0, work.gradient.force, work, work.here)
-    eliminate(lay_out(loops, held, work), n, work, view)
-    for a in range(linear.counts[MOTIONS]):
-        g[a] = 0.0
-        for j in range(n):
-            g[a] += basis[j, a] * here[j]
-        for b in range(a + 1):
-            metric[a, b] = 0.0
-            for j in range(n):
-                metric[a, b] += basis[j, a] * basis[j, b]
+    eliminate(lay_out(loops, held, work), work.elimination, view)
+    project_gradient(work.here, view)
     linearise_limits(loops, objective.margin, state, work, view)
 
 
 @routine
 def lay_out(loops: Loops, held: int, work: Workspace) -> int:
     """The equations of the loops and of what is held, with an identity beside them; how many."""
-    paths, n, A, eq = len(loops.paths) - 1, len(loops.lo), work.A, work.eq
+    paths, n, A, eq = len(loops.paths) - 1, len(loops.lo), work.elimination.A, work.eq
     first = 6 * (paths - 1)
     rows, holds = eq.rows, work.gradient.holds
     for r in range(first + held):
@@ -176,55 +129,6 @@ def lay_out(loops: Loops, held: int, work: Workspace) -> int:
 
 
 @routine
-def eliminate(rows: int, n: int, work: Workspace, view: FreeMotions) -> None:
-    """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what closes the loops."""
-    A, rank, width = work.A, 0, n + 1 + rows
-    taken, used, filled_at, basis, shift, pivots = work.row, work.used, work.filled, view.basis, view.shift, view.pivots
-    for j in range(n):
-        shift[j] = 0.0
-        taken[j] = 0.0  # 1 for pivot columns
-    for row in range(rows):
-        largest, pivot = 0.0, -1
-        for j in range(n):
-            size = abs(A[row, j])
-            if size > DEPENDENT and taken[j] == 0.0:
-                size *= SHARED if used[j] > 1 else 1.0
-                if size > largest:
-                    largest, pivot = size, j
-        if pivot < 0:  # it follows from those before
-            continue
-        factor, filled = 1.0 / A[row, pivot], 0
-        for j in range(width):
-            A[row, j], A[rank, j] = A[rank, j], factor * A[row, j]
-            if A[rank, j] != 0.0:
-                filled_at[filled] = j
-                filled += 1
-        for i in range(rows):
-            share = A[i, pivot]
-            if i != rank and share != 0.0:
-                for k in range(filled):
-                    A[i, filled_at[k]] -= share * A[rank, filled_at[k]]
-                A[i, pivot] = 0.0
-        taken[pivot] = 1.0
-        pivots[rank] = pivot
-        rank += 1
-    motions = 0
-    for j in range(n):
-        if taken[j] == 0.0 and used[j] > 0:
-            for i in range(n):
-                basis[i, motions] = 0.0
-            basis[j, motions] = 1.0
-            for r in range(rank):
-                basis[pivots[r], motions] = -A[r, j]
-            motions += 1
-    for r in range(rank):
-        shift[pivots[r]] = A[r, n]
-        for i in range(rows):
-            view.transform[r, i] = A[r, n + 1 + i]
-    view.linear.counts[MOTIONS], view.linear.counts[RANK] = motions, rank
-
-
-@routine
 def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace, view: FreeMotions) -> None:
     """Excess and gradient of every limit within reach."""
     linear = view.linear
@@ -233,7 +137,7 @@ def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace,
     for j in range(n):
         for side in range(2):
             h = loops.lo[j] + margin - state.q[j] if side == 0 else state.q[j] - loops.hi[j] + margin
-            if h > -REACH and work.used[j] > 0:
+            if h > -REACH and work.elimination.used[j] > 0:
                 for a in range(linear.counts[MOTIONS]):
                     G[k, a] = -basis[j, a] if side == 0 else basis[j, a]
                 linear.drift[k] = -shift[j] if side == 0 else shift[j]
@@ -242,20 +146,12 @@ def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace,
                 k += 1
     for cone in range(len(loops.cone_angles)):
         h = cone_excess(loops, cone, margin, state, work)
-        if h > -REACH and work.used[loops.columns[loops.cone_units[cone, 0]]] > 0:
+        if h > -REACH and work.elimination.used[loops.columns[loops.cone_units[cone, 0]]] > 0:
             for j in range(n):
                 row[j] = 0.0
             add_cone(loops, cone, 1.0, work, work.row)
-            for a in range(linear.counts[MOTIONS]):
-                G[k, a] = 0.0
-                for j in range(n):
-                    G[k, a] += row[j] * basis[j, a]
-            linear.drift[k] = 0.0
-            for j in range(n):
-                linear.drift[k] += row[j] * shift[j]
-            linear.h[k], linear.which[k] = h, 2 * n + cone
             excess = max(excess, h)
-            k += 1
+            k = add_limit(k, h, 2 * n + cone, work.row, view)
     linear.counts[LIMITS] = k
     linear.scalars[EXCESS] = excess
 

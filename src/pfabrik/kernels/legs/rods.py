@@ -94,11 +94,17 @@ def place_rod(
     ----------
     carrier, lead : the rod whose carrier it is on and that rod's values; its own if it shares none.
     """
-    head, sure = move(frame, vec(rod["head_point"])), 1.0
+    sure = 1.0
     if rod["carrier"] == CRANK or rod["carrier"] == CARRIAGE:
-        sure = carry(rod, head, side, own)
-    span = sub(head, carried_foot(rod, carrier, lead))
-    length = norm(span)
+        sure = carry(rod, move(frame, vec(rod["head_point"])), side, own)
+    return min(sure, read_rod(rod, carrier, frame, lead, own, line))
+
+
+@routine
+def read_rod(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, line: Floats) -> float:
+    """The same, with the carrier where its values say."""
+    span = sub(move(frame, vec(rod["head_point"])), carried_foot(rod, carrier, lead))
+    length, sure = norm(span), 1.0
     u, home = scale(1.0 / length, span), vec(rod["line"])
     foot_line, head_line = carried(carrier, lead, u, -1.0), turned_back(frame, u)
     put(line, span)

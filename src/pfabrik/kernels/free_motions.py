@@ -1,0 +1,130 @@
+"""Motions that equations leave free: elimination, and what is known of a configuration in terms of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._jit import allocator, routine
+from .closure.loops import Floats, Ints
+from .sqp import MOTIONS, RANK, Linearisation, new_linearisation
+
+DEPENDENT = 1e-6
+"""What is left of an equation that follows from the others: descriptions are typed with as many digits."""
+
+SHARED = 0.01
+"""By what entries of unknowns that legs have in common count less as pivots: they couple the legs' equations."""
+
+
+class FreeMotions(NamedTuple):
+    """The motions that equations leave free at a configuration, and objective and limits linearised in them."""
+
+    linear: Linearisation
+    basis: Floats  # (unknowns, unknowns): free motions, one a column
+    shift: Floats  # (unknowns,): what would meet the equations
+    transform: Floats  # (rows, rows): how pivot rows are made of the equations
+    pivots: Ints  # (rows,): column of each
+
+
+class Elimination(NamedTuple):
+    """Equations being solved."""
+
+    A: Floats  # (rows, unknowns + 1 + rows): equations, right-hand side, identity
+    taken: Floats  # (unknowns,): 1 for pivot columns
+    filled: Ints  # (unknowns + 1 + rows,): where a row of A is not zero: legs have few unknowns in common
+    used: Ints  # (unknowns,): 0 for what does not move, more than 1 for what legs have in common
+
+
+@allocator
+def new_free_motions(n: int, rows: int, limits: int) -> FreeMotions:
+    """Memory for what is known of one configuration."""
+    linear = new_linearisation(n, limits)
+    return FreeMotions(linear, np.zeros((n, n)), np.zeros(n), np.zeros((rows, rows)), np.zeros(rows, np.int64))
+
+
+@allocator
+def new_elimination(n: int, rows: int) -> Elimination:
+    """Memory for equations; `used` is to be filled."""
+    width = n + 1 + rows
+    return Elimination(np.zeros((rows, width)), np.zeros(n), np.zeros(width, np.int64), np.zeros(n, np.int64))
+
+
+@routine
+def eliminate(rows: int, scratch: Elimination, view: FreeMotions) -> None:
+    """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what meets the equations."""
+    A, taken, filled_at, used = scratch.A, scratch.taken, scratch.filled, scratch.used
+    basis, shift, pivots = view.basis, view.shift, view.pivots
+    n, rank = used.shape[0], 0
+    width = n + 1 + rows
+    for j in range(n):
+        shift[j] = 0.0
+        taken[j] = 0.0
+    for row in range(rows):
+        largest, pivot = 0.0, -1
+        for j in range(n):
+            size = abs(A[row, j])
+            if size > DEPENDENT and taken[j] == 0.0:
+                size *= SHARED if used[j] > 1 else 1.0
+                if size > largest:
+                    largest, pivot = size, j
+        if pivot < 0:  # it follows from those before
+            continue
+        factor, filled = 1.0 / A[row, pivot], 0
+        for j in range(width):
+            A[row, j], A[rank, j] = A[rank, j], factor * A[row, j]
+            if A[rank, j] != 0.0:
+                filled_at[filled] = j
+                filled += 1
+        for i in range(rows):
+            share = A[i, pivot]
+            if i != rank and share != 0.0:
+                for k in range(filled):
+                    A[i, filled_at[k]] -= share * A[rank, filled_at[k]]
+                A[i, pivot] = 0.0
+        taken[pivot] = 1.0
+        pivots[rank] = pivot
+        rank += 1
+    motions = 0
+    for j in range(n):
+        if taken[j] == 0.0 and used[j] > 0:
+            for i in range(n):
+                basis[i, motions] = 0.0
+            basis[j, motions] = 1.0
+            for r in range(rank):
+                basis[pivots[r], motions] = -A[r, j]
+            motions += 1
+    for r in range(rank):
+        shift[pivots[r]] = A[r, n]
+        for i in range(rows):
+            view.transform[r, i] = A[r, n + 1 + i]
+    view.linear.counts[MOTIONS], view.linear.counts[RANK] = motions, rank
+
+
+@routine
+def project_gradient(force: Floats, view: FreeMotions) -> None:
+    """The gradient of the objective in the free motions, from that in the unknowns, and the metric."""
+    basis, g, metric, n = view.basis, view.linear.g, view.linear.metric, force.shape[0]
+    for a in range(view.linear.counts[MOTIONS]):
+        g[a] = 0.0
+        for j in range(n):
+            g[a] += basis[j, a] * force[j]
+        for b in range(a + 1):
+            metric[a, b] = 0.0
+            for j in range(n):
+                metric[a, b] += basis[j, a] * basis[j, b]
+
+
+@routine
+def add_limit(k: int, h: float, number: int, slope: Floats, view: FreeMotions) -> int:
+    """Note a limit by its excess, its number and its derivative by the unknowns; how many are noted then."""
+    linear, basis, shift, G, drift = view.linear, view.basis, view.shift, view.linear.G, view.linear.drift
+    drift[k] = 0.0
+    for j in range(slope.shape[0]):
+        drift[k] += slope[j] * shift[j]
+    for a in range(linear.counts[MOTIONS]):
+        G[k, a] = 0.0
+        for j in range(slope.shape[0]):
+            G[k, a] += slope[j] * basis[j, a]
+    linear.h[k], linear.which[k] = h, number
+    return k + 1

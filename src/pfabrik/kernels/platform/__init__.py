@@ -1,0 +1,1 @@
+"""Configurations of legs in closed form in few unknowns: the pose of the platform, and what carries each rod."""

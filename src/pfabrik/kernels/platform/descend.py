@@ -1,0 +1,349 @@
+"""The nearest feasible configuration of legs in closed form: a descent on the platform's pose and its rods' carriers.
+
+As on joint coordinates (`closure.descend`), in a quarter of the unknowns: its motions are those that the legs'
+equations leave free, found anew at each configuration, and each step is brought back onto them before it is judged.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .._jit import allocator, routine
+from ..closure.pose_objective import PoseGradient, PoseObjective, pose_gradient
+from ..free_motions import (
+    Elimination,
+    FreeMotions,
+    add_limit,
+    eliminate,
+    new_elimination,
+    new_free_motions,
+    project_gradient,
+)
+from ..legs.answer import deviation, turn_pose
+from ..qp import QP, new_qp
+from ..sqp import (
+    CLOSED,
+    DONE,
+    EXCESS,
+    GAP,
+    LARGEST,
+    LIMITS,
+    LONGEST_STEP,
+    MOTIONS,
+    NEARLY_CLOSED,
+    PROBE,
+    RANK,
+    REACH,
+    RESTORING,
+    VALUE,
+    Hessian,
+    StepControl,
+    begin_descent,
+    is_closed,
+    judge_step,
+    longest,
+    new_hessian,
+    new_step_control,
+    plan_step,
+    restoring_step,
+)
+from ..vectors import copy_row, copy_table, wrap
+from .equations import (
+    Floats,
+    Now,
+    Table,
+    View,
+    cone_slope,
+    coordinate_slope,
+    count_unknowns,
+    new_now,
+    new_view,
+    place,
+    put_slopes,
+)
+
+
+class Aim(NamedTuple):
+    """What is to come near: the pose of the platform, or the values of actuators."""
+
+    pose: PoseObjective
+    values: Floats  # (n, n_a): deviations from home [L or rad] that actuators are to have; no rows if that is no aim
+
+
+class Search(NamedTuple):
+    """Scratch memory of one thread."""
+
+    look: View
+    gradient: PoseGradient
+    hessian: Hessian
+    control: StepControl
+    p: QP
+    elimination: Elimination
+    first: FreeMotions
+    second: FreeMotions
+    force: Floats  # (n,): gradient of the objective
+    here: Floats  # (n,)
+    there: Floats  # (n,)
+    step: Floats  # (n,)
+    balance: Floats  # (rows,): multipliers of the equations and of what is held
+    best: Now
+    trial: Now
+
+
+@allocator
+def new_search(table: Table) -> Search:
+    """Scratch memory of one thread."""
+    n, legs = count_unknowns(table), table.legs.shape[0]
+    rows, limits = table.task[0]["rows"] + n, 2 * table.limited.shape[0] + table.cones.shape[0]
+    elimination = new_elimination(n, rows)
+    for j in range(n):
+        elimination.used[j] = 2 if j < 6 else 1
+    return Search(
+        new_view(table),
+        PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
+        new_hessian(n, limits),
+        new_step_control(),
+        new_qp(n, limits),
+        elimination,
+        new_free_motions(n, rows, limits),
+        new_free_motions(n, rows, limits),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(rows),
+        new_now(legs),
+        new_now(legs),
+    )
+
+
+@routine
+def copy_now(source: Now, to: Now) -> None:
+    copy_table(source.pose, to.pose)
+    copy_row(source.q, to.q)
+    copy_row(source.sides, to.sides)
+
+
+@routine
+def put_objective(table: Table, row: int, aim: Aim, now: Now, search: Search) -> tuple[float, int]:
+    """The objective, its gradient into `search.force`; how many components of the twist are held."""
+    force, slope = search.force, search.look.slope
+    for j in range(6, force.shape[0]):
+        force[j] = 0.0
+    value, held = pose_gradient(aim.pose, aim.pose.targets[row], now.pose, search.gradient)
+    for j in range(6):
+        force[j] = search.gradient.force[j]
+    for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
+        driven = table.driven[i]
+        off = coordinate_slope(table, driven, search.look) - aim.values[row, driven["column"]]
+        off = wrap(off, 0.0) if driven["turns"] == 1 else off
+        value += 0.5 * search.gradient.unit[0] * off * off
+        for j in range(force.shape[0]):
+            force[j] += search.gradient.unit[0] * off * slope[j]
+    return value, held
+
+
+@routine
+def linearise(table: Table, row: int, aim: Aim, now: Now, search: Search, view: FreeMotions) -> None:
+    """Look at a configuration."""
+    scalars, errors = view.linear.scalars, search.gradient.errors
+    gap = place(table, now, search.look)
+    put_slopes(table, search.look)
+    scalars[VALUE], held = put_objective(table, row, aim, now, search)
+    for k in range(held):
+        gap = max(gap, abs(errors[k]))
+    scalars[GAP] = gap
+    eliminate(lay_out(held, search), search.elimination, view)
+    project_gradient(search.force, view)
+    linearise_limits(table, aim.pose.margin, search, view)
+
+
+@routine
+def lay_out(held: int, search: Search) -> int:
+    """The equations of the legs and of what is held, with an identity beside them; how many."""
+    A, rows, slopes = search.elimination.A, search.look.rows, search.look.slopes
+    errors, holds = search.gradient.errors, search.gradient.holds
+    m, n = slopes.shape
+    for r in range(m + held):
+        for j in range(A.shape[1]):
+            A[r, j] = 0.0
+        A[r, n + 1 + r] = 1.0
+    for r in range(m):
+        A[r, n] = -rows[r]
+        for j in range(n):
+            A[r, j] = slopes[r, j]
+    for k in range(held):
+        A[m + k, n] = -errors[k]
+        for j in range(6):
+            A[m + k, j] = holds[k, j]
+    return int(m + held)
+
+
+@routine
+def linearise_limits(table: Table, margin: float, search: Search, view: FreeMotions) -> None:
+    """Excess and gradient of every limit within reach."""
+    slope, values, k, excess = search.look.slope, search.look.values, 0, -math.inf
+    for i in range(table.limited.shape[0]):
+        limited = table.limited[i]
+        value = deviation(limited, values)
+        below, above = limited["lo"] + margin - value, value - limited["hi"] + margin
+        if max(below, above) <= -REACH:
+            continue
+        excess = max(excess, max(below, above))
+        coordinate_slope(table, limited, search.look)
+        if above > -REACH:
+            k = add_limit(k, above, 2 * i + 1, search.look.slope, view)
+        if below > -REACH:
+            for j in range(slope.shape[0]):
+                slope[j] = -slope[j]
+            k = add_limit(k, below, 2 * i, search.look.slope, view)
+    for i in range(table.cones.shape[0]):
+        over = cone_slope(table, table.cones[i], search.look) - table.cones[i]["half_angle"] + margin
+        if over > -REACH:
+            excess = max(excess, over)
+            k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.look.slope, view)
+    view.linear.counts[LIMITS] = k
+    view.linear.scalars[EXCESS] = excess
+
+
+@routine
+def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Search, out: Floats) -> None:
+    """Gradient of the Lagrangian at a configuration, by multipliers of limits and the `balance` of the equations."""
+    place(table, now, search.look)
+    put_slopes(table, search.look)
+    _, held = put_objective(table, row, aim, now, search)
+    force, slopes, balance, multipliers = search.force, search.look.slopes, search.balance, search.hessian.multipliers
+    m, slope, holds = slopes.shape[0], search.look.slope, search.gradient.holds
+    for j in range(out.shape[0]):
+        out[j] = force[j]
+        for r in range(m):
+            out[j] += balance[r] * slopes[r, j]
+    for k in range(held):
+        for j in range(6):
+            out[j] += balance[m + k] * holds[k, j]
+    ranges = table.limited.shape[0]
+    for i in range(ranges):
+        pull = multipliers[2 * i + 1] - multipliers[2 * i]
+        if pull != 0.0:
+            coordinate_slope(table, table.limited[i], search.look)
+            for j in range(out.shape[0]):
+                out[j] += pull * slope[j]
+    for i in range(table.cones.shape[0]):
+        pull = multipliers[2 * ranges + i]
+        if pull != 0.0:
+            cone_slope(table, table.cones[i], search.look)
+            for j in range(out.shape[0]):
+                out[j] += pull * slope[j]
+
+
+@routine
+def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: FreeMotions) -> float:
+    """Curvature of the objective and of the active limits along free motions, into `hessian`; the largest on its
+    diagonal.
+
+    By differences of the gradient of the Lagrangian, whose multipliers of the equations balance it at pivot unknowns.
+    """
+    linear, H, basis, balance, step = view.linear, search.hessian.H, view.basis, search.balance, search.step
+    motions, here, there = linear.counts[MOTIONS], search.here, search.there
+    for i in range(balance.shape[0]):
+        balance[i] = 0.0
+    lagrangian_gradient(table, row, aim, search.best, search, search.here)
+    for r in range(linear.counts[RANK]):
+        for i in range(balance.shape[0]):
+            balance[i] -= here[view.pivots[r]] * view.transform[r, i]
+    lagrangian_gradient(table, row, aim, search.best, search, search.here)
+    largest = 0.0
+    for a in range(motions):
+        probe = PROBE / math.sqrt(linear.metric[a, a])
+        for j in range(step.shape[0]):
+            step[j] = basis[j, a]
+        copy_now(search.best, search.trial)
+        move(table, search.step, probe, search.trial)
+        lagrangian_gradient(table, row, aim, search.trial, search, search.there)
+        for b in range(motions):
+            H[b, a] = 0.0
+            for j in range(step.shape[0]):
+                H[b, a] += basis[j, b] * (there[j] - here[j]) / probe
+    for a in range(motions):
+        largest = max(largest, abs(H[a, a]))
+        for b in range(a):
+            H[a, b] = H[b, a] = 0.5 * (H[a, b] + H[b, a])
+    return largest
+
+
+@routine
+def move(table: Table, step: Floats, share: float, now: Now) -> None:
+    """Take a share of a step."""
+    pose, q, columns = now.pose, now.q, table.columns
+    for i in range(3):
+        pose[i, 3] += share * step[i]
+    turn_pose(now.pose, (share * step[3], share * step[4], share * step[5]))
+    for k in range(q.shape[0]):
+        if columns[k] >= 0:
+            q[k] += share * step[columns[k]]
+
+
+@routine
+def take(table: Table, view: FreeMotions, x: Floats, now: Now, search: Search, closing: bool) -> float:
+    """Take a step of the free motions, and with it one that meets the equations; the share of it not too long."""
+    basis, shift, step = view.basis, view.shift, search.step
+    n = step.shape[0]
+    for j in range(n):
+        step[j] = shift[j] if closing else 0.0
+        for a in range(view.linear.counts[MOTIONS]):
+            step[j] += basis[j, a] * x[a]
+    share = LONGEST_STEP / max(longest(search.step, n), LONGEST_STEP)
+    move(table, search.step, share, now)
+    return share
+
+
+@routine
+def restore_feasibility(table: Table, row: int, aim: Aim, now: Now, search: Search, view: FreeMotions) -> bool:
+    """Bring a configuration onto its equations and within its limits, by the shortest way; `view` is where it ends."""
+    for _step in range(RESTORING):
+        linearise(table, row, aim, now, search, view)
+        if is_closed(view.linear, CLOSED):
+            return True
+        if not restoring_step(view.linear, search.p):
+            return False
+        take(table, view, search.p.x, now, search, True)
+    linearise(table, row, aim, now, search, view)
+    return is_closed(view.linear, NEARLY_CLOSED)
+
+
+@routine
+def scale_objective(table: Table, row: int, aim: Aim, search: Search, view: FreeMotions) -> None:
+    """Choose the unit of the objective, so that its gradient is of order one, and look again."""
+    unit = search.gradient.unit
+    unit[0] = 1.0
+    linearise(table, row, aim, search.best, search, view)
+    unit[0] = 1.0 / max(math.sqrt(2.0 * view.linear.scalars[VALUE]), 1e-12)
+    linearise(table, row, aim, search.best, search, view)
+
+
+@routine
+def descend(table: Table, row: int, aim: Aim, search: Search) -> float:
+    """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible."""
+    view, other, hessian, control = search.first, search.second, search.hessian, search.control
+    unit = search.gradient.unit
+    unit[0] = 1.0
+    if not restore_feasibility(table, row, aim, search.best, search, view):
+        return math.inf
+    scale_objective(table, row, aim, search, view)
+    begin_descent(view.linear, hessian, control)
+    while control.counts[DONE] == 0:
+        control.scalars[LARGEST] = lagrangian_hessian(table, row, aim, search, view)
+        led_down = False
+        while not led_down and control.counts[DONE] == 0:
+            if plan_step(view.linear, hessian, control, aim.pose.max_iterations, search.p):
+                copy_now(search.best, search.trial)
+                share = take(table, view, search.p.x, search.trial, search, False)
+                feasible = restore_feasibility(table, row, aim, search.trial, search, other)
+                led_down = judge_step(view.linear, other.linear, feasible, share, control)
+                if led_down:
+                    copy_now(search.trial, search.best)
+                    view, other = other, view
+    return math.sqrt(2.0 * view.linear.scalars[VALUE] / unit[0])

@@ -1,0 +1,307 @@
+"""Legs in the pose of the platform and the coordinates of what carries their rods: equations, limits, derivatives.
+
+Nothing is eliminated here, so that all of it is smooth where rods are stretched out over what carries them, and both
+working modes are one set. Unknowns, n of them: the twist of the platform (velocity of its reference point, angular
+velocity), then one for each crank and carriage. Equations, besides those that `legs` leave on the pose: each rod on a
+carrier has its length.
+
+Whatever is told of a rod follows from y = du - B x u, the rate at which its line u turns as seen by the body that an
+end of it is on, with angular velocity B: hinges and cones at that end change by t . y, each with a vector t of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._jit import allocator, routine
+from ..legs.answer import deviation, set_frames
+from ..legs.endings import put_pose_slope
+from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
+from ..legs.records import (
+    CARRIAGE,
+    CARRIER,
+    COSINE,
+    CRANK,
+    CROSS,
+    FOOT,
+    FOOT_LINE,
+    HEAD,
+    HINGE,
+    N_VALUES,
+    PIVOT,
+    SHARED,
+    SINE,
+    SLIDE,
+    TRIPLE,
+    Floats,
+    Record,
+    Records,
+)
+from ..legs.rods import NOWHERE, carried, carrier_rate, mark, read_rod, rod_rows, twist_rate
+from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, turn, vec
+
+Ints = NDArray[np.int64]
+
+AT_FOOT, AT_HEAD = 0, 1
+# Sine below which a line is straight along the axis of its cone: no direction leads in or out.
+ALIGNED = 1e-12
+
+
+class Table(NamedTuple):
+    """A mechanism's legs, as `decomposition.leg_table` has them."""
+
+    legs: Records
+    limited: Records
+    cones: Records
+    driven: Records
+    task: Records  # one
+    columns: Ints  # (legs,): the unknown that is the coordinate of a leg's carrier; -1 where it has none
+
+
+class Now(NamedTuple):
+    """A configuration under work."""
+
+    pose: Floats  # (4, 4) [L]
+    q: Floats  # (legs,): of its carrier, deviation from home [L or rad]
+    sides: Floats  # (legs,): which of its two solutions a pivot of three hinges takes
+
+
+class View(NamedTuple):
+    """What legs are like at a configuration."""
+
+    frames: Floats  # (2, 4, 4): see `set_frames`
+    values: Floats  # (legs, N_VALUES)
+    lines: Floats  # (legs, 3): of a rod, from foot to head
+    rows: Floats  # (m,): the equations
+    slopes: Floats  # (m, n): their derivatives
+    slope: Floats  # (n,): that of a limit
+
+
+@allocator
+def new_now(legs: int) -> Now:
+    """Memory for a configuration."""
+    return Now(np.zeros((4, 4)), np.zeros(legs), np.zeros(legs))
+
+
+@allocator
+def new_view(table: Table) -> View:
+    """Memory for what is told of it."""
+    legs, n = table.legs.shape[0], count_unknowns(table)
+    m = table.task[0]["rows"] + n - 6
+    frames, values, lines = np.zeros((2, 4, 4)), np.zeros((legs, N_VALUES)), np.zeros((legs, 3))
+    return View(frames, values, lines, np.zeros(m), np.zeros((m, n)), np.zeros(n))
+
+
+@routine
+def count_unknowns(table: Table) -> int:
+    n = 6
+    for k in range(table.columns.shape[0]):
+        n = max(n, table.columns[k] + 1)
+    return n
+
+
+@routine
+def is_carried(leg: Record) -> bool:
+    """Whether a leg is a rod with a carrier of its own."""
+    return bool(leg["kind"] != PIVOT and (leg["carrier"] == CRANK or leg["carrier"] == CARRIAGE))
+
+
+@routine
+def place(table: Table, now: Now, view: View) -> float:
+    """Read all legs at a configuration, and fill the equations; the largest of them, infinite if not a number."""
+    legs, frames, values, lines, rows = table.legs, view.frames, view.values, view.lines, view.rows
+    set_frames(now.pose, table.task[0], view.frames)
+    main, own_row = 0, table.task[0]["rows"] - 6
+    for k in range(legs.shape[0]):
+        leg = legs[k]
+        frame = frames[leg["reversed"]]
+        if leg["kind"] == PIVOT:
+            place_pivot(leg, frame, now.sides[k], values[k])
+            pivot_rows(leg, frame, view.rows)
+            continue
+        main = main if leg["carrier"] == SHARED else k
+        if is_carried(leg):
+            values[k, CARRIER] = now.q[k]
+            values[k, COSINE], values[k, SINE] = math.cos(now.q[k]), math.sin(now.q[k])
+        read_rod(leg, legs[main], frame, values[main], values[k], lines[k])
+        rod_rows(leg, legs[main], frame, values[main], values[k], lines[k], view.rows)
+        if is_carried(leg):
+            rows[own_row + table.columns[k]] = values[k, SLIDE]
+    worst = 0.0
+    for i in range(rows.shape[0]):
+        if not abs(rows[i]) <= worst:
+            worst = abs(rows[i])
+    return worst if worst == worst else math.inf
+
+
+@routine
+def put_slopes(table: Table, view: View) -> None:
+    """Fill the derivatives of the equations."""
+    legs, frames, values, lines, slopes = table.legs, view.frames, view.values, view.lines, view.slopes
+    for i in range(slopes.shape[0]):
+        for j in range(6, slopes.shape[1]):
+            slopes[i, j] = 0.0
+    main, own_row = 0, table.task[0]["rows"] - 6
+    for k in range(legs.shape[0]):
+        leg, column = legs[k], table.columns[k]
+        frame = frames[leg["reversed"]]
+        if leg["kind"] == PIVOT:
+            pivot_slopes(leg, frame, view.slopes)
+            continue
+        main = main if leg["carrier"] == SHARED else k
+        if is_carried(leg):
+            u = direction(lines[k])
+            put_rate(leg, leg, frame, values[k], column, u, NOWHERE, NOWHERE, slopes[own_row + column])
+        put_rod_slopes(leg, legs[main], frame, values[main], values[k], lines[k], column, view.slopes)
+
+
+@routine
+def direction(line: Floats) -> Vec:
+    return scale(1.0 / norm(vec(line)), vec(line))
+
+
+@routine
+def put_rate(
+    rod: Record, carrier: Record, frame: Floats, lead: Floats, column: int, a: Vec, b: Vec, c: Vec, slope: Floats
+) -> None:
+    """Derivative (n,) of a . (dH - dF) + b . W + c . w; only the entries of this leg's unknowns are written."""
+    put_pose_slope(rod, frame, a, c, slope)
+    if column >= 0:
+        slope[column] = carrier_rate(rod, carrier, lead, a, b)
+
+
+@routine
+def put_rod_slopes(
+    rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, line: Floats, column: int, slopes: Floats
+) -> None:
+    """Fill the derivatives of the equations that `rod_rows` fills."""
+    n, span, u = rod["first_row"], vec(line), direction(line)
+    if rod["slides"] == 0 and not is_carried(rod):
+        put_rate(rod, carrier, frame, lead, column, u, NOWHERE, NOWHERE, slopes[n])
+        n += 1
+    if rod["foot"] == HINGE:
+        axis = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
+        put_rate(rod, carrier, frame, lead, column, axis, cross(axis, span), NOWHERE, slopes[n])
+        n += 1
+    if rod["head"] == HINGE:
+        axis = turn(frame, vec(rod["head_axes"][0]))
+        put_rate(rod, carrier, frame, lead, column, axis, NOWHERE, cross(axis, span), slopes[n])
+        n += 1
+    if rod["twists"] == 1:
+        by_line, b, c = twist_rate(rod, carrier, frame, lead, own, u)
+        by_line = scale(1.0 / norm(span), along(by_line, -dot(by_line, u), u))
+        put_rate(rod, carrier, frame, lead, column, by_line, b, c, slopes[n])
+
+
+@routine
+def put_turning(table: Table, k: int, main: int, end: int, t: Vec, view: View) -> None:
+    """Derivative, into `view.slope`, of what changes by t . y at an end of a rod."""
+    leg, u = table.legs[k], direction(view.lines[k])
+    flat = along(t, -dot(t, u), u)
+    a, spin = scale(1.0 / norm(vec(view.lines[k])), flat), scale(-1.0, cross(u, t))
+    b, c = (spin, NOWHERE) if end == AT_FOOT else (NOWHERE, spin)
+    frame = view.frames[leg["reversed"]]
+    put_rate(leg, table.legs[main], frame, view.values[main], table.columns[k], a, b, c, view.slope)
+
+
+@routine
+def seen(table: Table, k: int, main: int, end: int, v: Vec, view: View) -> Vec:
+    """A direction that goes with the body which an end of a rod is on, as it is now."""
+    if end == AT_FOOT:
+        return carried(table.legs[main], view.values[main], v, 1.0)
+    return turn(view.frames[table.legs[k]["reversed"]], v)
+
+
+@routine
+def main_of(table: Table, k: int) -> int:
+    """The leg whose carrier a leg is on; itself if it shares none."""
+    while table.legs[k]["carrier"] == SHARED:
+        k -= 1
+    return k
+
+
+@routine
+def coordinate_slope(table: Table, coordinate: Record, view: View) -> float:
+    """A coordinate's deviation from home, its derivative into `view.slope`."""
+    slope, k, spot = view.slope, coordinate["leg"], coordinate["place"]
+    for j in range(slope.shape[0]):
+        slope[j] = 0.0
+    leg = table.legs[k]
+    if leg["kind"] == PIVOT:
+        put_pivot_slope(leg, view.frames[leg["reversed"]], view.values[k], spot, view.slope)
+    elif spot == CARRIER:
+        slope[table.columns[k]] = 1.0
+    elif spot == SLIDE:
+        main = main_of(table, k)
+        frame, u = view.frames[leg["reversed"]], direction(view.lines[k])
+        put_rate(leg, table.legs[main], frame, view.values[main], table.columns[k], u, NOWHERE, NOWHERE, view.slope)
+    else:
+        put_hinge_slope(table, k, spot, view)
+    for j in range(slope.shape[0]):
+        slope[j] *= coordinate["sense"]
+    return deviation(coordinate, view.values)
+
+
+@routine
+def put_hinge_slope(table: Table, k: int, spot: int, view: View) -> None:
+    """Derivative of the angle of a hinge at an end of a rod.
+
+    One hinge n: (n x u) . y / |n x u|^2. Two, a on the body and b on the rod: q1' = b . y / D, q2' = - a . y / D,
+    D = (a x u) . b.
+    """
+    leg, main, u = table.legs[k], main_of(table, k), direction(view.lines[k])
+    end = AT_FOOT if spot < HEAD else AT_HEAD
+    ending, axes = (leg["foot"], leg["foot_axes"]) if end == AT_FOOT else (leg["head"], leg["head_axes"])
+    first = seen(table, k, main, end, vec(axes[0]), view)
+    if ending == HINGE:
+        across = cross(first, u)
+        t = scale(1.0 / dot(across, across), across)
+    else:
+        place = FOOT if end == AT_FOOT else HEAD
+        last = seen(table, k, main, end, mark(ending, axes, view.values[k, place:]), view)
+        D = dot(cross(first, u), last)
+        t = scale(1.0 / D, last) if spot == place else scale(-1.0 / D, first)
+    put_turning(table, k, main, end, t, view)
+
+
+@routine
+def put_pivot_slope(pivot: Record, frame: Floats, own: Floats, spot: int, slope: Floats) -> None:
+    """Derivative of a coordinate of a pivot: a slide, or one of up to three hinges that add up to its turn w."""
+    if spot >= HEAD:
+        put_pose_slope(pivot, frame, vec(pivot["slide_rows"][spot - HEAD]), NOWHERE, slope)
+        return
+    axes, which = pivot["foot_axes"], spot - FOOT
+    first = vec(axes[0])
+    if pivot["foot"] == HINGE:
+        put_pose_slope(pivot, frame, NOWHERE, first, slope)
+        return
+    second = mark(CROSS, axes, own[FOOT:])
+    if pivot["foot"] == TRIPLE:
+        third = turn(frame, vec(axes[2]))
+        others = cross(second, third) if which == 0 else (cross(third, first) if which == 1 else cross(first, second))
+        D = dot(first, cross(second, third))
+        put_pose_slope(pivot, frame, NOWHERE, scale(1.0 / D, others), slope)
+        return
+    lean = dot(first, second)
+    own_axis, other = (first, second) if which == 0 else (second, first)
+    rate = scale(1.0 / (1.0 - lean * lean), along(own_axis, -lean, other))
+    put_pose_slope(pivot, frame, NOWHERE, rate, slope)
+
+
+@routine
+def cone_slope(table: Table, cone: Record, view: View) -> float:
+    """The angle of a rod's line from the axis of its cone, its derivative into `view.slope`."""
+    slope, k = view.slope, cone["leg"]
+    for j in range(slope.shape[0]):
+        slope[j] = 0.0
+    end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
+    main = main_of(table, k)
+    axis, u = seen(table, k, main, end, vec(cone["axis"]), view), direction(view.lines[k])
+    sine = norm(cross(axis, u))
+    if sine > ALIGNED:
+        put_turning(table, k, main, end, scale(-1.0 / sine, axis), view)
+    return angle_between(axis, u)

@@ -1,0 +1,259 @@
+"""Forward kinematics of legs in closed form: the pose at which actuators have given values.
+
+A driven carrier is put where its value says, and is no unknown: the length of its rod is then an equation, without a
+branch or a dead point. Every other driven coordinate is an equation beside those of the legs, and what carries a rod
+undriven is an unknown beside the pose. Newton's method solves them by least squares.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._jit import allocator, kernel, routine
+from ..legs.answer import KEPT, PENDING, REACHED, deviation, excess_of, make_exact
+from ..legs.records import CARRIER, PIVOT
+from ..linear import solve_spd
+from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
+from ..vectors import copy_row, copy_table, wrap
+from .descend import copy_now, move
+from .equations import Floats, Now, Table, View, coordinate_slope, count_unknowns, new_now, new_view, place, put_slopes
+from .nearest import Starts
+
+ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
+"""Largest equation of an assembled configuration, and of one that no step makes more so [L or rad]: more actuators than
+freedoms, or conditions that repeat each other, agree no better than the description is exact."""
+
+STEPS, LED_STEPS = 24, 8
+"""Most steps of Newton's method, and those at each stride where actuators are led to their values."""
+
+STRIDES = 8
+"""In how many strides they are led where one does not assemble."""
+
+FAR_STEP = 0.5
+"""Longest step of Newton's method [L or rad]."""
+
+
+class Newton(NamedTuple):
+    """Scratch memory of one thread."""
+
+    look: View
+    free: NDArray[np.int64]  # (n,): place of each unknown among those that are free; -1 where it is not
+    normal: Floats  # (n, n + 1): normal equations, right-hand side last
+    step: Floats  # (n,)
+    values: Floats  # (n_a,): deviations from home that the actuators are led to
+    begin: Floats  # (n_a,)
+    now: Now
+    first: Now
+
+
+@allocator
+def new_newton(table: Table, turns: bool) -> Newton:
+    """Scratch memory of one thread; without `turns` the platform does not turn."""
+    n, legs, n_driven = count_unknowns(table), table.legs.shape[0], table.driven.shape[0]
+    free = np.zeros(n, np.int64)
+    for j in range(n):
+        free[j] = -1 if 3 <= j < 6 and not turns else 0
+    for i in range(n_driven):
+        if drives_carrier(table, i):
+            free[table.columns[table.driven[i]["leg"]]] = -1
+    place = 0
+    for j in range(n):
+        if free[j] == 0:
+            free[j] = place
+            place += 1
+    return Newton(
+        new_view(table),
+        free,
+        np.zeros((n, n + 1)),
+        np.zeros(n),
+        np.zeros(n_driven),
+        np.zeros(n_driven),
+        new_now(legs),
+        new_now(legs),
+    )
+
+
+@routine
+def drives_carrier(table: Table, i: int) -> bool:
+    """Whether an actuator is what carries a rod."""
+    driven = table.driven[i]
+    return bool(driven["place"] == CARRIER and table.legs[driven["leg"]]["kind"] != PIVOT)
+
+
+@routine
+def put_drivers(table: Table, work: Newton) -> None:
+    """Put driven carriers where their values say."""
+    q = work.now.q
+    for i in range(table.driven.shape[0]):
+        if drives_carrier(table, i):
+            q[table.driven[i]["leg"]] = table.driven[i]["sense"] * work.values[table.driven[i]["column"]]
+
+
+@routine
+def add_equation(residual: float, slope: Floats, work: Newton) -> None:
+    """Add an equation to the normal equations."""
+    free, normal = work.free, work.normal
+    n = normal.shape[0]
+    for i in range(n):
+        a = free[i]
+        if a >= 0 and slope[i] != 0.0:
+            for j in range(i + 1):
+                if free[j] >= 0:
+                    normal[a, free[j]] += slope[i] * slope[j]
+            normal[a, n] -= slope[i] * residual
+
+
+@routine
+def put_normal(table: Table, work: Newton) -> float:
+    """Fill the normal equations at the present configuration; the largest residual."""
+    normal, rows, slopes, look = work.normal, work.look.rows, work.look.slopes, work.look
+    for i in range(normal.shape[0]):
+        for j in range(normal.shape[1]):
+            normal[i, j] = 0.0
+    worst = place(table, work.now, look)
+    put_slopes(table, look)
+    for r in range(rows.shape[0]):
+        add_equation(rows[r], slopes[r], work)
+    for i in range(table.driven.shape[0]):
+        if not drives_carrier(table, i):
+            driven = table.driven[i]
+            off = coordinate_slope(table, driven, look) - work.values[driven["column"]]
+            off = wrap(off, 0.0) if driven["turns"] == 1 else off
+            worst = max(worst, abs(off))
+            add_equation(off, look.slope, work)
+    return worst
+
+
+@routine
+def newton(table: Table, steps: int, work: Newton) -> float:
+    """Solve for the actuators' values from the present configuration; the largest residual left."""
+    free, normal, step = work.free, work.normal, work.step
+    n, before = normal.shape[0], math.inf
+    put_drivers(table, work)
+    for _ in range(steps):
+        worst = put_normal(table, work)
+        if not worst < math.inf or worst <= ASSEMBLED or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * before):
+            return worst
+        before, most, n_free = worst, 0.0, 0
+        for j in range(n):
+            n_free = max(n_free, free[j] + 1)
+        for i in range(n_free):
+            normal[i, n_free] = normal[i, n]
+        if not solve_spd(normal, n_free, 0.0):
+            return math.inf
+        for j in range(n):
+            step[j] = normal[free[j], n_free] if free[j] >= 0 else 0.0
+            most = max(most, abs(step[j]))
+        move(table, step, min(1.0, FAR_STEP / max(most, FAR_STEP)), work.now)
+    return put_normal(table, work)
+
+
+@routine
+def lead(table: Table, values: Floats, work: Newton) -> float:
+    """The same, with the actuators led to their values from those of the present configuration."""
+    begin, now = work.begin, work.values
+    place(table, work.now, work.look)
+    for i in range(table.driven.shape[0]):
+        column = table.driven[i]["column"]
+        begin[column] = deviation(table.driven[i], work.look.values)
+        if table.driven[i]["turns"] == 1:
+            begin[column] = wrap(begin[column], values[column])
+    worst = math.inf
+    for stride in range(1, STRIDES + 1):
+        for column in range(now.shape[0]):
+            now[column] = begin[column] + (values[column] - begin[column]) * stride / STRIDES
+        worst = newton(table, STEPS if stride == STRIDES else LED_STEPS, work)
+    return worst
+
+
+@routine
+def is_feasible(table: Table, values: Floats, work: Newton) -> bool:
+    """Whether the present configuration, assembled, keeps all limits, and its actuators those of theirs."""
+    for i in range(table.driven.shape[0]):
+        value = values[table.driven[i]["column"]]
+        if not max(table.driven[i]["lo"] - value, value - table.driven[i]["hi"]) <= KEPT:
+            return False
+    return bool(excess_of(table.limited, table.cones, work.look.values) <= KEPT)
+
+
+@routine
+def load_start(starts: Starts, start: int, now: Now) -> None:
+    copy_table(starts.poses[start], now.pose)
+    copy_row(starts.q[start], now.q)
+    copy_row(starts.sides[start], now.sides)
+
+
+@routine
+def apart(one: Floats, other: Floats) -> float:
+    """Square of how far two poses are apart."""
+    square = 0.0
+    for i in range(3):
+        for j in range(4):
+            square += (one[i, j] - other[i, j]) ** 2
+    return square
+
+
+@routine
+def assemble_row(table: Table, values: Floats, own: Starts, row: int, others: Starts, work: Newton) -> bool:
+    """Assemble one row, into `work.now`, within all limits; see `assemble`."""
+    first = row if own.poses.shape[0] > 1 else 0
+    for attempt in range(2):
+        load_start(own, first, work.now)
+        copy_row(values, work.values)
+        worst = newton(table, STEPS, work) if attempt == 0 else lead(table, values, work)
+        if worst <= NEARLY_ASSEMBLED:
+            if is_feasible(table, values, work):
+                return True
+            break
+    nearest = math.inf
+    for start in range(others.poses.shape[0]):
+        load_start(others, start, work.now)
+        copy_row(values, work.values)
+        if newton(table, STEPS, work) <= NEARLY_ASSEMBLED and is_feasible(table, values, work):
+            distance = apart(work.now.pose, own.poses[first])
+            if distance < nearest:
+                nearest = distance
+                copy_now(work.now, work.first)
+    if nearest < math.inf:
+        copy_now(work.first, work.now)
+    return nearest < math.inf
+
+
+@kernel
+def assemble(
+    table: Table,
+    values: Floats,
+    turns: bool,
+    own: Starts,
+    others: Starts,
+    status: NDArray[np.int64],
+    measures: Floats,
+    found: Starts,
+) -> None:
+    """Assemble legs at given actuators, within all limits; rows for which none is found are PENDING.
+
+    Newton's method from each row's start; where it strays, the actuators are led to their values in strides.
+
+    Parameters
+    ----------
+    values : (n, n_a), deviations from home [L or rad].
+    turns : whether the platform turns; a point that is an end effector does not.
+    own : where each row starts, or all of them.
+    others : starts that follow; of the configurations that they find, the one nearest to the row's start is taken.
+    found : the configurations, (n,).
+    """
+    work = new_newton(table, turns)
+    for row in range(values.shape[0]):
+        status[row] = PENDING
+        if assemble_row(table, values[row], own, row, others, work):
+            status[row] = REACHED
+            make_exact(work.now.pose)
+            measures[row, RESIDUAL] = place(table, work.now, work.look)
+            measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, work.look.values), 0.0)
+            copy_table(work.now.pose, found.poses[row])
+            copy_row(work.now.q, found.q[row])
+            copy_row(work.now.sides, found.sides[row])

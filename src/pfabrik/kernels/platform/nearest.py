@@ -1,0 +1,203 @@
+"""Rows of targets answered by the nearest feasible configurations that descents from several starts find."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._jit import kernel, routine
+from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES
+from ..closure.pose_objective import PoseGradient, PoseObjective, pose_gradient
+from ..legs.answer import column, deviation, excess_of, make_exact, set_frames, turn_pose
+from ..legs.records import CARRIER, CRANK, Record, Records
+from ..legs.rods import carry
+from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
+from ..sqp import STEPS
+from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
+from .descend import Aim, Search, copy_now, descend, new_search
+from .equations import Floats, Now, Table, View, is_carried, new_now, new_view, place
+
+SAME = 1e-7
+"""Share by which a later start must come nearer to be preferred to an earlier one."""
+
+
+class Starts(NamedTuple):
+    """Configurations that searches start from: poses [L], coordinates of carriers and sides, as of `Now`."""
+
+    poses: Floats  # (s, 4, 4)
+    q: Floats  # (s, legs)
+    sides: Floats  # (s, legs)
+
+
+class Found(NamedTuple):
+    """Where the searches of each row ended."""
+
+    distances: Floats  # (n,) [L]; infinite where nothing feasible was found
+    poses: Floats  # (n, 4, 4) [L]
+    q: Floats  # (n, legs)
+    sides: Floats  # (n, legs)
+    steps: NDArray[np.int64]  # (n,)
+
+
+@routine
+def begin(starts: Starts, start: int, now: Now) -> None:
+    """Put a start into `now`."""
+    copy_table(starts.poses[start], now.pose)
+    copy_row(starts.q[start], now.q)
+    copy_row(starts.sides[start], now.sides)
+
+
+@routine
+def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, now: Now) -> None:
+    """Place the platform as it is to be held, and carriers where rods then put them."""
+    pose, q = now.pose, now.q
+    for i in range(3):
+        if aim.platform[i] == LOCKED:
+            pose[i, 3] = target[i, 3]
+        for j in range(3):
+            if aim.frame == BASE_AXES and aim.platform[3] == LOCKED:
+                pose[i, j] = target[i, j]
+    if aim.frame == TARGET_AXES and aim.platform[3] == LOCKED:
+        axis = cross(column(now.pose, 2), column(target, 2))
+        sine = norm(axis)
+        if sine > 0.0:
+            turn_pose(now.pose, scale(math.atan2(sine, dot(column(now.pose, 2), column(target, 2))) / sine, axis))
+    set_frames(now.pose, table.task[0], view.frames)
+    for k in range(q.shape[0]):
+        leg = table.legs[k]
+        if is_carried(leg):
+            q[k] = nearest_carrier(leg, view.frames[leg["reversed"]], q[k], view.values[k])
+
+
+@routine
+def nearest_carrier(leg: Record, frame: Floats, present: float, own: Floats) -> float:
+    """Of the two coordinates at which a carrier's rod reaches its head, or comes nearest, the one nearer to this."""
+    head, best = move(frame, vec(leg["head_point"])), math.inf
+    for i in range(2):
+        carry(leg, head, 2.0 * i - 1.0, own)
+        found: float = own[CARRIER]
+        if leg["carrier"] == CRANK:
+            found = wrap(found, present)
+        if abs(found - present) < abs(best - present):
+            best = found
+    return best
+
+
+@routine
+def put_sides(table: Table, now: Now, look: View) -> None:
+    """Tell which of their two solutions legs take."""
+    set_frames(now.pose, table.task[0], look.frames)
+    sides, q = now.sides, now.q
+    for k in range(q.shape[0]):
+        leg = table.legs[k]
+        if is_carried(leg):
+            frame = look.frames[leg["reversed"]]
+            head = move(frame, vec(leg["head_point"]))
+            off = (0.0, 0.0)
+            for side in (-1.0, 1.0):
+                carry(leg, head, side, look.values[k])
+                away = look.values[k, CARRIER] - q[k]
+                off = (off[1], abs(wrap(away, 0.0) if leg["carrier"] == CRANK else away))
+            sides[k] = 1.0 if off[1] <= off[0] else -1.0
+
+
+@kernel
+def read_configurations(table: Table, known: Records, poses: Floats, q: Floats, sides: Floats, found: Floats) -> None:
+    """Fill deviations from home [length or rad], `found` (n, columns), of the coordinates that legs tell.
+
+    Parameters
+    ----------
+    known : what legs tell; its column is that in `found`.
+    poses, q, sides : as of `Found`.
+    """
+    now, look = new_now(table.legs.shape[0]), new_view(table)
+    for row in range(poses.shape[0]):
+        copy_table(poses[row], now.pose)
+        copy_row(q[row], now.q)
+        copy_row(sides[row], now.sides)
+        place(table, now, look)
+        for i in range(known.shape[0]):
+            found[row, known[i]["column"]] = deviation(known[i], look.values) * known[i]["unit"]
+
+
+@kernel
+def judge(table: Table, poses: Floats, q: Floats, sides: Floats, actuators: Floats, measures: Floats) -> None:
+    """Fill the actuators (n, n_a), and of `measures` the largest equation [L or rad] and the largest excess."""
+    now, look = new_now(table.legs.shape[0]), new_view(table)
+    for row in range(poses.shape[0]):
+        copy_table(poses[row], now.pose)
+        copy_row(q[row], now.q)
+        copy_row(sides[row], now.sides)
+        measures[row, RESIDUAL] = place(table, now, look)
+        measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, look.values), 0.0)
+        for i in range(table.driven.shape[0]):
+            driven = table.driven[i]
+            actuators[row, driven["column"]] = driven["home"] + deviation(driven, look.values) * driven["unit"]
+
+
+@routine
+def nearest_start(aim: PoseObjective, target: Floats, starts: Starts, gradient: PoseGradient) -> int:
+    """The start whose pose is nearest to a target; -1 where there is none."""
+    nearest, least = -1, math.inf
+    gradient.unit[0] = 1.0
+    for start in range(starts.poses.shape[0]):
+        value, _ = pose_gradient(aim, target, starts.poses[start], gradient)
+        if value < least:
+            nearest, least = start, value
+    return nearest
+
+
+@routine
+def search_row(
+    table: Table, row: int, aim: Aim, own: Starts, others: Starts, hits: int, search: Search, best: Now
+) -> float:
+    """The nearest configuration of a row, into `best`, and how far it is [L]; see `approach`.
+
+    What is held is put in its place at once where searches may start anywhere, and else brought there step by step; the
+    other way too, where that finds nothing.
+    """
+    least, met, target, n = math.inf, 0, aim.pose.targets[row], others.poses.shape[0]
+    near = nearest_start(aim.pose, target, others, search.gradient)
+    for start in range(n + 2):
+        if start == 0 or start == n + 1:
+            begin(own, row if own.poses.shape[0] > 1 else 0, search.best)
+        else:
+            begin(others, near if start == 1 else (start - 2 if start - 2 < near else start - 1), search.best)
+        if start == n + 1 and least < math.inf:
+            break
+        if (start <= n) == (n > 0):
+            put_held(table, aim.pose, target, search.look, search.best)
+        distance = descend(table, row, aim, search)
+        if distance < (1.0 - SAME) * least:
+            least, met = distance, 1
+            copy_now(search.best, best)
+        elif distance <= (1.0 + SAME) * least and least < math.inf:
+            met += 1
+        if met >= hits:
+            break
+    return least
+
+
+@kernel
+def approach(table: Table, aim: Aim, own: Starts, others: Starts, hits: int, found: Found) -> None:
+    """Fill the nearest feasible configuration of every row.
+
+    Parameters
+    ----------
+    own : the first start of each row, or one for all.
+    others : starts that follow, for any row, until the nearest configuration has been met as often as `hits` says.
+    """
+    search, best = new_search(table), new_now(table.legs.shape[0])
+    for row in range(found.distances.shape[0]):
+        least = search_row(table, row, aim, own, others, hits, search, best)
+        found.distances[row] = least
+        found.steps[row] = search.control.counts[STEPS]
+        if least < math.inf:
+            make_exact(best.pose)
+            copy_table(best.pose, found.poses[row])
+            copy_row(best.q, found.q[row])
+            put_sides(table, best, search.look)
+            copy_row(best.sides, found.sides[row])

@@ -1,0 +1,118 @@
+"""Poses that legs in closed form reach on other sides than those they start on: in other working modes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._jit import kernel, routine
+from ..legs.answer import (
+    KEPT,
+    PENDING,
+    REACHED,
+    complete,
+    cone_cosine,
+    deviation,
+    excess_of,
+    load,
+    place_legs,
+    put_rows,
+    set_frames,
+    worst_of,
+)
+from ..legs.feasibility import largest_row
+from ..legs.records import N_VALUES, Floats
+from .equations import Table, main_of
+
+MOST_CHOICES = 8
+"""Legs with two solutions beyond which not every combination of them is tried, where a pose is completed by all."""
+
+
+@routine
+def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) -> None:
+    """Note which legs, by those whose carriers they are on, do not close on a pose within their limits."""
+    for k in range(misfits.shape[0]):
+        misfits[k] = 0.0
+    for k in range(misfits.shape[0]):
+        if largest_row(table.legs, rows, k) > KEPT:
+            misfits[main_of(table, k)] = 1.0
+    for i in range(table.limited.shape[0]):
+        limited = table.limited[i]
+        value = deviation(limited, values)
+        if not max(limited["lo"] - value, value - limited["hi"]) <= KEPT:
+            misfits[main_of(table, limited["leg"])] = 1.0
+    for i in range(table.cones.shape[0]):
+        if not cone_cosine(table.cones[i], values) >= table.cones[i]["least_cosine"]:
+            misfits[main_of(table, table.cones[i]["leg"])] = 1.0
+
+
+@kernel
+def answer_otherwise(
+    table: Table,
+    targets: Floats,
+    begins: Floats,
+    sides: Floats,
+    status: NDArray[np.int64],
+    poses: Floats,
+    actuators: Floats,
+    measures: Floats,
+) -> int:
+    """Answer targets (n, 4, 4) [length] that legs reach on any sides within all limits; the others are PENDING.
+
+    Where a target sets the whole pose, every leg takes the side that suits it; where legs complete it together, their
+    sides are tried in all combinations.
+
+    Parameters
+    ----------
+    begins : poses that targets are completed from, (n or 1, 4, 4) [length].
+    sides : where to start, (n, legs), and where answers are.
+
+    Returns
+    -------
+    How many are PENDING.
+    """
+    legs, n_legs, own = table.legs, table.legs.shape[0], table.task[0]
+    n_rows = own["rows"]
+    frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
+    follow, rows, slopes = np.zeros((n_legs, 6)), np.zeros(n_rows), np.zeros((n_rows, 6))
+    pose, motions, normal, left = np.zeros((4, 4)), np.zeros((7, 6)), np.zeros((7, 8)), 0
+    misfits, choosing, n_choices = np.zeros(n_legs), np.zeros(n_legs, np.int64), 0
+    for k in range(n_legs):
+        if sides[0, k] != 0.0:
+            choosing[n_choices] = k
+            n_choices += 1
+    together = own["unset"] > 0
+    tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if together else 1
+    for row in range(targets.shape[0]):
+        status[row] = PENDING
+        if not together and load(targets[row], begins[row if begins.shape[0] > 1 else 0], own, pose):
+            set_frames(pose, own, frames)
+            place_legs(legs, frames, sides[row], values, lines)
+            put_rows(legs, frames, values, lines, rows)
+            note_misfits(table, values, rows, misfits)
+        for attempt in range(1, tries + 1):
+            for c in range(n_choices):
+                k = choosing[c]
+                flips = misfits[k] == 1.0 if not together else (attempt ^ (attempt - 1)) >> c & 1 == 1
+                sides[row, k] = -sides[row, k] if flips else sides[row, k]
+            if not load(targets[row], begins[row if begins.shape[0] > 1 else 0], own, pose):
+                break
+            if not complete(legs, own, sides[row], frames, values, lines, follow, rows, slopes, motions, normal, pose):
+                continue
+            excess = excess_of(table.limited, table.cones, values)
+            if excess <= KEPT:
+                status[row] = REACHED
+                for i in range(3):
+                    poses[row, i, 3] = pose[i, 3] * own["length"]
+                    poses[row, 3, i] = 0.0
+                    for j in range(3):
+                        poses[row, i, j] = pose[i, j]
+                poses[row, 3, 3] = 1.0
+                for i in range(table.driven.shape[0]):
+                    driven = table.driven[i]
+                    actuators[row, driven["column"]] = driven["home"] + deviation(driven, values) * driven["unit"]
+                measures[row, 2] = worst_of(rows) * own["length"]
+                measures[row, 3] = max(excess, 0.0)
+                break
+        left += status[row]
+    return left // PENDING

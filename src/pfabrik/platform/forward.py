@@ -1,0 +1,77 @@
+"""Forward kinematics of legs in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+from ..closure.configurations import Configurations, new_rows
+from ..decomposition.leg_table import LegTable
+from ..description.mechanism import Mechanism
+from ..kernels.platform.nearest import Starts
+from ..kernels.reaching import plan as P
+from ..kernels.threads import in_blocks
+from .nearest import corners_of, home_start, in_lengths, no_starts, starts_at
+from .table import kernel_table
+
+ROWS_A_BLOCK = 256
+
+
+def assembled(
+    mechanism: Mechanism, table: LegTable, values: Floats, start: Configurations | None, sides: Floats
+) -> tuple[P.Rows, Floats, Floats]:
+    """Configurations that have actuated values (n, n_a), within all limits; rows without one are PENDING.
+
+    Without a start, the row's own configuration is looked for from elsewhere too.
+
+    Parameters
+    ----------
+    sides : which of its two solutions each leg takes at the start, (n or 1, legs).
+
+    Returns
+    -------
+    The rows, the coordinates of the legs' carriers (n, legs) [L or rad], and the sides of the answers (n, legs).
+    """
+    own = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
+    rows, n = new_rows(mechanism, len(values)), len(values)
+    found = Starts(np.zeros((n, 4, 4)), np.zeros((n, len(table.legs))), np.zeros((n, len(table.legs))))
+    wanted = np.zeros_like(values)
+    for driven in table.driven:
+        wanted[:, driven["column"]] = (values[:, driven["column"]] - driven["home"]) / driven["unit"]
+    everything = np.arange(n)
+    _assemble(mechanism, table, wanted, own, no_starts(table), everything, rows, found)
+    rest = np.flatnonzero(rows.status == P.PENDING)
+    if start is None and len(rest):
+        _assemble(mechanism, table, wanted, own, corners_of(mechanism), rest, rows, found)
+    rows.poses[:] = in_lengths(found.poses, mechanism.characteristic_length)
+    rows.actuators[:] = values
+    rows.measures[:, P.RESIDUAL] *= mechanism.characteristic_length
+    return rows, found.q, found.sides
+
+
+def _assemble(
+    mechanism: Mechanism,
+    table: LegTable,
+    values: Floats,
+    own: Starts,
+    others: Starts,
+    places: Floats,
+    rows: P.Rows,
+    found: Starts,
+) -> None:
+    """Assemble the rows at some places."""
+    from ..kernels.platform.forward import assemble
+
+    legs, turns, wanted = kernel_table(table), not mechanism.end_effector_is_joint, values[places]
+    status, measures = rows.status[places], rows.measures[places]
+    ended = Starts._make(array[places] for array in found)
+
+    def run(block: slice) -> None:
+        first = own if len(own.poses) == 1 else Starts._make(array[places][block] for array in own)
+        ends = Starts._make(array[block] for array in ended)
+        assemble(legs, wanted[block], turns, first, others, status[block], measures[block], ends)
+
+    in_blocks(run, len(places), ROWS_A_BLOCK)
+    rows.status[places], rows.measures[places] = status, measures
+    for array, own_array in zip(found, ended, strict=True):
+        array[places] = own_array

@@ -1,0 +1,208 @@
+"""The nearest feasible poses, by searches in the pose of the platform."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..closure.close import MARGIN
+from ..closure.projection import Way
+from ..decomposition.leg_table import LegTable, Records, leg_table
+from ..description.mechanism import Mechanism
+from ..description.task import task_of
+from ..kernels.closure.loops import BASE_AXES, LOCKED
+from ..kernels.closure.pose_objective import PoseObjective
+from ..kernels.legs import records as K
+from ..kernels.platform.descend import Aim
+from ..kernels.platform.nearest import Found, Starts
+from ..kernels.reaching import plan as P
+from ..kernels.threads import in_blocks
+from ..rotations import from_rotvec
+from ..tolerances import TOLERANCES
+from .coordinates import read_into
+from .table import kernel_table
+
+MOST_STEPS = 200
+"""Steps of a search, including those that are taken back; most need a dozen."""
+
+CORNERS, HITS = 12, 3
+"""How many configurations searches start from at most, and how many of them must end at the nearest one."""
+
+DRAWS, DRAWN_STEPS = 240, 30
+"""How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
+
+SAMPLES, NEARBY = 8, 0.05
+"""How many poses about home are looked at, and how far off they are [L]."""
+
+FAR, TURNED = 2.0, 0.8
+"""How far from home they are [L], and how far they are turned [rad]."""
+
+TURNING = 0.2
+"""What the square of a rotation counts beside that of a distance where corners are to be far apart [L^2]."""
+
+OTHER_SIDE = 0.02
+"""The same for the square of the sine of half the angle by which carriers differ."""
+
+ROWS_A_BLOCK = 16
+
+
+class Projected(NamedTuple):
+    """The nearest feasible configurations found, and what each holds of its target; distances are infinite where there
+    is none."""
+
+    found: Found
+    holds: NDArray[np.int64]
+
+
+def project(
+    mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts, ways: Sequence[Way], *, corners: bool
+) -> Projected:
+    """The nearest feasible configurations that searches from several starts find.
+
+    Parameters
+    ----------
+    targets : (n, 4, 4) [length].
+    own : the first start of each row, or one for all; poses [L].
+    ways : what counts and what is held, tried in turn until one has an answer.
+    corners : start from elsewhere too. Without, a search stays about where it starts.
+    """
+    best = Projected(_new_found(len(targets), len(table.legs)), np.full(len(targets), P.HOLD_NOTHING))
+    for way in ways:
+        rows = np.flatnonzero(np.isinf(best.found.distances))
+        if len(rows):
+            first = own if len(own.poses) == 1 else Starts._make(array[rows] for array in own)
+            found = _search(mechanism, table, targets[rows], first, way, corners)
+            for array, tried in zip(best.found, found, strict=True):
+                array[rows] = tried
+            best.holds[rows] = way.hold
+    return best
+
+
+def _search(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts, way: Way, corners: bool) -> Found:
+    wanted = in_lengths(targets, 1.0 / mechanism.characteristic_length)
+    weights, frame = np.array(way.weights, dtype=float), task_of(mechanism).frame
+    if keeps_rotation(mechanism):
+        wanted[:, :3, :3] = mechanism.home_pose[:3, :3]
+    if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
+        weights[3:], frame = LOCKED, BASE_AXES
+    others = corners_of(mechanism) if corners else no_starts(table)
+    return _approach(table, PoseObjective(wanted, weights, frame, MARGIN, TOLERANCES.active, MOST_STEPS), own, others)
+
+
+def _approach(table: LegTable, objective: PoseObjective, own: Starts, others: Starts) -> Found:
+    """The kernel over all rows, on all cores."""
+    from ..kernels.platform.nearest import approach
+
+    legs, no_values = kernel_table(table), np.zeros((0, len(table.driven)))
+    found = _new_found(len(objective.targets), len(table.legs))
+
+    def run(block: slice) -> None:
+        first = own if len(own.poses) == 1 else Starts._make(array[block] for array in own)
+        aim = Aim(objective._replace(targets=objective.targets[block]), no_values)
+        approach(legs, aim, first, others, HITS, Found._make(array[block] for array in found))
+
+    in_blocks(run, len(found.distances), ROWS_A_BLOCK)
+    return found
+
+
+def _new_found(n: int, legs: int) -> Found:
+    return Found(
+        np.full(n, np.inf), np.zeros((n, 4, 4)), np.zeros((n, legs)), np.zeros((n, legs)), np.zeros(n, np.int64)
+    )
+
+
+def no_starts(table: LegTable) -> Starts:
+    return Starts(np.zeros((0, 4, 4)), np.zeros((0, len(table.legs))), np.zeros((0, len(table.legs))))
+
+
+def starts_at(mechanism: Mechanism, table: LegTable, poses: Floats, sides: Floats) -> Starts:
+    """Poses (n, 4, 4) [length] with legs on given sides, (n, legs), as starts."""
+    columns = np.zeros((len(poses), 1 + table.known["column"].max(initial=0)))
+    read_into(table, poses, sides, columns)
+    q = np.zeros(sides.shape)
+    for carrier in _carriers(table):
+        q[:, carrier["leg"]] = carrier["sense"] * columns[:, carrier["column"]] / carrier["unit"]
+    return Starts(in_lengths(poses, 1.0 / mechanism.characteristic_length), q, sides)
+
+
+def _carriers(table: LegTable) -> Records:
+    """The coordinates of carriers among those known."""
+    on_rods = table.legs["kind"][table.known["leg"]] == K.ROD
+    return np.asarray(table.known[on_rods & (table.known["place"] == K.CARRIER)])
+
+
+def home_start(mechanism: Mechanism, table: LegTable) -> Starts:
+    """Home, as a start."""
+    poses = in_lengths(mechanism.home_pose[None], 1.0 / mechanism.characteristic_length)
+    return Starts(poses, np.zeros((1, len(table.legs))), table.home_sides)
+
+
+@lru_cache(maxsize=64)
+def keeps_rotation(mechanism: Mechanism) -> bool:
+    """Whether legs keep the platform from turning, though its task leaves the rotation open: parallelograms do.
+
+    A platform that has turned over on its rods is of no use, though its loops close, and no answer.
+    """
+    table = leg_table(mechanism)
+    if not isinstance(table, LegTable) or task_of(mechanism).rotations > 0 or mechanism.end_effector_is_joint:
+        return False
+    if table.task[0]["rows"] < 3:
+        return False
+    from ..kernels.legs.answer import measure_rows
+
+    poses = np.repeat(mechanism.home_pose[None], SAMPLES, axis=0)
+    shifts = np.random.default_rng(0).uniform(-NEARBY, NEARBY, (SAMPLES, 3))
+    poses[:, :3, 3] += mechanism.characteristic_length * shifts
+    rows, slopes = np.zeros((SAMPLES, table.task[0]["rows"])), np.zeros((SAMPLES, table.task[0]["rows"], 6))
+    measure_rows(table.legs, table.task, poses, table.home_sides, rows, slopes)
+    turns = np.linalg.svd(slopes[:, :, 3:])[1]
+    return bool(
+        np.abs(rows).max(initial=0.0) <= TOLERANCES.position and (turns[:, -1] > TOLERANCES.nearly_implied).all()
+    )
+
+
+@lru_cache(maxsize=64)
+def corners_of(mechanism: Mechanism) -> Starts:
+    """Feasible configurations far from home and from each other: the nearest to random poses, chosen one by one."""
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
+    rng, home = np.random.default_rng(0), home_start(mechanism, table)
+    poses = np.repeat(home.poses, DRAWS, axis=0)
+    poses[:, :3, 3] += rng.uniform(-FAR, FAR, (DRAWS, 3))
+    weights = np.array([1.0, 1.0, 1.0, TURNING, TURNING, TURNING])
+    if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
+        weights[3:] = LOCKED
+    else:
+        poses[:, :3, :3] = from_rotvec(rng.uniform(-TURNED, TURNED, (DRAWS, 3))) @ poses[:, :3, :3]
+    q = np.zeros((DRAWS, len(table.legs)))
+    for carrier in _carriers(table):
+        drawn = rng.uniform(max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi), DRAWS)
+        q[:, carrier["leg"]] = carrier["sense"] * drawn
+    objective = PoseObjective(poses, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
+    drawn = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, DRAWS, axis=0)), no_starts(table))
+    feasible = np.flatnonzero(np.isfinite(drawn.distances))
+    every = Starts(*(np.concatenate([first, array[feasible]]) for first, array in zip(home, drawn[1:4], strict=True)))
+    chosen, away = [], _apart(every, 0)
+    while len(chosen) < min(CORNERS, len(feasible)):
+        chosen.append(int(away.argmax()))
+        away = np.minimum(away, _apart(every, chosen[-1]))
+    return Starts._make(array[chosen] for array in every)
+
+
+def _apart(starts: Starts, which: int) -> Floats:
+    """How far starts are from one of them, (s,): squares of distances [L]."""
+    squares = (starts.poses - starts.poses[which])[:, :3] ** 2 * (TURNING, TURNING, TURNING, 1.0)
+    bends = np.sin(0.5 * (starts.q - starts.q[which])) ** 2
+    return np.asarray(squares.sum(axis=(1, 2)) + OTHER_SIDE * bends.sum(axis=1))
+
+
+def in_lengths(poses: Floats, scale: float) -> Floats:
+    """Poses with their positions scaled, copied."""
+    scaled = np.array(poses)
+    scaled[:, :3, 3] *= scale
+    return scaled
