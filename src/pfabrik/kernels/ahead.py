@@ -17,6 +17,12 @@ from .closure.pose_objective import PoseObjective
 from .legs import records as R
 from .legs.answer import answer, measure_rows, read_coordinates
 from .legs.feasibility import feasibility
+from .platform.descend import Aim
+from .platform.equations import Table
+from .platform.forward import assemble
+from .platform.nearest import Found, Starts, judge, read_configurations
+from .platform.nearest import approach as approach_by_pose
+from .platform.otherwise import answer_otherwise
 from .reaching import plan as P
 from .reaching.solve import solve_by_iteration, solve_directly
 
@@ -47,14 +53,26 @@ _LEGS, _TASK = np.zeros(0, R.LEG), np.zeros(0, R.TASK)
 _LIMITS = (np.zeros(0, R.COORDINATE), np.zeros(0, R.CONE))
 _KNOWN = np.zeros(0, R.COORDINATE)
 
+_TABLE = Table(_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("i1"))
+_STARTS = Starts(*_values("f3 f2 f2"))
+_POSE_OBJECTIVE = PoseObjective(*_values("f3 f1 i f f i"))
+
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (solve_directly, _ROWS),
     (answer, (_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("f3 f3 f2 i1 f3 f2 f2"))),
     (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
     (solve_by_iteration, _ROWS),
-    (approach, (_LOOPS, _LAYOUT, PoseObjective(*_values("f3 f1 i f f i")), _CLOSED, np.zeros((0, 0)))),
+    (approach, (_LOOPS, _LAYOUT, _POSE_OBJECTIVE, _CLOSED, np.zeros((0, 0)))),
     (read_coordinates, (_LEGS, _KNOWN, _TASK, *_values("f3 f2 f2"))),
     (feasibility, (_LEGS, *_LIMITS, _TASK, *_values("f3 f3 f2 f1 i1"))),
+    (answer_otherwise, (_TABLE, *_values("f3 f3 f2 i1 f3 f2 f2"))),
+    (
+        approach_by_pose,
+        (_TABLE, Aim(_POSE_OBJECTIVE, np.zeros((0, 0))), _STARTS, _STARTS, 0, Found(*_values("f1 f3 f2 f2 i1"))),
+    ),
+    (judge, (_TABLE, *_values("f3 f2 f2 f2 f2"))),
+    (read_configurations, (_TABLE, _KNOWN, *_values("f3 f2 f2 f2"))),
+    (assemble, (_TABLE, np.zeros((0, 0)), True, _STARTS, _STARTS, *_values("i1 f2"), _STARTS)),
     (measure_rows, (_LEGS, _TASK, *_values("f3 f2 f2 f3"))),
 )
 """Every kernel with arguments of the types it takes, what most questions need first."""

@@ -47,8 +47,8 @@ def settled(
     if not len(poses):
         return found
     read_into(table, poses, sides, found)
-    rows = np.flatnonzero(np.isfinite(carriers).all(axis=1)) if carriers is not None else ()
-    if len(rows):
+    if carriers is not None:
+        rows = np.flatnonzero(np.isfinite(carriers).all(axis=1))
         found[rows] = _read_with(mechanism, table, poses[rows], sides[rows], carriers[rows], found[rows])
     closure.put_actuators(found, actuators)
     locked = frozenset(mechanism.actuator_names)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.configurations import Configurations, new_rows
@@ -55,7 +56,7 @@ def _assemble(
     values: Floats,
     own: Starts,
     others: Starts,
-    places: Floats,
+    places: NDArray[np.intp],
     rows: P.Rows,
     found: Starts,
 ) -> None:

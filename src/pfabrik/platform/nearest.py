@@ -181,13 +181,14 @@ def corners_of(mechanism: Mechanism) -> Starts:
         poses[:, :3, :3] = from_rotvec(rng.uniform(-TURNED, TURNED, (DRAWS, 3))) @ poses[:, :3, :3]
     q = np.zeros((DRAWS, len(table.legs)))
     for carrier in _carriers(table):
-        drawn = rng.uniform(max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi), DRAWS)
-        q[:, carrier["leg"]] = carrier["sense"] * drawn
+        lo, hi = max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi)
+        q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, DRAWS)
     objective = PoseObjective(poses, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
     drawn = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, DRAWS, axis=0)), no_starts(table))
     feasible = np.flatnonzero(np.isfinite(drawn.distances))
     every = Starts(*(np.concatenate([first, array[feasible]]) for first, array in zip(home, drawn[1:4], strict=True)))
-    chosen, away = [], _apart(every, 0)
+    chosen: list[int] = []
+    away = _apart(every, 0)
     while len(chosen) < min(CORNERS, len(feasible)):
         chosen.append(int(away.argmax()))
         away = np.minimum(away, _apart(every, chosen[-1]))

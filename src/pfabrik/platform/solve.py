@@ -31,8 +31,8 @@ class LegsEngine:
     """Answers that legs in closed form reach in the working mode they start in; another engine gives all the others.
 
     The constraints that legs leave on the pose complete what the task leaves open. What they do not reach is answered
-    in other working modes, then by the nearest feasible pose, by searches in the platform's pose; what these leave, near
-    dead points above all, as if there were no closed forms.
+    in other working modes, then by the nearest feasible pose, by searches in the platform's pose; and what these leave,
+    near dead points above all, as if there were no closed forms.
     """
 
     def __init__(self, table: LegTable, inner: ReachingEngine | ClosureEngine) -> None:

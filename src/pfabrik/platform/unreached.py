@@ -98,7 +98,7 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
     reached = own.status == P.REACHED
     put_rows(rows, rest[reached], rows_at(own, reached))
     sides[rest[reached]] = tried[reached]
-    return rest[~reached]
+    return np.asarray(rest[~reached])
 
 
 def _reach_again(question: Question, near: NDArray[np.intp], sides: Floats, rows: P.Rows) -> None:

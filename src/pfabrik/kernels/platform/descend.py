@@ -23,6 +23,7 @@ from ..free_motions import (
     project_gradient,
 )
 from ..legs.answer import deviation, turn_pose
+from ..legs.records import Floats
 from ..qp import QP, new_qp
 from ..sqp import (
     CLOSED,
@@ -52,7 +53,6 @@ from ..sqp import (
 )
 from ..vectors import copy_row, copy_table, wrap
 from .equations import (
-    Floats,
     Now,
     Table,
     View,

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from .._jit import allocator, kernel, routine
 from ..legs.answer import KEPT, PENDING, REACHED, deviation, excess_of, make_exact
-from ..legs.records import CARRIER, PIVOT
+from ..legs.records import CARRIER, PIVOT, Floats
 from ..linear import solve_spd
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..vectors import copy_row, copy_table, wrap
 from .descend import copy_now, move
-from .equations import Floats, Now, Table, View, coordinate_slope, count_unknowns, new_now, new_view, place, put_slopes
+from .equations import Now, Table, View, coordinate_slope, count_unknowns, new_now, new_view, place, put_slopes
 from .nearest import Starts
 
 ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11

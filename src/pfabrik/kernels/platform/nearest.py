@@ -12,13 +12,13 @@ from .._jit import kernel, routine
 from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES
 from ..closure.pose_objective import PoseGradient, PoseObjective, pose_gradient
 from ..legs.answer import column, deviation, excess_of, make_exact, set_frames, turn_pose
-from ..legs.records import CARRIER, CRANK, Record, Records
+from ..legs.records import CARRIER, CRANK, Floats, Record, Records
 from ..legs.rods import carry
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..sqp import STEPS
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
 from .descend import Aim, Search, copy_now, descend, new_search
-from .equations import Floats, Now, Table, View, is_carried, new_now, new_view, place
+from .equations import Now, Table, View, is_carried, new_now, new_view, place
 
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
