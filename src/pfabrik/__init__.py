@@ -68,6 +68,7 @@ _HOMES = {
     "warm_up": "warm_up",
     "Workspace": "workspace.result",
     "workspace": "workspace.ask",
+    "export_c": "export.export_c",
 }
 # Modules that are themselves public.
 _MODULES = ("errors", "geometric", "interop")
@@ -98,6 +99,7 @@ __all__ = [
     "configuration",
     "decompose",
     "errors",
+    "export_c",
     "feasibility",
     "forward_jacobian",
     "geometric",
@@ -131,6 +133,7 @@ if TYPE_CHECKING:
     from .decomposition.decompose import SubChain, decompose
     from .description.legs import Leg
     from .description.mechanism import Cone, Joint, Mechanism
+    from .export.export_c import export_c
     from .feasibility import Feasibility, feasibility
     from .files import load, save
     from .fk import solve_fk

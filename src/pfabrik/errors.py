@@ -84,10 +84,10 @@ class InvalidMechanism(PfabrikError, ValueError):
 class UnsupportedMechanism(PfabrikError, ValueError):
     """A valid mechanism that no engine of this version can solve; names the sub-chain and the reason."""
 
-    def __init__(self, mechanism: str, reasons: Sequence[str]) -> None:
+    def __init__(self, mechanism: str, reasons: Sequence[str], purpose: str = "solved") -> None:
         self.mechanism = mechanism
         self.reasons = tuple(reasons)
-        super().__init__(f"'{mechanism}' cannot be solved: " + "; ".join(self.reasons))
+        super().__init__(f"'{mechanism}' cannot be {purpose}: " + "; ".join(self.reasons))
 
 
 class NoClosedForm(PfabrikError, ValueError):

@@ -22,8 +22,24 @@ def mjcf(mechanism: Mechanism) -> str:
     return pf.interop.to_mjcf(mechanism)
 
 
+def c_double(mechanism: Mechanism) -> str:
+    """One file of C in double precision."""
+    from ..export.export_c import c_source
+
+    return c_source(mechanism)
+
+
+def c_float(mechanism: Mechanism) -> str:
+    """One file of C in single precision."""
+    from ..export.export_c import c_source
+
+    return c_source(mechanism, precision="float")
+
+
 TARGETS: dict[str, tuple[Callable[[Mechanism], str], str]] = {
     "mjcf": (mjcf, "A MuJoCo model, which starts closed; what weighs and drives it is made up."),
+    "c": (c_double, "One file of C99: inverse and forward kinematics with every limit."),
+    "c_float": (c_float, "The same in single precision."),
 }
 """Name of an option -> the text that a mechanism becomes, and what the help says of it."""
 
@@ -31,8 +47,13 @@ TARGETS: dict[str, tuple[Callable[[Mechanism], str], str]] = {
 def one_option_each(command: Callable[..., Any]) -> Callable[..., Any]:
     """An option for every target, which takes the file to write."""
     for name, (_, said) in reversed(TARGETS.items()):
-        command = click.option(f"--{name}", type=click.Path(path_type=Path), metavar="FILE", help=said)(command)
+        command = click.option(option(name), type=click.Path(path_type=Path), metavar="FILE", help=said)(command)
     return command
+
+
+def option(name: str) -> str:
+    """A target as an option."""
+    return f"--{name.replace('_', '-')}"
 
 
 @click.command()
@@ -46,7 +67,7 @@ def export(mech: str, force: bool, **files: Path | None) -> int:
     """
     wanted = {name: path for name, path in files.items() if path is not None}
     if not wanted:
-        raise click.UsageError(f"say what to write: {', '.join(f'--{name} FILE' for name in TARGETS)}")
+        raise click.UsageError(f"say what to write: {', '.join(f'{option(name)} FILE' for name in TARGETS)}")
     for path in wanted.values():
         if path.exists() and not force:
             raise click.ClickException(f"{path}: exists already; --force replaces it")

@@ -1,0 +1,1 @@
+"""Code and settings for controllers, from the description of a machine."""

@@ -1,0 +1,72 @@
+"""C text in one precision, with one prefix: the templates are written in double, for the prefix pfk."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from .legs import Number
+
+Precision = Literal["double", "float"]
+
+_MATHS = re.compile(r"\b(sqrt|fabs|sin|cos|atan2|floor)\(")
+_LITERAL = re.compile(r"(?<![\w.])(\d+\.\d*(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+)(?![\w.])")
+_COMMENT = re.compile(r"(/\*.*?\*/|\"(?:[^\"\\]|\\.)*\")", re.DOTALL)
+
+
+class Accuracy(NamedTuple):
+    """Thresholds of the exported file; lengths as shares of L.
+
+    Attributes
+    ----------
+    kept : excess up to which a limit counts as kept [L or rad].
+    closed, close : equations that are as small as rounding leaves them; those that count as closed.
+    dead : square of the sine of the angle from a dead point below which a carrier does not follow.
+    rank : what is smaller than this share of the largest says nothing of the pose.
+    rotation : sum of the deviations from an orthonormal matrix up to which a target is a pose.
+    """
+
+    kept: float
+    closed: float
+    close: float
+    dead: float
+    rank: float
+    rotation: float
+
+
+ACCURACY: dict[Precision, Accuracy] = {
+    "double": Accuracy(1e-9, 1e-13, 1e-10, 1e-12, 1e-9, 2e-6),
+    "float": Accuracy(1e-6, 1e-6, 2e-5, 1e-6, 1e-5, 2e-5),
+}
+
+
+def in_words(text: str, name: str, precision: Precision) -> str:
+    """A template with a prefix in place of pfk; numbers and functions of the C library in a precision."""
+    text = re.sub(r"\bpfk_", f"{name}_", re.sub(r"\bPFK_", f"{name.upper()}_", text))
+    if precision == "double":
+        return text
+    parts = _COMMENT.split(text.replace("typedef double", "typedef float"))
+    parts[::2] = [_LITERAL.sub(r"\1f", _MATHS.sub(r"\1f(", part)) for part in parts[::2]]
+    return "".join(parts)
+
+
+def literal(value: Number) -> str:
+    """A number, or nested braces of numbers, with every digit of a double."""
+    if np.ndim(value):
+        return "{" + ", ".join(literal(each) for each in np.asarray(value)) + "}"
+    number = float(value) + 0.0  # so that no -0.0 is written
+    text = repr(number)
+    return text if "." in text or "e" in text else f"{text}.0"
+
+
+def comment(text: str) -> str:
+    """Text that cannot end the comment it is in, nor leave the characters that every compiler reads."""
+    plain = text.encode("ascii", "replace").decode().replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
+    return "".join(each if each.isprintable() else " " for each in plain)
+
+
+def quoted(text: str) -> str:
+    """A string of C."""
+    return '"' + comment(text).replace("\\", "\\\\").replace('"', '\\"') + '"'

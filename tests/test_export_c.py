@@ -1,0 +1,284 @@
+"""The exported C, compiled: it answers as the library does, and as limits measured on all joints say."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from machines import closure, published
+from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.description.joint_types import KINDS
+from pfabrik.errors import InvalidArgument, UnsupportedMechanism
+from pfabrik.export.export_c import c_source
+from pfabrik.export.self_test import targets_around_home
+from pfabrik.motion.displacements import columns
+from pfabrik.motion.limits import coned
+
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
+needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler here: neither gcc nor clang")
+STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
+DRIVER = Path(__file__).parent / "data" / "run_exported.c"
+PRECISIONS = {"double": 1e-12, "float": 1e-5}
+
+CATALOGUE = [name for name in pf.catalog() if isinstance(leg_table(pf.load(name)), LegTable)]
+OTHERS = {
+    "exechon": closure.exechon,
+    "upu": closure.upu,
+    "ankle": closure.ankle,
+    "tricept": closure.tricept,
+    "puu": closure.puu,
+    "hinge": closure.hinge,
+    "slider": closure.slider,
+    "seven_struts": published.seven_struts,
+}
+
+
+@lru_cache
+def machine(name: str) -> pf.Mechanism:
+    return OTHERS[name]() if name in OTHERS else pf.load(name)
+
+
+class Answers(NamedTuple):
+    """What the exported file said, one row a pose; lengths over L."""
+
+    ik: np.ndarray
+    limits: np.ndarray
+    fk: np.ndarray
+    steps: np.ndarray
+    poses: np.ndarray
+    back: np.ndarray
+    actuators: np.ndarray
+    slack: np.ndarray
+
+
+class Truth(NamedTuple):
+    """What the library says of the same targets, limits measured on the coordinates of all joints."""
+
+    targets: np.ndarray
+    whole: np.ndarray
+    closes: np.ndarray
+    actuators: np.ndarray
+    slack: np.ndarray
+
+
+def units(mechanism: pf.Mechanism, names: Any) -> np.ndarray:
+    lengths = [mechanism.joint(name).type == "prismatic" for name in names]
+    return np.where(lengths, mechanism.characteristic_length, 1.0)
+
+
+@lru_cache
+def truth(name: str, count: int) -> Truth:
+    """Targets around home; where a machine has less freedoms than its task asks for, nearest to them."""
+    mechanism = machine(name)
+    free = mechanism.without_limits()
+    keep = pf.Options(working_mode="keep")
+    targets = targets_around_home(mechanism, count, np.random.default_rng(5))
+    found = pf.solve_ik(free, targets, options=keep)
+    if not (found.status == 0).any():
+        targets = np.ascontiguousarray(found.pose)
+        found = pf.solve_ik(free, targets, options=keep)
+    home = np.concatenate([np.ravel(mechanism.home_coordinate(joint.name)) for joint in mechanism.joints])
+    slack = slack_of(mechanism, found.q, home)
+    return Truth(targets, found.pose, found.status == 0, found.actuators, slack)
+
+
+def slack_of(mechanism: pf.Mechanism, q: np.ndarray, home: np.ndarray) -> np.ndarray:
+    """Room left before every limit, in the order of the file, (n, limits) [L or rad]."""
+    turning = {joint.name: angles for joint, angles, _ in coned(mechanism, q - home)}
+    rooms, ranged_so_far = [], {}
+    for joint, bound in leg_table(mechanism).limits:
+        described = mechanism.joint(joint)
+        if bound == "cone":
+            rooms.append(described.cone.half_angle - turning[joint])
+            continue
+        place = ranged_so_far.setdefault((joint, bound), 0)
+        ranged_so_far[joint, bound] += 1
+        kinds = KINDS[described.type].coordinates
+        table = leg_table(mechanism)
+        column = columns(mechanism)[joint].start + (place if len(kinds) > 1 else 0)
+        if len(kinds) > 1:  # a leg may tell the two coordinates of a joint in either order
+            own = [int(each["column"]) for each in table.limited if columns(mechanism)[joint].start <= each["column"]]
+            own = [each for each in own if each < columns(mechanism)[joint].stop]
+            column = own[place]
+        lo, hi = np.reshape(described.range, (-1, 2))[column - columns(mechanism)[joint].start]
+        unit = mechanism.characteristic_length if described.type == "prismatic" else 1.0
+        rooms.append((q[:, column] - lo if bound == "min" else hi - q[:, column]) / unit)
+    return np.array(rooms).T.reshape(len(q), -1)
+
+
+def flat(poses: np.ndarray) -> np.ndarray:
+    return np.concatenate([poses[:, :3, 3], poses[:, :3, :3].reshape(-1, 9)], axis=1)
+
+
+def compiled(folder: Path, text: str, compiler: str, *options: str, driver: Path | None = DRIVER) -> Path:
+    """A program of an exported text, compiled without one warning."""
+    exported, program = folder / "exported.c", folder / "program"
+    exported.write_text(text)
+    given = ["-std=c99", *options] if not any(each.startswith("-std") for each in options) else list(options)
+    source = [f'-DEXPORTED="{exported}"', str(driver)] if driver else ["-DPFK_SELF_TEST", str(exported)]
+    run = subprocess.run(
+        [compiler, *given, *STRICT, *source, "-o", str(program), "-lm"], capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stderr
+    return program
+
+
+def asked(program: Path, mechanism: pf.Mechanism, known: Truth) -> Answers:
+    """What a program answers to all targets."""
+    given = np.concatenate([flat(known.targets), flat(known.whole)], axis=1)
+    run = subprocess.run([str(program)], input=given.tobytes(), capture_output=True)
+    assert run.returncode == 0, run.stderr.decode()[-2000:]
+    told = np.frombuffer(run.stdout).reshape(len(given), -1)
+    n_a, limits = len(mechanism.actuator_names), leg_table(mechanism).limits
+    sizes = [
+        1.0 if bound == "cone" else size
+        for (_, bound), size in zip(limits, units(mechanism, [j for j, _ in limits]), strict=True)
+    ]
+    codes = told[:, :4].astype(int)
+    scale = np.repeat([mechanism.characteristic_length, 1.0], [3, 9])
+    return Answers(
+        *codes.T, told[:, 4:16] / scale, told[:, 16:28] / scale, told[:, 28 : 28 + n_a], told[:, 28 + n_a :] / sizes
+    )
+
+
+def check(name: str, precision: str, told: Answers, known: Truth) -> float:
+    """The promises of an exported file; the mean number of steps of its forward kinematics."""
+    mechanism, exact = machine(name), PRECISIONS[precision]
+    least = known.slack.min(axis=1, initial=1.0)
+    kept, doubtful = known.closes & (least >= -1e-9), np.abs(known.slack + 1e-9).min(axis=1, initial=1.0) <= exact
+    reached = told.ik == 0
+    assert not (reached != kept)[~doubtful].any(), np.flatnonzero((reached != kept) & ~doubtful)[:5]
+    both = reached & kept
+    assert both.sum() >= 0.05 * len(both)
+    off = np.abs(told.actuators - known.actuators)[both] / units(mechanism, mechanism.actuator_names)
+    assert off.max() <= exact
+    # every limit by itself, and which is exceeded most
+    measured = known.closes & (told.limits < 1000)
+    assert measured.sum() >= both.sum()
+    verdicts = (told.slack >= -1e-9) == (known.slack >= -1e-9)
+    assert verdicts[measured][np.abs(known.slack + 1e-9)[measured] > exact].all()
+    beyond = measured & (told.limits > 0)
+    worst = (
+        np.take_along_axis(known.slack, np.maximum(told.limits - 1, 0)[:, None], axis=1)[:, 0]
+        if beyond.any()
+        else least
+    )
+    assert (worst[beyond] <= least[beyond] + 10 * exact).all()
+    # back to a pose that has these actuators: mostly the same one, else another assembly
+    assert (told.fk[both] == 0).mean() > 0.98
+    back = both & (told.fk == 0)
+    seen = slice(3) if mechanism.end_effector_is_joint else slice(12)
+    other = np.flatnonzero(back & (np.abs(told.back - told.poses)[:, seen].max(axis=1) > 10 * exact))
+    assert len(other) <= 0.1 * back.sum()
+    if len(other) and precision == "double":
+        poses = np.tile(np.eye(4), (len(other), 1, 1))
+        poses[:, :3, 3] = told.back[other, :3] * mechanism.characteristic_length
+        poses[:, :3, :3] = told.back[other, 3:].reshape(-1, 3, 3)
+        again = pf.solve_ik(mechanism.without_limits(), poses, options=pf.Options(working_mode="keep")).actuators
+        assert np.abs((again - told.actuators[other]) / units(mechanism, mechanism.actuator_names)).max() < 1e-9
+    return float(told.steps[both].mean())
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["stewart", "delta", "canfield", "five_bar", "agile_eye", "rps", "tricept", "upu"])
+def test_the_file_answers_as_the_library_does(name: str, tmp_path: Path) -> None:
+    known = truth(name, 300)
+    for precision in PRECISIONS:
+        program = compiled(tmp_path, c_source(machine(name), precision=precision), COMPILERS[0])
+        assert check(name, precision, asked(program, machine(name), known), known) <= 6.0
+
+
+@needs_compiler
+@pytest.mark.campaign
+@pytest.mark.parametrize("precision", PRECISIONS)
+@pytest.mark.parametrize("name", [*CATALOGUE, *OTHERS])
+def test_the_file_answers_as_the_library_does_on_many_poses(name: str, precision: str, tmp_path: Path) -> None:
+    known, text = truth(name, 20_000), c_source(machine(name), precision=precision)
+    for compiler in COMPILERS:
+        for standard in ("-std=c99", "-std=c11"):
+            checked = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+            program = compiled(tmp_path, text, compiler, standard, *checked)
+            assert check(name, precision, asked(program, machine(name), known), known) <= 6.0
+
+
+@needs_compiler
+@pytest.mark.parametrize("precision", PRECISIONS)
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_the_file_checks_itself_under_sanitizers(compiler: str, precision: str, tmp_path: Path) -> None:
+    text = c_source(machine("delta"), precision=precision)
+    program = compiled(tmp_path, text, compiler, "-std=c11", "-fsanitize=address,undefined", driver=None)
+    run = subprocess.run([str(program)], capture_output=True, text=True)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "50 poses, 0 wrong\n", "")
+
+
+@needs_compiler
+def test_a_self_test_fails_where_the_machine_is_another(tmp_path: Path) -> None:
+    text = c_source(machine("stewart"))
+    place = text.index(".foot = {") + len(".foot = {")
+    wrong = text[:place] + "1.0 + " + text[place:]
+    run = subprocess.run([str(compiled(tmp_path, wrong, COMPILERS[0], driver=None))], capture_output=True, text=True)
+    assert run.returncode == 1
+    assert "actuator 0" in run.stdout
+
+
+@needs_compiler
+def test_nothing_is_kept_between_calls_and_nothing_is_needed_but_mathematics(tmp_path: Path) -> None:
+    (tmp_path / "exported.c").write_text(c_source(machine("servo_hexapod"), name="robot"))
+    subprocess.run([COMPILERS[0], "-std=c99", "-O1", "-c", "exported.c"], cwd=tmp_path, check=True)
+    listed = subprocess.run(["nm", "exported.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    symbols = [line.split()[-2:] for line in listed.splitlines()]
+    assert not [name for kind, name in symbols if kind in "bBdDC"]
+    assert {name for kind, name in symbols if kind == "U"} <= {"sin", "cos", "sincos", "atan2", "sqrt", "floor"}
+    assert all(name.startswith("robot_") for kind, name in symbols if kind == "T")
+
+
+def test_parts_that_are_not_asked_for_are_not_there() -> None:
+    text = c_source(machine("stewart"), parts=("ik",))
+    assert "int pfk_ik(" in text
+    assert "pfk_fk" not in text
+    assert "pfk_limits" not in text
+
+
+@needs_compiler
+@pytest.mark.parametrize("parts", [("ik",), ("limits",), ("fk",), ("ik", "limits"), ("limits", "fk"), ("ik", "fk")])
+def test_any_choice_of_parts_compiles_without_a_warning(parts: Any, tmp_path: Path) -> None:
+    for name in ("stewart", "prs"):
+        exported = tmp_path / "exported.c"
+        exported.write_text(c_source(machine(name), parts=parts))
+        command = [COMPILERS[0], "-std=c99", *STRICT, "-c", str(exported), "-o", str(tmp_path / "exported.o")]
+        assert subprocess.run(command, capture_output=True, text=True).stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("nrpm", "R*-P*-["), ("serial_arm", "R*-R*-P*-R*"), ("orthoglide", "P*-R-Pa-R")]
+)
+def test_chains_without_code_are_refused_by_name_and_nothing_is_written(name: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(UnsupportedMechanism) as caught:
+        pf.export_c(pf.load(name), tmp_path / "machine.c")
+    assert said in str(caught.value)
+    assert "cannot be exported" in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"precision": "half"}, {"parts": ()}, {"parts": ("ik", "dynamics")}, {"parts": "ik"}, {"name": "my kins"}]
+)
+def test_wrong_arguments_are_named(wrong: dict[str, Any], tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument, match=next(iter(wrong))):
+        pf.export_c(machine("stewart"), tmp_path / "machine.c", **wrong)
+
+
+@needs_compiler
+def test_names_of_joints_cannot_leave_comments_or_strings(tmp_path: Path) -> None:
+    joints = [
+        pf.Joint('a */ "\\ ??/ é', "prismatic", ("base", "platform"), axis=(0, 0, 1), actuated=True, range=(-1, 1))
+    ]
+    mechanism = pf.Mechanism("evil */ int x;", joints, "platform", (0, 0, 0), task=("z",))
+    compiled(tmp_path, c_source(mechanism), COMPILERS[0])
