@@ -48,10 +48,10 @@ $(READY): pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(v < (3, 11) and "Python >= 3.11 is needed; %s is %d.%d. Try: make PYTHON=python3.12" % (sys.executable, v[0], v[1]))'
 	@echo "installing pfabrik into .venv" >&2
 	@$(PYTHON) -m venv .venv
-	@$(BIN)/python -m pip install --disable-pip-version-check --editable '.[view]'
+	@$(BIN)/python -m pip install --disable-pip-version-check --editable '.[plot]'
 	@touch $@
 
 $(STAMP): $(READY)
 	@echo "installing what tests and checks need" >&2
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[view,dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[plot,view,dev]'
 	@touch $@

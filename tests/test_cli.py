@@ -982,10 +982,10 @@ def test_demo_writes_a_picture_and_a_table_for_each_machine(run: Callable[..., R
 
 
 def test_demo_says_how_to_get_what_it_needs(run: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pfabrik.cli.demo.find_spec", lambda _: None)
+    monkeypatch.setattr("pfabrik.extras.find_spec", lambda _: None)
     result = run("demo")
     assert result.exit_code == 2
-    assert "pip install 'pfabrik[view]'" in result.stderr
+    assert "pip install 'pfabrik[plot]'" in result.stderr
 
 
 def test_demo_refuses_a_file_where_its_folder_should_be(run: Callable[..., Result], tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -140,3 +141,21 @@ def test_commands_of_the_readme_answer(line: str, tmp_path: Path) -> None:
     done = python(tmp_path, "-m", "pfabrik", *shlex.split(line, comments=True)[1:])
     assert done.returncode in (0, 1), done.stderr
     assert done.stdout
+
+
+SEEING = ROOT / "docs" / "see-your-machine.md"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "line", [line for block in blocks(SEEING, "") for line in block.splitlines() if line.startswith("pfabrik ")]
+)
+def test_pictures_are_made_by_the_commands_shown_beside_them(line: str, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    (made,) = re.findall(r"figures/[\w.]+$", line)
+    assert f"]({made})" in SEEING.read_text(encoding="utf-8")
+    shown = (ROOT / "docs" / made).stat().st_size
+    shutil.copytree(ROOT / "docs" / "figures", tmp_path / "figures", ignore=shutil.ignore_patterns(Path(made).name))
+    done = python(tmp_path, "-m", "pfabrik", *shlex.split(line)[1:])
+    assert done.returncode in (0, 1), done.stderr
+    assert (tmp_path / made).stat().st_size == pytest.approx(shown, rel=0.2), "run the command again, in docs/"

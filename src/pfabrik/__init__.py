@@ -11,6 +11,7 @@ Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, wor
            Solver (one machine, asked again and again)
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
+See        plot, plot_track, plot_travel, animate
 Structure  decompose, SubChain; geometric (closed forms of the paper's machines); errors
 Exchange   interop (MuJoCo and URDF, in and out)
 
@@ -69,6 +70,10 @@ _HOMES = {
     "Workspace": "workspace.result",
     "workspace": "workspace.ask",
     "export_c": "export.export_c",
+    "animate": "view.animation",
+    "plot": "view.machine",
+    "plot_track": "view.track",
+    "plot_travel": "view.travel",
 }
 # Modules that are themselves public.
 _MODULES = ("errors", "geometric", "interop")
@@ -93,6 +98,7 @@ __all__ = [
     "WorkingModes",
     "Workspace",
     "__version__",
+    "animate",
     "assembly_modes",
     "catalog",
     "closure_residual",
@@ -108,6 +114,9 @@ __all__ = [
     "load",
     "margins",
     "mobility",
+    "plot",
+    "plot_track",
+    "plot_travel",
     "pose",
     "save",
     "singularity",
@@ -145,6 +154,10 @@ if TYPE_CHECKING:
     from .solver import Solver
     from .track import track
     from .travel import Travel, travel
+    from .view.animation import animate
+    from .view.machine import plot
+    from .view.track import plot_track
+    from .view.travel import plot_travel
     from .warm_up import warm_up
     from .workspace.ask import workspace
     from .workspace.result import Workspace

@@ -11,8 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from .answers.limits import ActiveLimit, active_limits
 from .answers.solution import Solution, Status, checked_solution
+from .answers.table import aligned, plain
+from .answers.words import short_names
 from .arrays import Floats
 from .description.mechanism import Mechanism
+from .description.notebook import card
 from .description.task import task_of
 from .engine import engine_of
 from .errors import InvalidArgument
@@ -54,7 +57,7 @@ class Reach:
     end: Solution | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Travel(Sequence[Reach]):
     """What `travel` found, one `Reach` a direction, in the order they were asked for."""
 
@@ -79,6 +82,29 @@ class Travel(Sequence[Reach]):
     def __iter__(self) -> Iterator[Reach]:
         return iter(self.reaches)
 
+    def __repr__(self) -> str:
+        return f"<Travel of '{self.origin.mechanism.name}': {len(self)} directions>"
+
+    def __str__(self) -> str:
+        """A table of them, angles in degrees."""
+        rows = ((*_direction(each), *self._distance(each), short_names(each.stopped_by)) for each in self)
+        return aligned(_HEADER, rows)
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks."""
+        rows = [(*_direction(each), *self._distance(each), short_names(each.stopped_by)) for each in self]
+        return card(self.origin.mechanism.name, ["how far the end effector can go"], _HEADER, rows, "")
+
+    def _distance(self, reach: Reach) -> tuple[str, str]:
+        """How far it is, and the unit: degrees about an axis."""
+        mechanism = self.origin.mechanism
+        unit = "deg" if reach.kind == "about" else mechanism.length_unit
+        if not np.isfinite(reach.distance):
+            return "unlimited", unit
+        if reach.kind == "about":
+            return plain(float(np.degrees(reach.distance)), 1e-6), unit
+        return plain(reach.distance, 2e-9 * mechanism.characteristic_length), unit
+
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, lists and dicts, ready for JSON; an endless distance becomes None."""
         rows = [
@@ -91,6 +117,13 @@ class Travel(Sequence[Reach]):
             for reach in self
         ]
         return {"from": self.origin.pose.tolist(), "travel": rows}
+
+
+_HEADER = ("", "x", "y", "z", "travel", "unit", "stopped by")
+
+
+def _direction(reach: Reach) -> tuple[str, ...]:
+    return (reach.kind, *(plain(part, 1e-9) for part in reach.direction))
 
 
 def travel(

@@ -41,6 +41,8 @@ class Track(Solution):
 
     Attributes
     ----------
+    targets : what was asked for, poses (n, 4, 4) [length].
+    sample_time : from one target to the next [s]; None where nothing was said of it.
     jumps : whether an answer leaps away from the one before it, (n,): no motion leads from one to the other while
         the target moves between theirs. So it is where the nearest feasible pose itself jumps, as it can where a
         workspace is not convex.
@@ -60,7 +62,6 @@ class Track(Solution):
     ) -> None:
         """Wrap answers; `follow` answers another path, (k, 4, 4), from a start, in the same way."""
         super().__init__(mechanism, found, (len(found),), wanted)
-        self._targets = wanted.targets
         self._follow = follow
         self._pace = pace
 
@@ -95,11 +96,20 @@ class Track(Solution):
         *own, self._pace, self.jumps = state
         super().__setstate__(tuple(own))
 
+    @property
+    def targets(self) -> Floats:
+        assert self._wanted is not None
+        return self._wanted.targets
+
+    @property
+    def sample_time(self) -> float | None:
+        return None if self._pace is None else self._pace.sample_time
+
     @cached_property
     def jumps(self) -> NDArray[np.bool_]:
         found = np.zeros(self.shape, bool)
         moved = np.maximum(_moves(self.mechanism, self.pose), self._actuator_moves().max(axis=1, initial=0.0))
-        asked = np.maximum(SUSPICIOUS * _moves(self.mechanism, self._targets), LEAST)
+        asked = np.maximum(SUSPICIOUS * _moves(self.mechanism, self.targets), LEAST)
         for row in np.flatnonzero(moved > asked).tolist():
             # where links are stretched out, only one direction may tell which way they bend
             ways = [ends for ends in ((row - 1, row), (row, row - 1)) if self.status[ends[0]] < Status.FAILED]
@@ -109,7 +119,7 @@ class Track(Solution):
     def _leaps(self, start: int, end: int, moved: float) -> bool:
         """Whether a step from one row to the next, or back, stays a leap where it is divided, or leads elsewhere."""
         shares = np.arange(1, SUBSTEPS + 1)[:, None, None] / SUBSTEPS
-        here, there = (np.repeat(self._targets[row : row + 1], SUBSTEPS, axis=0) for row in (start, end))
+        here, there = (np.repeat(self.targets[row : row + 1], SUBSTEPS, axis=0) for row in (start, end))
         way = [self[start], self._follow(between(here, there, shares), self[start]), self[end]]
         poses = np.concatenate([each.pose.reshape(-1, 4, 4) for each in way])
         actuators = np.concatenate([each.actuators.reshape(-1, self.actuators.shape[1]) for each in way])

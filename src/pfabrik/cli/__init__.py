@@ -27,6 +27,7 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
     subcommands=(
         *("catalog", "new", "info", "check"),
         *("ik", "fk", "track", "travel"),
+        *("plot",),
         *("export",),
         *("compile", "demo", "reproduce"),
     ),

@@ -11,6 +11,7 @@ import click
 
 import pfabrik as pf
 
+from ..answers.table import aligned, plain
 from ..answers.words import as_sentence, by_bound, exceeded, loop_gap
 from ..arrays import Floats
 from ..description.notebook import bound_text
@@ -19,7 +20,6 @@ from ..errors import ContinuumOfSolutions
 from ..rotations import to_rpy
 from ..tolerances import TOLERANCES
 from .group import complain
-from .table import aligned
 
 if TYPE_CHECKING:
     from ..answers.solution import Solution
@@ -130,8 +130,3 @@ def describe_modes(found: Modes, kind: str, header: Sequence[str], cells: Callab
 def pose_header(mechanism: Mechanism) -> list[str]:
     """The columns of `pose_texts`."""
     return [*(f"{name} [{mechanism.length_unit}]" for name in "xyz"), "roll [deg]", "pitch [deg]", "yaw [deg]"]
-
-
-def plain(value: float, smallest: float) -> str:
-    """Six digits; what is smaller than `smallest` is noise and reads 0."""
-    return f"{value:.6g}" if abs(value) > smallest else "0"

@@ -6,9 +6,9 @@ import json
 
 import click
 
+from ..answers.table import aligned
 from ..catalog import catalog as names
 from ..catalog import description
-from .table import aligned
 
 
 @click.command()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,8 +11,10 @@ import click
 
 import pfabrik as pf
 
+from ..answers.table import aligned
+from ..extras import require
+from .picture import picture
 from .progress import progress
-from .table import aligned
 from .track import count_statuses
 from .whole import new_folder, whole_folder
 
@@ -51,8 +52,7 @@ def demo(out: Path, steps: int, quick: bool) -> int:
     """
     from ..reproduce.study import cases
 
-    if find_spec("matplotlib") is None:
-        raise click.UsageError("the pictures need matplotlib; install it with: pip install 'pfabrik[view]'")
+    require("pictures", "matplotlib", "plot")
     with new_folder(out.resolve()):  # what cannot be written is found before the work begins
         runs = []
     for case in sorted(cases(), key=lambda case: case.mechanism.end_effector_is_joint):  # quickest to compile first
@@ -82,9 +82,8 @@ def follow(case: Case, steps: int) -> Run:
 
 def draw(run: Run, folder: Path) -> None:
     """The picture of one run."""
-    from ..view.tracking import draw_tracking
-
-    draw_tracking(run.targets, run.solution, folder / f"{run.key}.png")
+    with picture(folder / f"{run.key}.png", quiet=True):
+        pf.plot_track(run.solution)
 
 
 def write(run: Run, folder: Path) -> None:

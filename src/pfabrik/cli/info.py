@@ -13,11 +13,11 @@ import click
 
 import pfabrik as pf
 
+from ..answers.table import aligned
 from ..decomposition.decompose import closure_reason, engine_of
 from ..decomposition.leg_table import leg_table, legs_answer
 from ..description.joint_types import KINDS
 from .mech import MECH, load
-from .table import aligned
 
 if TYPE_CHECKING:
     from ..answers.differential import Mobility

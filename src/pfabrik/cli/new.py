@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
+from ..answers.table import aligned
 from ..catalog import catalog, catalog_file, template, templates, title
 from .mech import MECH
-from .table import aligned
 from .whole import whole_file
 
 

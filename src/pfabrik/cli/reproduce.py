@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
+from ..answers.table import aligned
 from .progress import progress
-from .table import aligned
 from .whole import whole_folder
 
 NEEDED = ("matplotlib", "scipy")

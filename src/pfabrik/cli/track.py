@@ -13,11 +13,13 @@ import click
 import pfabrik as pf
 
 from ..errors import near_miss
+from ..extras import require
 from .finite import FINITE, is_finite
 from .mech import MECH, load
+from .picture import picture
 from .progress import progress
 from .projecting import note_left_out, options_projecting, projecting
-from .whole import whole_file
+from .whole import refuse_input, whole_file
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
@@ -42,6 +44,10 @@ ROWS_NAMED = 5
     metavar="[NAME=]VALUE",
     help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated.",
 )
+@click.option(
+    "--plot", "picture_path", type=click.Path(path_type=Path), metavar="FILE", help="Picture: PNG, SVG or PDF."
+)
+@click.option("--animate", "film_path", type=click.Path(path_type=Path), metavar="FILE", help="Film: GIF or MP4.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
 def track(
     mech: str,
@@ -51,6 +57,8 @@ def track(
     projection: str,
     sample_time: float | None,
     speeds: tuple[str, ...],
+    picture_path: Path | None,
+    film_path: Path | None,
     as_json: bool,
 ) -> int:
     """Follow a path of targets.
@@ -61,16 +69,20 @@ def track(
     yaw_rad; - is standard input. Coordinates that the machine cannot change may be missing, as z in a plane. Further
     columns go out as they came in, and angles in the unit they came in.
 
+    --plot draws the path, every actuator between its limits, and all margins; --animate the machine on its way.
+
     The exit code is 1 also where an actuator would have to be faster than --speed allows.
     """
     from .pathfile import STANDARD, read_path, write_track
 
-    if output is None and not as_json:
-        raise click.UsageError("no place for the answers: give -o FILE, -o - or --json")
+    if output is None and not as_json and picture_path is None and film_path is None:
+        raise click.UsageError("no place for the answers: give -o FILE, -o -, --json, --plot or --animate")
     if as_json and output == STANDARD:
         raise click.UsageError("-o - and --json both print on stdout: give one of them")
     if mech == str(path) == str(STANDARD):
         raise click.UsageError("MECH and PATH are both standard input: give a file for one of them")
+    inputs = (path, Path(mech))
+    refuse_early(picture_path, film_path, inputs)
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
     if limits and sample_time is None:
@@ -78,7 +90,7 @@ def track(
     read = read_path(path, mechanism)
     note_ignored(mechanism, read.targets)
     options = options_projecting(hold, projection)
-    with nullcontext() if output is None else whole_file(output, inputs=(path, Path(mech))) as handle:
+    with nullcontext() if output is None else whole_file(output, inputs) as handle:
         with progress(f"tracking {len(read.targets)} targets") as on_progress:
             followed = pf.track(
                 mechanism,
@@ -90,10 +102,28 @@ def track(
             )
         if handle is not None:
             write_track(handle, read, followed)
+    if picture_path is not None:
+        with picture(picture_path):
+            pf.plot_track(followed)
+    if film_path is not None:
+        with progress(f"drawing {film_path}") as on_progress:
+            pf.animate(followed, film_path, on_progress=on_progress)
+        click.echo(f"wrote {film_path}", err=True)
     if as_json:
         click.echo(json.dumps(followed.to_dict(), allow_nan=False))
     click.echo(summary(followed), err=as_json or output == STANDARD)
     return 0 if followed and not any(followed.too_fast or ()) else 1
+
+
+def refuse_early(picture_path: Path | None, film_path: Path | None, inputs: tuple[Path, ...]) -> None:
+    """Stop before the work begins where a picture or film cannot be written, or would replace what was read."""
+    from ..view.saving import FILMS, PICTURES, checked_ending
+
+    for path, endings in ((picture_path, PICTURES), (film_path, FILMS)):
+        if path is not None:
+            checked_ending(path, endings)
+            refuse_input(path, inputs)
+            require("pictures", "matplotlib", "plot")
 
 
 def note_ignored(mechanism: Mechanism, targets: Floats) -> None:

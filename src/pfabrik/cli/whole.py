@@ -28,9 +28,7 @@ def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
     if path == Path("-"):
         yield sys.stdout
         return
-    for read in inputs:
-        if path.exists() and read.exists() and path.samefile(read):
-            raise click.UsageError(f"-o {path}: found a file that was read; expected another file")
+    refuse_input(path, inputs)
     path = path.resolve()  # a link keeps pointing where it points
     if path.exists() and not path.is_file():
         with path.open("w", newline="", encoding="utf-8") as direct:
@@ -44,6 +42,13 @@ def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def refuse_input(path: Path, inputs: Iterable[Path]) -> None:
+    """Stop if an output would overwrite a file that was read."""
+    for read in inputs:
+        if path.exists() and read.exists() and path.samefile(read):
+            raise click.UsageError(f"{path}: found a file that was read; expected another file")
 
 
 def open_new(part: Path, path: Path) -> TextIO:

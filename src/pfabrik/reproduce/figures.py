@@ -12,7 +12,8 @@ from matplotlib.lines import Line2D
 
 from ..answers.solution import Status
 from ..description.readouts import Readout, readout
-from ..view.tracking import ACHIEVED, OFF_TARGET, SHADE, TARGET, common_keys, draw_limits, line_style, shade_steps
+from ..view.looks import ACHIEVED, ASKED, HELD, SHADE
+from ..view.track import common_keys, draw_limits, line_style, shade_steps
 from .efficacy import Efficacy, is_point
 from .efficiency import Efficiency
 from .robustness import Robustness
@@ -144,9 +145,9 @@ def draw_path(axes: Axes, found: Robustness) -> None:
     inside = space.reached.astype(float)
     axes.contourf(space.y, space.z, inside, levels=[-0.5, 0.5], colors=[OUTSIDE])
     axes.contour(space.y, space.z, inside, levels=[0.5], colors=[EDGE], linewidths=1)
-    axes.plot(*asked.T, color=TARGET, linestyle="--", linewidth=1.6, label="asked for")
+    axes.plot(*asked.T, color=ASKED, linestyle="--", linewidth=1.6, label="asked for")
     axes.plot(*taken.T, color=ACHIEVED, linewidth=1.8, label="achieved")
-    axes.plot(*taken[off].T, "o", color=OFF_TARGET, markersize=2.5, label="projected step")
+    axes.plot(*taken[off].T, "o", color=HELD, markersize=2.5, label="projected step")
     axes.set(xlabel=f"y [{unit}]", ylabel=f"z [{unit}]", title=f"{found.case.label}: path")
     axes.set_aspect("equal")
     handles = [*axes.get_legend_handles_labels()[0], Line2D([], [], color=EDGE, linewidth=1, label="workspace's edge")]

@@ -1,1 +1,1 @@
-"""Pictures. Needs the extra ``view``: ``pip install 'pfabrik[view]'``."""
+"""Pictures, which need the extra ``plot``, and the viewer in the browser, which needs the extra ``view``."""

@@ -28,3 +28,8 @@ def starts_like_a_number(cell: str) -> bool:
     except ValueError:
         return head in ("", "-")
     return True
+
+
+def plain(value: float, smallest: float) -> str:
+    """Six digits; what is smaller than `smallest` is noise and reads 0."""
+    return f"{value:.6g}" if abs(value) > smallest else "0"

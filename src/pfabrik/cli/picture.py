@@ -1,0 +1,34 @@
+"""Pictures that commands write."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from ..extras import require
+from .whole import refuse_input
+
+
+@contextmanager
+def picture(path: Path, inputs: Iterable[Path] = (), quiet: bool = False) -> Iterator[None]:
+    """Write to a file what a block draws in one new figure, and say so; a name that cannot be, before it draws."""
+    from ..view.saving import PICTURES, checked_ending, save_picture
+
+    checked_ending(path, PICTURES)
+    refuse_input(path, inputs)
+    require("pictures", "matplotlib", "plot")
+    import matplotlib
+    from matplotlib import pyplot
+
+    matplotlib.use("Agg")  # no window, whatever the user's settings
+    yield
+    figure = pyplot.gcf()
+    try:
+        save_picture(figure, path)
+    finally:
+        pyplot.close(figure)
+    if not quiet:
+        click.echo(f"wrote {path}", err=True)

@@ -1,0 +1,149 @@
+"""`animate`: a path that was followed, as a film."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..answers.solution import Solution, Status
+from ..answers.tracked import Track
+from ..answers.words import as_sentence, short_names
+from ..errors import InvalidArgument, MissingLibrary
+from ..extras import require
+from ..writing import whole_path
+from .canvas import SMALL, canvas_on, new_axes
+from .looks import ACHIEVED, ASKED, HELD
+from .machine import draw_key, draw_machine
+from .plane import plane_of
+from .saving import FILMS, checked_ending
+from .skeleton import Skeleton, skeleton_of
+from .track import checked_track, ways_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FRAMES_A_SECOND = 20
+MOST_FRAMES = 10_000
+
+
+def animate(
+    track: Track,
+    path: str | os.PathLike[str],
+    *,
+    seconds: float | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Write a film of a path that was followed: the machine, what was asked for, and what holds it back.
+
+    Axes and their limits stay the same throughout. The file appears when it is complete, or not at all.
+
+    Parameters
+    ----------
+    track : what `track` answered.
+    path : of the film; it ends in ".gif" or ".mp4". The latter needs the program `ffmpeg`.
+    seconds : how long it runs; default: as long as the path takes where `track` was told a `sample_time`, else a
+        twentieth of a second a step. There are 20 frames a second, each the step that is due.
+    on_progress : called with (frames done, frames in all).
+
+    Raises
+    ------
+    InvalidArgument : no Track, another ending, or no positive time.
+    MissingLibrary : matplotlib, or for ".mp4" `ffmpeg`, is not there.
+    """
+    known = checked_track(track)
+    suffix = checked_ending(path, FILMS)
+    steps = _steps(track, known, seconds)
+    require("pictures", "matplotlib", "plot")
+    writer = _writer(suffix)
+    film = _Film(track, [skeleton_of(track[int(step)]) for step in np.unique(steps)], np.unique(steps))
+    with whole_path(path) as part, writer.saving(film.figure, str(part), film.figure.dpi):
+        for done, step in enumerate(steps.tolist(), 1):
+            film.show(step)
+            writer.grab_frame()
+            if on_progress is not None:
+                on_progress(done, len(steps))
+
+
+def _steps(track: Track, known: NDArray[np.intp], seconds: float | None) -> NDArray[np.intp]:
+    """The step that every frame shows."""
+    if seconds is None:
+        seconds = len(known) / FRAMES_A_SECOND if track.sample_time is None else len(known) * track.sample_time
+    elif isinstance(seconds, bool) or not np.isreal(seconds) or not 0.0 < seconds < np.inf:
+        raise InvalidArgument("seconds", repr(seconds), "a positive number")
+    frames = int(np.clip(round(seconds * FRAMES_A_SECOND), 1, MOST_FRAMES))
+    return known[np.linspace(0, len(known) - 1, frames).round().astype(np.intp)]
+
+
+def _writer(suffix: str) -> Any:
+    """What writes a film of that ending."""
+    from matplotlib import animation, rcParams
+
+    if suffix == ".gif":
+        return animation.PillowWriter(fps=FRAMES_A_SECOND)
+    program = shutil.which(str(rcParams["animation.ffmpeg_path"])) or _own_ffmpeg()
+    if program is None:
+        command = "your system's packages (apt, brew, winget install ffmpeg), or pip install imageio-ffmpeg"
+        raise MissingLibrary("mp4 films", "the program ffmpeg", command)
+    rcParams["animation.ffmpeg_path"] = program
+    even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]  # what every player shows
+    return animation.FFMpegWriter(fps=FRAMES_A_SECOND, codec="h264", extra_args=even)
+
+
+def _own_ffmpeg() -> str | None:
+    """The program that the package imageio-ffmpeg brings, where it is installed."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return str(get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        return None
+
+
+class _Film:
+    """One figure, whose machine is drawn anew for each frame."""
+
+    def __init__(self, track: Track, skeletons: list[Skeleton], steps: NDArray[np.intp]) -> None:
+        from matplotlib.figure import Figure
+
+        self._track = track
+        self._skeletons = dict(zip(steps.tolist(), skeletons, strict=True))
+        plane = plane_of(track.mechanism)
+        self.figure: Figure = Figure(figsize=(6.0, 5.4), dpi=100, layout=None if plane is None else "constrained")
+        above, below = np.ravel(self.figure.subfigures(2, 1, height_ratios=(1, 11), squeeze=False))
+        self._caption = above.text(0.02, 0.9, " ", fontsize=SMALL + 1.0, va="top")
+        self._canvas = canvas_on(new_axes(below, plane), plane)
+        draw_key(self._canvas, next((each for each in skeletons if each.is_held), skeletons[0]))
+        everything = np.vstack([ways_of(track), *(skeleton.points for skeleton in skeletons)])
+        self._canvas.frame(everything, track.mechanism.length_unit)
+        self._artists: list[Any] = []
+
+    def show(self, step: int) -> None:
+        """The machine at a step, the whole path asked for, and the path taken so far."""
+        for artist in self._artists:
+            artist.remove()
+        track, canvas = self._track, self._canvas
+        self._artists = draw_machine(canvas, self._skeletons[step])
+        taken = track.pose[: step + 1, :3, 3]
+        asked = track.targets[:, :3, 3]
+        self._artists += [
+            canvas.line(asked, color=ASKED, linestyle="--", linewidth=1.2, zorder=20),
+            canvas.line(taken, color=ACHIEVED, linewidth=1.8, zorder=21),
+            canvas.line(asked[step][None], marker="x", color=ASKED, markersize=6, zorder=22),
+        ]
+        self._caption.set(text=_caption(track[step], step, len(track)), color=_colour(track[step]))
+
+
+def _caption(solution: Solution, step: int, steps: int) -> str:
+    """Which step it is, what became of it, and what holds it back."""
+    held = short_names(solution._limits[0])
+    told = as_sentence(solution).partition(";")[0]
+    return f"step {step + 1} of {steps}: {told}\n{held or ' '}"
+
+
+def _colour(solution: Solution) -> str:
+    return ACHIEVED if solution.status == Status.REACHED else HELD

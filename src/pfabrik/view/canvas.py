@@ -1,0 +1,231 @@
+"""Axes to draw points of space on: three-dimensional ones, or two-dimensional ones for what lies in a plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import InvalidArgument
+from ..extras import require
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MARGIN = 1.1
+"""Room around what is drawn, as a share of it."""
+
+THINNEST = 0.15
+"""The least that the axes of a flat machine in space span across it, as a share of its largest extent."""
+
+TICKS, ROOM_ACROSS, ROOM_UP = 6, 24.0, 18.0
+"""Ticks of an axis at most, and the room each needs on an axis of any direction, and on an upright one [points]."""
+
+OFF_CORNERS = 0.06
+"""How far ticks stay off the corners of a box, as a share of its side: those of two axes would meet there."""
+
+ZOOMS = (1.1, 1.05, 1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
+"""Sizes of a box in space, tried until all that belongs to it is within the figure."""
+
+MOST_LOOKS = 16
+"""How often a picture in space is looked at before it is taken as it is."""
+
+FREE_EDGE = 2.0
+"""How far from the edge of the figure that is at least [points]."""
+
+ELEVATION, AZIMUTH = 22.0, -58.0
+"""Where a machine in space is seen from [deg]."""
+
+LABEL_OFF = 4.0
+"""How far the names of axes in space stay off their ticks, beyond matplotlib's own distance [points]."""
+
+SPATIAL = (0.0, 0.0, 1.0, 0.9)
+"""Where in a figure axes in space are: left, bottom, width, height."""
+
+PANE, GRID = (1.0, 1.0, 1.0, 0.0), "#d9d9d9"
+SMALL = 8.0
+"""Size of letters [points]."""
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """Axes, and what makes points (n, 3) of the base frame theirs.
+
+    Attributes
+    ----------
+    plane : the directions to the right and up, (2, 3), of two-dimensional axes; None for three-dimensional ones.
+    """
+
+    axes: Any
+    plane: Floats | None
+
+    def seen(self, points: Floats) -> Floats:
+        """Points (..., 3) in the coordinates of the axes, (..., 2 or 3)."""
+        return points if self.plane is None else points @ self.plane.T
+
+    def line(self, points: Floats, **style: Any) -> Any:
+        """Straight lines from point to point, (n, 3)."""
+        return self.axes.plot(*self.seen(points).T, **style)[0]
+
+    def face(self, points: Floats, **style: Any) -> Any:
+        """A filled polygon of corners (n, 3)."""
+        if self.plane is None:
+            from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+            return self.axes.add_collection3d(Poly3DCollection([points], linewidth=0, **style))
+        from matplotlib.patches import Polygon
+
+        return self.axes.add_patch(Polygon(self.seen(points), linewidth=0, **style))
+
+    def marks(self, points: Floats, **style: Any) -> Any:
+        """Markers at points (n, 3)."""
+        style |= {"depthshade": False} if self.plane is None else {}
+        return self.axes.scatter(*self.seen(points).T, **style)
+
+    def words(self, place: Floats, text: str, **style: Any) -> Any:
+        """A text at a point (3,)."""
+        from matplotlib.patheffects import withStroke
+
+        outline = withStroke(linewidth=2.0, foreground="white")
+        return self.axes.text(*self.seen(place), text, **({"fontsize": SMALL, "path_effects": [outline]} | style))
+
+    def frame(self, points: Floats, unit: str) -> None:
+        """Show all of points (n, 3), at one scale, with axes named and ticks that keep out of each other's way."""
+        seen = self.seen(points)
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        largest = float(np.max(high - low)) or 1.0
+        spans = MARGIN * np.maximum(high - low, THINNEST * largest)
+        ends = np.stack([(low + high - spans) / 2.0, (low + high + spans) / 2.0])
+        for name, own in zip("xyz", ends.T.tolist(), strict=False):
+            self.axes.set(**{f"{name}lim": own})
+        if self.plane is not None:
+            self.axes.set_aspect("equal")
+        else:
+            self.axes.set_box_aspect(spans)
+            self.axes.computed_zorder = False
+            self.axes.view_init(elev=ELEVATION, azim=AZIMUTH)
+        for place, name in enumerate("xyz"[: len(spans)]):
+            low_end, high_end = ends[:, place].tolist()
+            ticks = _ticks(low_end, high_end, self._most_ticks(place, ends))
+            self.axes.set(**{f"{name}ticks": ticks, f"{name}label": f"{self._direction(place)} [{unit}]"})
+
+        if self.plane is None:
+            self._fit(spans)
+
+    def _fit(self, spans: Floats) -> None:
+        """Move the names of axes in space off their ticks, and shrink the box until all of them are in the figure."""
+        root = self.axes.get_figure(root=True)
+        zooms, axes = iter(ZOOMS), self._axes
+        self.axes.set_box_aspect(spans, zoom=next(zooms))
+        for _ in range(MOST_LOOKS):
+            root.draw_without_rendering()
+            edge = root.bbox.padded(-FREE_EDGE * root.dpi / 72.0)
+            boxes = [text.get_window_extent() for text in self.axis_words]
+            hidden = [axis for axis in axes if any(axis.label.get_window_extent().overlaps(box) for box in boxes[3:])]
+            for axis in hidden:
+                axis.labelpad += LABEL_OFF / 2.0
+            if hidden:
+                continue
+            if all(edge.x0 <= box.x0 and box.x1 <= edge.x1 and edge.y0 <= box.y0 for box in boxes):
+                return
+            self.axes.set_box_aspect(spans, zoom=next(zooms, ZOOMS[-1]))
+
+    @property
+    def _axes(self) -> list[Any]:
+        return [getattr(self.axes, f"{name}axis") for name in "xyz"[: 2 if self.plane is not None else 3]]
+
+    @property
+    def axis_words(self) -> list[Any]:
+        """The names of all axes, then the numbers at their ticks, where they were drawn last."""
+        ticks = [tick.label1 for axis in self._axes for tick in axis.majorTicks if tick.label1.get_text()]
+        return [axis.label for axis in self._axes] + ticks
+
+    def on_screen(self, places: Floats) -> Floats:
+        """Points (n, 3), or points of the axes themselves, in pixels, (n, 2)."""
+        seen = self.seen(places) if places.shape[1] == 3 else places
+        if self.plane is None:
+            from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
+
+            seen = np.transpose(proj_transform(*seen.T, self.axes.get_proj()))[:, :2]
+        return np.asarray(self.axes.transData.transform(seen))
+
+    def _most_ticks(self, place: int, ends: Floats) -> int:
+        """How many ticks an axis has room for, as the figure is now; ends are the lowest and highest corner shown."""
+        if self.plane is None:
+            line = np.repeat(ends.mean(axis=0)[None], 2, axis=0)
+            line[:, place] = ends[:, place]
+            self.axes.apply_aspect()
+            length = np.linalg.norm(np.diff(self.on_screen(line), axis=0))
+            upright = place == 2
+        else:
+            box = self.axes.get_window_extent()
+            length, upright = (box.width, box.height)[place], place == 1
+        points = length * 72.0 / self.axes.get_figure(root=True).dpi
+        return int(np.clip(points / (ROOM_UP if upright else ROOM_ACROSS), 3, TICKS))
+
+    def _direction(self, place: int) -> str:
+        """What an axis is called: "x" where it is one of the base frame, else its direction."""
+        if self.plane is None:
+            return "xyz"[place]
+        along = self.plane[place]
+        nearest = int(np.argmax(np.abs(along)))
+        is_base_axis = np.isclose(along[nearest], 1.0)
+        return "xyz"[nearest] if is_base_axis else f"along ({', '.join(f'{part:.3g}' for part in along)})"
+
+
+def canvas_on(ax: Axes | None, plane: Floats | None) -> Canvas:
+    """A canvas on axes that are given, or on new ones; planar machines take both kinds.
+
+    Raises
+    ------
+    InvalidArgument : two-dimensional axes for a machine in space.
+    MissingLibrary : matplotlib is not installed.
+    """
+    require("pictures", "matplotlib", "plot")
+    if ax is None:
+        from matplotlib import pyplot
+
+        figure = pyplot.figure(figsize=(5.0, 4.5), dpi=150, layout=None if plane is None else "constrained")
+        ax = new_axes(figure, plane)
+    if hasattr(ax, "get_zlim"):
+        plane = None
+        _dress(ax)
+    elif plane is None:
+        expected = "three-dimensional ones, as of figure.add_subplot(projection='3d')"
+        raise InvalidArgument("ax", "two-dimensional axes for a machine that is not planar", expected)
+    ax.tick_params(labelsize=SMALL)
+    for name in "xyz"[: 2 if plane is not None else 3]:
+        getattr(ax, f"{name}axis").label.set_size(SMALL + 1.0)
+    return Canvas(ax, plane)
+
+
+def _dress(axes: Any) -> None:
+    """Axes in space without walls, with names that are easily read."""
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.labelpad = LABEL_OFF
+        axis.set_rotate_label(False)
+        axis.label.set_rotation(90.0 if axis is axes.zaxis else 0.0)
+        axis.set_pane_color(PANE)
+        axis._axinfo["grid"] |= {"color": GRID, "linewidth": 0.6}
+
+
+def new_axes(figure: Figure | Any, plane: Floats | None) -> Axes:
+    """New axes that fill a figure but for a key above: two-dimensional ones for what is planar."""
+    if plane is not None:
+        axes: Axes = figure.add_subplot()
+        axes.spines[["top", "right"]].set_visible(False)
+        return axes
+    spatial: Axes = figure.add_axes(SPATIAL, projection="3d")  # no layout engine knows how much room its names need
+    return spatial
+
+
+def _ticks(low: float, high: float, most: int) -> list[float]:
+    """Round numbers between both ends of an axis, off its corners."""
+    from matplotlib.ticker import MaxNLocator
+
+    off = OFF_CORNERS * (high - low)
+    ticks = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
+    return [float(tick) for tick in ticks if low + off <= tick <= high - off]

@@ -1,0 +1,34 @@
+"""How things look, in pictures and in the viewer: one colour, one meaning; lightness and shape tell them apart too."""
+
+from __future__ import annotations
+
+from ..description.joint_types import JointType
+
+BASE, PLATFORM, LINK, EDGE = "#c8c8c8", "#79b4d9", "#4d4d4d", "#1a1a1a"
+ACTUATED, PASSIVE = "#1a1a1a", "#ffffff"
+HELD = "#d55e00"
+"""What a limit holds back, or what is not as it was asked for: nothing else has this colour."""
+
+ASKED, ACHIEVED, SHADE = "#8c8c8c", "#00204d", "#ececec"
+
+LINE_COLOURS = ("#00204d", "#0072b2", "#009e73", "#e69f00", "#cc79a7", "#999999")
+"""Of lines that only their names tell apart; neighbours also differ in dashes."""
+
+MARKERS: dict[JointType, str] = {
+    "revolute": "o",
+    "prismatic": "s",
+    "universal": "D",
+    "spherical": "^",
+    "cylindrical": "h",
+    "fixed": "X",
+}
+
+
+def of_a_body(role: str) -> str:
+    """The colour of a body: the base, the platform, or a link between them."""
+    return {"base": BASE, "platform": PLATFORM}.get(role, LINK)
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """A colour such as "#d55e00" as three numbers from 0 to 255."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

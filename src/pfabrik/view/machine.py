@@ -1,0 +1,164 @@
+"""A machine as matplotlib artists, and `plot`: one configuration as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..answers.solution import Solution
+from ..description.mechanism import Mechanism
+from .canvas import SMALL, Canvas, canvas_on
+from .labels import place_names
+from .looks import ACTUATED, EDGE, HELD, LINK, MARKERS, PASSIVE, PLATFORM, of_a_body
+from .plane import plane_of
+from .skeleton import Mark, Part, Skeleton, checked_shown, skeleton_of
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+SIZE, SLIDE_SIZE = 20.0, 44.0
+"""Areas of markers [points²]: a slide's is to be seen behind that of a joint in the same place."""
+
+RAIL_DASHES = (0, (4, 2))
+
+
+def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence[str] = ()) -> Axes:
+    """Draw a machine at home, or one answer: in space, or a planar machine in its plane.
+
+    Joints are markers by type, actuated ones filled; links are lines, and bodies with three or more joints faces. The
+    base is grey, the end effector blue, dashed lines are rails, and a cross marks the reference point. What holds an
+    answer back, or what it exceeds, is orange, and named: "B3 max".
+
+    Parameters
+    ----------
+    shown : a Mechanism, or one Solution.
+    ax : matplotlib axes to draw on: three-dimensional ones, or any for a planar machine. Default: those of a new
+        figure, which is `ax.figure`; its `savefig` writes PNG, SVG and PDF.
+    names : joints whose names are written beside them, such as `mechanism.actuator_names`.
+
+    Returns
+    -------
+    Axes : what was drawn on, in the mechanism's unit of length.
+
+    Raises
+    ------
+    InvalidArgument : a batch, or two-dimensional axes for a machine in space.
+    UnknownName : no joint of such a name.
+    MissingLibrary : matplotlib is not installed.
+    """
+    mechanism, _ = checked_shown(shown)
+    named = {mechanism.joint(name).name for name in names}
+    skeleton = skeleton_of(shown)
+    canvas = canvas_on(ax, plane_of(mechanism))
+    draw_machine(canvas, skeleton)
+    draw_key(canvas, skeleton)
+    canvas.frame(skeleton.points, mechanism.length_unit)
+    write_names(canvas, skeleton, named)
+    axes: Axes = canvas.axes
+    return axes
+
+
+def draw_machine(canvas: Canvas, skeleton: Skeleton) -> list[Artist]:
+    """Bodies, rails, reference point and joints, as artists that can be removed again."""
+    held = {body for mark in skeleton.marks if mark.held_by for body in mark.joint.connects}
+    artists: list[Artist] = [each for part in skeleton.parts for each in _body(canvas, part, part.body in held)]
+    for rail in skeleton.rails:
+        artists.append(canvas.line(rail, color=EDGE, linewidth=0.9, linestyle=RAIL_DASHES, zorder=1))
+    if skeleton.stem is not None:
+        artists.append(canvas.line(skeleton.stem, color=PLATFORM, linewidth=1.6, zorder=1))
+    artists.append(canvas.line(skeleton.reference[None], marker="+", color=EDGE, markersize=9, zorder=4))
+    return artists + _joints(canvas, skeleton.marks)
+
+
+def _body(canvas: Canvas, part: Part, is_held: bool) -> list[Artist]:
+    """A body: base and end effector light and broad, links dark and narrow; links of a joint at its limit orange."""
+    is_link = part.role == "link"
+    colour = HELD if is_link and is_held else of_a_body(part.role)
+    width = 1.6 if is_link or len(part.corners) > 2 else 4.0
+    artists: list[Artist] = []
+    corners = part.corners
+    if len(corners) >= 3:
+        artists.append(canvas.face(corners, facecolor=colour, alpha=0.25 if is_link else 0.55, zorder=0))
+        corners = np.vstack([corners, corners[:1]])
+    if len(corners) >= 2:
+        artists.append(canvas.line(corners, color=colour, linewidth=width, solid_capstyle="round", zorder=1))
+    return artists
+
+
+def _joints(canvas: Canvas, marks: Sequence[Mark]) -> list[Artist]:
+    """A marker for every joint, those of a kind together, slides behind the others."""
+    kinds: dict[tuple[str, bool, bool], list[Mark]] = {}
+    for mark in marks:
+        kinds.setdefault((mark.joint.type, mark.joint.actuated, bool(mark.held_by)), []).append(mark)
+    return [
+        canvas.marks(np.array([mark.place for mark in own]), zorder=2 if kind == "prismatic" else 3, **look(*key))
+        for key, own in sorted(kinds.items())
+        for kind in key[:1]
+    ]
+
+
+def look(kind: str, actuated: bool, held: bool) -> dict[str, Any]:
+    """How the marker of a joint looks: shape by type, filled where it is actuated, orange where a limit holds it."""
+    return {
+        "marker": MARKERS[kind],  # type: ignore[index]
+        "s": SLIDE_SIZE if kind == "prismatic" else SIZE,
+        "facecolor": (HELD if held else ACTUATED) if actuated else PASSIVE,
+        "edgecolor": HELD if held else EDGE,
+        "linewidths": 1.8 if held else 0.8,
+    }
+
+
+def draw_key(canvas: Canvas, skeleton: Skeleton) -> None:
+    """What the markers mean, above the axes."""
+    handles = key_of(skeleton)
+    canvas.axes.legend(handles=handles, **KEY, ncols=min(len(handles), 3))
+
+
+KEY: dict[str, Any] = {
+    "loc": "lower center",
+    "bbox_to_anchor": (0.5, 1.0),
+    "frameon": False,
+    "fontsize": SMALL,
+    "handletextpad": 0.2,
+    "columnspacing": 1.2,
+    "borderaxespad": 0.0,
+}
+"""How a key is set above axes."""
+
+
+def key_of(skeleton: Skeleton) -> list[Artist]:
+    """A marker and a word for each kind of joint that occurs, and for limits if there is one that holds."""
+    from matplotlib.lines import Line2D
+
+    kinds = sorted({(mark.joint.type, mark.joint.actuated) for mark in skeleton.marks})
+    looks = [(kind + ", actuated" * actuated, look(kind, actuated, False)) for kind, actuated in kinds]
+    if skeleton.is_held:
+        looks.append(("at a limit", look("fixed", False, True) | {"marker": "o", "facecolor": HELD}))
+    return [
+        Line2D(
+            [],
+            [],
+            linestyle="",
+            marker=each["marker"],
+            markersize=np.sqrt(each["s"]),
+            markerfacecolor=each["facecolor"],
+            markeredgecolor=each["edgecolor"],
+            markeredgewidth=each["linewidths"],
+            label=label,
+        )
+        for label, each in looks
+    ]
+
+
+def write_names(canvas: Canvas, skeleton: Skeleton, named: set[str]) -> None:
+    """The limits that hold, at their joints, and the names of chosen joints."""
+    texts = []
+    for mark in skeleton.marks:
+        if mark.held_by or mark.joint.name in named:
+            words = " ".join([mark.joint.name, *mark.held_by])
+            colour = HELD if mark.held_by else LINK
+            texts.append(canvas.words(mark.place, words, color=colour, zorder=30))
+    place_names(canvas, texts, np.array([mark.place for mark in skeleton.marks]), skeleton.lines)

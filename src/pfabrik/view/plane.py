@@ -1,0 +1,46 @@
+"""The plane that a planar machine moves in, told from the directions of its joints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.mechanism import Mechanism
+from ..tolerances import TOLERANCES
+
+VIEWER = np.array([1.0, -1.0, 1.0]) / np.sqrt(3.0)
+"""Where a plane is looked at from: x to the right, y to the back, z up."""
+
+
+def plane_of(mechanism: Mechanism) -> Floats | None:
+    """The directions that a picture of a planar machine has to the right and up, unit vectors (2, 3); None in space.
+
+    Planar is what cannot leave its plane: every hinge square to it, every slide within it, and no joint but these.
+    """
+    if any(joint.type not in ("revolute", "prismatic", "fixed") for joint in mechanism.joints):
+        return None
+    hinges = _axes(mechanism, "revolute")
+    slides = _axes(mechanism, "prismatic")
+    normal = hinges[0] if len(hinges) else _square_to(slides)
+    if normal is None:
+        return None
+    off = [np.linalg.norm(np.cross(hinges, normal), axis=1), np.abs(slides @ normal)]
+    if np.concatenate(off).max(initial=0.0) > TOLERANCES.alignment:
+        return None
+    normal = normal * np.copysign(1.0, normal @ VIEWER)
+    upward = next(each for each in np.eye(3)[[2, 1]] if np.linalg.norm(np.cross(each, normal)) > TOLERANCES.alignment)
+    right = np.cross(upward, normal)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(normal, right)]) + 0.0
+
+
+def _axes(mechanism: Mechanism, kind: str) -> Floats:
+    """Unit vectors (n, 3) of the axes of all joints of a kind at home."""
+    return np.array([mechanism.home_axis(each.name) for each in mechanism.joints if each.type == kind]).reshape(-1, 3)
+
+
+def _square_to(slides: Floats) -> Floats | None:
+    """The unit vector square to slides that span a plane; None where they do not."""
+    spreads, axes = np.linalg.svd(slides)[1:]
+    spans = int((spreads > TOLERANCES.alignment).sum())
+    return np.asarray(axes[2]) if spans == 2 else None

@@ -1,0 +1,51 @@
+"""Pictures into files: whole or not at all, with fonts that journals take."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InvalidArgument
+from ..writing import whole_path
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PICTURES, FILMS = (".png", ".svg", ".pdf"), (".gif", ".mp4")
+
+SETTINGS = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "pfabrik"}
+"""Letters of a PDF as TrueType, those of an SVG as outlines, which look the same everywhere."""
+
+WITHOUT_DATES: dict[str, dict[str, str | None]] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+}
+"""So that the same picture is the same file."""
+
+ROOM = 0.05
+"""Free edge around what is drawn [inches]."""
+
+
+def save_picture(figure: Figure, path: str | os.PathLike[str], *, tight: bool = True) -> None:
+    """Write a picture as PNG, SVG or PDF, as the ending of its name says.
+
+    Parameters
+    ----------
+    tight : whether its edges are where the drawing ends; else where the figure does.
+    """
+    from matplotlib import rc_context
+
+    suffix = checked_ending(path, PICTURES)
+    box: dict[str, Any] = {"bbox_inches": "tight", "pad_inches": ROOM} if tight else {}
+    with whole_path(path) as part, rc_context(SETTINGS):  # type: ignore[arg-type]
+        figure.savefig(part, metadata=WITHOUT_DATES[suffix], **box)
+
+
+def checked_ending(path: str | os.PathLike[str], known: tuple[str, ...]) -> str:
+    """How a file's name ends, in small letters; InvalidArgument where nothing is written that way."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in known:
+        raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(known[:-1])} or {known[-1]}")
+    return suffix

@@ -1,0 +1,234 @@
+"""`plot_track`: a path that was followed: where the machine went, what its actuators did, how much room was left."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..answers.margins import margins
+from ..answers.solution import Solution, Status
+from ..answers.tracked import Track
+from ..arrays import Floats
+from ..description.readouts import Readout, readouts
+from ..errors import InvalidArgument
+from ..extras import require
+from .canvas import SMALL, Canvas, canvas_on, new_axes
+from .looks import ACHIEVED, ASKED, HELD, LINE_COLOURS, SHADE
+from .machine import draw_machine, key_of
+from .plane import plane_of
+from .skeleton import skeleton_of
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_STRIPS = 6
+"""Strips of actuators one below the other; further ones make another column."""
+
+HELD_BY = 1e-4
+"""Share of what is shown within which a value is at its limit."""
+
+ROOM = 0.14
+"""Room above and below a range, as a share of it: for the names of limits."""
+
+LIMIT_DASHES = (0, (8, 3, 1, 3))
+DASHES = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
+
+MOST_MARGINS = 6
+"""Limits whose margins are named; further ones are grey."""
+
+
+def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
+    """Draw a path that was followed: the machine on it, its actuators between their limits, and all margins.
+
+    The machine is drawn where it is farthest from its target. Steps whose target is out of reach have a grey band,
+    values at a limit are orange. Margins are as of `margins`: 0 on a limit; named are those that are ever the least.
+
+    Parameters
+    ----------
+    track : what `track` answered.
+    figure : matplotlib figure or subfigure to draw in; default: a new one. Its `savefig` writes PNG, SVG and PDF.
+
+    Returns
+    -------
+    dict : axes by what they show: "path", every actuator's name, and "margins" where the machine has limits.
+
+    Raises
+    ------
+    InvalidArgument : what is no Track, or one without a step that has a configuration.
+    MissingLibrary : matplotlib is not installed.
+    """
+    known = checked_track(track)
+    require("pictures", "matplotlib", "plot")
+    if figure is None:
+        from matplotlib import pyplot
+
+        figure = pyplot.figure(figsize=(11.5, 6.2), dpi=130, layout="constrained")
+    mechanism = track.mechanism
+    figure.suptitle(f"{mechanism.name}: {told(track)}", fontsize=SMALL + 4.0)
+    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1, 1.2), squeeze=False))
+    axes: dict[str, Axes] = {}
+    strips, below = _grid(right, len(mechanism.actuator_names), has_margins := bool(limits_of(track)))
+    for index, (strip, readout) in enumerate(zip(strips, readouts(mechanism), strict=True)):
+        draw_actuator(strip, readout, np.asarray(readout.display(track.actuators[:, index])), track)
+        axes[readout.name] = strip
+    if has_margins:
+        draw_margins(below, track)
+        axes["margins"] = below
+    right.legend(handles=common_keys(), loc="outside upper center", ncols=3, frameon=False, fontsize=SMALL)
+    return {"path": draw_path(left, track, known)} | axes
+
+
+def checked_track(track: Track) -> NDArray[np.intp]:
+    """The steps of a track that have a configuration."""
+    if not isinstance(track, Track):
+        raise InvalidArgument("track", type(track).__name__, "a Track, as `track` returns")
+    known = np.flatnonzero(np.isfinite(track.pose).all(axis=(1, 2)))
+    if not len(known):
+        raise InvalidArgument("track", "no step that has a configuration", "at least one")
+    return known
+
+
+def told(solution: Solution) -> str:
+    """How many steps were reached, and how far the others stay from their targets."""
+    off = int((np.asarray(solution.status) != Status.REACHED).sum())
+    reached = f"{len(solution) - off} of {len(solution)} steps reached"
+    farthest = f"{float(np.nanmax(solution.position_error)):.3g} {solution.mechanism.length_unit}"
+    return f"{reached}, the others at most {farthest} from their targets" if off else reached
+
+
+def _grid(figure: Any, actuators: int, with_margins: bool) -> tuple[list[Axes], Axes]:
+    """Axes for the actuators, column by column, and axes for the margins below all of them."""
+    columns = -(-actuators // MOST_STRIPS)
+    rows = -(-actuators // columns)
+    grid = figure.add_gridspec(rows + with_margins, columns, height_ratios=[1.0] * rows + [2.2] * with_margins)
+    strips: list[Axes] = []
+    for place in range(actuators):
+        column, row = divmod(place, rows)
+        strip = figure.add_subplot(grid[row, column], sharex=strips[0] if strips else None)
+        is_last = row == rows - 1 or place == actuators - 1
+        strip.tick_params(labelsize=SMALL, labelbottom=is_last and not with_margins)
+        strip.set_xlabel("step" if is_last and not with_margins else "", fontsize=SMALL)
+        strips.append(strip)
+    return strips, figure.add_subplot(grid[rows, :], sharex=strips[0]) if with_margins else strips[0]
+
+
+def draw_path(figure: Any, track: Track, known: NDArray[np.intp]) -> Axes:
+    """The machine at the step that is farthest from its target, the path asked for and the path taken."""
+    shown = skeleton_of(track[int(known[np.argmax(track.position_error[known])])])
+    canvas = canvas_on(new_axes(figure, plane := plane_of(track.mechanism)), plane)
+    draw_machine(canvas, shown)
+    lines = draw_ways(canvas, track)
+    labels = [*key_of(shown), *lines]
+    figure.legend(handles=labels, loc="outside upper center", ncols=3, frameon=False, fontsize=SMALL)
+    canvas.frame(np.vstack([shown.points, ways_of(track)]), track.mechanism.length_unit)
+    axes: Axes = canvas.axes
+    return axes
+
+
+def ways_of(track: Track) -> Floats:
+    """Every place that was asked for, or taken, (n, 3) [length]."""
+    places = np.vstack([track.targets[:, :3, 3], track.pose[:, :3, 3]])
+    return np.asarray(places[np.isfinite(places).all(axis=1)])
+
+
+def draw_ways(canvas: Canvas, track: Track) -> list[Artist]:
+    """The path asked for, and the path taken: where targets were reached, and where they were not."""
+    off = track.status != Status.REACHED
+    achieved = track.pose[:, :3, 3]
+    on_target, projected = (np.where(mask[:, None], achieved, np.nan) for mask in (~off | next_to(off), off))
+    asked = {"color": ASKED, "linestyle": "--", "linewidth": 1.4, "label": "asked for", "zorder": 20}
+    lines = [
+        canvas.line(track.targets[:, :3, 3], **asked),
+        canvas.line(on_target, color=ACHIEVED, linewidth=2.0, label="reached", zorder=21),
+    ]
+    if off.any():
+        style = {"marker": "o", "markersize": 2.6, "markeredgewidth": 0.0}  # a single step has no line
+        lines.append(canvas.line(projected, color=HELD, linewidth=2.6, label="not reached", zorder=22, **style))
+    return lines
+
+
+def next_to(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The first and last step of every run of marked ones, so that lines on both sides of an end meet."""
+    padded = np.concatenate([[True], marked, [True]])
+    return np.asarray(marked & ~(padded[:-2] & padded[2:]))
+
+
+def draw_actuator(axes: Axes, readout: Readout, values: Floats, solution: Solution) -> None:
+    """One actuator over the steps, its limits named at the axis, and where it is held by one."""
+    shade_steps(axes, np.asarray(solution.status) != Status.REACHED)
+    bounds = [bound for bound in readout.limits if np.isfinite(bound)]
+    for bound in bounds:
+        axes.axhline(bound, color="black", linewidth=0.9, linestyle=LIMIT_DASHES, zorder=1)
+    axes.plot(values, color=ACHIEVED, linewidth=1.5)
+    finite = values[np.isfinite(values)]
+    if bounds:
+        near = np.min([np.abs(values - bound) for bound in bounds], axis=0) <= HELD_BY * np.ptp([*finite, *bounds])
+        axes.plot(np.where(near, values, np.nan), color=HELD, linewidth=3.0, solid_capstyle="butt")
+    low, high = min([*finite, *bounds]), max([*finite, *bounds])
+    room = ROOM * (high - low) or 1.0
+    axes.set(xlim=(0, max(len(solution) - 1, 1)), ylim=(low - room, high + room))
+    ticks = zip(readout.limits, ("min", "max"), strict=True)
+    named = [(bound, f"{name} {bound:.4g}") for bound, name in ticks if np.isfinite(bound)]
+    named = named or [(low, f"{low:.4g}"), (high, f"{high:.4g}")] if high > low else named
+    axes.set_yticks([bound for bound, _ in named], [text for _, text in named], fontsize=SMALL)
+    axes.set_ylabel(f"{readout.name}\n[{readout.unit}]", rotation=0, ha="right", va="center", fontsize=SMALL)
+
+
+def limits_of(track: Track) -> dict[str, Floats]:
+    """What a limit is called -> its margin at every step, those that come nearest to none first."""
+    found = {f"{joint} {bound}": np.asarray(margin) for (joint, bound), margin in margins(track).items()}
+    return dict(sorted(found.items(), key=lambda item: float(np.nanmin(item[1]))))
+
+
+def draw_margins(axes: Axes, track: Track) -> None:
+    """How much room every limit leaves; named are those that are the tightest at some step."""
+    shade_steps(axes, track.status != Status.REACHED)
+    found = limits_of(track)
+    every = np.array(list(found.values()))
+    least = np.nanmin(np.where(np.isnan(every), np.inf, every), axis=0)
+    tightest = [name for name, margin in found.items() if (margin <= least).any()][:MOST_MARGINS]
+    for margin in (margin for name, margin in found.items() if name not in tightest):
+        axes.plot(margin, color="#cccccc", linewidth=0.7, zorder=1)
+    for place, name in enumerate(tightest):
+        axes.plot(found[name], label=name, linewidth=1.5, zorder=2, **line_style(place))
+    axes.axhline(0.0, color="black", linewidth=0.9, linestyle=LIMIT_DASHES, zorder=1)
+    axes.set(xlabel="step", ylabel="margin", xlim=(0, max(len(track) - 1, 1)), ylim=(min(-0.05, *least), 1.05))
+    axes.tick_params(labelsize=SMALL)
+    for label in (axes.xaxis.label, axes.yaxis.label):
+        label.set_fontsize(SMALL)
+    beside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "frameon": False}
+    axes.legend(title="limit", title_fontsize=SMALL, fontsize=SMALL, **beside)
+
+
+def line_style(place: int) -> dict[str, Any]:
+    """Colour and dashes of the line at a place: 18 that differ, neighbours in both."""
+    colour = LINE_COLOURS[place % len(LINE_COLOURS)]
+    return {"color": colour, "linestyle": DASHES[(place + place // len(LINE_COLOURS)) % len(DASHES)]}
+
+
+def draw_limits(axes: Axes, group: list[tuple[int, Readout]]) -> None:
+    """One line for every distinct finite limit."""
+    for bound in sorted({bound for _, readout in group for bound in readout.limits if np.isfinite(bound)}):
+        axes.axhline(bound, color="black", linewidth=1, linestyle=LIMIT_DASHES, zorder=1)
+
+
+def shade_steps(axes: Axes, marked: NDArray[np.bool_]) -> None:
+    """A grey band behind every run of marked steps."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
+    for start, stop in edges.reshape(-1, 2):
+        axes.axvspan(start - 0.5, stop - 0.5, color=SHADE, linewidth=0, zorder=0)
+
+
+def common_keys() -> list[Artist]:
+    """What the legend explains once for all panels."""
+    from matplotlib.lines import Line2D
+
+    return [
+        Line2D([], [], color="black", linewidth=1, linestyle=LIMIT_DASHES, label="limit"),
+        Line2D([], [], color=HELD, linewidth=3, label="at a limit"),
+        Line2D([], [], color=SHADE, linewidth=7, label="target out of reach"),
+    ]

@@ -1,0 +1,350 @@
+"""Pictures show what the answers say, where they say it, and nothing in them hides anything else."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from machines import MACHINES, planar, tripod_rps
+from pfabrik.description.places import joint_places, slider_place
+from pfabrik.errors import InvalidArgument, MissingLibrary, UnknownName
+from pfabrik.view.skeleton import around, rail_of, skeleton_of
+
+pytest.importorskip("matplotlib")
+from matplotlib import pyplot
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from PIL import Image
+
+from pfabrik.view.looks import HELD
+from pfabrik.view.plane import plane_of
+from pfabrik.view.saving import save_picture
+
+pyplot.switch_backend("Agg")
+
+
+@pytest.fixture(autouse=True)
+def _closed() -> Iterator[None]:
+    yield
+    pyplot.close("all")
+
+
+def gantry(*axes: int) -> pf.Mechanism:
+    """Slides in a row: not one joint has a centre."""
+    bodies = ("base", "bridge", "trolley", "tool")
+    joints = [
+        pf.Joint(f"P{k}", "prismatic", bodies[place : place + 2], axis=np.eye(3)[k], actuated=True, range=(-5, 5))
+        for place, k in enumerate(axes)
+    ]
+    return pf.Mechanism("gantry", joints, bodies[len(axes)], (1, 2, 3), task=["xyz"[k] for k in axes])
+
+
+def circle_of(machine: pf.Mechanism, radius: float, steps: int = 12) -> pf.Track:
+    """A circle about home, along two axes of the task, in a plane that the machine reaches at home."""
+    angle = np.linspace(0.0, 2.0 * np.pi, steps, endpoint=False)
+    targets = np.repeat(machine.home_pose[None], steps, axis=0)
+    first, second = [place for place, name in enumerate("xyz") if name in machine.task][-2:]
+    targets[:, first, 3] += radius * np.sin(angle)
+    targets[:, second, 3] += radius * (1.0 - np.cos(angle))
+    return pf.track(machine, targets)
+
+
+def texts_drawn(figure: Any, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, np.ndarray]]:
+    """Every text as it is drawn, with its left, bottom, right and top edge [pixels]."""
+    drawn: list[tuple[str, np.ndarray]] = []
+    draw = Text.draw
+
+    def listening(self: Text, renderer: Any, *arguments: Any, **options: Any) -> Any:
+        if self.get_visible() and self.get_text().strip():
+            drawn.append((self.get_text(), self.get_window_extent(renderer).extents))
+        return draw(self, renderer, *arguments, **options)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Text, "draw", listening)
+        figure.canvas.draw()
+    return drawn
+
+
+def faults(figure: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Texts that hide each other, or leave the figure."""
+    drawn = texts_drawn(figure, monkeypatch)
+    pairs = itertools.combinations(drawn, 2)
+    hiding = [
+        f"{text} hides {other}"
+        for (text, box), (other, another) in pairs
+        if (np.minimum(box[2:], another[2:]) - np.maximum(box[:2], another[:2])).min() > 0.5
+    ]
+    edges = figure.bbox.extents
+    cut = [text for text, box in drawn if (box[:2] < edges[:2]).any() or (box[2:] > edges[2:]).any()]
+    return hiding + [f"{text} is cut" for text in cut]
+
+
+# What is drawn, before any library draws it.
+
+
+def places_of(shown: pf.Mechanism | pf.Solution) -> dict[str, np.ndarray]:
+    return {mark.joint.name: mark.place for mark in skeleton_of(shown).marks}
+
+
+def test_an_answer_is_drawn_where_its_points_are() -> None:
+    mechanism = tripod_rps()
+    answer = pf.solve_ik(mechanism, (0, 0, 212))
+    home, moved = places_of(mechanism), places_of(answer)
+    assert moved["S1"] == pytest.approx(answer.points["S1"])
+    assert moved["S1"][2] - home["S1"][2] == pytest.approx(12.0)
+    assert moved["P1"] == pytest.approx((answer.points["R1"] + answer.points["S1"]) / 2)
+    assert skeleton_of(answer).reference == pytest.approx(answer.pose[:3, 3])
+
+
+def test_a_rail_spans_the_travel_and_stays_when_the_carriage_moves() -> None:
+    mechanism = planar("PRR")
+    moved = pf.solve_fk(mechanism, [3.0, -2.0, 4.0])
+    at_home, later = skeleton_of(mechanism).rails, skeleton_of(moved).rails
+    assert np.linalg.norm(at_home[0, 1] - at_home[0, 0]) == pytest.approx(140)
+    assert later == pytest.approx(at_home)
+    assert rail_of(mechanism.joint("B1"), places_of(mechanism), mechanism) is None
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.parametrize("make", MACHINES.values(), ids=MACHINES)
+def test_every_joint_and_every_body_is_drawn(make: Callable[[], pf.Mechanism]) -> None:
+    mechanism = make()
+    skeleton = skeleton_of(mechanism)
+    assert [mark.joint for mark in skeleton.marks] == list(mechanism.joints)
+    assert [part.body for part in skeleton.parts] == list(mechanism.bodies)
+    assert np.isfinite(skeleton.points).all()
+    assert np.isfinite(skeleton.lines).all()
+
+
+def test_slides_without_any_centre_are_drawn_at_the_reference_point() -> None:
+    mechanism = gantry(0, 1, 2)
+    assert slider_place(mechanism, mechanism.joint("P1"), {}) is None
+    places = joint_places(mechanism, None, mechanism.home_pose[:3, 3])
+    assert np.array(list(places.values())) == pytest.approx(np.array([[1, 2, 3]] * 3))
+
+
+def test_corners_of_a_polygon_follow_each_other() -> None:
+    square = [np.array(corner, float) for corner in ((0, 0, 1), (1, 1, 1), (1, 0, 1), (0, 1, 1))]
+    ordered = np.array(around(square))
+    assert np.linalg.norm(ordered - np.roll(ordered, 1, axis=0), axis=1) == pytest.approx(1)
+
+
+def test_what_holds_an_answer_back_is_marked_at_its_joint() -> None:
+    far = pf.solve_ik(pf.load("stewart"), (40, 0, 300))
+    held = {mark.joint.name: mark.held_by for mark in skeleton_of(far).marks if mark.held_by}
+    assert held == {limit.joint: (limit.bound,) for limit in far.active_limits} != {}
+
+
+def test_planar_is_what_cannot_leave_its_plane() -> None:
+    assert plane_of(pf.load("five_bar")) == pytest.approx(np.array([[0, 1, 0], [0, 0, 1]]))
+    assert plane_of(planar("RPR")) == pytest.approx(np.array([[1, 0, 0], [0, 1, 0]]))
+    assert plane_of(gantry(0, 2)) == pytest.approx(np.array([[1, 0, 0], [0, 0, 1]]))
+    for machine in (tripod_rps(), gantry(0, 1, 2), gantry(0), pf.load("agile_eye")):
+        assert plane_of(machine) is None
+
+
+# A picture of one configuration.
+
+
+@pytest.mark.parametrize("make", [tripod_rps, lambda: gantry(0, 1, 2), lambda: pf.load("nrpm")])
+def test_home_can_be_drawn_on_axes_of_ones_own(make: Callable[[], pf.Mechanism]) -> None:
+    mechanism = make()
+    axes = Figure(figsize=(3, 3)).add_subplot(projection="3d")
+    assert pf.plot(mechanism, axes) is axes
+    markers = [each for each in axes.collections if hasattr(each, "get_offsets") and len(each.get_sizes())]
+    assert sum(len(each.get_offsets()) for each in markers) == len(mechanism.joints)
+
+
+def test_a_planar_machine_is_drawn_in_its_plane_and_others_in_space() -> None:
+    flat, deep = pf.plot(pf.load("five_bar")), pf.plot(tripod_rps())
+    assert (flat.get_xlabel(), flat.get_ylabel(), flat.get_aspect()) == ("y [mm]", "z [mm]", 1.0)
+    assert (deep.get_xlabel(), deep.get_zlabel()) == ("x [mm]", "z [mm]")
+    spans = np.array([np.ptp(getattr(deep, f"get_{name}lim")()) for name in "xyz"])
+    assert np.ptp(deep._box_aspect / spans) == pytest.approx(0, abs=1e-12)
+
+
+def test_limits_that_hold_an_answer_back_are_named_in_their_own_colour() -> None:
+    far = pf.solve_ik(pf.load("five_bar"), (0, 0, 300))
+    axes = pf.plot(far, names=["p1"])
+    names = {text.get_text(): to_hex(text.get_color()) for text in axes.texts}
+    held = {f"{limit.joint} {limit.bound}": HELD for limit in far.active_limits}
+    assert len(held) == 2
+    assert {name: colour for name, colour in names.items() if colour == HELD} == held
+    assert set(names) - set(held) == {"p1"}
+
+
+@pytest.mark.parametrize("name", ["stewart", "five_bar", "nrpm", "hexaglide", "serial_arm", "delta"])
+def test_no_label_hides_another_or_leaves_the_figure(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = pf.load(name)
+    axes = pf.plot(machine, names=machine.actuator_names)
+    assert faults(axes.figure, monkeypatch) == []
+
+
+def test_what_cannot_be_drawn_is_refused() -> None:
+    mechanism = tripod_rps()
+    batch = pf.solve_ik(mechanism, np.array([mechanism.home_pose, np.full((4, 4), np.nan)]),
+                        options=pf.Options(on_invalid="mark"))  # fmt: skip
+    for shown, found in ((batch, "batch of shape"), (batch[1], "INVALID"), ("stewart", "str")):
+        with pytest.raises(InvalidArgument, match=found):
+            pf.plot(shown)  # type: ignore[arg-type]
+    with pytest.raises(InvalidArgument, match="two-dimensional axes"):
+        pf.plot(mechanism, Figure().add_subplot())
+    with pytest.raises(UnknownName, match="did you mean 'P1'"):
+        pf.plot(mechanism, names=["PP1"])
+    with pytest.raises(InvalidArgument, match="no direction"):
+        pf.plot_travel(pf.Travel(batch[0], ()))
+    with pytest.raises(InvalidArgument, match="expected a Track"):
+        pf.plot_track(batch)  # type: ignore[arg-type]
+
+
+def test_a_missing_library_is_named_with_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pfabrik.extras.find_spec", lambda _: None)
+    with pytest.raises(MissingLibrary, match=r"pictures need matplotlib; .* pip install 'pfabrik\[plot\]'"):
+        pf.plot(tripod_rps())
+
+
+# Files.
+
+
+def test_a_picture_is_the_same_file_every_time(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        axes = pf.plot(pf.load("rrr"))
+        for ending in ("png", "svg", "pdf"):
+            save_picture(axes.figure, tmp_path / f"{name}.{ending}")
+    for ending, begins in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")):
+        one, two = ((tmp_path / f"{name}.{ending}").read_bytes() for name in ("one", "two"))
+        assert one == two
+        assert one.startswith(begins)
+
+
+def test_a_picture_that_cannot_be_written_is_told_by_the_name_that_was_given(tmp_path: Path) -> None:
+    figure = Figure()
+    with pytest.raises(InvalidArgument, match=r"found '.*a\.bmp'; expected a name that ends in \.png, \.svg or \.pdf"):
+        save_picture(figure, tmp_path / "a.bmp")
+    with pytest.raises(FileNotFoundError) as told:
+        save_picture(figure, tmp_path / "none" / "a.png")
+    assert told.value.filename == str(tmp_path / "none" / "a.png")
+
+
+# A path.
+
+
+def test_a_track_is_drawn_with_its_actuators_and_margins(monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = pf.load("five_bar")
+    track = circle_of(machine, 60.0)
+    assert not track
+    axes = pf.plot_track(track)
+    assert list(axes) == ["path", *machine.actuator_names, "margins"]
+    p1 = axes["p1"].lines[2].get_ydata()
+    assert p1 == pytest.approx(np.degrees(track.actuators[:, 0]))
+    assert [text.get_text() for text in axes["p1"].get_yticklabels()] == ["min -60", "max 60"]
+    least = np.min(list(pf.margins(track).values()), axis=0)
+    drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in axes["margins"].lines}
+    named = [name for name in drawn if not name.startswith("_")]
+    assert np.min([drawn[name] for name in named], axis=0) == pytest.approx(least)
+    assert faults(axes["path"].get_figure(root=True), monkeypatch) == []
+
+
+def test_a_machine_without_limits_has_no_margins_to_draw() -> None:
+    track = circle_of(planar("RRR").without_limits(), 5.0)
+    assert "margins" not in pf.plot_track(track, Figure(layout="constrained"))
+
+
+def test_a_film_shows_every_step_and_its_axes_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    track = circle_of(pf.load("five_bar"), 60.0, 4)
+    steps: list[tuple[int, int]] = []
+    pf.animate(track, tmp_path / "film.gif", on_progress=lambda *done: steps.append(done))
+    assert steps == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    with Image.open(tmp_path / "film.gif") as film:
+        assert (film.n_frames, film.info["duration"]) == (4, 50)
+        frames = []
+        for frame in range(film.n_frames):
+            film.seek(frame)
+            frames.append(np.asarray(film.convert("L"), float))
+    axes_of = [frame[-40:] for frame in frames]  # ticks and the name of the horizontal axis
+    assert max(np.abs(each - axes_of[0]).mean() for each in axes_of) < 0.5
+    assert min(np.abs(first - second).mean() for first, second in itertools.pairwise(frames)) > 0.1
+
+
+def test_a_film_lasts_as_long_as_its_path(tmp_path: Path) -> None:
+    machine = pf.load("five_bar")
+    track = pf.track(machine, np.repeat(machine.home_pose[None], 8, axis=0), sample_time=0.025)
+    pf.animate(track, tmp_path / "film.gif")
+    pf.animate(track, tmp_path / "quick.gif", seconds=0.1)
+    for name, frames in (("film", 4), ("quick", 2)):  # 0.2 s and 0.1 s; frames that are the same count as one
+        with Image.open(tmp_path / f"{name}.gif") as film:
+            lasting = 0
+            for frame in range(film.n_frames):
+                film.seek(frame)
+                lasting += film.info["duration"]
+        assert lasting == 50 * frames
+
+
+def test_an_interrupted_film_leaves_nothing_behind(tmp_path: Path) -> None:
+    def interrupt(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        pf.animate(circle_of(pf.load("five_bar"), 10.0, 3), tmp_path / "film.gif", on_progress=interrupt)
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_film_of_another_kind_is_refused(tmp_path: Path) -> None:
+    track = circle_of(pf.load("five_bar"), 10.0, 3)
+    with pytest.raises(InvalidArgument, match=r"ends in \.gif or \.mp4"):
+        pf.animate(track, tmp_path / "film.avi")
+    with pytest.raises(InvalidArgument, match="a positive number"):
+        pf.animate(track, tmp_path / "film.gif", seconds=-1.0)
+
+
+def test_mp4_needs_a_program_that_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pfabrik.view.animation.shutil.which", lambda _: None)
+    monkeypatch.setattr("pfabrik.view.animation._own_ffmpeg", lambda: None)
+    with pytest.raises(MissingLibrary, match=r"need the program ffmpeg; install it with: .*apt"):
+        pf.animate(circle_of(pf.load("five_bar"), 10.0, 3), tmp_path / "film.mp4")
+
+
+def test_mp4_is_written_where_ffmpeg_is(tmp_path: Path) -> None:
+    if shutil.which("ffmpeg") is None and find_spec("imageio_ffmpeg") is None:
+        pytest.skip("needs the program ffmpeg, which is not installed")
+    pf.animate(circle_of(pf.load("five_bar"), 10.0, 3), tmp_path / "film.mp4", seconds=0.1)
+    assert (tmp_path / "film.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+# How far it can go.
+
+
+def test_travel_is_a_table_and_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = pf.load("stewart")
+    found = pf.travel(pf.solve_ik(machine, (0, 20, 200)))
+    table = str(found).splitlines()
+    assert len(table) == 13
+    assert table[1].split() == ["along", "1", "0", "0", "138.585", "mm", "BL3", "max"]
+    assert "<td>BL3 max</td>" in found._repr_html_()
+    axes = pf.plot_travel(found)
+    assert list(axes) == ["along", "about"]
+    widths = [abs(bar.get_width()) for bar in axes["about"].patches]
+    assert sorted(widths) == pytest.approx(sorted(np.degrees(found.distances[6:])))
+    told = [text.get_text() for text in axes["along"].texts]
+    assert "138.6\nBL3 max" in told
+    assert faults(axes["along"].figure, monkeypatch) == []
+
+
+def test_a_way_without_end_and_one_of_stretched_links_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = pf.load("five_bar").without_limits()
+    axes = pf.plot_travel(pf.travel(pf.solve_ik(machine, machine.home_pose), along=(0, 0, 1)))["along"]
+    assert "links stretched" in axes.texts[0].get_text().replace("\n", " ")
+    free = gantry(0).without_limits()
+    axes = pf.plot_travel(pf.travel(pf.solve_ik(free, free.home_pose)))["along"]
+    assert [text.get_text() for text in axes.texts] == ["unlimited", "unlimited"]
+    assert faults(axes.figure, monkeypatch) == []
