@@ -116,6 +116,18 @@ class TestReading:
         joint = loads(HEAD + text).joints[0]
         assert joint.home == (math.pi / 2, 5.0) and joint.range == ((0.0, math.pi), (4.0, 6.0))
 
+    @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+    def test_either_coordinate_of_a_cylindrical_joint_is_driven_and_its_speed_is_in_its_own_unit(self):
+        said = {"true": "[90, 5]", "[true, true]": "[90, 5]", "[true, false]": "90", "[false, true]": "5"}
+        names = {"true": ("A[0]", "A[1]"), "[true, false]": ("A[0]",), "[false, true]": ("A[1]",)}
+        speeds = {"true": (math.pi / 2, 5.0), "[true, false]": math.pi / 2, "[false, true]": 5.0}
+        for driven, speed in said.items():
+            text = edited(("revolute", "cylindrical"), ("actuated = true\n", f"actuated = {driven}\n"), text=CRANK)
+            machine = loads(HEAD + text + f"max_speed = {speed}\n")
+            driven = driven.replace("[true, true]", "true")
+            assert machine.actuator_names == names[driven] and machine.joints[0].max_speed == speeds[driven]
+            assert loads(dumps(machine)) == machine and f"actuated = {driven}\n" in dumps(machine)
+
     def test_universal_ranges_are_angles(self):
         limits = "axes = [[0, 1, 0], [1, 0, 0]]\nrange = [[-90, 90], [-45, 45]]\n"
         with pytest.warns(MobilityWarning):
@@ -370,6 +382,12 @@ vectors = st.tuples(numbers, numbers, numbers)
 directions = vectors.filter(lambda vector: max(map(abs, vector)) > 1e-3)
 
 
+DRIVEN: list[dict[str, object]] = [
+    {}, {"actuated": True}, {"actuated": (True, False)}, {"actuated": (False, True), "max_acceleration": 3.5},
+    {"actuated": (True, False), "max_speed": 1.25}, {"actuated": True, "max_speed": (0.3, 70)},
+]  # fmt: skip
+
+
 @st.composite
 def mechanisms(draw: st.DrawFn) -> Mechanism:
     """A chain of joints of every type, with limits that home keeps."""
@@ -384,7 +402,8 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
     joints = [
         Joint(labels[0], "revolute", links[0], centres[0], axis=axis, actuated=True, home=turn, range=around,
               max_speed=draw(st.one_of(st.none(), st.floats(0.1, 9)))),
-        Joint(labels[1], "cylindrical", links[1], centres[1], axis=axis, home=(turn, shift), range=(around, across)),
+        Joint(labels[1], "cylindrical", links[1], centres[1], axis=axis, home=(turn, shift), range=(around, across),
+              **draw(st.sampled_from(DRIVEN))),
         Joint(labels[2], "universal", links[2], centres[2], axes=(np.eye(3)[np.abs(axis).argmin()], axis),
               home=(turn, turn), range=(around, around)),
         Joint(labels[3], "spherical", links[3], centres[3], cone=Cone(toward_next, half_angle, bodies[3])),

@@ -127,6 +127,29 @@ class TestWhatLegsStandFor:
         assert found.joint("B1").cone.axis == pytest.approx(np.array([-40, -20, 125]) / math.hypot(40, 20, 125))
         assert [str(chain) for chain in pf.decompose(found)] == ["R*-U-S"] * 6
 
+    def test_a_star_drives_both_coordinates_of_a_cylindrical_joint_or_the_one_that_is_said(self):
+        post = '[[leg]]\nchain = "C*-P*"\nbase = [0, 0, 0]\naxis = "z"\nB.axis = "x"\n'
+        head = 'schema = 1\nname = "post"\nend_effector = "platform"\nreference_point = [300, 0, 200]\ntask = ["x"]\n'
+        assert loads(head + post).actuator_names == ("A1[0]", "A1[1]", "B1")
+        assert loads(head + post + "A.max_speed = [90, 5]\n").joints[0].max_speed == (math.pi / 2, 5.0)
+        turned = post + "A.actuated = [true, false]\nA.max_speed = 90\n"
+        with pytest.warns(MobilityWarning, match="2 actuators leave the end effector 1 freedom"):
+            found = loads(head + turned)
+        assert found.actuator_names == ("A1[0]", "B1") and found.joints[0].max_speed == math.pi / 2
+        with pytest.warns(MobilityWarning):
+            again = Mechanism.from_legs("C*-P*", base=(0, 0, 0), axis="z", name="post", reference_point=(300, 0, 200),
+                                        A={"actuated": (True, False), "max_speed": math.pi / 2}, B={"axis": "x"},
+                                        task=["x"])  # fmt: skip
+        assert again == found
+        for said, starred, expected in (
+            ("[true, false]", "C-P*", "[True, False] -> nothing: 'C-P*' has no `*` behind the joint"),
+            ("false", "C*-P*", "False -> what is driven: 'C*-P*' has a `*` behind the joint"),
+            ("[false, false]", "C*-P*", "[False, False] -> what is driven"),
+            ("3", "C*-P*", "3 (joint A1) -> true, false, or a pair of them: angle, length"),
+        ):
+            faults = faults_of(head + post.replace("C*-P*", starred) + f"A.actuated = {said}\n")
+            assert faults.keys() == {"leg[0].A.actuated"} and expected in faults["leg[0].A.actuated"]
+
     def test_drives_say_what_they_can_do_by_their_letters(self):
         found = loads(edited(SERVOS, ("A.range = [-80, 80]", "A.max_speed = 180")))
         assert [found.joint(f"A{leg}").max_speed for leg in range(1, 7)] == [math.pi] * 6

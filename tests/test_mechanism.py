@@ -196,8 +196,9 @@ class TestFreedom:
         machine = stewart()
         assert mobility(machine).mobility == 6
         assert end_effector_freedom(machine, frozenset()) == 6
-        assert end_effector_freedom(machine, frozenset(machine.actuator_names)) == 0
-        assert end_effector_freedom(machine, frozenset(machine.actuator_names[1:])) == 1
+        struts = [drive.column for drive in machine.drives]
+        assert end_effector_freedom(machine, frozenset(struts)) == 0
+        assert end_effector_freedom(machine, frozenset(struts[1:])) == 1
 
     def test_struts_between_spherical_joints_spin_without_moving_the_platform(self):
         joints = [
@@ -320,7 +321,16 @@ JOINT_FAULTS = [
     ({"along": ("a", "b")}, "along", "nothing: a revolute joint does not run along"),
     ({"actuated": 1}, "actuated", "1 -> true or false"),
     ({**SQUARE, "type": "universal", "actuated": True}, "actuated", "an actuated universal joint"),
-    ({"type": "cylindrical", "actuated": True}, "actuated", "an actuated cylindrical joint"),
+    ({"actuated": (True, False)}, "actuated", "[True, False] -> true or false"),
+    ({"actuated": (True, True)}, "actuated", "[True, True] -> true or false"),
+    ({"type": "cylindrical", "actuated": 1}, "actuated", "1 -> true, false, or a pair of them: angle, length"),
+    ({"type": "cylindrical", "actuated": (True,)}, "actuated", "a pair of them"),
+    ({"type": "cylindrical", "actuated": (True, 1)}, "actuated", "a pair of them"),
+    ({"type": "cylindrical", "actuated": "angle"}, "actuated", "'angle' -> true, false, or a pair of them"),
+    ({"type": "cylindrical", "actuated": (True, False), "max_speed": (1, 2)}, "max_speed", "[1, 2] -> a number"),
+    ({"type": "cylindrical", "actuated": True, "max_speed": 1}, "max_speed", "1 -> two numbers"),
+    ({"type": "cylindrical", "actuated": True, "max_speed": (1, -2)}, "max_speed", "numbers greater than 0"),
+    ({"type": "cylindrical", "actuated": (False, False), "max_speed": 1}, "max_speed", "the joint is not actuated"),
     ({"type": "fixed", "axis": None}, "actuated", "an actuated fixed joint"),
     ({"home": (1, 2)}, "home", "[1, 2] -> a number"),
     ({"home": math.inf}, "home", "finite"),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..description.task import Task
-from ..motion.displacements import columns, end_effector_pose, gaps, home_coordinates
+from ..motion.displacements import end_effector_pose, gaps
 from .solution import Solution, checked_solution
 
 
@@ -28,9 +28,8 @@ def closure_residual(solution: Solution) -> float | NDArray[np.float64]:
     compared = Task((True, True, True), 0 if mechanism.end_effector_is_joint else 3)
     position, rotation = compared.errors(end_effector_pose(mechanism, q[known]), rows.poses[known])
     found[known] = np.max([gaps(mechanism, q[known]), position, rotation * length], axis=0)
-    for column, name in enumerate(mechanism.actuator_names):
-        unit = 1.0 if mechanism.joint(name).type == "prismatic" else length
-        place = columns(mechanism)[name].start
-        value = q[known, place] + home_coordinates(mechanism)[place]
-        found[known] = np.maximum(found[known], np.abs(value - rows.actuators[known, column]) * unit)
+    for place, drive in enumerate(mechanism.drives):
+        unit = 1.0 if drive.kind == "length" else length
+        value = q[known, drive.column] + drive.home
+        found[known] = np.maximum(found[known], np.abs(value - rows.actuators[known, place]) * unit)
     return float(found[0]) if solution.shape == () else found.reshape(solution.shape)

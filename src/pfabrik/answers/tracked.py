@@ -190,6 +190,6 @@ def _moves(mechanism: Mechanism, poses: Floats) -> Floats:
 
 def _scaled(mechanism: Mechanism, actuators: Floats) -> Floats:
     """How far each actuator moves in every step, (n, n_a) [L or rad]."""
-    slides = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names])
+    slides = np.array([drive.kind == "length" for drive in mechanism.drives])
     units = np.where(slides, mechanism.characteristic_length, 1.0)
     return np.asarray(np.abs(np.diff(actuators, axis=0, prepend=actuators[:1])) / units)

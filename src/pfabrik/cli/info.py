@@ -112,7 +112,7 @@ def joint_table(mechanism: Mechanism) -> str:
     """Every joint with what it connects, its coordinate and its limits; ``*`` marks the actuated ones."""
     rows = [
         (
-            joint.name + "*" * joint.actuated,
+            joint.name + "*" * bool(joint.actuated),
             joint.type,
             " - ".join(joint.connects),
             coordinate(joint),
@@ -129,8 +129,10 @@ def coordinate(joint: Joint) -> str:
         return f"distance {joint.along[0]} to {joint.along[1]}"
     if joint.axis is None:
         return ""
+    kinds = KINDS[joint.type].coordinates
+    driven = joint.driven if len(kinds) > 1 else ()
     measured = " and ".join(
-        {"angle": "angle", "length": "displacement"}[kind] for kind in KINDS[joint.type].coordinates
+        {"angle": "angle", "length": "displacement"}[kind] + "*" * (place in driven) for place, kind in enumerate(kinds)
     )
     return (
         f"{measured} about {vector(joint.axis)}" if joint.type == "revolute" else f"{measured} on {vector(joint.axis)}"

@@ -86,7 +86,7 @@ def _locked(closure: Closure, coordinates: Floats, poses: Floats, values: Floats
     """Newton's method with the actuators locked."""
     start = coordinates.copy()
     closure.put_actuators(start, values)
-    return close(closure, start, poses, locked=frozenset(closure.mechanism.actuator_names))
+    return close(closure, start, poses, locked=closure.driven)
 
 
 def _led(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:

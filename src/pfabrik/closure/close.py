@@ -19,7 +19,7 @@ from ..description.joint_types import KINDS
 from ..description.mechanism import Mechanism
 from ..kernels.closure import loops as K
 from ..kernels.threads import in_blocks
-from ..motion.displacements import columns, displacements
+from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
 from .loops import loops_of
 
@@ -41,8 +41,9 @@ class Closure:
     ----------
     scale : what a coordinate is multiplied by to be dimensionless: 1 / L for lengths, 1 for angles, (columns,).
     turning : 1 for angles, 0 for lengths, (columns,).
-    last_balls : ball joints at the platform, each at the end of a path that shares no joint.
+    last_balls : columns of ball joints at the platform, each at the end of a path that shares no joint.
     actuated, home : columns of the actuators, and their values at home, (n_a,).
+    driven : the columns of the actuators, to be locked.
     """
 
     mechanism: Mechanism
@@ -50,7 +51,8 @@ class Closure:
     scale: Floats
     turning: Floats
     actuated: NDArray[np.int64]
-    last_balls: frozenset[str]
+    driven: frozenset[int]
+    last_balls: frozenset[int]
     home: Floats
     whole: bool
 
@@ -69,8 +71,8 @@ class Closure:
         """Write actuated values (n, n_a) into coordinates (n, columns)."""
         coordinates[:, self.actuated] = values - self.home
 
-    def layout(self, locked: frozenset[str]) -> K.Layout:
-        """The layout in which some joints do not move."""
+    def layout(self, locked: frozenset[int]) -> K.Layout:
+        """The layout in which the coordinates of some columns do not move."""
         return _layout(self.mechanism, self.whole, locked)
 
 
@@ -87,21 +89,18 @@ def closure_of(mechanism: Mechanism, whole: bool = True) -> Closure:
     kinds = [kind for joint in mechanism.joints for kind in KINDS[joint.type].coordinates]
     turning = np.array([float(kind == "angle") for kind in kinds])
     scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
-    actuated = np.array([columns(mechanism)[name].start for name in mechanism.actuator_names], np.int64)
-    home = np.array([np.ravel(mechanism.home_coordinate(name))[0] for name in mechanism.actuator_names])
+    actuated = np.array([drive.column for drive in mechanism.drives], np.int64)
+    home = np.array([drive.home for drive in mechanism.drives])
     ending = loops.columns[loops.visits[loops.paths[1:][loops.last_balls == 1] - 1, 0]]
-    starts = {span.start: name for name, span in columns(mechanism).items() if span.stop > span.start}
-    balls = frozenset(starts[int(first)] for first in ending)
-    return Closure(mechanism, loops, scale, turning, actuated, balls, home, whole)
+    balls = frozenset((ending[:, None] + np.arange(3)).ravel().tolist())
+    return Closure(mechanism, loops, scale, turning, actuated, frozenset(actuated.tolist()), balls, home, whole)
 
 
 @lru_cache(maxsize=256)
-def _layout(mechanism: Mechanism, whole: bool, locked: frozenset[str]) -> K.Layout:
+def _layout(mechanism: Mechanism, whole: bool, locked: frozenset[int]) -> K.Layout:
     loops = closure_of(mechanism, whole).loops
     free = np.ones(len(loops.group_of), bool)
-    for name, span in columns(mechanism).items():
-        if name in locked:
-            free[span] = False
+    free[list(locked)] = False
     slots = np.full(len(free), -1)
     sizes = np.zeros(len(loops.groups) - 1, np.int64)
     for j in np.flatnonzero(free):
@@ -172,7 +171,7 @@ def close(
     coordinates: Floats,
     poses: Floats,
     *,
-    locked: frozenset[str] = frozenset(),
+    locked: frozenset[int] = frozenset(),
     platform: Sequence[float] = EVERYTHING_FREE,
     frame: int = K.BASE_AXES,
     targets: Floats | None = None,
@@ -191,7 +190,7 @@ def close(
     Parameters
     ----------
     coordinates, poses : where to start, (n, columns) and (n, 4, 4).
-    locked : joints that keep their coordinates.
+    locked : columns of the coordinates that stay as they are.
     platform : weights of the squares of the platform's distance from `targets` (default: `poses`), position [L], then
         rotation [rad]; `LOCKED` holds that part where it starts.
     frame : what the weights of the rotation are about: the axes of the base, those of the targets (of which the first

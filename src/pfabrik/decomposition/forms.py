@@ -28,7 +28,6 @@ class Coordinate:
     sign: float
     offset: float
     limits: Interval
-    actuated: bool
 
 
 @dataclass(frozen=True)

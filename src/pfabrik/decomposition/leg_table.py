@@ -98,8 +98,9 @@ def _table(mechanism: Mechanism) -> LegTable:
     known = np.array([_coordinate(mechanism, *each) for each in told], K.COORDINATE)
     joints = [item.joint for _, item, _ in told]
     limited = known[[joint.range is not None for joint in joints]]
-    driven = known[[joint.actuated for joint in joints]]
-    driven["column"] = [mechanism.actuator_names.index(joint.name) for joint in joints if joint.actuated]
+    drives = {drive.column: number for number, drive in enumerate(mechanism.drives)}
+    driven = known[[column in drives for column in known["column"].tolist()]]
+    driven["column"] = [drives[column] for column in driven["column"].tolist()]
     coned = [joint for joint in mechanism.joints if joint.cone is not None]
     cones = np.array([_cone(mechanism, forms, joint) for joint in coned], K.CONE)
     aimed = _aimed(legs, known)
@@ -143,7 +144,7 @@ def _require_all(mechanism: Mechanism, seen: set[tuple[str, int]]) -> None:
     """Every range and every motor is one that legs tell."""
     for joint in mechanism.joints:
         for place in range(len(KINDS[joint.type].coordinates)):
-            if (joint.range is not None or joint.actuated) and (joint.name, place) not in seen:
+            if (joint.range is not None or place in joint.driven) and (joint.name, place) not in seen:
                 raise NoLeg(f"joint {joint.name} has a motor or a limit that no closed form tells")
 
 
@@ -179,7 +180,7 @@ def _coordinate(mechanism: Mechanism, leg: int, item: Item, place: int) -> tuple
         leg,
         place,
         column,
-        int(joint.type == "revolute"),
+        int(joint.type in ("revolute", "cylindrical") and not is_length),
         item.sense,
         (lo - home) / unit,
         (hi - home) / unit,

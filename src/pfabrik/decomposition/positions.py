@@ -62,7 +62,7 @@ def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> TrunkForm:
         home = _home(mechanism, joint)
         limits = _limits(joint, home)
         ranges.append((limits[0] - home, limits[1] - home))
-        coordinates.append(Coordinate(joint.name, "trunk", index, 1.0, home, limits, joint.actuated))
+        coordinates.append(Coordinate(joint.name, "trunk", index, 1.0, home, limits))
     return TrunkForm(tuple(points), tuple(axes), tuple(slides), tuple(ranges), tuple(coordinates))
 
 
@@ -314,7 +314,7 @@ def _stroke(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: int) 
             raise NotExpressible(f"prismatic joint {joint.name} is measured along joints that are not its neighbours")
         sign = 1.0
     offset = home - sign * length
-    draft.coordinates.append(Coordinate(joint.name, "stroke", k, sign, offset, limits, joint.actuated))
+    draft.coordinates.append(Coordinate(joint.name, "stroke", k, sign, offset, limits))
     lo, hi = sorted(((limits[0] - offset) * sign, (limits[1] - offset) * sign))
     return max(lo, 0.0), hi
 
@@ -325,7 +325,7 @@ def _range_hinge(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: 
     sense = _sense(step, draft.normal)
     home = _home(mechanism, step.joint)
     limits = _limits(step.joint, home)
-    draft.coordinates.append(Coordinate(step.joint.name, "hinge", k, sense, home, limits, step.joint.actuated))
+    draft.coordinates.append(Coordinate(step.joint.name, "hinge", k, sense, home, limits))
     lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
     before = nodes[k].at - nodes[k - 1].at if k > 0 else None
     angle_home = _angle_about(draft.normal, before, nodes[k + 1].at - nodes[k].at) if before is not None else 0.0
@@ -353,7 +353,7 @@ def _end_turn(mechanism: Mechanism, draft: _Draft) -> Interval:
     home = _home(mechanism, joint)
     limits = _limits(joint, home)
     last = len(draft.spots) - 1
-    draft.coordinates.append(Coordinate(joint.name, "end_hinge", last, sense, home, limits, joint.actuated))
+    draft.coordinates.append(Coordinate(joint.name, "end_hinge", last, sense, home, limits))
     lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
     return lo, hi
 
@@ -365,7 +365,7 @@ def _rail(mechanism: Mechanism, draft: _Draft) -> tuple[Array | None, Interval]:
     axis = np.array(mechanism.home_axis(joint.name)) * draft.rail.sign
     home = _home(mechanism, joint)
     limits = _limits(joint, home)
-    draft.coordinates.append(Coordinate(joint.name, "rail", 0, 1.0, home, limits, joint.actuated))
+    draft.coordinates.append(Coordinate(joint.name, "rail", 0, 1.0, home, limits))
     return axis, (limits[0] - home, limits[1] - home)
 
 

@@ -23,9 +23,15 @@ def items(value: Any) -> Any:
     return tuple(value) if isinstance(value, Iterable) else value
 
 
-def truth(value: Any) -> Any:
-    """A truth value of NumPy as Python's own."""
-    return bool(value) if isinstance(value, np.bool_) else value
+def truths(value: Any, type_: Any) -> Any:
+    """Truth values as Python's own, a pair as a tuple; one for both of a cylindrical joint, if they are the same."""
+    if isinstance(value, np.ndarray | np.bool_):
+        value = value.tolist()
+    if not _is_list(value):
+        return value
+    found = tuple(bool(each) if isinstance(each, np.bool_) else each for each in value)
+    pair = isinstance(type_, str) and type_ == "cylindrical" and [type(each) for each in found] == [bool, bool]
+    return found[0] if pair and found[0] == found[1] else found
 
 
 def text(value: Any) -> Any:

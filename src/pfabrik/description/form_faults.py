@@ -223,10 +223,14 @@ def _along_faults(place: str, joint: Joint) -> Iterator[Fault]:
 
 def _actuated_faults(place: str, joint: Joint) -> Iterator[Fault]:
     kind, actuated = kind_of(joint), cast(Any, joint.actuated)
-    if not isinstance(actuated, bool):
+    if kind is not None and kind.actuatable and len(kind.coordinates) == 2:
+        pair = isinstance(actuated, tuple) and len(actuated) == 2 and all(isinstance(each, bool) for each in actuated)
+        if not isinstance(actuated, bool) and not pair:
+            yield Fault(place, shown(actuated), f"true, false, or a pair of them: {', '.join(kind.coordinates)}")
+    elif not isinstance(actuated, bool):
         yield Fault(place, shown(actuated), "true or false")
     elif actuated and kind is not None and not kind.actuatable:
-        yield Fault(place, f"an actuated {joint.type} joint", "an actuator on a revolute or prismatic joint")
+        yield Fault(place, f"an actuated {joint.type} joint", "an actuator on an R, P or C joint")
 
 
 def _home_faults(place: str, joint: Joint) -> Iterator[Fault]:
@@ -267,13 +271,14 @@ def _bounds_faults(place: str, bounds: Any, coordinate: Coordinate) -> Iterator[
 
 
 def _pace_faults(place: str, joint: Joint, value: Any) -> Iterator[Fault]:
-    """Faults of a speed or an acceleration: a positive number, and only where something drives the joint."""
+    """Faults of a speed or an acceleration: positive, and one for each coordinate that something drives."""
     if value is None:
         return
-    faults = list(number_faults(place, value, 1))
+    count = len(joint.driven)
+    faults = list(number_faults(place, value, count or 1))
     yield from faults
-    if not faults and value <= 0.0:
-        yield Fault(place, shown(value), "a number greater than 0")
+    if not faults and min(value if count > 1 else (value,)) <= 0.0:
+        yield Fault(place, shown(value), "a number greater than 0" if count < 2 else "numbers greater than 0")
     elif not faults and joint.actuated is False:
         yield Fault(place, shown(value), "nothing: the joint is not actuated")
 

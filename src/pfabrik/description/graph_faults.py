@@ -41,6 +41,18 @@ def _duplicate_faults(mechanism: Structure) -> Iterator[Fault]:
             yield Fault(f"joint[{index}].name", f"'{joint.name}', the name of an earlier joint", "a name of its own")
         elif is_name(joint.name):
             seen.add(joint.name)
+    owners = {name: joint.name for joint in mechanism.joints for name in _names_of_several(joint)}
+    for index, joint in enumerate(mechanism.joints):
+        if is_name(joint.name) and joint.name in owners:
+            found = f"'{joint.name}', the name of a coordinate of joint '{owners[joint.name]}'"
+            yield Fault(f"joint[{index}].name", found, "a name of its own")
+
+
+def _names_of_several(joint: Joint) -> list[str]:
+    """The names of a joint's coordinates, where it has several."""
+    kind = kind_of(joint) if is_name(joint.name) else None
+    count = 0 if kind is None else len(kind.coordinates)
+    return [f"{joint.name}[{place}]" for place in range(count)] if count > 1 else []
 
 
 def _actuator_faults(mechanism: Structure) -> Iterator[Fault]:

@@ -42,12 +42,12 @@ def loop_conditions(loops: NDArray[np.float64], screws: NDArray[np.float64]) -> 
     return conditions.reshape(*screws.shape[:-2], 6 * len(loops), screws.shape[-2])
 
 
-def end_effector_freedom(mechanism: Structure, locked: frozenset[str]) -> int:
-    """Number of independent motions of the end effector at home, with some joints locked.
+def end_effector_freedom(mechanism: Structure, locked: frozenset[int]) -> int:
+    """Number of independent motions of the end effector at home, with some coordinates locked.
 
     Parameters
     ----------
-    locked : names of the joints that do not move.
+    locked : columns of the coordinates that do not move.
 
     Returns
     -------
@@ -207,14 +207,14 @@ def _screws(mechanism: Structure) -> NDArray[np.float64]:
     return np.vstack([joint_screws(mechanism, joint, mechanism.reference_point) for joint in mechanism.joints])
 
 
-def _home_motion(mechanism: Structure, locked: frozenset[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _home_motion(mechanism: Structure, locked: frozenset[int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Twist of the end effector, (6, rates), and loop conditions, (6 loops, rates), per rate of what is not locked.
 
     Velocities are those at the reference point: at an origin far away from the machine its motions would look alike.
     """
     screws = _screws(mechanism)
     owners = column_joints(mechanism)
-    moving = np.array([joint.name not in locked for joint in mechanism.joints])[owners]
+    moving = np.array([column not in locked for column in range(len(owners))], dtype=bool)
     screws, owners = (orthonormal_rates(mechanism) @ screws)[moving], owners[moving]
     tree = tree_of(mechanism)
     path = tree.paths[mechanism.end_effector_body]

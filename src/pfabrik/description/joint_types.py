@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, cast, get_args
 
 JointType: TypeAlias = Literal["revolute", "prismatic", "universal", "spherical", "cylindrical", "fixed"]
 JOINT_TYPES: tuple[JointType, ...] = get_args(JointType)
@@ -44,6 +44,22 @@ KINDS: dict[JointType, JointKind] = {
     "prismatic": JointKind("P", ("length",), "axis", ranged=True, actuatable=True),
     "universal": JointKind("U", ("angle", "angle"), "axes", ranged=True, coned=True),
     "spherical": JointKind("S", ("angle", "angle", "angle"), coned=True),
-    "cylindrical": JointKind("C", ("angle", "length"), "axis", ranged=True),
+    "cylindrical": JointKind("C", ("angle", "length"), "axis", ranged=True, actuatable=True),
     "fixed": JointKind("fixed", ()),
 }
+
+
+def driven_places(joint_type: Any, actuated: Any) -> tuple[int, ...]:
+    """Which coordinates of a joint of some type are driven, as far as what is said of it makes sense.
+
+    Parameters
+    ----------
+    actuated : true for all of its coordinates, or a pair, one for each.
+    """
+    kind = KINDS.get(cast(Any, joint_type)) if isinstance(joint_type, str) else None
+    if kind is None or not kind.actuatable:
+        return ()
+    each = (actuated,) * len(kind.coordinates) if isinstance(actuated, bool) else actuated
+    if not isinstance(each, tuple) or len(each) != len(kind.coordinates):
+        return ()
+    return tuple(place for place, drives in enumerate(each) if drives is True)

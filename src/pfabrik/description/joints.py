@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from numpy.typing import ArrayLike
 
-from .coercion import home_value, numbers, text, texts, truth, unit_vector, unit_vectors
-from .joint_types import JointType
+from .coercion import home_value, numbers, text, texts, truths, unit_vector, unit_vectors
+from .joint_types import JointType, driven_places
 
 __all__ = ["Cone", "Joint", "Range", "Vector", "set_fields"]
 
@@ -53,9 +53,11 @@ class Joint:
         its link from spinning about itself; x and y where there is no such line. Which two of the directions square
         to the line they are is left open: give them where that counts, as in a leg without a spherical joint.
     along : the two joints whose distance is the coordinate of a prismatic joint.
+    actuated : whether its coordinate is driven; of a C both of them, or as two values (angle, displacement) either.
     home : value of the coordinate in the home configuration; two values for C (angle, displacement) and U.
     range : (lo, hi) for R and P; two such pairs for C (angle, displacement) and U.
-    max_speed, max_acceleration : of an actuated joint's coordinate [rad or length, per s and per s²]; None is no limit.
+    max_speed, max_acceleration : of the driven coordinate [rad or length, per s and per s²], two values where a C has
+        both driven; None is no limit.
     """
 
     name: str
@@ -65,12 +67,12 @@ class Joint:
     axis: Vector | None = None
     axes: tuple[Vector, Vector] | None = None
     along: tuple[str, str] | None = None
-    actuated: bool = False
+    actuated: bool | tuple[bool, bool] = False
     home: float | tuple[float, float] = 0.0
     range: Range | tuple[Range, Range] | None = None
     cone: Cone | None = None
-    max_speed: float | None = None
-    max_acceleration: float | None = None
+    max_speed: float | tuple[float, float] | None = None
+    max_acceleration: float | tuple[float, float] | None = None
 
     if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
 
@@ -83,12 +85,12 @@ class Joint:
             axis: ArrayLike | None = None,
             axes: ArrayLike | None = None,
             along: Sequence[str] | None = None,
-            actuated: bool = False,
+            actuated: bool | Sequence[bool] = False,
             home: ArrayLike = 0.0,
             range: ArrayLike | None = None,
             cone: Cone | None = None,
-            max_speed: float | None = None,
-            max_acceleration: float | None = None,
+            max_speed: ArrayLike | None = None,
+            max_acceleration: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -101,12 +103,17 @@ class Joint:
             axis=unit_vector(self.axis),
             axes=unit_vectors(self.axes),
             along=texts(self.along),
-            actuated=truth(self.actuated),
+            actuated=truths(self.actuated, self.type),
             home=home_value(self.home, self.type),
             range=numbers(self.range),
             max_speed=numbers(self.max_speed),
             max_acceleration=numbers(self.max_acceleration),
         )
+
+    @property
+    def driven(self) -> tuple[int, ...]:
+        """Which of its coordinates are driven: (0,) of an actuated R or P."""
+        return driven_places(self.type, self.actuated)
 
 
 def set_fields(frozen: object, **values: object) -> None:

@@ -84,7 +84,18 @@ class LegMaker:
             else:
                 self.faults += key_faults(where, values, JOINT_KEYS)
                 said[letter] = values
+        self.faults += self._star_faults(said)
         return said
+
+    def _star_faults(self, said: Mapping[str, Mapping[str, Any]]) -> Iterator[Fault]:
+        """What is said of actuators against the stars of the chain."""
+        for step in self.steps:
+            actuated = said.get(step.letter, {}).get("actuated")
+            where = f"{self.place}.{step.letter}.actuated"
+            if actuated is not None and not step.actuated:
+                yield Fault(where, shown(actuated), f"nothing: '{self.leg.chain}' has no `*` behind the joint")
+            elif actuated in (False, (False, False)):
+                yield Fault(where, shown(actuated), f"what is driven: '{self.leg.chain}' has a `*` behind the joint")
 
     def _ranges(self) -> dict[str, tuple[Any, str]]:
         """The range of each joint that has one, and where it is said."""
@@ -115,6 +126,8 @@ class LegMaker:
         limits, limits_place = self.ranges.get(step.letter, (None, ""))
         places = dict.fromkeys(("type", "actuated", "connects"), f"{self.place}.chain")
         places |= {"name": f"{self.place}.name", "range": limits_place}
+        if said.get("actuated") is not None:
+            places["actuated"] = f"{self.place}.{step.letter}.actuated"
         fields: list[dict[str, Any]] = [{} for _ in range(self.legs)]
         self._give_axes(index, said, fields, places)
         cones = self._cones(index, said.get("cone"), bodies)
@@ -126,7 +139,7 @@ class LegMaker:
                 step.type,
                 bodies,
                 at=at.at or (PLACEHOLDER if step.centred else None),
-                actuated=step.actuated,
+                actuated=said.get("actuated", step.actuated) if step.actuated else False,
                 home=said.get("home", 0.0),
                 range=limits,
                 cone=cones[leg],

@@ -17,7 +17,7 @@ from .joints import Cone, Range, set_fields
 LEG_KEYS = ("chain", "name", "connects", "base", "via", "platform", "axis", "stroke", "copies")
 """What can be said of legs, in the order in which it is told, beside what is said of single joints."""
 
-JOINT_KEYS = ("axis", "axes", "home", "range", "cone", "max_speed", "max_acceleration")
+JOINT_KEYS = ("axis", "axes", "actuated", "home", "range", "cone", "max_speed", "max_acceleration")
 """What can be said of one joint of a chain."""
 
 CONE_KEYS = ("axis", "half_angle", "fixed_to")
@@ -41,9 +41,10 @@ class Leg:
     name : what comes before the names of joints and bodies.
     connects : the bodies that the legs lead from and to; the base and the end effector by default.
     by_letter : what is said of single joints, by their letters: {"A": {"axis": "radial", "range": (-1, 1)}}. Keys are
-        axis, axes, home, range, cone, max_speed and max_acceleration, as of a `Joint`, directions as above. A cone is a
-        mapping too: half_angle; axis, by default the line that it limits, at home; fixed_to, by default the base or the
-        end effector at the ends of the chain and the inner body between.
+        axis, axes, home, range, cone, max_speed and max_acceleration, as of a `Joint`, directions as above; and, of a C
+        with `*` in the chain, actuated: which of its coordinates is driven, by default both. A cone is a mapping too:
+        half_angle; axis, by default the line that it limits, at home; fixed_to, by default the base or the end effector
+        at the ends of the chain and the inner body between.
     copies : {"count": 3, "axis": (0, 0, 1)}: rotational copies about an axis through the origin.
     """
 

@@ -152,7 +152,7 @@ class Mechanism(Structure):
             warnings.warn(f"'{self.name}': {doubt}", MobilityWarning, stacklevel=4)
 
     def _doubts_of_freedom(self) -> Iterator[str]:
-        left = end_effector_freedom(self, frozenset(self.actuator_names))
+        left = end_effector_freedom(self, frozenset(drive.column for drive in self.drives))
         if left > 0:
             freedoms = "1 freedom" if left == 1 else f"{left} freedoms"
             yield f"{len(self.actuator_names)} actuators leave the end effector {freedoms} at home"

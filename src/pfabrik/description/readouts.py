@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats
-from .joints import Joint
+from .joint_coordinates import JointCoordinate
 from .structure import Structure
 
 
@@ -40,12 +40,11 @@ class Readout:
 
 def readouts(mechanism: Structure) -> tuple[Readout, ...]:
     """One readout for each actuator, in the order of ``mechanism.actuator_names``."""
-    return tuple(readout(mechanism.joint(name), mechanism.length_unit) for name in mechanism.actuator_names)
+    return tuple(readout(drive, mechanism.length_unit) for drive in mechanism.drives)
 
 
-def readout(joint: Joint, length_unit: str) -> Readout:
-    """How the coordinate of one actuated revolute or prismatic joint is shown."""
-    is_angle = joint.type == "revolute"
-    low, high = (float(bound) for bound in joint.range or (-math.inf, math.inf))  # type: ignore[arg-type]
+def readout(coordinate: JointCoordinate, length_unit: str) -> Readout:
+    """How one coordinate is shown."""
+    is_angle, (low, high) = coordinate.kind == "angle", coordinate.limits
     limits = (math.degrees(low), math.degrees(high)) if is_angle else (low, high)
-    return Readout(joint.name, is_angle, "deg" if is_angle else length_unit, limits)
+    return Readout(coordinate.name, is_angle, "deg" if is_angle else length_unit, limits)

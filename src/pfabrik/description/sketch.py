@@ -97,4 +97,4 @@ def _circle(joint: Joint, x: float, y: float) -> str:
 def _style(joint: Joint) -> str:
     """The rest of a marker: its colours, and as its title the name, with ``*`` where it is actuated."""
     colour = ACTUATED if joint.actuated else PASSIVE
-    return f'fill="{colour}" stroke="#1a1a1a"><title>{escape(joint.name)}{"*" * joint.actuated}</title>'
+    return f'fill="{colour}" stroke="#1a1a1a"><title>{escape(joint.name)}{"*" * bool(joint.actuated)}</title>'

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import UnknownName
 from .coercion import items, numbers, text, texts, unit_vector
 from .enclosing import enclosing_radius
+from .joint_coordinates import JointCoordinate
 from .joint_types import KINDS, TASK_COORDINATES, WHOLE_TASK
 from .joints import Joint, Range, Vector, set_fields
 
@@ -60,8 +61,11 @@ class Structure:
 
     @cached_property
     def actuator_names(self) -> tuple[str, ...]:
-        """Names of the actuated joints, in the order of `joints`."""
-        return tuple(joint.name for joint in self.joints if joint.actuated)
+        """Names of the actuated coordinates, in the order of `joints`, as in `coordinate_names`.
+
+        Those of the actuated joints; of a cylindrical one either coordinate may be driven, or both ("C1[0]", "C1[1]").
+        """
+        return tuple(drive.name for drive in self.drives)
 
     @cached_property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -70,7 +74,25 @@ class Structure:
         One for a revolute or prismatic joint ("A1"), two for a universal or cylindrical one ("A1[0]", "A1[1]"), three
         for a spherical one (its rotation vector), none for a fixed one.
         """
-        return tuple(name for joint in self.joints for name in _coordinate_names(joint))
+        return tuple(each.name for each in self.coordinates)
+
+    @cached_property
+    def coordinates(self) -> tuple[JointCoordinate, ...]:
+        """The coordinates of all joints, in the order of `coordinate_names`."""
+        found: list[JointCoordinate] = []
+        for joint in self.joints:
+            homes = np.ravel(self.home_coordinate(joint.name)).tolist()
+            names = [joint.name] if len(homes) == 1 else [f"{joint.name}[{place}]" for place in range(len(homes))]
+            found += [
+                JointCoordinate(name, joint, place, len(found) + place, home)
+                for place, (name, home) in enumerate(zip(names, homes, strict=True))
+            ]
+        return tuple(found)
+
+    @cached_property
+    def drives(self) -> tuple[JointCoordinate, ...]:
+        """The actuated coordinates, in the order of `actuator_names`."""
+        return tuple(each for each in self.coordinates if each.place in each.joint.driven)
 
     @cached_property
     def bodies(self) -> tuple[str, ...]:
@@ -170,11 +192,6 @@ class Structure:
         """The joint that the end effector is named after, whatever else may be wrong with the description."""
         joints = self.joints if isinstance(self.joints, tuple) else ()
         return next((each for each in joints if isinstance(each, Joint) and each.name == self.end_effector), None)
-
-
-def _coordinate_names(joint: Joint) -> tuple[str, ...]:
-    count = len(KINDS[joint.type].coordinates)
-    return (joint.name,) if count == 1 else tuple(f"{joint.name}[{index}]" for index in range(count))
 
 
 def _in_order(task: Any) -> Any:

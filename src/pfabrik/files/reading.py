@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
-from ..description.chains import read_chain
+from ..description.chains import Step, read_chain
 from ..description.coercion import numbers
 from ..description.copies import Copy, Layout, Pattern, count_of, read_copies
 from ..description.faults import in_order, joint_index, merged
@@ -95,7 +95,8 @@ def _pattern(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Pa
     faults += _unknown_keys(place, table, (*_JOINT_FIELDS, "copies"))
     values: dict[str, Any] = {"name": None, "type": None, "connects": None}
     given = {key: table[key] for key in _JOINT_FIELDS if key in table}
-    values |= {key: in_radians(key, value, given.get("type"), angle_unit) for key, value in given.items()}
+    kind, actuated = given.get("type"), given.get("actuated", False)
+    values |= {key: in_radians(key, value, kind, actuated, angle_unit) for key, value in given.items()}
     if "cone" in values:
         values["cone"] = _cone(values["cone"], f"{place}.cone", angle_unit, faults)
     joint = Joint(**values)
@@ -118,11 +119,11 @@ def _leg(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Leg:
         faults.append(Fault(place, shown(table), "a [[leg]] table"))
         return Leg("")
     letters = sorted(key for key in table if re.fullmatch("[A-Z]", key))
-    types = {step.letter: step.type for step in read_chain(table.get("chain"))}
+    steps = {step.letter: step for step in read_chain(table.get("chain"))}
     own = {key: value for key, value in table.items() if key not in letters}
     others = ", or the letter of one of its joints: A, B, ..."
-    faults += key_faults(place, own, LEG_KEYS, lambda key: _leg_hint(key, list(types) or ["A"]), others)
-    by_letter = {letter: _said(table[letter], types.get(letter), angle_unit) for letter in letters}
+    faults += key_faults(place, own, LEG_KEYS, lambda key: _leg_hint(key, list(steps) or ["A"]), others)
+    by_letter = {letter: _said(table[letter], steps.get(letter), angle_unit) for letter in letters}
     values = {"chain": None} | {key: own[key] for key in LEG_KEYS if key in own}
     return Leg(by_letter=by_letter, **values)
 
@@ -138,11 +139,12 @@ def _leg_hint(key: str, letters: Sequence[str]) -> str:
     return " here: it is one of the file, above its first table" if of_the_file else near_miss(key, LEG_KEYS)
 
 
-def _said(table: Any, joint_type: Any, angle_unit: str) -> Any:
+def _said(table: Any, step: Step | None, angle_unit: str) -> Any:
     """What is said of one joint of a leg, angles in radians; anything but a table as it is."""
     if not isinstance(table, dict):
         return table
-    said = {key: in_radians(key, value, joint_type, angle_unit) for key, value in table.items()}
+    kind, actuated = (step.type, table.get("actuated", step.actuated)) if step is not None else (None, False)
+    said = {key: in_radians(key, value, kind, actuated, angle_unit) for key, value in table.items()}
     cone = said.get("cone")
     if isinstance(cone, dict) and "half_angle" in cone:
         said["cone"] = cone | {"half_angle": angle_in_radians(cone["half_angle"], angle_unit)}

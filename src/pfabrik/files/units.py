@@ -3,34 +3,44 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..description.coercion import numbers
+from ..description.coercion import numbers, truths
 from ..description.form_faults import is_numbers
-from ..description.joint_types import KINDS
+from ..description.joint_types import KINDS, Coordinate, driven_places
 
 MEASURED = ("home", "range", "max_speed", "max_acceleration")
 """Fields of a joint in the unit of its coordinate (per second, per second squared): their numbers may be angles."""
 
 
-def in_radians(field: str, value: Any, joint_type: Any, unit: str) -> Any:
+def in_radians(field: str, value: Any, joint_type: Any, actuated: Any, unit: str) -> Any:
     """What a file says in a field of a joint, its angles in radians and its lengths as they are.
 
     Parameters
     ----------
     field : one of MEASURED; anything in another field stays as it is.
-    value : a number, or a pair of them for a range, or one for each coordinate of the joint; anything else stays too.
+    value : a number, or a pair of them for a range, or one for each coordinate that it is of; anything else stays too.
+    actuated : what is said of the joint's being driven: speeds are those of what is driven.
     unit : "deg" or "rad", the unit of the angles in `value`.
     """
     if field not in MEASURED or unit != "deg" or joint_type not in list(KINDS):
         return value
     read = numbers(value)
-    parts = read if len(KINDS[joint_type].coordinates) > 1 else (read,)
+    kinds = measured(field, joint_type, actuated)
+    parts = read if len(kinds) > 1 else (read,)
     fits = isinstance(parts, tuple) and all(
         is_numbers(part, 2) if field == "range" else isinstance(part, float) for part in parts
     )
-    return converted(read, joint_type, math.radians) if fits else value
+    return converted(read, kinds, math.radians) if fits else value
+
+
+def measured(field: str, joint_type: Any, actuated: Any) -> tuple[Coordinate, ...]:
+    """What the numbers in one of the fields MEASURED of a joint are: all its coordinates, or those that are driven."""
+    kind = KINDS[joint_type]
+    if field in ("home", "range"):
+        return kind.coordinates if kind.ranged else ()
+    return tuple(kind.coordinates[place] for place in driven_places(joint_type, truths(actuated, joint_type)))
 
 
 def angle_in_radians(value: Any, unit: str) -> Any:
@@ -39,17 +49,18 @@ def angle_in_radians(value: Any, unit: str) -> Any:
     return math.radians(read) if unit == "deg" and isinstance(read, float) else value
 
 
-def converted(value: Any, joint_type: Any, convert: Callable[[float], float]) -> Any:
-    """A joint's home, range, speed or acceleration with a function applied to every angle in it."""
-    kind = KINDS[joint_type]
-    if not kind.ranged:
+def converted(value: Any, kinds: Sequence[Coordinate], convert: Callable[[float], float]) -> Any:
+    """A home, range, speed or acceleration with a function applied to every angle in it.
+
+    Parameters
+    ----------
+    kinds : what its parts are, as of `measured`; a single one has no parts.
+    """
+    if len(kinds) == 1:
+        return _each(value, convert) if kinds[0] == "angle" else value
+    if not isinstance(value, tuple) or len(value) != len(kinds):
         return value
-    if len(kind.coordinates) == 1:
-        return _each(value, convert) if kind.coordinates[0] == "angle" else value
-    if not isinstance(value, tuple) or len(value) != len(kind.coordinates):
-        return value
-    parts = zip(value, kind.coordinates, strict=True)
-    return tuple(_each(part, convert) if coordinate == "angle" else part for part, coordinate in parts)
+    return tuple(_each(part, convert) if kind == "angle" else part for part, kind in zip(value, kinds, strict=True))
 
 
 def _each(value: Any, convert: Callable[[float], float]) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..description.mechanism import Joint, Mechanism
-from .units import MEASURED, converted, exact_degrees
+from .units import MEASURED, converted, exact_degrees, measured
 
 
 def dumps(mechanism: Mechanism) -> str:
@@ -38,7 +38,7 @@ def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:
     for field in ("name", "type", "actuated", "connects", "at", "axis", "axes", "along", *MEASURED):
         value = getattr(joint, field)
         if field in MEASURED:
-            value = converted(value, joint.type, convert)
+            value = converted(value, measured(field, joint.type, joint.actuated), convert)
         left_out = value is None or value is False or (field == "home" and value in (0.0, (0.0, 0.0)))
         if not left_out:
             yield f"{field} = {_value(value)}"
@@ -57,7 +57,7 @@ def _angles(mechanism: Mechanism) -> Iterator[float]:
 
     for joint in mechanism.joints:
         for field in MEASURED:
-            converted(getattr(joint, field), joint.type, note)
+            converted(getattr(joint, field), measured(field, joint.type, joint.actuated), note)
         yield from found
         found.clear()
         if joint.cone is not None:

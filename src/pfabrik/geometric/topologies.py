@@ -78,10 +78,10 @@ def closed_form(mechanism: Mechanism) -> ClosedForm:
             raise Unsuitable("another topology")
         require(mechanism.task == mechanism.whole_task, "its task leaves out a part of the pose")
         known = {name for chain in chains for name in chain.joints}
-        for name in mechanism.actuator_names:
-            require(name in known, f"actuated joint {name} is in no sub-chain")
+        for drive in mechanism.drives:
+            require(drive.joint.name in known, f"actuated joint {drive.joint.name} is in no sub-chain")
         plan = topology.plan(mechanism, chains)
     except Unsuitable as reason:
         raise NoClosedForm(mechanism.name, [*map(str, chains)], str(reason), [*map(str, TOPOLOGIES)]) from None
-    home = np.array([[mechanism.home_coordinate(name) for name in mechanism.actuator_names]], dtype=float)
+    home = np.array([[drive.home for drive in mechanism.drives]])
     return ClosedForm(plan, topology.kernel, home)

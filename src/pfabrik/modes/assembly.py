@@ -65,7 +65,7 @@ class _Search:
     def __init__(self, closure: Closure, values: Floats) -> None:
         self.closure = closure
         self.values = values
-        self.locked = frozenset(closure.mechanism.actuator_names)
+        self.locked = closure.driven
         self.rng = np.random.default_rng(0)
         self.starts = 0
         self.found = Clusters()

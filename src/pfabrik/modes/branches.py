@@ -209,7 +209,7 @@ class BranchSearch:
             for row in range(len(best)):
                 best[row, own] = branches.coordinates[min(row, len(branches.hits) - 1)][own]
         held = HELD if marks.pose_rests else self.task.held
-        locked = frozenset(self.closure.mechanism.actuator_names)
+        locked = self.closure.driven
         from_home = np.zeros_like(best)
         from_home[:, self.closure.actuated] = best[:, self.closure.actuated]
         for start, wishes in (

@@ -45,7 +45,7 @@ class Fingerprints:
         """See what rests at a closed configuration, (columns,) and (4, 4)."""
         mechanism = self.mechanism = closure.mechanism
         self._closure = closure
-        locked = frozenset(mechanism.actuator_names)
+        locked = closure.driven
 
         def rests(read: Read) -> NDArray[np.bool_]:
             return np.asarray((shifts(closure, coordinates, pose, read, locked) == 0.0).all(axis=(0, 2)))
@@ -110,7 +110,7 @@ class Fingerprints:
 
 
 def shifts(
-    closure: Closure, coordinates: Floats, pose: Floats, read: Read, locked: frozenset[str] = frozenset()
+    closure: Closure, coordinates: Floats, pose: Floats, read: Read, locked: frozenset[int] = frozenset()
 ) -> Floats:
     """How far what is read of a configuration (columns,) moves with the end effector on its target.
 
@@ -128,8 +128,7 @@ def shifts(
     rng = np.random.default_rng(0)
     shakes, twists = rng.normal(size=(SHAKES, len(coordinates))), rng.normal(size=(SHAKES, 6))
     shakes[:, closure.idle] = 0.0
-    for name in locked:
-        shakes[:, columns(closure.mechanism)[name]] = 0.0
+    shakes[:, list(locked)] = 0.0
     lengths = ALONG / np.sqrt((shakes**2).sum(axis=1, keepdims=True) + (twists**2).sum(axis=1, keepdims=True))
     moves = []
     for size in (0.0, 0.5 * lengths, lengths):

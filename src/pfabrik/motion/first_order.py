@@ -30,7 +30,7 @@ from ..description.home_mobility import (
 )
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
-from .displacements import columns, end_effector_pose, gaps, loop_errors, rate_units, screws, stepped
+from .displacements import end_effector_pose, gaps, loop_errors, rate_units, screws, stepped
 
 KINDS = ("serial", "parallel", "constraint", "passive")
 SAMPLES, STEPS, STEP = 8, 3, 0.1
@@ -279,7 +279,7 @@ def _units(mechanism: Mechanism, motion: _Motion) -> tuple[Floats, Floats]:
 
 def _actuated(mechanism: Mechanism) -> list[int]:
     """The columns of the actuators."""
-    return [columns(mechanism)[name].start for name in mechanism.actuator_names]
+    return [drive.column for drive in mechanism.drives]
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,11 @@ from .displacements import centres, columns, displacements
 
 
 def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
-    """Count the angles of ranged revolute joints by whole turns into their ranges, where that is possible, in place."""
+    """Count the angles of ranged joints about one axis by whole turns into their ranges, if possible, in place."""
     for joint in mechanism.joints:
-        if joint.type != "revolute" or joint.range is None:
+        if joint.type not in ("revolute", "cylindrical") or joint.range is None:
             continue
-        low, high = np.ravel(joint.range) - np.ravel(mechanism.home_coordinate(joint.name))
+        low, high = np.ravel(joint.range)[:2] - np.ravel(mechanism.home_coordinate(joint.name))[0]
         values = coordinates[:, columns(mechanism)[joint.name].start]  # a view
         low, high = low - TOLERANCES.limit, high + TOLERANCES.limit
         least = values + 2.0 * np.pi * np.ceil((low - values) / (2.0 * np.pi))

@@ -51,7 +51,7 @@ def settled(
         rows = np.flatnonzero(np.isfinite(carriers).all(axis=1))
         found[rows] = _read_with(mechanism, table, poses[rows], sides[rows], carriers[rows], found[rows])
     closure.put_actuators(found, actuators)
-    locked = frozenset(mechanism.actuator_names)
+    locked = closure.driven
     platform = (*HELD[:3], *((0.0,) * 3)) if mechanism.end_effector_is_joint else HELD
     closing = close(closure, found, poses, locked=locked, platform=platform)
     rng = np.random.default_rng(0)

@@ -90,7 +90,7 @@ def _centres(mechanism: Mechanism, compiled: CompiledPlan, rows: P.Rows) -> Floa
 
 def _settle(closure: Closure, begin: Floats, poses: Floats, centres: Floats, chained: bool) -> Closing:
     """Close the legs below a platform and actuators at rest; rows that do not close are tried from elsewhere."""
-    locked = frozenset(closure.mechanism.actuator_names)
+    locked = closure.driven
     platform = (*HELD[:3], *((0.0,) * 3)) if closure.mechanism.end_effector_is_joint else HELD
     closing = close(closure, begin, poses, locked=locked, platform=platform, centres=centres, chained=chained)
     rng = np.random.default_rng(0)

@@ -157,7 +157,8 @@ def draw_path(axes: Axes, found: Robustness) -> None:
 def joints_by_unit(found: Robustness) -> list[list[tuple[int, Readout]]]:
     """The joints that are shown with their places, those of one unit together."""
     mechanism = found.case.mechanism
-    shown = list(enumerate(readout(mechanism.joint(name), mechanism.length_unit) for name in found.case.shown))
+    known = {each.name: each for each in mechanism.coordinates}
+    shown = list(enumerate(readout(known[name], mechanism.length_unit) for name in found.case.shown))
     units = dict.fromkeys(each.unit for _, each in shown)
     return [[(place, each) for place, each in shown if each.unit == unit] for unit in units]
 

@@ -114,7 +114,7 @@ def run(case: Case, extent: Extent, tick: Tick) -> Robustness:
 def jumps(solution: Track, finer: Track) -> dict[str, dict[str, Jump]]:
     """The largest changes of the actuators of either kind, in each part of the path."""
     mechanism = solution.mechanism
-    is_length = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names])
+    is_length = np.array([drive.kind == "length" for drive in mechanism.drives])
     kinds = {"lengths": is_length, "angles": ~is_length}
     return {
         kind: {part: _jump(solution, finer, chosen, part) for part in ("inside", "outside", "edge")}

@@ -50,7 +50,8 @@ def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence
     MissingLibrary : matplotlib is not installed.
     """
     mechanism, _ = checked_shown(shown)
-    named = {mechanism.joint(name).name for name in names}
+    owners = {each.name: each.joint.name for each in mechanism.coordinates}
+    named = {mechanism.joint(owners.get(name, name)).name for name in names}
     skeleton = skeleton_of(shown)
     canvas = canvas_on(ax, plane_of(mechanism))
     draw_machine(canvas, skeleton)
@@ -92,7 +93,7 @@ def _joints(canvas: Canvas, marks: Sequence[Mark]) -> list[Artist]:
     """A marker for every joint, those of a kind together, slides behind the others."""
     kinds: dict[tuple[str, bool, bool], list[Mark]] = {}
     for mark in marks:
-        kinds.setdefault((mark.joint.type, mark.joint.actuated, bool(mark.held_by)), []).append(mark)
+        kinds.setdefault((mark.joint.type, bool(mark.joint.actuated), bool(mark.held_by)), []).append(mark)
     return [
         canvas.marks(np.array([mark.place for mark in own]), zorder=2 if kind == "prismatic" else 3, **look(*key))
         for key, own in sorted(kinds.items())
@@ -133,7 +134,7 @@ def key_of(skeleton: Skeleton) -> list[Artist]:
     """A marker and a word for each kind of joint that occurs, and for limits if there is one that holds."""
     from matplotlib.lines import Line2D
 
-    kinds = sorted({(mark.joint.type, mark.joint.actuated) for mark in skeleton.marks})
+    kinds = sorted({(mark.joint.type, bool(mark.joint.actuated)) for mark in skeleton.marks})
     looks = [(kind + ", actuated" * actuated, look(kind, actuated, False)) for kind, actuated in kinds]
     if skeleton.is_held:
         looks.append(("at a limit", look("fixed", False, True) | {"marker": "o", "facecolor": HELD}))

@@ -1,0 +1,43 @@
+"""The coordinates of a mechanism's joints, one by one: what they are called, measure, and may be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .joint_types import KINDS, Coordinate
+from .joints import Joint, Range
+
+
+@dataclass(frozen=True)
+class JointCoordinate:
+    """One coordinate of a joint.
+
+    Attributes
+    ----------
+    name : that of its joint, with "[0]", "[1]" or "[2]" behind it where the joint has several.
+    joint, place : the joint, and which of its coordinates it is.
+    column : which of all coordinates it is, in the order of `q`.
+    home : its value in the home configuration [rad or length].
+    """
+
+    name: str
+    joint: Joint
+    place: int
+    column: int
+    home: float
+
+    @property
+    def kind(self) -> Coordinate:
+        """Whether it is an angle or a length."""
+        return KINDS[self.joint.type].coordinates[self.place]
+
+    @property
+    def limits(self) -> Range:
+        """Its range [rad or length], infinite where there is no limit."""
+        if self.joint.range is None:
+            return -math.inf, math.inf
+        low, high = np.reshape(self.joint.range, (-1, 2))[self.place].tolist()
+        return low, high
