@@ -619,6 +619,34 @@ def test_a_starting_file_is_printed_where_no_file_is_named(run: Callable[..., Re
     assert result.stdout == template("6-UPS") and os.listdir(tmp_path) == []
 
 
+@pytest.mark.parametrize(
+    "line, found",
+    [
+        ("info st", ["stewart"]),
+        ("ik serv", ["servo_hexapod"]),
+        ("new 6-", ["6-PUS", "6-RUS", "6-UPS"]),
+        ("new --from agi", ["agile_eye"]),
+        ("tra", ["track", "travel"]),
+    ],
+)
+def test_names_of_machines_and_kinds_are_completed(line: str, found: list[str]) -> None:
+    words = ["pfabrik", *line.split(" ")]
+    asked = {"_PFABRIK_COMPLETE": "bash_complete", "COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1)}
+    with in_process(env=os.environ | asked, stdout=subprocess.PIPE) as process:
+        told = process.communicate()[0]
+    assert [each.removeprefix("plain,") for each in told.split()] == found
+    assert "_PFABRIK_COMPLETE=bash_source" in (Path(__file__).parents[1] / "docs" / "cli.md").read_text()
+
+
+def test_kinds_are_listed_for_programs_too(run: Callable[..., Result]) -> None:
+    assert list(json.loads(run("new", "--list", "--json").stdout)) == list(templates())
+    assert run("new", "delta", "--json").exit_code == 2
+
+
+def test_an_option_without_its_values_is_told_as_its_commands(run: Callable[..., Result]) -> None:
+    assert run("travel", "stewart", "--along", "1").stderr.endswith("travel --help')\n")
+
+
 def test_a_file_that_exists_is_kept_unless_forced(run: Callable[..., Result], tmp_path: Path) -> None:
     path = tmp_path / "my.toml"
     path.write_text("mine")
@@ -847,6 +875,40 @@ def test_an_unwritable_output_is_told_by_its_name(run: Callable[..., Result], tm
     assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1
     assert ".part" not in result.stderr
+
+
+@pytest.fixture
+def linked(tmp_path: Path) -> dict[str, bytes]:
+    """A machine and a path with links to them, and what they hold."""
+    pf.save(pf.load("five_bar"), tmp_path / "arm.toml")
+    (tmp_path / "path.csv").write_text("y,z\n0,170\n")
+    (tmp_path / "soft.csv").symlink_to("path.csv")
+    (tmp_path / "soft.toml").symlink_to("arm.toml")
+    os.link(tmp_path / "path.csv", tmp_path / "hard.csv")
+    return {each.name: each.read_bytes() for each in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize("output", ["path.csv", "./path.csv", "soft.csv", "hard.csv", "arm.toml", "soft.toml"])
+@pytest.mark.parametrize("read", [("arm.toml", "path.csv"), ("soft.toml", "soft.csv")])
+def test_nothing_that_is_read_is_overwritten(
+    run: Callable[..., Result], tmp_path: Path, linked: dict[str, bytes], read: tuple[str, str], output: str
+) -> None:
+    result = run("track", *read, "-o", output)
+    assert result.exit_code == 2
+    assert "found a file that was read" in result.stderr
+    assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == linked
+
+
+@pytest.mark.parametrize("line", [("arm.toml", "-", "-o", "hard.csv"), ("-", "path.csv", "-o", "soft.toml")])
+def test_a_file_on_standard_input_is_not_overwritten(
+    tmp_path: Path, linked: dict[str, bytes], line: tuple[str, ...]
+) -> None:
+    name = "arm.toml" if line[0] == "-" else "path.csv"
+    with (tmp_path / name).open() as file, in_process("track", *line, stdin=file, cwd=tmp_path) as process:
+        told = process.communicate()[1]
+    assert process.returncode == 2
+    assert "found a file that was read" in told
+    assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == linked
 
 
 def test_an_output_that_is_a_link_or_a_device_stays_one(run: Callable[..., Result], tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import click
 
 import pfabrik as pf
 
-from .mech import MECH, STANDARD_INPUT, load
+from .mech import MECH, load
 from .whole import whole_file
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def export(mech: str, force: bool, **files: Path | None) -> int:
     mechanism = load(mech)
     for name, path in wanted.items():
         text = TARGETS[name][0](mechanism)
-        with whole_file(path, [] if mech == STANDARD_INPUT else [Path(mech)]) as handle:
+        with whole_file(path, [Path(mech)]) as handle:
             handle.write(text)
         if path != Path("-"):
             click.echo(f"wrote {path}", err=True)

@@ -48,6 +48,16 @@ class CommandGroup(click.Group):
             ctx.fail(f"no command '{args[0]}'{hint}")
         return super().resolve_command(ctx, args)
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """As click does, but what is wrong with the options of a subcommand is told as that subcommand's."""
+        try:
+            return super().invoke(ctx)
+        except click.UsageError as error:
+            name = ctx.invoked_subcommand
+            if error.ctx is None and name in self.subcommands:
+                error.ctx = click.Context(click.Command(name), parent=ctx, info_name=name)
+            raise
+
     def main(
         self,
         args: Sequence[str] | None = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
@@ -32,14 +33,18 @@ KIND = Kind()
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write. Default: print it.")
 @click.option("--force", is_flag=True, help="Replace the file if it exists.")
 @click.option("--list", "list_all", is_flag=True, help="List the kinds of machines there are files for.")
-def new(kind: str | None, machine: str | None, output: Path | None, force: bool, list_all: bool) -> int:
+@click.option("--json", "as_json", is_flag=True, help="With --list: one JSON object on stdout.")
+def new(kind: str | None, machine: str | None, output: Path | None, force: bool, list_all: bool, as_json: bool) -> int:
     """Write a starting file for a machine of your own.
 
     KIND is a name from `pfabrik new --list`. The file describes a machine of this kind that works as it is; its
     comments say what to measure and where to put it. With --from it is a machine of `pfabrik catalog`, as it is there.
     """
+    if as_json and not list_all:
+        raise click.UsageError("--json goes with --list: a file is TOML")
     if list_all:
-        click.echo(aligned(("kind", "machine"), [(name, title(name)) for name in templates()]))
+        kinds = {name: title(name) for name in templates()}
+        click.echo(json.dumps(kinds) if as_json else aligned(("kind", "machine"), kinds.items()))
         return 0
     if (kind is None) == (machine is None):
         raise click.UsageError(f"give either --from NAME or one KIND of {', '.join(templates())}")

@@ -23,7 +23,7 @@ def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
 
     Parameters
     ----------
-    inputs : files that were read, by any name or link: none of them is ever overwritten.
+    inputs : files that were read, by any name or link, ``-`` for standard input: none of them is ever overwritten.
     """
     if path == Path("-"):
         yield sys.stdout
@@ -46,9 +46,18 @@ def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
 
 def refuse_input(path: Path, inputs: Iterable[Path]) -> None:
     """Stop if an output would overwrite a file that was read."""
-    for read in inputs:
-        if path.exists() and read.exists() and path.samefile(read):
-            raise click.UsageError(f"{path}: found a file that was read; expected another file")
+    if any(is_same_file(path, read) for read in inputs):
+        raise click.UsageError(f"{path}: found a file that was read; expected another file")
+
+
+def is_same_file(path: Path, read: Path) -> bool:
+    """Whether a path leads to the file that was read, or that standard input (``-``) comes from."""
+    if read != Path("-"):
+        return path.exists() and read.exists() and path.samefile(read)
+    try:
+        return path.is_file() and os.path.samestat(path.stat(), os.fstat(sys.stdin.fileno()))
+    except (OSError, ValueError):  # standard input is closed, or no file at all
+        return False
 
 
 def open_new(part: Path, path: Path) -> TextIO:

@@ -125,7 +125,7 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
             attributes["ref"] = repr(float(homes[index]) * unit)
         if pairs[index] is not None:
             attributes["range"] = vector(np.array(pairs[index]) * unit)
-        yield attributes | as_attributes(physics.joint(turning, joint.actuated))
+        yield attributes | as_attributes(physics.joint(turning, index in joint.driven))
 
 
 def _axes(mechanism: Mechanism, joint: Joint) -> Floats:

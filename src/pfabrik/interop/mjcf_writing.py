@@ -126,20 +126,18 @@ def _equalities(tree: CutTree, names: Names, physics: Physics) -> ET.Element:
 
 
 def _servos(mechanism: Mechanism, metres: float, physics: Physics) -> ET.Element:
-    """A position servo for every actuated joint."""
+    """A position servo for every actuated coordinate."""
     actuator = ET.Element("actuator")
-    for name in mechanism.actuator_names:
-        joint = mechanism.joint(name)
-        turning = joint.type == "revolute"
+    for drive in mechanism.drives:
+        turning = drive.kind == "angle"
         gains = as_attributes(physics.servo(turning))
-        servo = ET.SubElement(actuator, "position", {"name": name, "joint": name, **gains})
-        if joint.range is not None:
-            servo.set("ctrlrange", vector(np.array(joint.range) * (1.0 if turning else metres)))
+        servo = ET.SubElement(actuator, "position", {"name": drive.name, "joint": drive.name, **gains})
+        if drive.joint.range is not None:
+            servo.set("ctrlrange", vector(np.array(drive.limits) * (1.0 if turning else metres)))
     return actuator
 
 
 def _home(mechanism: Mechanism, metres: float) -> Iterator[float]:
     """The actuated coordinates at home [rad or m]."""
-    for name in mechanism.actuator_names:
-        turning = mechanism.joint(name).type == "revolute"
-        yield float(np.ravel(mechanism.home_coordinate(name))[0]) * (1.0 if turning else metres)
+    for drive in mechanism.drives:
+        yield drive.home * (1.0 if drive.kind == "angle" else metres)
