@@ -32,6 +32,11 @@ def asks_too_much(mechanism: Mechanism) -> bool:
     return generic_of(mechanism).mobility.platform < _asked(mechanism)
 
 
+def has_other_assemblies(mechanism: Mechanism) -> bool:
+    """Whether a target that one way of assembly misses is to be looked for in all others: they reach different ones."""
+    return follows_task(mechanism) and asks_too_much(mechanism)
+
+
 def _asked(mechanism: Mechanism) -> int:
     """How many coordinates of a pose the task sets."""
     task = task_of(mechanism)

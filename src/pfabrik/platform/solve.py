@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..closure.close import Closing, measured
 from ..closure.configurations import Configurations, new_rows, put_rows
+from ..closure.parasitic import has_other_assemblies
 from ..closure.solve import STRANGE, ClosureEngine
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
@@ -56,7 +57,7 @@ class LegsEngine:
         rows = new_rows(self.mechanism, len(targets))
         left = self._reach(targets, start, sides, keep_mode, rows)
         carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
-        if left and options.projection == "nearest":
+        if left and options.projection == "nearest" and not has_other_assemblies(self.mechanism):
             sides = np.array(np.broadcast_to(sides, (len(targets), sides.shape[1])))
             poses = self.mechanism.home_pose[None] if start is None else start.rows.poses
             question = Question(self.mechanism, self._table, targets, poses, options, keep_mode)
