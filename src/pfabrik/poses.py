@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arrays import Floats
 from .errors import InvalidArgument
-from .rotations import from_quaternion, from_rotvec, from_rpy, nearest_rotations
+from .rotations import UNTURNED, from_quaternion, from_rotvec, from_rpy, nearest_rotations
 from .tolerances import TOLERANCES
 
 
@@ -168,9 +168,15 @@ def are_poses(targets: Floats) -> NDArray[np.bool_]:
 
 
 def made_exact(poses: Floats) -> Floats:
-    """Poses (n, 4, 4) with the rotations nearest to theirs: targets are typed with a few digits."""
-    exact = np.zeros_like(poses)
-    exact[:, :3, :3], exact[:, :3, 3], exact[:, 3, 3] = nearest_rotations(poses[:, :3, :3]), poses[:, :3, 3], 1.0
+    """Poses (n, 4, 4) with the rotations nearest to theirs: targets are typed with a few digits.
+
+    Two steps of Newton's method for the polar decomposition, R <- R (3 - R^T R) / 2: of an error of 1e-6, which is the
+    most that poses have, the first leaves 1e-12.
+    """
+    exact = poses.copy()
+    R, exact[:, 3] = exact[:, :3, :3], (0.0, 0.0, 0.0, 1.0)
+    for _ in range(2):
+        R[:] = R @ (1.5 * UNTURNED - 0.5 * (np.swapaxes(R, 1, 2) @ R))
     return exact
 
 

@@ -13,9 +13,16 @@ def from_rotvec(vectors: Floats) -> Floats:
     R = I + sinc(a) K + sinc(a / 2)^2 / 2 K^2 with K the cross product by the vector and a its length: exact down to
     zero, so that there is no branch for small angles.
     """
-    angles = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    K = np.cross(np.eye(3), vectors[..., None, :])
-    return np.asarray(np.eye(3) + np.sinc(angles / np.pi) * K + 0.5 * np.sinc(0.5 * angles / np.pi) ** 2 * (K @ K))
+    angles = np.sqrt((vectors * vectors).sum(axis=-1))[..., None, None]
+    angles[angles == 0.0] = 1e-20  # whose sine is itself
+    half = 0.5 * angles
+    K = (vectors @ CROSSED).reshape(*vectors.shape, 3)
+    return np.asarray(UNTURNED + np.sin(angles) / angles * K + 0.5 * (np.sin(half) / half) ** 2 * (K @ K))
+
+
+UNTURNED = np.eye(3)
+CROSSED = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0.0]])
+"""By what each component of a vector enters the matrix of its cross product, row by row, (3, 9)."""
 
 
 def from_rpy(angles: Floats) -> Floats:

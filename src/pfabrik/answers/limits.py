@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..description.joint_types import KINDS
 from ..description.mechanism import Mechanism
-from ..motion.limits import coned, ranged
+from ..motion.limits import coned, ranges_of
 from ..tolerances import TOLERANCES
 
 
@@ -47,14 +47,16 @@ ALIKE = 0.999
 def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[ActiveLimit, ...]]:
     """The limits that each row of joint coordinates (n, columns), deviations from home, lies on; ranges first."""
     found: list[list[ActiveLimit]] = [[] for _ in coordinates]
-    for joint in mechanism.joints:
-        for place, (values, bounds, scale) in enumerate(ranged(mechanism, joint, coordinates)):
-            near = TOLERANCES.active * scale
-            low, high = values - bounds[0] <= near, bounds[1] - values <= near
-            for row in np.flatnonzero(low):
-                found[row].append(ActiveLimit(joint.name, "min", float(values[row]), bounds[0], None, place))
-            for row in np.flatnonzero(high & ~low):
-                found[row].append(ActiveLimit(joint.name, "max", float(values[row]), bounds[1], None, place))
+    ranges = ranges_of(mechanism)
+    values, near = ranges.values(coordinates), TOLERANCES.active * ranges.units
+    low, high = values - ranges.low <= near, ranges.high - values <= near
+    for k, (joint, place) in enumerate(zip(ranges.joints, ranges.places, strict=True)):
+        for row in np.flatnonzero(low[:, k]):
+            limit = ActiveLimit(joint.name, "min", float(values[row, k]), float(ranges.low[k]), None, place)
+            found[row].append(limit)
+        for row in np.flatnonzero(high[:, k] & ~low[:, k]):
+            limit = ActiveLimit(joint.name, "max", float(values[row, k]), float(ranges.high[k]), None, place)
+            found[row].append(limit)
     for joint, angles, half_angle in coned(mechanism, coordinates):
         for row in np.flatnonzero(half_angle - angles <= TOLERANCES.active):
             found[row].append(ActiveLimit(joint.name, "cone", float(angles[row]), half_angle))

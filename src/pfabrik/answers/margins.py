@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..arrays import Floats
-from ..motion.limits import coned, ranged
+from ..motion.limits import coned, ranges_of
 from ..tolerances import TOLERANCES
 from .solution import Solution, checked_solution
 
@@ -26,22 +26,28 @@ def margins(solution: Solution) -> Mapping[tuple[str, str], float | Floats]:
     InvalidArgument : what is no Solution.
     """
     mechanism = checked_solution(solution).mechanism
+    ranges, q = ranges_of(mechanism), solution._coordinates
+    values, room, tolerances = ranges.values(q), 0.5 * (ranges.high - ranges.low), TOLERANCES.limit * ranges.units
+    shares = {
+        "min": _shares(values - ranges.low, room, tolerances).T,
+        "max": _shares(ranges.high - values, room, tolerances).T,
+    }
     found: dict[tuple[str, str], Floats] = {}
-    for joint in mechanism.joints:
-        for values, (low, high), unit in ranged(mechanism, joint, solution._coordinates):
-            for bound, off in (("min", values - low), ("max", high - values)):
-                margin = _share(off, 0.5 * (high - low), TOLERANCES.limit * unit)
-                found[joint.name, bound] = np.minimum(margin, found.get((joint.name, bound), np.inf))
-    for joint, angles, half_angle in coned(mechanism, solution._coordinates):
+    for place, joint in enumerate(ranges.joints):
+        for bound, each in shares.items():
+            before = found.get((joint.name, bound))
+            found[joint.name, bound] = each[place] if before is None else np.minimum(each[place], before)
+    for joint, angles, half_angle in coned(mechanism, q):
         found[joint.name, "cone"] = (half_angle - angles) / half_angle
     return MappingProxyType({key: _shaped(margin, solution.shape) for key, margin in found.items()})
 
 
-def _share(off: Floats, room: float, tolerance: float) -> Floats:
-    """Distances from a bound (n,) as shares of the room there is."""
-    if room > 0.0:
+def _shares(off: Floats, room: Floats, tolerances: Floats) -> Floats:
+    """Distances from bounds (n, k) as shares of the room there is, (k,)."""
+    if (room > 0.0).all():
         return off / room
-    return np.where(np.abs(off) <= tolerance, 0.0 * off, np.copysign(np.inf, off))
+    without = np.where(np.abs(off) <= tolerances, 0.0 * off, np.copysign(np.inf, off))
+    return np.where(room > 0.0, off / np.where(room > 0.0, room, 1.0), without)
 
 
 def _shaped(array: Floats, shape: tuple[int, ...]) -> float | Floats:

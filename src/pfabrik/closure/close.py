@@ -112,6 +112,8 @@ def _layout(mechanism: Mechanism, whole: bool, locked: frozenset[int]) -> K.Layo
 
 def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
     """Poses (n, 4, 4) of the end effector, or of the body that carries it where it is a joint."""
+    if not coordinates.any():
+        return np.repeat(mechanism.home_pose[None], len(coordinates), axis=0)
     return np.asarray(displacements(mechanism, coordinates)[mechanism.end_effector_body] @ mechanism.home_pose)
 
 
@@ -240,6 +242,9 @@ def measured(mechanism: Mechanism, coordinates: Floats) -> Closing:
     return close(closure_of(mechanism), coordinates, platform_poses(mechanism, coordinates), max_iterations=0)
 
 
+ROWS_A_BLOCK = 64
+
+
 def _run(loops: K.Loops, layout: K.Layout, problem: K.ClosureProblem, closed: K.Closed) -> None:
     """The kernel over all rows, on all cores."""
     from ..kernels.closure.close import close as close_rows
@@ -251,7 +256,10 @@ def _run(loops: K.Loops, layout: K.Layout, problem: K.ClosureProblem, closed: K.
         close_rows(loops, layout, own, K.Closed._make(array[block] for array in closed))
 
     n = len(closed.poses)
-    in_blocks(run, n, rows_a_block=max(n, 1) if problem.chained else 64)
+    if n <= ROWS_A_BLOCK or problem.chained:
+        close_rows(loops, layout, problem, closed)
+    else:
+        in_blocks(run, n, ROWS_A_BLOCK)
 
 
 def _in_lengths(poses: Floats, scale: float) -> Floats:

@@ -175,17 +175,21 @@ def _has_loops_aside(mechanism: Mechanism) -> bool:
 def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_mode: bool) -> Closing:
     """Close the legs below platforms on their targets, within limits; the rows that are feasible are reached."""
     task, follows = task_of(closure.mechanism), follows_task(closure.mechanism)
-    wanted = task.completed(targets, begin)
+    wanted = targets if task.is_whole_pose else task.completed(targets, begin)
     rows = np.arange(len(targets))
     if follows:
         assembled = _assembled(closure, wanted, start, begin)
         wanted, rows = assembled.poses, np.flatnonzero(assembled.gap <= TOLERANCES.position)
     held = HELD if follows else task.held
     found = _close_below(closure, start, wanted, held)
-    is_far = _distances(closure, begin, wanted) > STRIDE
-    rest = np.flatnonzero(~found.feasible | (is_far if keep_mode else False))
+    strayed = ~found.feasible
+    if keep_mode:
+        strayed |= _distances(closure, begin, wanted) > STRIDE
+    rest = np.flatnonzero(strayed)
     if len(rest):
         found.improve(rest, _led(closure, wanted[rest], start[rest], begin[rest], held, limits=True))
+    elif len(rows) == len(targets):
+        return found
     if not keep_mode:
         at_rest = follows or task.is_whole_pose
         if not at_rest:

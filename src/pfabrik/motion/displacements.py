@@ -118,6 +118,13 @@ def centres(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
     return {joint.name: present[:, j] for j, joint in enumerate(mechanism.joints) if joint.at is not None}
 
 
+def placed(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats]:
+    """Displacements (n, bodies, 4, 4) of `mechanism.bodies`, and joint centres (n, joints, 3) as of `centres`."""
+    geometry = _geometry(mechanism)
+    bodies = _bodies(geometry, _motions(geometry, q)[0])
+    return bodies, _centres(geometry, bodies)
+
+
 def end_effector_pose(mechanism: Mechanism, q: Floats) -> Floats:
     """Pose of the end effector, T_base_platform, (n, 4, 4) [length].
 
@@ -246,7 +253,7 @@ def _motions(geometry: _Geometry, q: Floats) -> tuple[Floats, Floats]:
     Both are in home coordinates.
     """
     shape = (len(q), *geometry.centres.shape)
-    first, second = (from_rotvec((q @ turn.reshape(len(turn), -1)).reshape(shape)) for turn in geometry.turns)
+    first, second = from_rotvec((q @ geometry.turns.reshape(2, len(geometry.owners), -1)).reshape(2, *shape))
     slides = (q @ geometry.slides.reshape(len(geometry.slides), -1)).reshape(shape)
     return _about(geometry.centres, first @ second, slides), first
 

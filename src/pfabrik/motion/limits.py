@@ -2,54 +2,124 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..description.graph import cone_line
 from ..description.joint_types import KINDS
-from ..description.mechanism import Joint, Mechanism
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
-from .displacements import centres, columns, displacements
+from .displacements import columns, placed
+
+
+class Ranges(NamedTuple):
+    """Every coordinate that has a range, k of them, in the order of the joints.
+
+    Attributes
+    ----------
+    joints, places : whose coordinate it is, and which of that joint.
+    columns : its place in q, (k,).
+    home, low, high : its value at home and its bounds, as the description counts them, (k,) [rad or length].
+    units : L for lengths, 1 for angles, (k,).
+    """
+
+    joints: tuple[Joint, ...]
+    places: tuple[int, ...]
+    columns: NDArray[np.intp]
+    home: Floats
+    low: Floats
+    high: Floats
+    units: Floats
+
+    def values(self, coordinates: Floats) -> Floats:
+        """Values (n, k), as the description counts them, in joint coordinates (n, c)."""
+        return np.asarray(coordinates[:, self.columns] + self.home)
+
+
+@lru_cache(maxsize=64)
+def ranges_of(mechanism: Mechanism) -> Ranges:
+    """The ranges of a mechanism."""
+    joints = [joint for joint in mechanism.joints if joint.range is not None]
+    own = [(joint, place) for joint in joints for place in range(len(KINDS[joint.type].coordinates))]
+    bounds = np.concatenate([np.zeros((0, 2)), *(np.reshape(np.asarray(joint.range), (-1, 2)) for joint in joints)])
+    low, high = np.ascontiguousarray(bounds.T, np.float64)
+    return Ranges(
+        tuple(joint for joint, _ in own),
+        tuple(place for _, place in own),
+        np.array([columns(mechanism)[joint.name].start + place for joint, place in own], np.intp),
+        np.array([np.ravel(mechanism.home_coordinate(joint.name))[place] for joint, place in own], float),
+        low,
+        high,
+        np.array([_unit(mechanism, joint, place) for joint, place in own], float),
+    )
+
+
+def _unit(mechanism: Mechanism, joint: Joint, place: int) -> float:
+    return mechanism.characteristic_length if KINDS[joint.type].coordinates[place] == "length" else 1.0
 
 
 def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
     """Count the angles of ranged joints about one axis by whole turns into their ranges, if possible, in place."""
-    for joint in mechanism.joints:
-        if joint.type not in ("revolute", "cylindrical") or joint.range is None:
-            continue
-        low, high = np.ravel(joint.range)[:2] - np.ravel(mechanism.home_coordinate(joint.name))[0]
-        values = coordinates[:, columns(mechanism)[joint.name].start]  # a view
-        low, high = low - TOLERANCES.limit, high + TOLERANCES.limit
+    places, low, high = _turning(mechanism)
+    values = coordinates[:, places]
+    outside = (values < low) | (values > high)
+    if outside.any():
         least = values + 2.0 * np.pi * np.ceil((low - values) / (2.0 * np.pi))
-        outside = (values < low) | (values > high)
-        values[:] = np.where(outside & (least <= high), least, values)
+        coordinates[:, places] = np.where(outside & (least <= high), least, values)
 
 
-def ranged(
-    mechanism: Mechanism, joint: Joint, coordinates: Floats
-) -> Iterator[tuple[Floats, tuple[float, float], float]]:
-    """Values (n,), bounds and unit of every ranged coordinate of a joint."""
-    if joint.range is None:
-        return
-    own = coordinates[:, columns(mechanism)[joint.name]] + np.ravel(mechanism.home_coordinate(joint.name))
-    for values, bounds, kind in zip(
-        own.T, np.reshape(joint.range, (-1, 2)).tolist(), KINDS[joint.type].coordinates, strict=True
-    ):
-        yield values, (bounds[0], bounds[1]), mechanism.characteristic_length if kind == "length" else 1.0
+@lru_cache(maxsize=64)
+def _turning(mechanism: Mechanism) -> tuple[NDArray[np.intp], Floats, Floats]:
+    """Columns of ranged angles about one axis, and the bounds of their deviations with what counts as on them."""
+    ranges = ranges_of(mechanism)
+    own = [
+        k
+        for k, (joint, place) in enumerate(zip(ranges.joints, ranges.places, strict=True))
+        if joint.type in ("revolute", "cylindrical") and place == 0
+    ]
+    low, high = (bound[own] - ranges.home[own] for bound in (ranges.low, ranges.high))
+    return ranges.columns[own], low - TOLERANCES.limit, high + TOLERANCES.limit
 
 
-def coned(mechanism: Mechanism, coordinates: Floats) -> Iterator[tuple[Joint, Floats, float]]:
+class _Cones(NamedTuple):
+    """Every cone: its joint, the joints its line leads from and to, and the body and direction of its axis."""
+
+    joints: tuple[Joint, ...]
+    starts: list[int]
+    ends: list[int]
+    bodies: list[int]
+    axes: Floats
+
+
+@lru_cache(maxsize=64)
+def _cones(mechanism: Mechanism) -> _Cones:
+    joints = tuple(joint for joint in mechanism.joints if joint.cone is not None)
+    lines = [cone_line(mechanism, joint) for joint in joints]
+    cones = [joint.cone for joint in joints if joint.cone is not None]
+    return _Cones(
+        joints,
+        [mechanism.joints.index(start) for start, _ in lines],
+        [mechanism.joints.index(end) for _, end in lines],
+        [mechanism.bodies.index(cone.fixed_to) for cone in cones],
+        np.array([cone.axis for cone in cones]).reshape(-1, 3),
+    )
+
+
+def coned(mechanism: Mechanism, coordinates: Floats) -> list[tuple[Joint, Floats, float]]:
     """Every joint with a cone, the angles (n,) of its line to the cone's axis, and the half angle."""
-    joints = [joint for joint in mechanism.joints if joint.cone is not None]
-    if not joints:
-        return
-    bodies, points = displacements(mechanism, coordinates), centres(mechanism, coordinates)
-    for joint in joints:
-        if joint.cone is not None:
-            start, end = cone_line(mechanism, joint)
-            line = points[end.name] - points[start.name]
-            axis = bodies[joint.cone.fixed_to][:, :3, :3] @ np.asarray(joint.cone.axis)
-            across = np.linalg.norm(np.cross(axis, line), axis=1)
-            yield joint, np.arctan2(across, (axis * line).sum(axis=1)), joint.cone.half_angle
+    cones = _cones(mechanism)
+    if not cones.joints:
+        return []
+    bodies, points = placed(mechanism, coordinates)
+    lines = points[:, cones.ends] - points[:, cones.starts]
+    axes = (bodies[:, cones.bodies, :3, :3] @ cones.axes[:, :, None])[..., 0]
+    (ax, ay, az), (x, y, z) = np.moveaxis(axes, -1, 0), np.moveaxis(lines, -1, 0)
+    across = np.sqrt((ay * z - az * y) ** 2 + (az * x - ax * z) ** 2 + (ax * y - ay * x) ** 2)
+    angles = np.arctan2(across, ax * x + ay * y + az * z)
+    half_angles = (joint.cone.half_angle for joint in cones.joints if joint.cone is not None)
+    return list(zip(cones.joints, angles.T, half_angles, strict=True))
