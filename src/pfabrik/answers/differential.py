@@ -7,8 +7,9 @@ from typing import Any, cast
 import numpy as np
 
 from ..arrays import Floats
+from ..closure.first_order import forward_map, inverse_map, singularities
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..motion.first_order import Mobility, Singularity, forward_map, generic_of, inverse_map, measures
+from ..motion.first_order import Mobility, Singularity, generic_of
 from .solution import Solution, checked_solution
 
 __all__ = ["Mobility", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]
@@ -51,7 +52,7 @@ def inverse_jacobian(solution: Solution) -> Floats:
 
 def singularity(solution: Solution) -> Singularity:
     """How near every configuration of a solution is to a singularity of each kind; INVALID rows are NaN."""
-    found = measures(*_of(solution))
+    found = singularities(*_of(solution))
     kinds = cast(list[tuple[str, ...]], found.kinds)
     return Singularity(
         serial=_shaped(solution, np.asarray(found.serial)),

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats
+from ..closure.first_order import are_stretched, forward_map
 from ..description.joint_types import KINDS
 from ..description.readouts import readouts
-from ..motion.first_order import are_stretched, forward_map
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:

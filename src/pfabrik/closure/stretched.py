@@ -5,9 +5,9 @@ from __future__ import annotations
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..kernels.reaching import plan as P
-from ..motion.first_order import are_stretched
 from ..options import Options
 from .close import closure_of
+from .first_order import are_stretched
 from .parasitic import differences
 from .projection import SAME, ways_of
 

@@ -12,7 +12,8 @@ import numpy as np
 from ._jit import _config, _name_of
 from .closure.close import close
 from .closure.descend import approach
-from .closure.loops import Closed, ClosureProblem, Layout, Loops
+from .closure.first_order import first_order
+from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Layout, Loops
 from .closure.pose_objective import PoseObjective
 from .legs import records as R
 from .legs.answer import answer, measure_rows, read_coordinates
@@ -41,6 +42,7 @@ _PLAN = P.Plan._make([*(np.zeros(0, record) for record in _PLAN_RECORDS), np.zer
 _LOOPS = Loops(*_values("i1 f2 f2 i1 i2 i1 i1 i1 i1 i1 i1 f1 f1 f1 i2 f2 f2 f1 i1 i2 i1 f2 i2 i1"))
 _LAYOUT = Layout(*_values("i1 i1"))
 _CLOSED = Closed(*_values("f2 f3 f2 f2 f2 i1"))
+_F2, _FIRST_ORDER = np.zeros((0, 0)), FirstOrder(*_values("f3 f3 f2 f2 f2"))
 _ROWS = (
     _PLAN,
     np.zeros((0, 4, 4)),
@@ -64,6 +66,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (solve_by_iteration, _ROWS),
     (approach, (_LOOPS, _LAYOUT, _POSE_OBJECTIVE, _CLOSED, np.zeros((0, 0)))),
     (read_coordinates, (_LEGS, _KNOWN, _TASK, *_values("f3 f2 f2"))),
+    (first_order, (_LOOPS, _LAYOUT, FirstOrderPlan(*_values("f2 f1 f2 i1 i i i i f i")), _F2, _FIRST_ORDER)),
     (feasibility, (_LEGS, *_LIMITS, _TASK, *_values("f3 f3 f2 f1 i1"))),
     (answer_otherwise, (_TABLE, *_values("f3 f3 f2 i1 f3 f2 f2"))),
     (

@@ -37,10 +37,6 @@ SAMPLES, STEPS, STEP = 8, 3, 0.1
 """Walks from home to generic configurations: how many, of how many steps, of which largest joint motion [rad or L]."""
 NEWTON_STEPS = 20
 """Most steps to close the loops after one of them; a walk that takes more is left out."""
-STRETCHED = 1e-3
-"""Measure of singularity [L and rad] below which links count as stretched out or folded: it goes with the square root
-of a length, and what a search for the nearest pose leaves of a length is up to a millionth.
-"""
 
 
 @dataclass(frozen=True)
@@ -135,22 +131,21 @@ def measures(mechanism: Mechanism, q: Floats) -> Singularity:
     found = np.stack([serial, parallel, motion.constraint, motion.passive])
     for array in (found.T, lost, gained):
         array[invalid] = np.nan
-    near = TOLERANCES.singular > found.T
+    return singularity_of(found.T, lost, gained)
+
+
+def singularity_of(found: Floats, lost: Floats, gained: Floats) -> Singularity:
+    """A `Singularity` of measures (n, 4), in the order of `KINDS`, and twists (n, r) of any length."""
+    near = TOLERANCES.singular > found
     return Singularity(
-        serial=found[0],
-        parallel=found[1],
-        constraint=found[2],
-        passive=found[3],
+        serial=found[:, 0],
+        parallel=found[:, 1],
+        constraint=found[:, 2],
+        passive=found[:, 3],
         lost=_unit(lost),
         gained=_unit(gained),
         kinds=[tuple(kind for kind, is_near in zip(KINDS, row, strict=True) if is_near) for row in near],
     )
-
-
-def are_stretched(mechanism: Mechanism, q: Floats) -> NDArray[np.bool_]:
-    """Whether links are stretched out or folded at coordinates q (n, c), so that they may bend either way, (n,)."""
-    found = measures(mechanism, q)
-    return np.asarray(np.minimum(found.serial, found.passive) < STRETCHED)
 
 
 def _set_aside(q: Floats) -> tuple[NDArray[np.bool_], Floats]:
@@ -183,7 +178,7 @@ class _Motion:
 def _motion(mechanism: Mechanism, q: Floats) -> _Motion:
     generic = generic_of(mechanism)
     closure, twist = _first_order(mechanism, q)
-    actuated = _actuated(mechanism)
+    actuated = actuated_columns(mechanism)
     rank, shown = closure.shape[-1] - generic.mobility.mobility, generic.mobility.platform + generic.mobility.internal
     values, right = _right_singular(closure)
     motions = np.swapaxes(right[:, rank:], -1, -2)
@@ -274,16 +269,16 @@ def _units(mechanism: Mechanism, motion: _Motion) -> tuple[Floats, Floats]:
     """What one stands for in a twist, (r,), and in actuator rates, (n_a,): L for a length, 1 for an angle."""
     twist = np.ones(motion.twists.shape[1])
     twist[:3] = mechanism.characteristic_length
-    return twist, rate_units(mechanism)[_actuated(mechanism)]
+    return twist, rate_units(mechanism)[actuated_columns(mechanism)]
 
 
-def _actuated(mechanism: Mechanism) -> list[int]:
+def actuated_columns(mechanism: Mechanism) -> list[int]:
     """The columns of the actuators."""
     return [drive.column for drive in mechanism.drives]
 
 
 @dataclass(frozen=True)
-class _Graph:
+class Graph:
     """How twists and loop conditions sum up the screws, per column of q.
 
     Attributes
@@ -300,16 +295,16 @@ class _Graph:
 
 
 @lru_cache(maxsize=64)
-def _graph(mechanism: Mechanism) -> _Graph:
+def graph_of(mechanism: Mechanism) -> Graph:
     tree, owners = tree_of(mechanism), column_joints(mechanism)
     path = tree.paths[mechanism.end_effector_body][owners]
     orthonormal = np.linalg.qr(tree.loops.T)[0].T
-    return _Graph(path, tree.loops[:, owners], orthonormal[:, owners], orthonormal_rates(mechanism))
+    return Graph(path, tree.loops[:, owners], orthonormal[:, owners], orthonormal_rates(mechanism))
 
 
 def _first_order(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats]:
     """Loop conditions (n, 6 loops, c) and twist of the end effector (n, r, c), per orthonormal joint rate."""
-    graph = _graph(mechanism)
+    graph = graph_of(mechanism)
     present = graph.rates @ _at_reference(mechanism, q, screws(mechanism, q))
     twist = body_twist(graph.path, present)
     velocity, angular = twist[:, 3:], twist[:, :3]
@@ -340,7 +335,7 @@ def generic_of(mechanism: Mechanism) -> Generic:
     ranks = _rank(values)
     rank = int(ranks.max())
     motions = np.swapaxes(right[ranks == rank, rank:], -1, -2)
-    twists, actuators = twist[ranks == rank] @ motions, motions[:, _actuated(mechanism)]
+    twists, actuators = twist[ranks == rank] @ motions, motions[:, actuated_columns(mechanism)]
     shown, platform, driven = (
         int(_rank(np.linalg.svd(each, compute_uv=False)).max())
         for each in (np.concatenate([twists, actuators], axis=1), twists, actuators)
@@ -378,7 +373,7 @@ def around_home(mechanism: Mechanism) -> Floats:
 
 
 def _moved(mechanism: Mechanism, q: Floats, rates: Floats) -> Floats:
-    return stepped(mechanism, q, rates @ _graph(mechanism).rates)
+    return stepped(mechanism, q, rates @ graph_of(mechanism).rates)
 
 
 def _closed(mechanism: Mechanism, q: Floats) -> Floats:
@@ -386,7 +381,7 @@ def _closed(mechanism: Mechanism, q: Floats) -> Floats:
 
     Directions in which the loops hardly resist are left alone, so that a walk may start in a singularity.
     """
-    graph = _graph(mechanism)
+    graph = graph_of(mechanism)
     for _ in range(NEWTON_STEPS):
         open_by = gaps(mechanism, q) / mechanism.characteristic_length
         conditions = loop_conditions(graph.fundamental, graph.rates @ _at_reference(mechanism, q, screws(mechanism, q)))
@@ -409,7 +404,7 @@ def stepped_freely(mechanism: Mechanism, q: Floats, step: float) -> Floats:
     step : of the end effector [L or rad].
     """
     closure, twist = _first_order(mechanism, q[None])
-    free = np.setdiff1d(np.arange(q.size), _actuated(mechanism))
+    free = np.setdiff1d(np.arange(q.size), actuated_columns(mechanism))
     values, right = _right_singular(closure[..., free])
     motions = right[0, np.count_nonzero(values > TOLERANCES.singular) :].T
     _, sizes, axes = np.linalg.svd(twist[0][:, free] @ motions, full_matrices=False)

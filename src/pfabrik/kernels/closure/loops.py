@@ -89,3 +89,28 @@ class Closed(NamedTuple):
     excesses: Floats  # (n, groups): largest excess over a limit
     misses: Floats  # (n, groups): largest distance of a joint's centre from where it was wished
     iterations: Ints  # (n,)
+
+
+class FirstOrderPlan(NamedTuple):
+    """What is asked of a mechanism, and what holds of it in general."""
+
+    loops: Floats  # (loops, columns): orthonormal combinations of the loops
+    way: Floats  # (columns,): how the way to the end effector passes each joint
+    rates: Floats  # (columns, columns): orthonormal rates of every joint
+    actuated: Ints  # (n_a,): columns of the actuators
+    rank: int  # of the loops' conditions
+    shown: int  # motions that show at the end effector or the actuators
+    freedoms: int  # of the end effector
+    twists: int  # rows of a twist: 6, or 3
+    least: float  # singular value up to which a direction counts as lost
+    asks_constraint: int  # 1: the singular value of the conditions is asked for
+
+
+class FirstOrder(NamedTuple):
+    """What is told, row by row; lengths in L."""
+
+    forward: Floats  # (n, twists, n_a)
+    inverse: Floats  # (n, n_a, twists)
+    measures: Floats  # (n, 4): serial, parallel, constraint, passive
+    lost: Floats  # (n, twists): not yet unit vectors
+    gained: Floats
