@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 import pfabrik as pf
+from calls import calls
 from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
 from pfabrik.reproduce.timing import one_core
@@ -55,21 +56,6 @@ def agree(solution: pf.Solution, values: Array) -> None:
     """Stop where the closed form answers differently: the comparison would mean nothing."""
     if not solution or np.abs(solution.actuators - values).max() > 1e-6 * solution.mechanism.characteristic_length:
         sys.exit(f"the closed form disagrees with {solution!r}")
-
-
-def single_calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
-    """One call at a time from Python, kernels loaded."""
-    mechanism = pf.load("stewart")
-    struts, calls = Struts(mechanism), 200
-    drawn = draw(mechanism, rng, 4 * calls, 0.2, 0.2)
-    targets = list(drawn[struts.solve(drawn)[1]][:calls])
-    ours, theirs = best_times(
-        runs,
-        lambda: [pf.solve_ik(mechanism, target) for target in targets],
-        lambda: [struts.one(target) for target in targets],
-    )
-    baseline = "NumPy, lengths and strokes of one pose"
-    yield Row("6-UPS, one call, reachable", calls, ours / calls, baseline, theirs / calls)
 
 
 def batches(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
@@ -167,7 +153,7 @@ def main() -> None:
     given = parser.parse_args()
     where, runs, rng = machine(), (3 if given.quick else 15), np.random.default_rng(1)
     rows = [
-        *single_calls(rng, runs),
+        *calls(rng, runs),
         *batches(rng, runs, 10_000 if given.quick else 100_000),
         *projections(rng, runs, 100 if given.quick else 1000),
         *forward(rng, runs, 200 if given.quick else 2000),

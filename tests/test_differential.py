@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
@@ -16,9 +17,12 @@ from machines import MACHINES, planar, ring
 from pfabrik import Joint, Mechanism, Solution
 from pfabrik.answers.differential import Mobility, forward_jacobian, inverse_jacobian, mobility, singularity
 from pfabrik.closure.configurations import Configurations, new_rows
+from pfabrik.closure.first_order import forward_map, inverse_map, singularities
+from pfabrik.description.graph import tree_of
+from pfabrik.description.home_mobility import column_joints
 from pfabrik.errors import InvalidArgument
-from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units
-from pfabrik.motion.first_order import KINDS, forward_map, generic_of, inverse_map, measures
+from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units, screws
+from pfabrik.motion.first_order import KINDS, generic_of, measures
 from pfabrik.tolerances import TOLERANCES
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -183,6 +187,18 @@ def driven(machine: Mechanism, q: np.ndarray, values: np.ndarray) -> np.ndarray:
     return solved(errors, q, units)
 
 
+def conditions_and_twist(machine: Mechanism, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What the loops ask to vanish (6 loops, c) and the twist of the end effector (6 or 3, c), by joint rates, in L."""
+    tree, owners = tree_of(machine), column_joints(machine)
+    present = screws(machine, q)[0]
+    present[:, 3:] += np.cross(present[:, :3], end_effector_pose(machine, q)[0, :3, 3] / machine.characteristic_length)
+    twist = (present * tree.paths[machine.end_effector_body][owners][:, None]).T
+    rows = twist[3:] if machine.end_effector_is_joint else np.concatenate([twist[3:], twist[:3]])
+    return np.concatenate(
+        [np.zeros((0, len(owners))), *((present * loop[owners][:, None]).T for loop in tree.loops)]
+    ), rows
+
+
 def drives(machine: Mechanism) -> list[int]:
     return [columns(machine)[each].start for each in machine.actuator_names]
 
@@ -301,6 +317,18 @@ class TestJacobians:
                 scale = np.abs(forward[row, :, k]).max()
                 assert forward[row, :, k] == pytest.approx(expected, abs=1e-6 * scale)
 
+    @pytest.mark.parametrize("name", CONTROLLED)
+    def test_forward_jacobian_is_what_the_loops_make_of_actuator_rates(self, name):
+        """The rates of all joints by SciPy's null space of the loops' conditions on the tree's screws."""
+        machine, q = closed(name)
+        units = rate_units(machine)[drives(machine)]
+        for row, found in zip(q, forward_map(machine, q), strict=True):
+            conditions, twist = conditions_and_twist(machine, row[None])
+            motions = null_space(conditions, rcond=1e-7)
+            expected = twist @ motions @ np.linalg.pinv(motions[drives(machine)], rcond=1e-7) / units
+            expected[:3] *= machine.characteristic_length
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
     @pytest.mark.parametrize("name", ["hexapod_ups", "hexapod_rus", "hexaglide", "stewart"])
     def test_jacobians_of_six_freedoms_and_six_actuators_are_inverse(self, name):
         machine, q = closed(name)
@@ -350,7 +378,7 @@ class TestJacobians:
             found = function(machine, marked)
             assert np.isnan(found[1]).all()
             assert np.array_equal(found[[0, 2]], function(machine, q))
-        near = measures(machine, marked)
+        near = singularities(machine, marked)
         assert np.isnan([near.serial[1], near.parallel[1], near.constraint[1], near.passive[1]]).all()
         assert np.isnan([near.lost[1], near.gained[1]]).all()
         assert near.kinds == [(), (), ()]
@@ -369,9 +397,17 @@ class TestJacobians:
 
 class TestSingularity:
     @pytest.mark.parametrize("name", CONTROLLED)
+    def test_measures_are_those_of_all_singular_vectors(self, name):
+        machine, q = closed(name)
+        found, exactly = singularities(machine, q), measures(machine, q)
+        for kind in KINDS:
+            np.testing.assert_allclose(getattr(found, kind), getattr(exactly, kind), rtol=1e-9)
+        assert found.kinds == exactly.kinds
+
+    @pytest.mark.parametrize("name", CONTROLLED)
     def test_measures_are_the_norms_of_the_jacobians_and_the_twists_attain_them(self, name):
         machine, q = closed(name)
-        forward, inverse, near = forward_map(machine, q), inverse_map(machine, q), measures(machine, q)
+        forward, inverse, near = forward_map(machine, q), inverse_map(machine, q), singularities(machine, q)
         units = rate_units(machine)[drives(machine)]
         twist = np.ones(forward.shape[1])
         twist[:3] = machine.characteristic_length
@@ -474,7 +510,7 @@ class TestSingularity:
         machine = MACHINES["serial_spherical"]()
         q = home(machine)
         q[0, columns(machine)["s2"]] = 0.4, 0.3, -0.2
-        near = measures(machine, q)
+        near = singularities(machine, q)
         assert near.parallel == pytest.approx(0, abs=1e-12)
         assert near.kinds == [("parallel",)]
 

@@ -56,11 +56,13 @@ def solve_fk(
     """
     options = checked_options(options)
     values, shape = as_values(mechanism, actuators)
+    begin = start_of(mechanism, start, shape)
+    if shape == () and np.abs(values).max(initial=0.0) <= HORIZON:  # one row of numbers, with nothing to set aside
+        return Solution(mechanism, engine_of(mechanism).forward(values, begin, options.actuator_tolerance), shape)
     known = np.asarray(np.isfinite(values).all(axis=1))
     if options.on_invalid == "raise" and not known.all():
         bad = np.flatnonzero(~known)[:5].tolist() if shape else ()
         raise InvalidArgument("actuators", "a value that is not finite", "finite values", rows=bad)
-    begin = start_of(mechanism, start, shape)
     first = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(known))
     asked = np.clip(values[known], -HORIZON, HORIZON)
     found = engine_of(mechanism).forward(asked, first, options.actuator_tolerance)

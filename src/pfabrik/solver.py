@@ -57,14 +57,19 @@ class Solver:
         self._start, begin = start, start_of(mechanism, start, ())
         warm_up(mechanism)
         self._engine, self._rows, self._target = engine_of(mechanism), new_rows(mechanism, 1), np.eye(4)[None]
+        self._values = np.zeros((1, len(mechanism.actuator_names)))
         self._reach: Callable[[], int] | None = None
+        self._assemble: Callable[[Floats], bool] | None = None
         if isinstance(self._engine, LegsEngine):
             keep_mode = keeps_mode(self.options, start)
             self._reach = self._engine.prepared(self._target, begin, self.options, self._rows, keep_mode=keep_mode)
+            if start is None:
+                self._assemble = self._engine.prepared_forward(self._rows)
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))
         self.pose, self.actuators = _read_only(self._rows.poses[0]), _read_only(self._rows.actuators[0])
         self.status = Status.INVALID
         self._found: Solution | None = None
+        self._was_forward = False
         self._clear()
 
     def ik(self, target: Target) -> Status:
@@ -81,7 +86,7 @@ class Solver:
         if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is DOUBLE:
             self._target[0] = target
             if self._reach is not None and not self._reach():
-                self._found, self.status = None, Status.REACHED
+                self._found, self._was_forward, self.status = None, False, Status.REACHED
                 return Status.REACHED
         self._clear()
         return self._take(solve_ik(self.mechanism, target, start=self._start, options=self.options), "target")
@@ -93,6 +98,11 @@ class Solver:
         ------
         InvalidArgument : as of `solve_fk`; then `status` is INVALID.
         """
+        if type(actuators) is np.ndarray and actuators.shape == self.actuators.shape and actuators.dtype is DOUBLE:
+            self._values[0] = actuators
+            if self._assemble is not None and self._assemble(self._values):
+                self._found, self._was_forward, self.status = None, True, Status.REACHED
+                return Status.REACHED
         self._clear()
         found = solve_fk(self.mechanism, actuators, start=self._start, options=self.options)
         return self._take(found, "actuators")
@@ -118,7 +128,10 @@ class Solver:
         if self._found is None:
             if self.status is Status.INVALID:
                 raise InvalidArgument("solution", "no answer", "a question before that is not refused")
-            self._found = solve_ik(self.mechanism, self._target[0].copy(), start=self._start, options=self.options)
+            if self._was_forward:
+                self._found = solve_fk(self.mechanism, self._values[0], options=self.options)
+            else:
+                self._found = solve_ik(self.mechanism, self._target[0], start=self._start, options=self.options)
         return self._found
 
     def __repr__(self) -> str:

@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from .answers.differential import forward_jacobian
 from .answers.solution import Solution
 from .description.mechanism import Mechanism, checked_mechanism
 from .fk import solve_fk
@@ -31,7 +32,8 @@ def warm_up(mechanism: Mechanism | None = None, *, on_step: Callable[[str, float
 
     Parameters
     ----------
-    mechanism : the machine to be asked: inverse and forward kinematics within and out of reach, paths, and all joints.
+    mechanism : the machine to be asked: inverse and forward kinematics within and out of reach, paths, all joints, and
+        Jacobians.
         What it does not need is not compiled. Default: everything that any machine needs.
     on_step : called after each step with its name and how long it took [s].
     """
@@ -57,5 +59,6 @@ def _questions(mechanism: Mechanism) -> Iterator[Step]:
     yield "targets out of reach", partial(solve_ik, mechanism, far)
     yield "paths", partial(track, mechanism, np.stack([home, far]))
     yield "coordinates of all joints", lambda: solve_ik(mechanism, np.stack([home, far])).q
+    yield "Jacobians", lambda: forward_jacobian(solve_ik(mechanism, home))
     yield "forward kinematics", partial(forward, 0.0)
     yield "actuator values out of reach", partial(forward, shift)

@@ -30,7 +30,7 @@ from ..description.home_mobility import (
 )
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
-from .displacements import end_effector_pose, gaps, loop_errors, rate_units, screws, stepped
+from .displacements import end_effector_pose, gaps, loop_errors, screws, stepped
 
 KINDS = ("serial", "parallel", "constraint", "passive")
 SAMPLES, STEPS, STEP = 8, 3, 0.1
@@ -99,27 +99,6 @@ class Singularity:
     lost: Floats
     gained: Floats
     kinds: tuple[str, ...] | list[tuple[str, ...]]
-
-
-def forward_map(mechanism: Mechanism, q: Floats) -> Floats:
-    """`forward_jacobian` at coordinates q, (n, c): (n, 6, n_a) or (n, 3, n_a)."""
-    invalid, q = _set_aside(q)
-    motion = _motion(mechanism, q)
-    twist_units, actuator_units = _units(mechanism, motion)
-    forward = twist_units[:, None] * (motion.twists @ _pseudo_inverse(motion.actuators)) / actuator_units
-    forward[invalid] = np.nan
-    return forward
-
-
-def inverse_map(mechanism: Mechanism, q: Floats) -> Floats:
-    """`inverse_jacobian` at coordinates q, (n, c): (n, n_a, 6) or (n, n_a, 3)."""
-    invalid, q = _set_aside(q)
-    motion = _motion(mechanism, q)
-    twist_units, actuator_units = _units(mechanism, motion)
-    freedoms = generic_of(mechanism).mobility.platform
-    inverse = actuator_units[:, None] * (motion.actuators @ _pseudo_inverse(motion.twists, freedoms)) / twist_units
-    inverse[invalid] = np.nan
-    return inverse
 
 
 def measures(mechanism: Mechanism, q: Floats) -> Singularity:
@@ -263,13 +242,6 @@ def _right_singular(matrices: Floats) -> tuple[Floats, Floats]:
         return np.zeros((n, 0)), np.broadcast_to(np.eye(b), (n, b, b))
     _, values, right = np.linalg.svd(matrices)
     return values, right
-
-
-def _units(mechanism: Mechanism, motion: _Motion) -> tuple[Floats, Floats]:
-    """What one stands for in a twist, (r,), and in actuator rates, (n_a,): L for a length, 1 for an angle."""
-    twist = np.ones(motion.twists.shape[1])
-    twist[:3] = mechanism.characteristic_length
-    return twist, rate_units(mechanism)[actuated_columns(mechanism)]
 
 
 def actuated_columns(mechanism: Mechanism) -> list[int]:

@@ -14,8 +14,11 @@ from ..closure.configurations import Configurations
 from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable, Records
 from ..description.mechanism import Mechanism
+from ..kernels.platform.nearest import Starts
 from ..kernels.reaching import plan as P
 from .coordinates import settled
+from .nearest import home_start, no_starts
+from .table import kernel_table
 
 
 class LegAnswer(Configurations):
@@ -76,6 +79,44 @@ class OneTarget:
 
     def _given(self, nearby: bool) -> tuple[Records, ...]:
         return self._nearby if nearby else self._anywhere
+
+
+class OneAssembly:
+    """Forward kinematics of a machine of legs from home, one row after the other, prepared likewise."""
+
+    def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
+        n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
+        self._length, turns = mechanism.characteristic_length, not mechanism.end_effector_is_joint
+        self._home, self._units = np.zeros(n_actuators), np.ones(n_actuators)
+        self._home[table.driven["column"]], self._units[table.driven["column"]] = (
+            table.driven["home"],
+            table.driven["unit"],
+        )
+        self._asked = turns, home_start(mechanism, table), no_starts(table)
+        self._legs = kernel_table(table)
+
+    @cached_property
+    def _kernel(self) -> Callable[..., None]:
+        from ..kernels.platform.forward import assemble
+
+        return assemble
+
+    def new_ends(self) -> Starts:
+        """Room for where one search ends."""
+        return Starts(np.empty((1, 4, 4)), np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
+
+    def assemble(self, values: Floats, rows: P.Rows, ends: Starts) -> bool:
+        """Answer actuated values (1, n_a) if they assemble from home within all limits; whether they do."""
+        wanted = (values - self._home) / self._units
+        self._kernel(self._legs, wanted, *self._asked, rows.status, rows.measures, ends)
+        if rows.status[0] != P.REACHED:
+            return False
+        pose = rows.poses[0]
+        pose[:] = ends.poses[0]
+        pose[:3, 3] *= self._length
+        rows.actuators[:] = values
+        rows.measures[0, P.RESIDUAL] *= self._length
+        return True
 
 
 def _filled(rows: P.Rows) -> tuple[NDArray[Any], ...]:

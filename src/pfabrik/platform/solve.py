@@ -20,7 +20,7 @@ from ..options import Options
 from ..reaching.solve import ReachingEngine
 from .coordinates import settled, sides_at
 from .forward import assembled
-from .one import LegAnswer, OneTarget
+from .one import LegAnswer, OneAssembly, OneTarget
 from .unreached import Question, answer_unreached
 
 Floats = NDArray[np.float64]
@@ -39,6 +39,7 @@ class LegsEngine:
     def __init__(self, table: LegTable, inner: ReachingEngine | ClosureEngine) -> None:
         self.mechanism = inner.mechanism
         self._table, self._inner, self._one = table, inner, OneTarget(self.mechanism, table)
+        self._one_forward = OneAssembly(self.mechanism, table)
         driven = table.driven
         self._turning = driven[(driven["turns"] == 1) & (driven["hi"] - driven["lo"] > 2.0 * np.pi)]
 
@@ -59,7 +60,7 @@ class LegsEngine:
         carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
         if left and options.projection == "nearest" and not has_other_assemblies(self.mechanism):
             sides = np.array(np.broadcast_to(sides, (len(targets), sides.shape[1])))
-            poses = self.mechanism.home_pose[None] if start is None else start.rows.poses
+            poses = self._one.home if start is None else start.rows.poses
             question = Question(self.mechanism, self._table, targets, poses, options, keep_mode)
             carriers = answer_unreached(question, rest, sides, rows)
             rest = np.flatnonzero(rows.status == P.PENDING)
@@ -113,6 +114,10 @@ class LegsEngine:
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
+        if start is None and len(values) == 1:
+            found = self._assemble_one(values)
+            if found is not None:
+                return found
         first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
         rows, carriers, sides = assembled(self.mechanism, self._table, values, start, first)
         rest, others = np.flatnonzero(rows.status == P.PENDING), None
@@ -126,6 +131,18 @@ class LegsEngine:
         return Configurations(
             rows, partial(_coordinates, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
         )
+
+    def prepared_forward(self, rows: P.Rows) -> Callable[[Floats], bool]:
+        """A call that answers actuated values (1, n_a) from home into `rows`; whether they assemble."""
+        return partial(self._one_forward.assemble, rows=rows, ends=self._one_forward.new_ends())
+
+    def _assemble_one(self, values: Floats) -> Configurations | None:
+        """Forward kinematics of one row from home, if it assembles there."""
+        rows, ends = self._one.new_rows(), self._one_forward.new_ends()
+        if not self._one_forward.assemble(values, rows, ends):
+            return None
+        end = rows.poses, rows.actuators, ends.sides, None, ends.q
+        return Configurations(rows, partial(settled, self.mechanism, self._table, *end))
 
     def _reach_one(self, target: Floats, start: LegAnswer | None, keep_mode: bool) -> LegAnswer | None:
         """Answer one target from home or from an answer before, if legs reach it."""

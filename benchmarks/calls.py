@@ -1,0 +1,112 @@
+"""One question at a time from Python, kernels loaded: `python benchmarks/calls.py`, and the first rows of `run.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+
+import pfabrik as pf
+from closed_forms import Array, Struts
+from pfabrik.closure.solve import ClosureEngine
+from pfabrik.motion.first_order import measures
+from table import Row, cells, machine, table
+from timing import best_times, draw
+
+CALLS = 200
+
+
+def each(question: Callable[..., object], *asked: object) -> Callable[[], object]:
+    """A question asked of one after the other."""
+    return lambda: [question(one) for one in asked]
+
+
+def strut_jacobian(struts: Struts, pose: Array) -> Array:
+    """Rates of strut lengths by the platform's twist, (k, 6), in plain NumPy."""
+    arms = struts.tops @ pose[:3, :3].T
+    lines = arms + (pose[:3, 3] - struts.feet)
+    units = lines / np.sqrt((lines * lines).sum(axis=1))[:, None]
+    return np.hstack([units, np.cross(arms, units)])
+
+
+def near(mechanism: pf.Mechanism, rng: np.random.Generator) -> list[Array]:
+    """Targets that are reached, one by one."""
+    drawn = draw(mechanism, rng, 4 * CALLS, 0.1, 0.1)
+    return list(drawn[pf.solve_ik(mechanism, drawn).status == pf.Status.REACHED][:CALLS])
+
+
+def questions(name: str, what: str, rng: np.random.Generator, runs: int) -> Iterator[Row]:
+    """Inverse and forward kinematics of a machine of legs, next to the closure engine on the same call."""
+    mechanism = pf.load(name)
+    targets, solver, engine = near(mechanism, rng), pf.Solver(mechanism), ClosureEngine(mechanism)
+    values = [pf.solve_ik(mechanism, target).actuators for target in targets]
+
+    def closed(target: Array) -> object:
+        return engine.answer(target[None], None, pf.Options(), keep_mode=False)
+
+    def assembled(value: Array) -> object:
+        return engine.forward(value[None], None, 1e-9)
+
+    n, slow = len(targets), slice(0, 20)
+    ik, prepared, fk, prepared_fk, by_closure, fk_by_closure = best_times(
+        runs,
+        each(partial(pf.solve_ik, mechanism), *targets),
+        each(solver.ik, *targets),
+        each(partial(pf.solve_fk, mechanism), *values),
+        each(solver.fk, *values),
+        each(closed, *targets[slow]),
+        each(assembled, *values[slow]),
+    )
+    few = len(targets[slow])
+    yield Row(f"{what}, one solve_ik, reachable", n, ik / n, "closure engine", by_closure / few)
+    yield Row(f"{what}, Solver.ik, reachable", n, prepared / n, "one solve_ik", ik / n)
+    yield Row(f"{what}, one solve_fk, from home", n, fk / n, "closure engine", fk_by_closure / few)
+    yield Row(f"{what}, Solver.fk, from home", n, prepared_fk / n, "one solve_fk", fk / n)
+
+
+def first_order(rng: np.random.Generator, runs: int) -> Iterator[Row]:
+    """Jacobians, singularity and margins of one answer of the 6-UPS whose joints are known."""
+    mechanism = pf.load("stewart")
+    struts, answer = Struts(mechanism), pf.solve_ik(mechanism, near(mechanism, rng)[0])
+    pose, q = answer.pose, answer._coordinates
+    inverse, near_singular, margins, lines, by_numpy = best_times(
+        runs,
+        lambda: [pf.inverse_jacobian(answer) for _ in range(20)],
+        lambda: [pf.singularity(answer) for _ in range(20)],
+        lambda: [pf.margins(answer) for _ in range(20)],
+        lambda: [strut_jacobian(struts, pose) for _ in range(20)],
+        lambda: [measures(mechanism, q) for _ in range(20)],
+    )
+    yield Row("6-UPS, one inverse_jacobian", 20, inverse / 20, "NumPy, lines of the struts", lines / 20)
+    yield Row("6-UPS, one singularity", 20, near_singular / 20, "NumPy, all singular vectors", by_numpy / 20)
+    yield Row("6-UPS, margins of one answer", 20, margins / 20)
+
+
+def closure(rng: np.random.Generator, runs: int) -> Iterator[Row]:
+    """Machines without closed forms: what a call costs beside its share of a batch."""
+    for name, what in (("serial_arm", "serial arm"), ("orthoglide", "Orthoglide")):
+        mechanism = pf.load(name)
+        targets = near(mechanism, rng)
+        one, batch = best_times(
+            runs, each(partial(pf.solve_ik, mechanism), *targets), partial(pf.solve_ik, mechanism, np.array(targets))
+        )
+        n = len(targets)
+        yield Row(f"{what}, one solve_ik, reachable", n, one / n, "a pose of a batch", batch / n)
+
+
+def calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
+    mechanism = pf.load("stewart")
+    struts, targets = Struts(mechanism), near(mechanism, rng)
+    ours, theirs = best_times(runs, each(partial(pf.solve_ik, mechanism), *targets), each(struts.one, *targets))
+    n, baseline = len(targets), "NumPy, lengths and strokes of one pose"
+    yield Row("6-UPS, one call, reachable", n, ours / n, baseline, theirs / n)
+    for name, what in (("stewart", "6-UPS"), ("delta", "delta"), ("rps", "3-RPS")):
+        yield from questions(name, what, rng, runs)
+    yield from first_order(rng, runs)
+    yield from closure(rng, runs)
+
+
+if __name__ == "__main__":
+    print(machine(), end="\n\n")
+    print("\n".join(table([cells(row) for row in calls(np.random.default_rng(1), 9)], False)))
