@@ -101,7 +101,21 @@ def loaded_by(heavy: str, lines: list[list[str]]) -> tuple[list[tuple[int | None
     return [tuple(each) for each in json.loads(told)], said
 
 
-COMMANDS = ("catalog", "new", "info", "check", "ik", "fk", "track", "travel", "plot", "export", "demo", "reproduce")
+COMMANDS = (
+    "catalog",
+    "new",
+    "info",
+    "check",
+    "ik",
+    "fk",
+    "track",
+    "travel",
+    "plot",
+    "view",
+    "export",
+    "demo",
+    "reproduce",
+)
 HELP = [["--help"], *[[command, "--help"] for command in COMMANDS]]
 WRONG = [
     ["chek"],

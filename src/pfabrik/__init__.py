@@ -11,7 +11,7 @@ Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, wor
            Solver (one machine, asked again and again)
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
-See        plot, plot_track, plot_travel, animate
+See        plot, plot_track, plot_travel, animate; view (in the browser)
 Structure  decompose, SubChain; geometric (closed forms of the paper's machines); errors
 Exchange   interop (MuJoCo and URDF, in and out)
 
@@ -71,6 +71,8 @@ _HOMES = {
     "workspace": "workspace.ask",
     "export_c": "export.export_c",
     "animate": "view.animation",
+    "Viewer": "view.live.viewer",
+    "view": "view.live.viewer",
     "plot": "view.machine",
     "plot_track": "view.track",
     "plot_travel": "view.travel",
@@ -95,6 +97,7 @@ __all__ = [
     "SubChain",
     "Track",
     "Travel",
+    "Viewer",
     "WorkingModes",
     "Workspace",
     "__version__",
@@ -124,6 +127,7 @@ __all__ = [
     "solve_ik",
     "track",
     "travel",
+    "view",
     "warm_up",
     "working_modes",
     "workspace",
@@ -155,6 +159,7 @@ if TYPE_CHECKING:
     from .track import track
     from .travel import Travel, travel
     from .view.animation import animate
+    from .view.live.viewer import Viewer, view
     from .view.machine import plot
     from .view.track import plot_track
     from .view.travel import plot_travel

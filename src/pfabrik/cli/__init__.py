@@ -27,7 +27,7 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
     subcommands=(
         *("catalog", "new", "info", "check"),
         *("ik", "fk", "track", "travel"),
-        *("plot",),
+        *("plot", "view"),
         *("export",),
         *("compile", "demo", "reproduce"),
     ),

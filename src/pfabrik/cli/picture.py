@@ -15,10 +15,9 @@ from .whole import refuse_input
 @contextmanager
 def picture(path: Path, inputs: Iterable[Path] = (), quiet: bool = False) -> Iterator[None]:
     """Write to a file what a block draws in one new figure, and say so; a name that cannot be, before it draws."""
-    from ..view.saving import PICTURES, checked_ending, save_picture
+    from ..view.saving import PICTURES, save_picture
 
-    checked_ending(path, PICTURES)
-    refuse_input(path, inputs)
+    ending_checked(path, PICTURES, inputs)
     require("pictures", "matplotlib", "plot")
     import matplotlib
     from matplotlib import pyplot
@@ -32,3 +31,11 @@ def picture(path: Path, inputs: Iterable[Path] = (), quiet: bool = False) -> Ite
         pyplot.close(figure)
     if not quiet:
         click.echo(f"wrote {path}", err=True)
+
+
+def ending_checked(path: Path, endings: tuple[str, ...], inputs: Iterable[Path] = ()) -> None:
+    """Stop where a name ends in another way, or is that of a file that was read."""
+    from ..view.saving import checked_ending
+
+    checked_ending(path, endings)
+    refuse_input(path, inputs)

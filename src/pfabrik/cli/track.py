@@ -16,10 +16,10 @@ from ..errors import near_miss
 from ..extras import require
 from .finite import FINITE, is_finite
 from .mech import MECH, load
-from .picture import picture
+from .picture import ending_checked, picture
 from .progress import progress
 from .projecting import note_left_out, options_projecting, projecting
-from .whole import refuse_input, whole_file
+from .whole import whole_file
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
@@ -117,12 +117,11 @@ def track(
 
 def refuse_early(picture_path: Path | None, film_path: Path | None, inputs: tuple[Path, ...]) -> None:
     """Stop before the work begins where a picture or film cannot be written, or would replace what was read."""
-    from ..view.saving import FILMS, PICTURES, checked_ending
+    from ..view.saving import FILMS, PICTURES
 
     for path, endings in ((picture_path, PICTURES), (film_path, FILMS)):
         if path is not None:
-            checked_ending(path, endings)
-            refuse_input(path, inputs)
+            ending_checked(path, endings, inputs)
             require("pictures", "matplotlib", "plot")
 
 

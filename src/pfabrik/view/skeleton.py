@@ -100,7 +100,7 @@ def skeleton_of(shown: Mechanism | Solution) -> Skeleton:
     )
 
 
-def checked_shown(shown: Mechanism | Solution) -> tuple[Mechanism, Solution | None]:
+def checked_shown(shown: object) -> tuple[Mechanism, Solution | None]:
     """The mechanism, and the answer if it is one."""
     if isinstance(shown, Mechanism):
         return shown, None

@@ -1,0 +1,264 @@
+"""What stands beside the scene: status, margins, sliders, modes, playback. It tells what the user does, no more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...answers.solution import Solution, Status
+from ...description.mechanism import Mechanism
+from ...description.readouts import Readout, readouts
+from ...description.task import task_of
+from ...rotations import to_rpy
+from ..looks import ACHIEVED, HELD
+from .session import Session
+
+if TYPE_CHECKING:
+    import viser
+
+    from .workspace import Patch
+
+BARS = 8
+"""Margins that have a bar; of further ones only the number is told."""
+
+FAR = 2.0
+"""How far from home sliders go where no limit says it [L or half turns]."""
+
+STEPS = 1000.0
+"""Steps of a slider, about."""
+
+TURNS = {3: ("roll", "pitch", "yaw"), 2: ("roll", "pitch"), 1: ("yaw",), 0: ()}
+"""Angles that have a slider, by how many freedoms of the rotation the task counts."""
+
+
+@dataclass(frozen=True)
+class Actions:
+    """What a panel calls, each at once and without waiting."""
+
+    change_target: Callable[[str, float], None]
+    change_actuator: Callable[[int, float], None]
+    go_home: Callable[[], None]
+    find_modes: Callable[[str], None]
+    take_mode: Callable[[int], None]
+    take_step: Callable[[int], None]
+    play: Callable[[bool], None]
+    show_workspace: Callable[[bool], None]
+    save: Callable[[Any], None]
+
+
+class Panel:
+    """The elements of one machine.
+
+    Parameters
+    ----------
+    steps : of the path to play; 0 without one.
+    """
+
+    def __init__(self, gui: viser.GuiApi, mechanism: Mechanism, session: Session, actions: Actions, steps: int) -> None:
+        self._actions, self._touched = actions, None
+        self._status = gui.add_html("")
+        self._margins = gui.add_html("")
+        with gui.add_folder("Target"):
+            self._target = {name: self._target_slider(gui, mechanism, name) for name in coordinates_of(mechanism)}
+            self._pose = gui.add_html("")
+            gui.add_button("Home").on_click(lambda _: actions.go_home())
+        with gui.add_folder("Actuators"):
+            self._readouts = readouts(mechanism)
+            values = zip(self._readouts, session.actuators, strict=True)
+            self._actuators = [
+                self._actuator_slider(gui, mechanism, place, readout, float(readout.display(value)))
+                for place, (readout, value) in enumerate(values)
+            ]
+        self._add_path(gui, steps)
+        self._add_modes(gui)
+        self._workspace = gui.add_checkbox("Workspace at this orientation", initial_value=False)
+        self._workspace.on_update(_of_users(lambda event: actions.show_workspace(event.target.value)))
+        self._border = gui.add_html("")
+        self._note = gui.add_html("")
+        gui.add_button("Save as a page").on_click(lambda event: actions.save(event.client))
+
+    def show(self, session: Session) -> None:
+        """Bring everything up to an answer, but for the slider that the user has hold of."""
+        self._status.content = status_html(session)
+        self._margins.content = margins_html(session)
+        self._pose.content = pose_html(session)
+        position, angles = session.target[:3, 3], np.degrees(to_rpy(session.target[:3, :3]))
+        named = dict(zip(("x", "y", "z", "roll", "pitch", "yaw"), (*position, *angles), strict=True))
+        for name, slider in self._target.items():
+            self._set(slider, named[name])
+        for slider, readout, value in zip(self._actuators, self._readouts, session.actuators, strict=True):
+            self._set(slider, float(readout.display(value)))
+
+    def tell(self, words: str, *, alarming: bool = False) -> None:
+        """A note of what is going on, or of what went wrong."""
+        colour = HELD if alarming else ACHIEVED
+        lines = "<br>".join(escape(line) for line in words.splitlines())
+        self._note.content = f'<div data-pfabrik="note" style="{BOX};color:{colour}">{lines}</div>' if words else ""
+
+    @property
+    def wants_workspace(self) -> bool:
+        """Whether the user wants to see the workspace."""
+        return bool(self._workspace.value)
+
+    def tell_border(self, patches: Sequence[Patch]) -> None:
+        """Which limit has which colour, and how much of the border it forms."""
+        rows = "".join(
+            f'<div><span style="color:{each.colour}">&#9632;</span> {escape(each.name)}: {each.share:.0%}</div>'
+            for each in patches
+        )
+        self._border.content = f'<div data-pfabrik="border" style="{BOX}">{rows}</div>' if rows else ""
+
+    def list_modes(self, kind: str, modes: Sequence[Solution], words: Sequence[str]) -> None:
+        """Offer modes to choose from."""
+        self._modes.options = (f"{len(modes)} {kind} modes", *words)
+        self._modes.visible = bool(modes)
+
+    def show_step(self, step: int) -> None:
+        """Bring the slider of a path up to a step."""
+        if self._step is not None:
+            self._set(self._step, step)
+
+    def release(self) -> None:
+        """Nothing is in the user's hands any more: sliders follow the answers again."""
+        self._touched = None
+
+    def _set(self, slider: Any, value: float) -> None:
+        if slider is not self._touched:
+            slider.value = float(np.clip(value, slider.min, slider.max))
+
+    def _target_slider(self, gui: viser.GuiApi, mechanism: Mechanism, name: str) -> Any:
+        if name in ("x", "y", "z"):
+            home = float(mechanism.home_pose["xyz".index(name), 3])
+            far = FAR * mechanism.characteristic_length
+            slider = _slider(gui, f"{name} [{mechanism.length_unit}]", *rounded(home - far, home + far), home)
+        else:
+            slider = _slider(gui, f"{name} [deg]", -180.0, 180.0, 0.0)
+        return self._heard(slider, lambda value: self._actions.change_target(name, value))
+
+    def _actuator_slider(
+        self, gui: viser.GuiApi, mechanism: Mechanism, place: int, readout: Readout, value: float
+    ) -> Any:
+        far = 180.0 if readout.is_angle else FAR * mechanism.characteristic_length
+        low, high = readout.limits
+        free_low, free_high = rounded(value - far, value + far)
+        low, high = (low if np.isfinite(low) else free_low), (high if np.isfinite(high) else free_high)
+        slider = _slider(gui, f"{readout.name} [{readout.unit}]", low, max(high, low), value)
+        return self._heard(slider, lambda shown: self._actions.change_actuator(place, readout.coordinate(shown)))
+
+    def _heard(self, slider: Any, tell: Callable[[float], None]) -> Any:
+        """A slider that tells what the user makes of it."""
+
+        def moved(event: Any) -> None:
+            self._touched = event.target
+            tell(event.target.value)
+
+        slider.on_update(_of_users(moved))
+        return slider
+
+    def _add_path(self, gui: viser.GuiApi, steps: int) -> None:
+        self._step: Any = None
+        if steps < 2:
+            return
+        with gui.add_folder("Path"):
+            playing = gui.add_checkbox("Play", initial_value=False)
+            playing.on_update(_of_users(lambda event: self._actions.play(event.target.value)))
+            self._step = gui.add_slider("step", 1, steps, 1, 1)
+            self._heard(self._step, lambda step: self._actions.take_step(int(step)))
+
+    def _add_modes(self, gui: viser.GuiApi) -> None:
+        with gui.add_folder("Modes", expand_by_default=False):
+            for kind, hint in (("working", "of this pose"), ("assembly", "of these actuator values")):
+                button = gui.add_button(f"{kind.capitalize()} modes", hint=f"All configurations {hint}")
+                button.on_click(lambda _, kind=kind: self._actions.find_modes(kind))  # type: ignore[misc]
+            self._modes = gui.add_dropdown("mode", ("none",), visible=False)
+            self._modes.on_update(_of_users(self._chosen))
+
+    def _chosen(self, event: Any) -> None:
+        place = self._modes.options.index(event.target.value)
+        if place > 0:
+            self._actions.take_mode(place - 1)
+
+
+def coordinates_of(mechanism: Mechanism) -> tuple[str, ...]:
+    """What a target's sliders are called: the coordinates that the task counts, a rotation as angles."""
+    task = task_of(mechanism)
+    return (*(name for name, counts in zip("xyz", task.axes, strict=True) if counts), *TURNS[task.rotations])
+
+
+def _of_users(listen: Callable[[Any], None]) -> Callable[[Any], None]:
+    """A callback for what a user does, not for what the program sets."""
+
+    def heard(event: Any) -> None:
+        if event.client is not None:
+            listen(event)
+
+    return heard
+
+
+def rounded(low: float, high: float) -> tuple[float, float]:
+    """A range with ends that are easily read."""
+    unit = 10.0 ** np.floor(np.log10(high - low)) / 10.0
+    return float(np.floor(low / unit) * unit), float(np.ceil(high / unit) * unit)
+
+
+def _slider(gui: viser.GuiApi, label: str, low: float, high: float, value: float) -> Any:
+    step = 10.0 ** np.floor(np.log10(max(high - low, 1e-9) / STEPS))
+    return gui.add_slider(label, low, high, float(step), float(np.clip(value, low, high)))
+
+
+BOX = "margin:0.3em 0.8em;font-size:0.85em;line-height:1.35"
+
+
+def status_html(session: Session) -> str:
+    """What became of what was asked for, with the limits that hold it back, by name."""
+    reached = session.solution.status == Status.REACHED
+    first, *others = session.sentence.split("; ")
+    rest = "".join(f"<div>{escape(each)}</div>" for each in others)
+    colour = ACHIEVED if reached else HELD
+    return (
+        f'<div style="{BOX};color:{colour}"><b data-pfabrik="status">{escape(first)}</b>'
+        f'<div data-pfabrik="held">{rest}</div></div>'
+    )
+
+
+def margins_html(session: Session) -> str:
+    """The nearest limits as bars, 1 in the middle of a range and 0 on the limit."""
+    found = session.margins
+    if not found:
+        return ""
+    rows = "".join(_bar(margin.name, margin.value) for margin in found[:BARS])
+    more = f"<div>and {len(found) - BARS} others, farther off</div>" if len(found) > BARS else ""
+    return f'<div data-pfabrik="margins" style="{BOX}">{rows}{more}</div>'
+
+
+def _bar(name: str, value: float) -> str:
+    share, colour = 100.0 * float(np.clip(value, 0.0, 1.0)), HELD if value <= 1e-6 else ACHIEVED
+    return (
+        f'<div style="display:flex;gap:0.5em;align-items:center"><span style="width:8em;overflow:hidden">{escape(name)}'
+        f'</span><span style="flex:1;background:#e8e8e8;height:0.6em"><span style="display:block;height:100%;'
+        f'width:{share:.1f}%;background:{colour}"></span></span><span style="width:3em;text-align:right">'
+        f"{value:.2f}</span></div>"
+    )
+
+
+COPY = (
+    "const t=this.previousElementSibling;t.select();"
+    "(navigator.clipboard?navigator.clipboard.writeText(t.value):Promise.reject()).catch(()=>document.execCommand('copy'));"
+    "this.textContent='Copied';setTimeout(()=>this.textContent='Copy pose',900)"
+)
+"""What the button does: the clipboard where the browser allows it, else the older way."""
+
+
+def pose_html(session: Session) -> str:
+    """The target as Python, to copy."""
+    text = escape(session.pose_as_python, quote=True)
+    return (
+        f'<div style="{BOX};display:flex;gap:0.4em"><input readonly data-pfabrik="pose" value="{text}" '
+        f'style="flex:1;min-width:0;border:1px solid #ccc;font:0.9em monospace;padding:0.2em">'
+        f'<button data-pfabrik="copy" onclick="{escape(COPY, quote=True)}" '
+        f'style="border:1px solid #ccc;padding:0 0.6em;cursor:pointer">Copy pose</button></div>'
+    )

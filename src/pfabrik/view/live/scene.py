@@ -1,0 +1,198 @@
+"""A machine in the browser: the same skeleton as in pictures, with thickness. One unit of the scene is L."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from ...answers.tracked import Track
+from ...arrays import Floats
+from ...description.mechanism import Mechanism
+from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, PLATFORM, of_a_body, rgb
+from ..skeleton import Mark, Part, Skeleton
+from .shapes import SHAPES, cylinder, fan, quaternion, upright_to
+
+if TYPE_CHECKING:
+    import viser
+
+    from .workspace import Patch
+
+RADIUS, LINK_RADIUS = 0.016, 0.010
+"""Of the edges of base and end effector, and of links [L]."""
+
+PASSIVE, BASE = "#8f8f8f", "#9f9f9f"
+"""Of joints that nobody drives, and of the base: darker than on paper, as light is added to them."""
+
+JOINT = 0.034
+"""Size of a joint [L]."""
+
+FRAME = 0.12
+"""Length of the axes at the reference point [L]."""
+
+GIZMO = 0.35
+"""Size of the handles to drag [L]."""
+
+PLAIN: dict[str, Any] = {"lod": "off", "cast_shadow": False, "receive_shadow": False}
+"""Of many small meshes: what computers without a graphics card would spend most of their time on."""
+
+MACHINE = "/machine"
+
+
+class Scene:
+    """The nodes of one machine; a new configuration moves them.
+
+    The machine's L is 1 in the scene: its camera sees from a hundredth to a thousand.
+    """
+
+    def __init__(self, server: viser.ViserServer, mechanism: Mechanism, skeleton: Skeleton) -> None:
+        self._scene, self._length = server.scene, mechanism.characteristic_length
+        self._labels: dict[str, Any] = {}
+        self._border: list[Any] = []
+        self._add_lines(skeleton)
+        self._faces = [
+            self._scene.add_mesh_simple(
+                f"{MACHINE}/bodies/{place}",
+                *fan(part.corners / self._length),
+                color=_colour_of(part),
+                opacity=0.45,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            for place, part in enumerate(skeleton.parts)
+            if len(part.corners) >= 3
+        ]
+        self._joints = {kind: self._add_joints(kind, skeleton) for kind in _kinds(skeleton)}
+        if len(skeleton.rails):
+            rails = (skeleton.rails / self._length).astype(np.float32)
+            self._scene.add_line_segments(f"{MACHINE}/rails", rails, rgb(EDGE), thickness=1.5)
+        self._frame = self._scene.add_frame(
+            f"{MACHINE}/reference", axes_length=FRAME, axes_radius=0.05 * FRAME, origin_radius=0.08 * FRAME
+        )
+
+    def show(self, skeleton: Skeleton, pose: Floats) -> None:
+        """Move everything to a configuration."""
+        positions, turns, scales, colours = self._cylinders(skeleton)
+        self._lines.batched_positions, self._lines.batched_wxyzs = positions, turns
+        self._lines.batched_scales, self._lines.batched_colors = scales, colours
+        corners = (part.corners for part in skeleton.parts if len(part.corners) >= 3)
+        for face, own in zip(self._faces, corners, strict=True):
+            face.vertices = fan(own / self._length)[0]
+        for kind, joints in self._joints.items():
+            marks = _of_kind(skeleton, kind)
+            joints.batched_positions, joints.batched_colors = self._places(marks), _colours(marks)
+        self._frame.position, self._frame.wxyz = pose[:3, 3] / self._length, quaternion(pose[:3, :3])
+        self._name(skeleton)
+
+    def show_path(self, track: Track) -> None:
+        """The path that was asked for, and the one that was taken."""
+        ways = (("asked", track.targets, ASKED), ("taken", track.pose, ACHIEVED))
+        for name, poses, colour in ways:
+            places = (poses[:, :3, 3] / self._length).astype(np.float32)
+            places = places[np.isfinite(places).all(axis=1)]
+            if len(places) > 1:
+                segments = np.stack([places[:-1], places[1:]], axis=1)
+                self._scene.add_line_segments(f"{MACHINE}/path/{name}", segments, rgb(colour), thickness=2.0)
+
+    def show_border(self, patches: Sequence[Patch]) -> None:
+        """The border of a workspace, in place of the one before."""
+        self.hide_border()
+        for place, patch in enumerate(patches):
+            name, corners = f"{MACHINE}/workspace/{place}", (patch.corners / self._length).astype(np.float32)
+            if corners.shape[1] == 2:
+                self._border.append(self._scene.add_line_segments(name, corners, rgb(patch.colour), thickness=3.0))
+                continue
+            faces = np.arange(3 * len(corners)).reshape(-1, 3)
+            style: dict[str, Any] = {"color": rgb(patch.colour), "opacity": 0.4, "side": "double"}
+            style |= {"cast_shadow": False, "receive_shadow": False, "flat_shading": True}
+            self._border.append(self._scene.add_mesh_simple(name, corners.reshape(-1, 3), faces, **style))
+
+    def hide_border(self) -> None:
+        """Take the border away."""
+        for part in self._border:
+            part.remove()
+        self._border = []
+
+    def _add_lines(self, skeleton: Skeleton) -> None:
+        positions, turns, scales, colours = self._cylinders(skeleton)
+        self._lines = self._scene.add_batched_meshes_simple(
+            f"{MACHINE}/lines",
+            *cylinder(),
+            batched_wxyzs=turns,
+            batched_positions=positions,
+            batched_scales=scales,
+            batched_colors=colours,
+            **PLAIN,
+        )
+
+    def _add_joints(self, kind: str, skeleton: Skeleton) -> Any:
+        marks = _of_kind(skeleton, kind)
+        upright = np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (len(marks), 1))
+        vertices, faces = SHAPES[kind]()
+        return self._scene.add_batched_meshes_simple(
+            f"{MACHINE}/joints/{kind}",
+            (JOINT * vertices).astype(np.float32),
+            faces,
+            batched_wxyzs=upright,
+            batched_positions=self._places(marks),
+            batched_colors=_colours(marks),
+            flat_shading=True,
+            **PLAIN,
+        )
+
+    def _places(self, marks: list[Mark]) -> Any:
+        return (np.array([mark.place for mark in marks]) / self._length).astype(np.float32)
+
+    def _cylinders(self, skeleton: Skeleton) -> tuple[Any, Any, Any, Any]:
+        """Every line as a cylinder: its middle, its turn from upright, radii and length, and its colour."""
+        held = {body for mark in skeleton.marks if mark.held_by for body in mark.joint.connects}
+        ends, radii, colours = [], [], []
+        for part in skeleton.parts:
+            colour = rgb(HELD) if part.role == "link" and part.body in held else _colour_of(part)
+            count = len(part.corners) if len(part.corners) > 2 else len(part.corners) - 1
+            edges = np.stack([part.corners, np.roll(part.corners, -1, axis=0)], axis=1)[:count]
+            ends += list(edges)
+            radii += [LINK_RADIUS if part.role == "link" else RADIUS] * count
+            colours += [colour] * count
+        if skeleton.stem is not None:
+            ends, radii, colours = [*ends, skeleton.stem], [*radii, LINK_RADIUS], [*colours, rgb(PLATFORM)]
+        lines = np.reshape(ends, (-1, 2, 3)) / self._length
+        along = lines[:, 1] - lines[:, 0]
+        lengths = np.linalg.norm(along, axis=1)
+        scales = np.stack([radii, radii, np.maximum(lengths, 1e-9)], axis=1)
+        turns = np.array([upright_to(each) for each in along])
+        middles = lines.mean(axis=1)
+        middles, turns, scales = (each.astype(np.float32) for each in (middles, turns, scales))
+        return middles, turns, scales, np.array(colours, np.uint8)
+
+    def _name(self, skeleton: Skeleton) -> None:
+        """Labels at the joints whose limits hold."""
+        wanted = {f"{mark.joint.name} {bound}": mark.place for mark in skeleton.marks for bound in mark.held_by}
+        for name in set(self._labels) - set(wanted):
+            self._labels.pop(name).remove()
+        for name, place in wanted.items():
+            at = cast(Any, place / self._length)
+            if name in self._labels:
+                self._labels[name].position = at
+            else:
+                self._labels[name] = self._scene.add_label(f"{MACHINE}/held/{name}", name, position=at)
+
+
+def _colour_of(part: Part) -> tuple[int, int, int]:
+    return rgb(BASE if part.role == "base" else of_a_body(part.role))
+
+
+def _kinds(skeleton: Skeleton) -> list[str]:
+    return sorted({mark.joint.type for mark in skeleton.marks})
+
+
+def _of_kind(skeleton: Skeleton, kind: str) -> list[Mark]:
+    return [mark for mark in skeleton.marks if mark.joint.type == kind]
+
+
+def _colours(marks: list[Mark]) -> Any:
+    """Of joints: orange where a limit holds, dark where they are actuated, light elsewhere."""
+    names = (HELD if mark.held_by else ACTUATED if mark.joint.actuated else PASSIVE for mark in marks)
+    return np.array([rgb(name) for name in names], np.uint8)

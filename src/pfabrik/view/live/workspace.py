@@ -1,0 +1,69 @@
+"""The workspace in the scene: its border, each face in the colour of the limit that forms it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...answers.solution import Solution
+from ...arrays import Floats, Ints
+from ...workspace.ask import workspace
+from ..looks import LINE_COLOURS
+
+REST = "#b0b0b0"
+"""The colour of all limits but those that form most of the border."""
+
+POSITIONS = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A part of the border that has one colour.
+
+    Attributes
+    ----------
+    corners : of its triangles, (k, 3, 3), or both ends of its segments, (k, 2, 3), in the base frame [length].
+    name, share : the limit that forms it, and how much of the border that is.
+    """
+
+    name: str
+    share: float
+    colour: str
+    corners: Floats
+
+
+def border_of(start: Solution, on_progress: Callable[[int, int], None]) -> tuple[list[Patch], str]:
+    """The border of the workspace at a configuration's orientation, in its working mode, and its size in words.
+
+    What the workspace is not looked over is as in that configuration. Where it is one of angles, there are no patches.
+    """
+    found = workspace(start.mechanism, start=start, on_progress=on_progress)
+    size = f"{found.size:.4g} ± {found.uncertainty:.1g} {found.size_unit}"
+    if not set(found.names) <= set(POSITIONS):
+        return [], f"workspace over {', '.join(found.names)}: {size}; it has no place in the scene"
+    corners = _in_space(start.pose[:3, 3], found.names, np.asarray(found.vertices))[found.faces]
+    names = [" ".join(limit) for limit in found.limits]
+    patches = [
+        Patch(names[limit], share, colour, corners[np.asarray(found.face_limit) == limit])
+        for colour, (limit, share) in zip(
+            LINE_COLOURS, ((found.limits.index(limit), share) for limit, share in found.shares.items()), strict=False
+        )
+    ]
+    return [*patches, *_rest(patches, corners, names, found.face_limit)], size
+
+
+def _rest(patches: list[Patch], corners: Floats, names: list[str], face_limit: Ints) -> list[Patch]:
+    """All faces that have no colour of their own, as one patch."""
+    coloured = [names.index(patch.name) for patch in patches]
+    left = ~np.isin(face_limit, coloured)
+    share = 1.0 - sum(patch.share for patch in patches)
+    return [Patch("other limits", share, REST, corners[left])] if left.any() else []
+
+
+def _in_space(position: Floats, names: tuple[str, ...], vertices: Floats) -> Floats:
+    """Vertices (v, d) of some coordinates as points (v, 3)."""
+    points = np.repeat(position[None], len(vertices), axis=0)
+    points[:, [POSITIONS.index(name) for name in names]] = vertices
+    return np.asarray(points)

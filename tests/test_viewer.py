@@ -1,0 +1,293 @@
+"""The viewer without a browser: what it asks, what it answers, what it drops, and what it lets in."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from machines import tripod_rps
+from pfabrik.cli import main
+from pfabrik.errors import InvalidArgument, MissingLibrary
+from pfabrik.view.live.newest import Newest
+from pfabrik.view.live.session import Session, moved
+from pfabrik.view.live.shapes import SHAPES, cylinder, fan, quaternion, upright_to
+from pfabrik.view.live.watching import Watch
+
+pytest.importorskip("viser")
+
+PATIENCE = 60.0  # seconds
+
+
+def until(true: Callable[[], object]) -> None:
+    """Wait until something is so; fail where it does not come."""
+    end = time.monotonic() + PATIENCE
+    while not true():
+        assert time.monotonic() < end, "it did not come"
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def shown() -> Iterator[Callable[..., pf.Viewer]]:
+    """`view`, whose viewers are closed in the end."""
+    opened: list[pf.Viewer] = []
+
+    def view(what: pf.Mechanism | pf.Solution | str | Path) -> pf.Viewer:
+        opened.append(pf.view(what, port=18080))
+        return opened[-1]
+
+    yield view
+    for viewer in opened:
+        viewer.close()
+
+
+# Only the newest.
+
+
+def test_only_the_newest_of_what_waits_is_answered() -> None:
+    begun, go_on, answered = threading.Event(), threading.Event(), []
+    worker = Newest(lambda error: None)
+
+    def first() -> None:
+        begun.set()
+        assert go_on.wait(PATIENCE)
+        answered.append(0)
+
+    worker.post(first)
+    assert begun.wait(PATIENCE)
+    for number in range(1, 100):
+        worker.post(lambda number=number: answered.append(number))
+    go_on.set()
+    until(lambda: worker.answered == 2)
+    assert answered == [0, 99]
+    worker.end()
+
+
+def test_a_job_that_fails_is_told_and_the_next_is_answered() -> None:
+    told: list[str] = []
+    worker = Newest(lambda error: told.append(str(error)))
+    worker.post(lambda: 1 / 0)
+    until(lambda: told == ["division by zero"])
+    worker.post(lambda: told.append("well"))
+    until(lambda: told == ["division by zero", "well"])
+    worker.end()
+
+
+# What is asked, and what is answered.
+
+
+def test_a_target_beyond_a_stroke_names_the_limit_and_stays_what_was_asked() -> None:
+    machine = pf.load("stewart")
+    session = Session(machine)
+    assert session.sentence == "reached"
+    far = pf.pose((0, 20, 300))
+    session.go_to(far)
+    assert session.solution.status == pf.Status.PROJECTED
+    assert session.target == pytest.approx(far)
+    names = {f"{each.joint} {each.bound}" for each in session.solution.active_limits}
+    assert all(name.split()[0] in session.sentence for name in names)
+    assert session.margins[0].value == pytest.approx(0.0, abs=1e-6)
+    assert session.margins[0].name in names
+    session.go_to(machine.home_pose)
+    assert session.solution.status == pf.Status.REACHED
+
+
+def test_actuator_values_that_cannot_be_stay_what_was_asked() -> None:
+    session = Session(pf.load("five_bar"))
+    session.drive(np.radians([30.0, -75.0]))
+    assert session.actuators == pytest.approx(np.radians([30.0, -75.0]))
+    assert session.solution.status == pf.Status.PROJECTED
+    assert "p4 at its maximum" in session.sentence
+    assert session.target == pytest.approx(session.solution.pose)
+
+
+def test_answers_stay_in_the_working_mode_that_was_chosen() -> None:
+    machine = pf.load("rrr").without_limits()
+    session = Session(machine)
+    mode = pf.working_modes(machine, machine.home_pose)[1]
+    session.show(mode)
+    assert session.start is mode
+    session.go_to(moved(machine.home_pose, "x", 2.0))
+    assert session.solution.actuators == pytest.approx(mode.actuators, abs=0.2)
+    assert np.abs(session.solution.actuators - pf.solve_ik(machine, session.target).actuators).max() > 0.3
+
+
+def test_coordinates_of_a_target_are_changed_one_by_one() -> None:
+    target = pf.pose((1, 2, 3), rpy=(10, 20, 30), degrees=True)
+    assert moved(target, "y", 5.0) == pytest.approx(pf.pose((1, 5, 3), rpy=(10, 20, 30), degrees=True))
+    assert moved(target, "pitch", -5.0) == pytest.approx(pf.pose((1, 2, 3), rpy=(10, -5, 30), degrees=True))
+
+
+def test_a_copied_pose_is_the_target() -> None:
+    session = Session(pf.load("stewart"))
+    session.go_to(pf.pose((10, -20, 200), rpy=(5, 0, -3), degrees=True))
+    assert eval(session.pose_as_python, {"pf": pf}) == pytest.approx(session.target)
+
+
+# Shapes.
+
+
+def test_meshes_are_closed_and_face_outward() -> None:
+    for make in (cylinder, *SHAPES.values()):
+        vertices, faces = make()
+        triangles = vertices[faces].astype(float)
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        assert np.abs(normals.sum(axis=0)).max() < 1e-5
+        assert (triangles[:, 0] * normals).sum() > 0.0
+
+
+def test_turns_are_those_of_scipy() -> None:
+    rng = np.random.default_rng(3)
+    special = Rotation.from_rotvec([[np.pi, 0, 0], [0, np.pi, 0], [0, 0, np.pi], [0, 0, 0]])
+    for rotation in Rotation.concatenate([Rotation.random(50, rng), special]):
+        w, x, y, z = quaternion(rotation.as_matrix())
+        assert (Rotation.from_quat([x, y, z, w]) * rotation.inv()).magnitude() < 1e-7
+    for direction in (*rng.normal(size=(20, 3)), np.array([0, 0, -2.0]), np.array([0, 0, 1.0])):
+        w, x, y, z = upright_to(direction)
+        turned = Rotation.from_quat([x, y, z, w]).apply([0, 0, 1])
+        assert turned == pytest.approx(direction / np.linalg.norm(direction))
+    assert upright_to(np.zeros(3)) == pytest.approx([1, 0, 0, 0])
+
+
+def test_a_face_is_triangles_about_its_middle() -> None:
+    square = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], float)
+    vertices, faces = fan(square)
+    assert vertices[4] == pytest.approx([1, 1, 0])
+    corners = vertices[faces]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] / 2
+    assert areas.sum() == pytest.approx(4.0)
+
+
+# The server.
+
+
+def test_only_this_computer_is_let_in_unless_told(shown: Callable[..., pf.Viewer]) -> None:
+    viewer = shown(pf.load("five_bar"))
+    port = int(viewer.url.rpartition(":")[2])
+    assert viewer.url.startswith("http://127.0.0.1:")
+    with socket.create_connection(("127.0.0.1", port), timeout=5):
+        pass
+    with pytest.raises(OSError, match="refused"), socket.create_connection(("127.0.0.2", port), timeout=5):
+        pass
+    assert viewer._server.request_share_url() is None
+    assert f'<iframe src="{viewer.url}"' in viewer._repr_html_()
+
+
+def test_motions_of_the_mouse_reach_the_answer(shown: Callable[..., pf.Viewer]) -> None:
+    machine = pf.load("stewart")
+    viewer = shown(machine)
+    viewer._drag(pf.pose((0, 0, 300)))
+    until(lambda: viewer.solution.status == pf.Status.PROJECTED)
+    until(lambda: "struts BL1, BL2" in viewer._panel._status.content)
+    viewer._change_target("z", 200.0)
+    until(lambda: viewer.solution.status == pf.Status.REACHED)
+    assert viewer.solution.pose[2, 3] == pytest.approx(200.0)
+    viewer._change_actuator(0, 190.0)
+    viewer._change_actuator(1, 200.0)
+    until(lambda: viewer.solution.actuators[:2] == pytest.approx([190.0, 200.0]))
+    viewer._go_home()
+    until(lambda: viewer.solution.pose == pytest.approx(machine.home_pose))
+
+
+def test_modes_are_listed_and_taken(shown: Callable[..., pf.Viewer]) -> None:
+    viewer = shown("five_bar")
+    viewer._find_modes("working")
+    until(lambda: len(viewer._modes) == 4)
+    until(lambda: viewer._panel._modes.options[2] == "2: beyond min of p4; max of p5")
+    viewer._take_mode(1)
+    until(lambda: viewer.solution.status == pf.Status.EXCEEDED)
+    until(lambda: "min of p4" in viewer._panel._status.content)
+
+
+def test_the_border_of_the_workspace_is_shown_on_request(shown: Callable[..., pf.Viewer]) -> None:
+    viewer = shown("five_bar")
+    viewer._panel._workspace.value = True
+    viewer._show_workspace(True)
+    until(lambda: "mm²" in viewer._panel._note.content)
+    assert "p2 max" in viewer._panel._border.content
+    assert viewer._scene._border
+    viewer._show_workspace(False)
+    assert not viewer._scene._border
+
+
+def test_a_track_is_played_step_by_step(shown: Callable[..., pf.Viewer]) -> None:
+    machine = pf.load("five_bar")
+    track = pf.track(machine, np.linspace([0, 0, 175], [0, 0, 200], 6))
+    viewer = shown(track)
+    viewer._take_step(6)
+    until(lambda: viewer.solution.pose == pytest.approx(track[5].pose))
+    viewer._play(True)
+    until(lambda: viewer.solution.pose == pytest.approx(track[2].pose))
+    viewer._play(False)
+
+
+def test_a_file_is_shown_again_when_it_changes_and_its_faults_are_told(
+    shown: Callable[..., pf.Viewer], tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    pf.save(pf.load("five_bar"), path)
+    viewer = shown(path)
+    viewer._newest.post(lambda: viewer.show(pf.solve_ik(viewer.mechanism, (0, 10, 180))))
+    until(lambda: viewer.solution.pose[1, 3] == pytest.approx(10.0))
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("revolute", "revolt"), encoding="utf-8")
+    until(lambda: "did you mean" in viewer._panel._note.content)
+    assert viewer.mechanism == pf.load("five_bar")
+    pf.save(tripod_rps(), path)
+    until(lambda: viewer.mechanism == tripod_rps())
+    assert viewer.solution.pose == pytest.approx(tripod_rps().home_pose)
+
+
+def test_a_file_half_written_is_not_read(tmp_path: Path) -> None:
+    path, seen = tmp_path / "a", []
+    path.write_text("one")
+    watch = Watch(path, lambda changed: seen.append(changed.read_text()))
+    path.unlink()
+    path.write_text("two, whole")
+    until(lambda: seen == ["two, whole"])
+    watch.end()
+
+
+def test_a_page_of_its_own_is_written_whole_or_not_at_all(shown: Callable[..., pf.Viewer], tmp_path: Path) -> None:
+    viewer = shown("five_bar")
+    viewer.save(tmp_path / "five_bar.html")
+    page = (tmp_path / "five_bar.html").read_text(encoding="utf-8")
+    assert page.lstrip().lower().startswith("<!doctype html>")
+    with pytest.raises(InvalidArgument, match=r"ends in \.html"):
+        viewer.save(tmp_path / "five_bar.pdf")
+    assert [path.name for path in tmp_path.iterdir()] == ["five_bar.html"]
+
+
+def test_what_cannot_be_shown_is_refused(shown: Callable[..., pf.Viewer], monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = pf.load("five_bar")
+    with pytest.raises(InvalidArgument, match="batch"):
+        pf.view(pf.solve_ik(machine, [[0, 0, 180], [0, 0, 190]]))
+    with pytest.raises(InvalidArgument, match="from 1 to 65535"):
+        pf.view(machine, port=0)
+    with pytest.raises(InvalidArgument, match="one Solution of"):
+        shown(machine).show(pf.solve_ik(tripod_rps(), (0, 0, 210)))
+    monkeypatch.setattr("pfabrik.extras.find_spec", lambda _: None)
+    with pytest.raises(MissingLibrary, match=r"the viewer needs viser; install it with: pip install 'pfabrik\[view\]'"):
+        pf.view(machine)
+
+
+def test_the_command_writes_a_page_and_refuses_what_it_cannot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "path.csv").write_text("x,y,z\n0,0,180\n0,0,300\n", encoding="utf-8")
+    result = CliRunner().invoke(
+        main, ["view", "five_bar", "--track", "path.csv", "--html", "a.html", "--port", "18080"]
+    )
+    assert (result.exit_code, result.stdout) == (0, "wrote a.html\n"), result.stderr
+    assert (tmp_path / "a.html").stat().st_size > 100_000
+    for words in (["view", "five_bar", "--html", "a.txt"], ["view", "five_bra"], ["view", "five_bar", "--port", "0"]):
+        result = CliRunner().invoke(main, words)
+        assert result.exit_code == 2
+        assert "Traceback" not in result.stderr
