@@ -76,6 +76,8 @@ _HOMES = {
     "plot": "view.machine",
     "plot_track": "view.track",
     "plot_travel": "view.travel",
+    "Timed": "timing.timed",
+    "time_path": "timing.time_path",
 }
 # Modules that are themselves public.
 _MODULES = ("errors", "geometric", "interop")
@@ -95,6 +97,7 @@ __all__ = [
     "Solver",
     "Status",
     "SubChain",
+    "Timed",
     "Track",
     "Travel",
     "Viewer",
@@ -125,6 +128,7 @@ __all__ = [
     "singularity",
     "solve_fk",
     "solve_ik",
+    "time_path",
     "track",
     "travel",
     "view",
@@ -156,6 +160,8 @@ if TYPE_CHECKING:
     from .options import Options
     from .poses import pose
     from .solver import Solver
+    from .timing.time_path import time_path
+    from .timing.timed import Timed
     from .track import track
     from .travel import Travel, travel
     from .view.animation import animate

@@ -1,0 +1,98 @@
+"""How fast a path may be followed: splines through samples, and the fastest speed within limits.
+
+With s along the path and q(s) the actuators, x = s'^2 and u = s'' make their rates q' sqrt(x) and their accelerations
+q' u + q'' x, both linear in (x, u); x + 2 u (step) is the next x. Backward, the largest x at every point from which the
+end can be reached; forward, the largest u that stays below it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._jit import kernel, routine
+
+Floats = NDArray[np.float64]
+
+
+@kernel
+def second_derivatives(s: Floats, values: Floats, curves: Floats) -> None:
+    """Fill those of the cubic splines through values (n, m) at s (n,), straight at both ends."""
+    n, m = values.shape
+    share = np.zeros(n)
+    for j in range(m):
+        curves[0, j] = 0.0
+        share[0] = 0.0
+        for i in range(1, n - 1):
+            before, after = s[i] - s[i - 1], s[i + 1] - s[i]
+            turn = (values[i + 1, j] - values[i, j]) / after - (values[i, j] - values[i - 1, j]) / before
+            pivot = 2.0 * (before + after) - before * share[i - 1]
+            share[i] = after / pivot
+            curves[i, j] = (6.0 * turn - before * curves[i - 1, j]) / pivot
+        curves[n - 1, j] = 0.0
+        for i in range(n - 2, 0, -1):
+            curves[i, j] -= share[i] * curves[i + 1, j]
+
+
+@routine
+def put_line(place: int, rate: float, curve: float, most: float, lines: Floats) -> tuple[int, float]:
+    """Note |rate u + curve x| <= most as bounds of u, lines[k] = (low, high, slope by x); the count, a bound of x."""
+    if most == math.inf:
+        return place, math.inf
+    if abs(rate) * 1e12 <= abs(curve) or rate == 0.0:
+        return place, most / abs(curve) if curve != 0.0 else math.inf
+    lines[place, 0] = -most / abs(rate)
+    lines[place, 1] = most / abs(rate)
+    lines[place, 2] = -curve / rate
+    return place + 1, math.inf
+
+
+@routine
+def put_lines(i: int, step: float, slopes: Floats, curves: Floats, most: Floats, lines: Floats) -> tuple[int, float]:
+    """The bounds of u from point i to the next, as seen from both ends; how many, and the largest x they allow."""
+    count, largest = 0, math.inf
+    for j in range(most.shape[0]):
+        count, bound = put_line(count, slopes[i, j], curves[i, j], most[j], lines)
+        largest = min(largest, bound)
+        ahead = slopes[i + 1, j] + 2.0 * step * curves[i + 1, j]
+        count, bound = put_line(count, ahead, curves[i + 1, j], most[j], lines)
+        largest = min(largest, bound)
+    return count, largest
+
+
+@kernel
+def fastest(s: Floats, slopes: Floats, curves: Floats, most: Floats, caps: Floats, at_rest: bool, x: Floats) -> None:
+    """Fill the largest squared speeds x (n,) along s (n,).
+
+    Parameters
+    ----------
+    slopes, curves : first and second derivatives of the actuators by s, (n, m).
+    most : their accelerations, (m,); infinite where there is no limit.
+    caps : largest x by speeds, (n,).
+    at_rest : whether the path begins and ends so.
+    """
+    n = s.shape[0]
+    reach, lines = np.zeros(n), np.zeros((2 * most.shape[0] + 1, 3))
+    reach[n - 1] = 0.0 if at_rest else caps[n - 1]
+    for i in range(n - 2, -1, -1):
+        step = s[i + 1] - s[i]
+        count, bound = put_lines(i, step, slopes, curves, most, lines)
+        largest = min(caps[i], bound)
+        # what brings x to the next point: - x <= 2 step u <= reach - x
+        lines[count, 0], lines[count, 1], lines[count, 2] = 0.0, reach[i + 1] / (2.0 * step), -0.5 / step
+        for a in range(count + 1):
+            for b in range(count + 1):
+                slope = lines[a, 2] - lines[b, 2]
+                if slope * largest > lines[b, 1] - lines[a, 0]:
+                    largest = (lines[b, 1] - lines[a, 0]) / slope
+        reach[i] = largest
+    x[0] = 0.0 if at_rest else reach[0]
+    for i in range(n - 1):
+        step = s[i + 1] - s[i]
+        count, _ = put_lines(i, step, slopes, curves, most, lines)
+        u = (reach[i + 1] - x[i]) / (2.0 * step)
+        for a in range(count):
+            u = min(u, lines[a, 1] + lines[a, 2] * x[i])
+        x[i + 1] = min(max(x[i] + 2.0 * step * u, 0.0), reach[i + 1])

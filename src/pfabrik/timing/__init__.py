@@ -1,0 +1,1 @@
+"""How fast a path may be followed, and how fast a platform may move."""

@@ -1,0 +1,157 @@
+"""The fastest speed along a given path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..answers.solution import Status
+from ..answers.tracked import Track
+from ..arrays import Floats
+from ..description.mechanism import Mechanism
+from ..errors import InvalidArgument, UnknownName
+from ..kernels.timing import fastest
+from .crossings import refuse_crossings
+from .curve import Curve, curve_of
+from .timed import Timed, What
+
+MOST_SAMPLES = 10_000_000
+
+
+def time_path(
+    track: Track,
+    *,
+    speed: float | Mapping[str, float] | None = None,
+    acceleration: float | Mapping[str, float] | None = None,
+    platform_speed: float | None = None,
+    rate: float = 1000.0,
+) -> Timed:
+    """The fastest way along a path that was followed, from rest to rest, within the limits of every actuator.
+
+    Between its steps the path is the cubic spline of the actuators through them, so that corners of a path are rounded
+    off within a step: follow it in steps as short as it is to be exact. On that path no other timing is faster, but for
+    the grid it is computed on. Where no acceleration is limited, it starts and ends at full speed.
+
+    Parameters
+    ----------
+    track : all of its steps reached, without jumps.
+    speed, acceleration : highest of the actuators, by name or the same for all [length or rad, per s and per s^2];
+        those not named have the limits of their joints, `max_speed` and `max_acceleration`.
+    platform_speed : highest speed of the reference point [length/s].
+    rate : of the samples that are returned [1/s].
+
+    Raises
+    ------
+    InvalidArgument : a track with steps that were not reached, leap, or cross a parallel singularity, by the number of
+        the step; one that does not move; no limit at all; more than ten million samples.
+    """
+    if not isinstance(track, Track):
+        raise InvalidArgument("track", f"a {type(track).__name__}", "a Track: what pfabrik.track returns")
+    mechanism = track.mechanism
+    speeds = limits_of(mechanism, "speed", speed)
+    accelerations = limits_of(mechanism, "acceleration", acceleration)
+    most_platform = np.inf if platform_speed is None else require_positive("platform_speed", platform_speed)
+    every = 1.0 / require_positive("rate", rate)
+    if not np.isfinite([*speeds, *accelerations, most_platform]).any():
+        found = f"'{mechanism.name}' without max_speed and max_acceleration"
+        raise InvalidArgument("speed", found, "a limit: in the mechanism, or speed, acceleration or platform_speed")
+    refuse_leaps(track)
+    curve = curve_of(track)
+    if len(curve.s) < 2:
+        raise InvalidArgument("track", "a path that does not move", "two steps or more that differ")
+    refuse_crossings(track)
+    s, x = _fastest(curve, speeds, accelerations, most_platform)
+    return _sampled(track, curve, s, x, (speeds, accelerations, most_platform), every)
+
+
+def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
+    """The highest speed or acceleration of every actuator, (n_a,); infinite where there is none."""
+    names = mechanism.actuator_names
+    own = [getattr(mechanism.joint(name), f"max_{what}") for name in names]
+    limits = np.array([np.inf if value is None else value for value in own], dtype=float)
+    if isinstance(given, Mapping):
+        for name, value in given.items():
+            if name not in names:
+                raise UnknownName("actuator", name, names)
+            limits[names.index(name)] = require_positive(f"{what}['{name}']", value)
+    elif given is not None:
+        limits[:] = require_positive(what, given)
+    return limits
+
+
+def require_positive(name: str, value: Any) -> float:
+    """A number above zero."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < np.inf:
+        raise InvalidArgument(name, repr(value), "a positive number")
+    return float(value)
+
+
+def refuse_leaps(track: Track) -> None:
+    """No machine follows steps that are not reached, or that leap."""
+    for bad, what in ((track.status != Status.REACHED, "not reached"), (track.jumps, "leaping from the one before")):
+        steps = np.flatnonzero(bad)
+        if len(steps):
+            found = f"{len(steps)} step{'s' * (len(steps) > 1)} {what}"
+            raise InvalidArgument("track", found, "a path that is reached throughout", rows=steps[:5].tolist())
+
+
+def _fastest(curve: Curve, speeds: Floats, accelerations: Floats, most_platform: float) -> tuple[Floats, Floats]:
+    """A grid along s and the largest squared speeds there."""
+    s = curve.grid()
+    _, slopes, bends = curve.at(s)
+    n = curve.n_actuators
+    slopes_of, bends_of = np.ascontiguousarray(slopes[:, :n]), np.ascontiguousarray(bends[:, :n])
+    with np.errstate(divide="ignore"):
+        caps = np.min(speeds / np.abs(slopes_of), axis=1)
+        caps = np.minimum(caps, most_platform / np.linalg.norm(slopes[:, n:], axis=1)) ** 2
+    caps[~np.isfinite(caps)] = np.finfo(float).max ** 0.5
+    x, at_rest = np.empty(len(s)), bool(np.isfinite(accelerations).any())
+    fastest(s, slopes_of, bends_of, accelerations, caps, at_rest, x)
+    return s, x
+
+
+def _sampled(
+    track: Track, curve: Curve, s: Floats, x: Floats, limits: tuple[Floats, Floats, float], every: float
+) -> Timed:
+    """Samples at a rate, and at the very end."""
+    steps, mean = np.diff(s), 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
+    if not (mean > 0.0).all():
+        stuck = curve.step_of(s[:-1][mean <= 0.0])
+        raise InvalidArgument("track", "steps that no limit lets it pass", "a smoother path", rows=stuck[:5].tolist())
+    reached = np.concatenate([[0.0], np.cumsum(steps / mean)])
+    if reached[-1] / every > MOST_SAMPLES:
+        found = f"{1.0 / every:g} samples per second for {reached[-1]:g} s"
+        raise InvalidArgument("rate", found, f"at most {MOST_SAMPLES} samples")
+    times = np.arange(0.0, reached[-1], every)
+    times = np.append(times[times < reached[-1] - 1e-9 * every], reached[-1])
+    cell = np.clip(np.searchsorted(reached, times, side="right") - 1, 0, len(steps) - 1)
+    pushes = np.diff(x) / (2.0 * steps)
+    late = times - reached[cell]
+    pace = np.maximum(np.sqrt(x[cell]) + pushes[cell] * late, 0.0)
+    where = np.clip(s[cell] + (np.sqrt(x[cell]) + 0.5 * pushes[cell] * late) * late, s[0], s[-1])
+    values, slopes, bends = curve.at(where)
+    n = curve.n_actuators
+    rates = slopes * pace[:, None]
+    gains = slopes[:, :n] * pushes[cell][:, None] + bends[:, :n] * pace[:, None] ** 2
+    speeds, accelerations, most_platform = limits
+    platform = np.linalg.norm(rates[:, n:], axis=1)
+    used = np.concatenate(
+        [np.abs(rates[:, :n]) / speeds, np.abs(gains) / accelerations, platform[:, None] / most_platform], axis=1
+    )
+    names = track.mechanism.actuator_names
+    kinds: list[tuple[str, What]] = [*((name, "speed") for name in names), *((name, "acceleration") for name in names)]
+    return Timed(
+        mechanism=track.mechanism,
+        times=times,
+        steps=curve.step_of(where),
+        poses=curve.poses_at(where),
+        actuators=values[:, :n],
+        rates=rates[:, :n],
+        accelerations=gains,
+        platform_speeds=platform,
+        used=used.max(axis=1),
+        binding=used.argmax(axis=1),
+        limits=(*kinds, ("platform", "speed")),
+    )

@@ -1,0 +1,133 @@
+"""A path with its times."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..description.mechanism import Mechanism
+from ..description.readouts import readouts
+from ..extras import require
+from ..rotations import to_rpy
+from ..writing import whole_path
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+What: TypeAlias = Literal["speed", "acceleration"]
+
+REACHED = 0.99
+"""Share of a limit from which on a sample counts as held back by it: some are felt at the next point of the grid."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Timed:
+    """A path as fast as it may be followed, in n samples.
+
+    Attributes
+    ----------
+    times : (n,) [s].
+    steps : the step of the track that each sample is at, or after, (n,).
+    poses : (n, 4, 4), actuators, rates, accelerations : (n, n_a) [length or rad, per s, per s^2].
+    platform_speeds : of the reference point, (n,) [length/s].
+    used, binding : the largest share of any limit, (n,), and which of `limits` that is, (n,).
+    limits : (actuator, "speed" or "acceleration") of all actuators, and ("platform", "speed").
+    """
+
+    mechanism: Mechanism
+    times: Floats
+    steps: NDArray[np.int64]
+    poses: Floats
+    actuators: Floats
+    rates: Floats
+    accelerations: Floats
+    platform_speeds: Floats
+    used: Floats
+    binding: NDArray[np.int64]
+    limits: tuple[tuple[str, What], ...]
+
+    @property
+    def duration(self) -> float:
+        """Of the whole path [s]."""
+        return float(self.times[-1])
+
+    @property
+    def held_back(self) -> dict[tuple[str, What], float]:
+        """(actuator, what) -> share of the time in which this limit holds the path back, the longest first."""
+        weights = np.gradient(self.times) if len(self.times) > 1 else np.ones(1)
+        shares = {
+            limit: float(weights[(self.binding == place) & (self.used >= REACHED)].sum() / weights.sum())
+            for place, limit in enumerate(self.limits)
+        }
+        return {limit: share for limit, share in sorted(shares.items(), key=lambda each: -each[1]) if share > 0.0}
+
+    def __repr__(self) -> str:
+        name = self.mechanism.name
+        return f"<Timed path of '{name}': {self.duration:.6g} s, {len(self.times)} samples>"
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write times, poses, actuators, their rates and accelerations; angles in degrees.
+
+        The file appears whole or not at all.
+        """
+        with whole_path(path) as part, part.open("w", newline="", encoding="utf-8") as handle:
+            self.write(handle)
+
+    def write(self, handle: TextIO) -> None:
+        """The same, to an open file."""
+        shown = readouts(self.mechanism)
+        units = np.array([float(each.display(np.ones(1))[0]) for each in shown])
+        names = [f"{each.name}{'_deg' if each.is_angle else ''}" for each in shown]
+        writer = csv.writer(handle, lineterminator="\n")
+        header = ["t", "step", "x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg"]
+        header += [f"{kind}_{name}" for kind in ("actuator", "rate", "acceleration") for name in names]
+        writer.writerow([*header, "platform_speed", "held_back_by"])
+        numbers = np.concatenate(
+            [
+                self.poses[:, :3, 3],
+                np.degrees(to_rpy(self.poses[:, :3, :3])),
+                self.actuators * units,
+                self.rates * units,
+                self.accelerations * units,
+                self.platform_speeds[:, None],
+            ],
+            axis=1,
+        )
+        words = [" ".join(limit) for limit in self.limits]
+        for time, step, row, used, place in zip(
+            self.times.tolist(),
+            self.steps.tolist(),
+            (numbers + 0.0).tolist(),
+            self.used.tolist(),
+            self.binding.tolist(),
+            strict=True,
+        ):
+            writer.writerow([time, step, *row, words[place] if used >= REACHED else ""])
+
+    def plot(self) -> Figure:
+        """Actuators, their rates and accelerations over time, one curve each; a Matplotlib figure."""
+        require("pictures", "matplotlib", "view")
+        from matplotlib.figure import Figure
+
+        shown = readouts(self.mechanism)
+        units = np.array([float(each.display(np.ones(1))[0]) for each in shown])
+        figure: Any = Figure(figsize=(8.0, 7.0), layout="constrained")
+        for axes, label, values in zip(
+            figure.subplots(3, 1, sharex=True),
+            ("actuators", "rates [/s]", "accelerations [/s²]"),
+            (self.actuators, self.rates, self.accelerations),
+            strict=True,
+        ):
+            for each, column in zip(shown, (values * units).T, strict=True):
+                axes.plot(self.times, column, label=f"{each.name} [{each.unit}]")
+            axes.set_ylabel(label)
+        axes.set_xlabel("time [s]")
+        axes.legend(ncols=3, fontsize="small")
+        found: Figure = figure
+        return found

@@ -1,0 +1,201 @@
+"""Timed paths: within every limit, and as fast as another's method says is possible."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from pfabrik.errors import InvalidArgument, UnknownName
+from pfabrik.motion.first_order import generic_of
+from pfabrik.timing.curve import curve_of
+from pfabrik.timing.time_path import limits_of
+
+MACHINES = ("stewart", "five_bar", "servo_hexapod", "linear_delta", "rrr")
+
+
+@lru_cache
+def followed(name: str, turns: int, count: int = 150) -> pf.Track:
+    """A closed curve around home of a few turns, tilting where the machine can."""
+    mechanism = pf.load(name)
+    size = 0.06 * mechanism.characteristic_length
+    angle = np.linspace(0.0, 2.0 * np.pi, count)
+    offsets = np.stack([np.sin(angle), np.sin(turns * angle), 0.5 - 0.5 * np.cos(angle)], axis=1) * size
+    tilts = np.stack([np.sin(angle), 1.0 - np.cos(angle), np.sin(turns * angle)], axis=1) * 0.05
+    directions = generic_of(mechanism).directions  # what the machine can do at all
+    basis = np.zeros((6, directions.shape[1]))
+    basis[: len(directions)] = directions
+    moved = np.concatenate([offsets, tilts], axis=1) @ np.round(basis @ basis.T, 9)
+    offsets, tilts = moved[:, :3], moved[:, 3:]
+    track = pf.track(mechanism, pf.pose(mechanism.home_pose[:3, 3] + offsets, rotvec=tilts))
+    assert track
+    return track
+
+
+def limits(name: str) -> dict[str, float]:
+    """Limits that a machine of this size could have: some by speed, some by acceleration."""
+    mechanism = pf.load(name)
+    is_slide = mechanism.joint(mechanism.actuator_names[0]).type == "prismatic"
+    unit = mechanism.characteristic_length if is_slide else 1.0
+    return {"speed": 0.4 * unit, "acceleration": 3.0 * unit}
+
+
+@pytest.mark.parametrize("turns", [1, 3])
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_time_is_that_of_toppra(name: str, turns: int) -> None:
+    pytest.importorskip("toppra", reason="no toppra here: its wheels are for Linux")
+    import toppra
+    from scipy.interpolate import CubicSpline
+
+    track = followed(name, turns)
+    given = limits(name)
+    curve = curve_of(track)
+    grid = curve.grid()
+    n_a = curve.n_actuators
+    path = toppra.SplineInterpolator(curve.s, track.actuators[curve.steps], bc_type="natural")
+    spline = CubicSpline(curve.s, track.actuators[curve.steps], bc_type="natural")
+    np.testing.assert_allclose(curve.at(grid)[0][:, :n_a], spline(grid), atol=1e-9)
+    both = [
+        toppra.constraint.JointVelocityConstraint(np.array([[-given["speed"], given["speed"]]] * n_a)),
+        toppra.constraint.JointAccelerationConstraint(
+            np.array([[-given["acceleration"], given["acceleration"]]] * n_a)
+        ),
+    ]
+    _, speeds, _ = toppra.algorithm.TOPPRA(both, path, gridpoints=grid).compute_parameterization(0.0, 0.0)
+    expected = (2.0 * np.diff(grid) / (speeds[1:] + speeds[:-1])).sum()
+    timed = pf.time_path(track, **given)
+    assert timed.duration == pytest.approx(expected, rel=1e-3)
+    assert np.abs(timed.rates).max() <= 1.001 * given["speed"]
+    assert np.abs(timed.accelerations).max() <= 1.001 * given["acceleration"]
+
+
+def slide(length: float = 100.0, count: int = 30) -> pf.Track:
+    joint = pf.Joint("x", "prismatic", ("base", "table"), axis=(1, 0, 0), actuated=True, range=(-1, 1000))
+    mechanism = pf.Mechanism("slide", [joint], "table", (0, 0, 0), task=("x",))
+    return pf.track(mechanism, np.linspace([0, 0, 0], [length, 0, 0], count))
+
+
+@pytest.mark.parametrize(("speed", "acceleration"), [(50.0, 200.0), (1000.0, 200.0), (50.0, 30.0)])
+def test_a_straight_move_of_one_actuator_takes_its_closed_form(speed: float, acceleration: float) -> None:
+    length = 100.0
+    timed = pf.time_path(slide(length), speed=speed, acceleration=acceleration, rate=500)
+    peak = min(speed, np.sqrt(length * acceleration))
+    assert timed.duration == pytest.approx(length / peak + peak / acceleration, rel=1e-5)
+    assert timed.rates.max() == pytest.approx(peak, rel=1e-2)
+    # what is told at the samples belongs together
+    assert timed.actuators[-1] == pytest.approx([length], rel=1e-12)
+    np.testing.assert_allclose(timed.rates[1:-2, 0], (np.diff(timed.actuators[:-1, 0]) * 500)[:-1], atol=peak * 0.05)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_it_is_never_slower_than_the_best_constant_speed(name: str) -> None:
+    track, given = followed(name, 3), limits(name)
+    curve = curve_of(track)
+    grid = curve.grid()
+    _, slopes, bends = curve.at(grid)
+    slopes, bends = np.abs(slopes[:, : curve.n_actuators]), np.abs(bends[:, : curve.n_actuators])
+    fastest = given["speed"] / slopes.max()
+    assert pf.time_path(track, speed=given["speed"]).duration <= curve.s[-1] / fastest * (1.0 + 1e-9)
+    # from rest to rest: up and down with half of the acceleration, the other half left for the bends
+    cruising = min(fastest, np.sqrt(0.5 * given["acceleration"] / bends.max()))
+    push = 0.5 * given["acceleration"] / slopes.max()
+    trapezoid = curve.s[-1] / cruising + cruising / push
+    assert pf.time_path(track, **given).duration <= trapezoid * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_some_limit_is_met_at_all_times_and_named(name: str) -> None:
+    timed = pf.time_path(followed(name, 1), **limits(name))
+    assert (timed.used[1:-1] > 0.99).mean() > 0.95
+    assert timed.used.max() <= 1.001
+    held = timed.held_back
+    assert sum(held.values()) == pytest.approx(1.0, abs=0.1)
+    actuator, what = next(iter(held))
+    assert actuator in (*pf.load(name).actuator_names, "platform")
+    assert what in ("speed", "acceleration")
+
+
+def test_the_platform_keeps_its_own_speed() -> None:
+    timed = pf.time_path(followed("linear_delta", 1), platform_speed=20.0)
+    inner = slice(2, -2)
+    assert timed.platform_speeds.max() <= 20.0 * 1.001
+    positions = timed.poses[:, :3, 3]
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(timed.times)
+    np.testing.assert_allclose(steps[inner], 20.0, rtol=1e-3)
+    assert ("platform", "speed") in timed.held_back
+
+
+def test_the_answer_is_the_machine_s() -> None:
+    timed = pf.time_path(followed("stewart", 3), **limits("stewart"), rate=50)
+    again = pf.solve_ik(pf.load("stewart"), timed.poses)
+    assert np.abs(again.actuators - timed.actuators).max() < 1e-4 * pf.load("stewart").characteristic_length
+
+
+def test_limits_come_from_the_file_and_from_the_call() -> None:
+    joints = [
+        pf.Joint("x", "prismatic", ("base", "a"), axis=(1, 0, 0), actuated=True, max_speed=3.0, max_acceleration=7.0),
+        pf.Joint("y", "prismatic", ("a", "b"), axis=(0, 1, 0), actuated=True),
+    ]
+    mechanism = pf.Mechanism("table", joints, "b", (0, 0, 0), task=("x", "y"))
+    assert limits_of(mechanism, "speed", None).tolist() == [3.0, np.inf]
+    assert limits_of(mechanism, "acceleration", {"y": 2.0}).tolist() == [7.0, 2.0]
+    assert limits_of(mechanism, "speed", 5.0).tolist() == [5.0, 5.0]
+    with pytest.raises(UnknownName, match="did you mean"):
+        limits_of(mechanism, "speed", {"yy": 1.0})
+
+
+def test_paths_that_no_machine_follows_are_refused_with_the_step() -> None:
+    mechanism = pf.load("five_bar")
+    home = mechanism.home_pose[:3, 3]
+    far = pf.track(mechanism, [home, home + [0, 1e4, 0], home])
+    with pytest.raises(InvalidArgument, match=r"not reached.*first bad rows: 1"):
+        pf.time_path(far, speed=1.0)
+    with pytest.raises(InvalidArgument, match="does not move"):
+        pf.time_path(pf.track(mechanism, [home, home]), speed=1.0)
+    with pytest.raises(InvalidArgument, match="a limit"):
+        pf.time_path(slide())
+    with pytest.raises(InvalidArgument, match="samples"):
+        pf.time_path(slide(), speed=1e-9)
+    with pytest.raises(InvalidArgument, match="track"):
+        pf.time_path(pf.solve_ik(mechanism, home), speed=1.0)  # type: ignore[arg-type]
+    for wrong in ({"speed": -1.0}, {"rate": 0.0}, {"acceleration": float("nan")}, {"platform_speed": True}):
+        with pytest.raises(InvalidArgument, match=next(iter(wrong))):
+            pf.time_path(slide(), **{"speed": 1.0, **wrong})
+
+
+def test_a_path_across_a_parallel_singularity_is_refused_with_the_step() -> None:
+    """A planar 3-RPR with like triangles, turned past where its legs meet in a point."""
+    from machines.positions import planar
+
+    mechanism = planar("RPR").without_limits()
+    angles = np.radians(np.linspace(0.0, 170.0, 60))
+    targets = pf.pose(np.tile(mechanism.home_pose[:3, 3], (60, 1)), rotvec=angles[:, None] * [0.0, 0.0, 1.0])
+    track = pf.track(mechanism, targets)
+    assert track
+    with pytest.raises(InvalidArgument, match="parallel singularity") as caught:
+        pf.time_path(track, speed=1.0)
+    (step, *_) = caught.value.rows
+    signs = np.sign(np.linalg.det(pf.inverse_jacobian(track)[:, :, [0, 1, 5]]))
+    assert signs[step] != signs[step - 1]
+
+
+def test_a_timed_path_goes_to_a_file_whole_or_not_at_all(tmp_path: Path) -> None:
+    timed = pf.time_path(followed("five_bar", 1), speed=1.0, rate=20)
+    timed.to_csv(tmp_path / "timed.csv")
+    header, *rows = (tmp_path / "timed.csv").read_text().splitlines()
+    assert header.startswith("t,step,x,y,z,roll_deg,pitch_deg,yaw_deg,actuator_")
+    assert len(rows) == len(timed.times)
+    first = dict(zip(header.split(","), rows[3].split(","), strict=True))
+    name = timed.mechanism.actuator_names[0]
+    assert float(first[f"actuator_{name}_deg"]) == pytest.approx(np.degrees(timed.actuators[3, 0]))
+    with pytest.raises(FileNotFoundError):
+        timed.to_csv(tmp_path / "no" / "timed.csv")
+
+
+def test_curves_are_drawn_over_time() -> None:
+    pytest.importorskip("matplotlib")
+    figure = pf.time_path(followed("five_bar", 1), speed=1.0, rate=20).plot()
+    assert [len(axes.lines) for axes in figure.axes] == [2, 2, 2]
