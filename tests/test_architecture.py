@@ -102,19 +102,8 @@ def loaded_by(heavy: str, lines: list[list[str]]) -> tuple[list[tuple[int | None
 
 
 COMMANDS = (
-    "catalog",
-    "new",
-    "info",
-    "check",
-    "ik",
-    "fk",
-    "track",
-    "travel",
-    "plot",
-    "view",
-    "export",
-    "demo",
-    "reproduce",
+    *("catalog", "new", "info", "check", "ik", "fk", "track", "travel", "plot", "view"),
+    *("import", "export", "verify", "demo", "reproduce"),
 )
 HELP = [["--help"], *[[command, "--help"] for command in COMMANDS]]
 WRONG = [

@@ -25,6 +25,7 @@ MODES = {
     "canfield": 8,
     "delta": 8,
     "five_bar": 4,
+    "g1_ankle": None,  # its pivot has two axes that miss each other
     "hexaglide": 64,
     "linear_delta": 8,
     "nrpm": None,  # redundant
@@ -32,6 +33,7 @@ MODES = {
     "prr": 8,
     "prs": 8,
     "psu": 8,
+    "reachy_mini": 64,
     "rpr": 1,
     "rps": 2,  # turned by half a turn, too
     "rrr": 8,
@@ -56,6 +58,7 @@ DRIVEN = {
     "prr": [("A", "B", "C")],
     "prs": [("A", "B", "C")],
     "psu": [("A", "BL", "CL"), ("A", "BR", "CR")],
+    "reachy_mini": [(f"stewart_{k}", f"passive_{k}", f"closing_{k}") for k in range(1, 7)],
     "rrr": [("A", "B", "C")],
     "servo_hexapod": [("AL", "BL", "CL"), ("AR", "BR", "CR")],
 }

@@ -32,6 +32,7 @@ FREEDOMS = {
     "canfield": (3, 3),  # Canfield 1997: two rotations and the plunge
     "delta": (3, 3),  # Clavel 1988: three translations
     "five_bar": (2, 2),
+    "g1_ankle": (2, 2),
     "hexaglide": (6, 6),
     "linear_delta": (3, 9),  # and six rods that spin between their ball joints
     "nrpm": (6, 12),  # the paper: twelve actuators for six freedoms
@@ -39,6 +40,7 @@ FREEDOMS = {
     "prr": (3, 3),
     "prs": (3, 3),
     "psu": (3, 3),
+    "reachy_mini": (6, 12),  # and six rods that spin between their ball joints
     "rpr": (3, 3),
     "rps": (3, 3),  # Lee and Shah 1988
     "rrr": (3, 3),

@@ -28,7 +28,7 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
         *("catalog", "new", "info", "check"),
         *("ik", "fk", "track", "travel"),
         *("plot", "view"),
-        *("export",),
+        *("import", "export", "verify"),
         *("compile", "demo", "reproduce"),
     ),
     invoke_without_command=True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import keyword
 import os
 import sys
 import warnings
@@ -21,7 +22,10 @@ PIPE_CLOSED = 141
 
 
 class CommandGroup(click.Group):
-    """A group whose subcommand ``name`` is the object ``name`` of the module ``pfabrik.cli.name``."""
+    """A group whose subcommand ``name`` is the object ``name`` of the module ``pfabrik.cli.name``.
+
+    A name that is a word of Python has an underscore behind it there.
+    """
 
     def __init__(self, *args: Any, subcommands: Sequence[str] = (), **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -35,8 +39,9 @@ class CommandGroup(click.Group):
         """Load one subcommand."""
         if cmd_name not in self.subcommands:
             return None
-        module = importlib.import_module(f".{cmd_name}", __package__)
-        command: click.Command = getattr(module, cmd_name)
+        name = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
+        module = importlib.import_module(f".{name}", __package__)
+        command: click.Command = getattr(module, name)
         return command
 
     def resolve_command(

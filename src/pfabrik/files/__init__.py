@@ -115,7 +115,8 @@ def _parsed(text: str) -> dict[str, Any]:
     _refuse_large(text)
     if text.lstrip().startswith("<"):
         told = next(name for tag, name in FORMATS.items() if tag in text)
-        raise _unusable(told, "a mechanism file (TOML), as `pfabrik new` writes")
+        way = ", or `pfabrik import` to make one of it" if told != FORMATS["<"] else ""
+        raise _unusable(told, f"a mechanism file (TOML), as `pfabrik new` writes{way}")
     try:
         if max(line.count(".") for line in text.split("\n") if not line.startswith("#")) > MOST_DOTS:
             raise RecursionError

@@ -2,8 +2,27 @@
 
 m = pf.interop.from_mjcf("robot.xml", base="body", end_effector="head").mechanism
 pf.interop.to_mjcf(m, "machine.xml")         # starts closed, and stays closed
+pf.interop.verify(m)                         # with MuJoCo as the referee
 """
 
+from .assembling import Imported, assemble
+from .mjcf_reading import from_mjcf
 from .mjcf_writing import to_mjcf
+from .opened import Loop, Note, OpenMechanism
+from .referee import Verification, verify
+from .urdf_reading import from_urdf
+from .xml_reading import kind_of
 
-__all__ = ["to_mjcf"]
+__all__ = [
+    "Imported",
+    "Loop",
+    "Note",
+    "OpenMechanism",
+    "Verification",
+    "assemble",
+    "from_mjcf",
+    "from_urdf",
+    "kind_of",
+    "to_mjcf",
+    "verify",
+]

@@ -20,6 +20,9 @@ from .physics import Physics
 REFERENCE_POINT = "reference_point"
 """Name of the site that targets place."""
 
+WORLD = "world"
+"""What MuJoCo calls the body that rests."""
+
 THICKNESS = 0.015
 """Radius of what is drawn of a link [L]."""
 
@@ -61,7 +64,7 @@ def as_attributes(values: Mapping[str, float]) -> dict[str, str]:
 def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, physics: Physics) -> ET.Element:
     """All bodies as a tree, the base fixed to the world; frames parallel at home, each at the joint it hangs on."""
     world = ET.Element("worldbody")
-    elements = {mechanism.base: ET.SubElement(world, "body", name=mechanism.base)}
+    elements = {mechanism.base: world if mechanism.base == WORLD else ET.SubElement(world, "body", name=mechanism.base)}
     origins = {mechanism.base: np.zeros(3)}
     points = _points(mechanism, metres)
     for branch in tree.branches:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -12,7 +11,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism, checked_mechanism
+from ..errors import InvalidArgument
 from ..poses import as_floats
+from ..writing import whole_path
 from .cuts import CutTree, cut_tree
 from .mjcf_bodies import Names, as_attributes, bodies, names_of, vector
 from .physics import STEP, Physics, physics
@@ -58,10 +59,13 @@ def to_mjcf(
     """
     metres = metres_of(checked_mechanism(mechanism).length_unit)
     pull = as_floats("gravity", gravity, "three numbers [m/s²]")
+    if pull.shape != (3,):
+        raise InvalidArgument("gravity", f"shape {pull.shape}", "three numbers [m/s²]")
     weights = physics(mechanism, metres, masses)
     text = _text(mechanism, metres, weights, pull)
     if path is not None:
-        Path(path).write_text(text, encoding="utf-8")
+        with whole_path(path) as part:
+            part.write_text(text, encoding="utf-8")
     return text
 
 
@@ -77,7 +81,7 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
         root, "option", timestep=repr(STEP), integrator="implicitfast", tolerance="1e-12", gravity=vector(gravity)
     )
     custom = ET.SubElement(root, "custom")
-    for name, text in _notes(mechanism):
+    for name, text in _notes(mechanism, names):
         ET.SubElement(custom, "text", name=NOTE + name, data=text)
     root.append(bodies(mechanism, tree, names, metres, physics))
     root.append(_equalities(tree, names, physics))
@@ -100,10 +104,11 @@ def _comments(mechanism: Mechanism, physics: Physics) -> Iterator[str]:
             yield f"a limit that MuJoCo does not keep: the cone of {joint.name}, {half_angle} about {joint.cone.axis}"
 
 
-def _notes(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
+def _notes(mechanism: Mechanism, names: Names) -> Iterator[tuple[str, str]]:
     """What MuJoCo has no word for, for who reads the model back."""
     yield "base", mechanism.base
     yield "end_effector", mechanism.end_effector
+    yield "reference_point", names.reference
     yield "task", " ".join(mechanism.task)
     for joint in mechanism.joints:
         if joint.cone is not None:

@@ -32,7 +32,8 @@ from ..description.home_mobility import (
     joint_screws,
     universal_axes,
 )
-from ..description.mechanism import Joint, Mechanism
+from ..description.joints import Joint
+from ..description.structure import Structure
 from ..rotations import angles_and_sines, composed, from_rotvec
 
 
@@ -66,7 +67,7 @@ class _Geometry:
 
 
 @lru_cache(maxsize=64)
-def columns(mechanism: Mechanism) -> Mapping[str, slice]:
+def columns(mechanism: Structure) -> Mapping[str, slice]:
     """Joint name -> its coordinates, as a slice of the columns of q."""
     bounds = np.searchsorted(column_joints(mechanism), np.arange(len(mechanism.joints) + 1)).tolist()
     return MappingProxyType(
@@ -75,14 +76,14 @@ def columns(mechanism: Mechanism) -> Mapping[str, slice]:
 
 
 @lru_cache(maxsize=64)
-def home_coordinates(mechanism: Mechanism) -> Floats:
+def home_coordinates(mechanism: Structure) -> Floats:
     """All joint coordinates at home as the description counts them, (c,) [rad or length]."""
     home = np.concatenate([np.ravel(mechanism.home_coordinate(joint.name)) for joint in mechanism.joints])
     home.setflags(write=False)
     return home
 
 
-def displacements(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
+def displacements(mechanism: Structure, q: Floats) -> dict[str, Floats]:
     """Body -> its displacements, (n, 4, 4) [length], in base coordinates.
 
     Parameters
@@ -94,7 +95,7 @@ def displacements(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
     return {body: bodies[:, place] for body, place in geometry.places.items()}
 
 
-def joint_displacements(mechanism: Mechanism, name: str, values: Floats) -> Floats:
+def joint_displacements(mechanism: Structure, name: str, values: Floats) -> Floats:
     """Displacements (n, 4, 4) [length] of a joint's second body when only that joint moves and its first body rests.
 
     Parameters
@@ -108,7 +109,7 @@ def joint_displacements(mechanism: Mechanism, name: str, values: Floats) -> Floa
     return np.asarray(_motions(geometry, q)[0][:, [joint.name for joint in mechanism.joints].index(name)])
 
 
-def centres(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
+def centres(mechanism: Structure, q: Floats) -> dict[str, Floats]:
     """Joint name -> present position of its centre, as a point of its first body, (n, 3) [length], in base coordinates.
 
     Joints without a centre (prismatic joints without `at`) are left out.
@@ -118,14 +119,14 @@ def centres(mechanism: Mechanism, q: Floats) -> dict[str, Floats]:
     return {joint.name: present[:, j] for j, joint in enumerate(mechanism.joints) if joint.at is not None}
 
 
-def placed(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats]:
+def placed(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:
     """Displacements (n, bodies, 4, 4) of `mechanism.bodies`, and joint centres (n, joints, 3) as of `centres`."""
     geometry = _geometry(mechanism)
     bodies = _bodies(geometry, _motions(geometry, q)[0])
     return bodies, _centres(geometry, bodies)
 
 
-def end_effector_pose(mechanism: Mechanism, q: Floats) -> Floats:
+def end_effector_pose(mechanism: Structure, q: Floats) -> Floats:
     """Pose of the end effector, T_base_platform, (n, 4, 4) [length].
 
     Of a joint end effector, the pose is the present centre of the joint, unrotated.
@@ -136,7 +137,7 @@ def end_effector_pose(mechanism: Mechanism, q: Floats) -> Floats:
     return displaced
 
 
-def screws(mechanism: Mechanism, q: Floats) -> Floats:
+def screws(mechanism: Structure, q: Floats) -> Floats:
     """Present unit screws of all coordinates, (n, c, 6), in base coordinates.
 
     A screw is the angular velocity, and the velocity of the point at the base origin in units of L (the characteristic
@@ -153,7 +154,7 @@ def screws(mechanism: Mechanism, q: Floats) -> Floats:
     return np.concatenate([angular, linear + np.cross(offset, angular)], axis=-1)
 
 
-def gaps(mechanism: Mechanism, q: Floats) -> Floats:
+def gaps(mechanism: Structure, q: Floats) -> Floats:
     """Largest gap of any loop, (n,) [length]; zero where there are no loops.
 
     At every joint that closes a loop, its second body is compared with where its first body and its coordinates put it:
@@ -165,7 +166,7 @@ def gaps(mechanism: Mechanism, q: Floats) -> Floats:
     return np.asarray(np.max(sizes, axis=-1, initial=0.0))
 
 
-def loop_errors(mechanism: Mechanism, q: Floats) -> Floats:
+def loop_errors(mechanism: Structure, q: Floats) -> Floats:
     """The small screw motions that open the loops, (n, loops, 6), in base coordinates; in the units of `screws`.
 
     One for every joint that closes a loop: the motion of its second body away from where its first body and its
@@ -178,7 +179,7 @@ def loop_errors(mechanism: Mechanism, q: Floats) -> Floats:
     return np.concatenate([rotations, velocity], axis=-1)
 
 
-def stepped(mechanism: Mechanism, q: Floats, step: Floats) -> Floats:
+def stepped(mechanism: Structure, q: Floats, step: Floats) -> Floats:
     """The coordinates after every joint made a step along its present screws, (n, c) [rad or length].
 
     Parameters
@@ -199,7 +200,7 @@ def stepped(mechanism: Mechanism, q: Floats, step: Floats) -> Floats:
 
 
 @lru_cache(maxsize=64)
-def rate_units(mechanism: Mechanism) -> Floats:
+def rate_units(mechanism: Structure) -> Floats:
     """What the rates of `screws` are counted in, (c,): 1 for an angle [1/s], L for a displacement [L/s]."""
     turning = _geometry(mechanism).screws[:, :3].any(axis=1)
     units = np.where(turning, 1.0, mechanism.characteristic_length)
@@ -208,7 +209,7 @@ def rate_units(mechanism: Mechanism) -> Floats:
 
 
 @lru_cache(maxsize=64)
-def _geometry(mechanism: Mechanism) -> _Geometry:
+def _geometry(mechanism: Structure) -> _Geometry:
     joints, owners = mechanism.joints, column_joints(mechanism)
     places = {body: place for place, body in enumerate(mechanism.bodies)}
     turns, slides = np.zeros((2, len(owners), len(joints), 3)), np.zeros((len(owners), len(joints), 3))
@@ -229,7 +230,7 @@ def _geometry(mechanism: Mechanism) -> _Geometry:
     )
 
 
-def _exponents(mechanism: Mechanism, joint: Joint) -> tuple[Floats, Floats]:
+def _exponents(mechanism: Structure, joint: Joint) -> tuple[Floats, Floats]:
     """Vectors of a joint's first and second rotation, (2, freedoms, 3), and of its translation, (freedoms, 3)."""
     none, one = np.zeros(3), np.eye(3)
     if joint.type == "spherical":
@@ -311,7 +312,7 @@ def _frames(geometry: _Geometry, bodies: Floats, turned: Floats) -> Floats:
     return frames
 
 
-def _openings(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats, Floats]:
+def _openings(mechanism: Structure, q: Floats) -> tuple[Floats, Floats, Floats]:
     """How far the loops are open at their closing joints, and where, in base coordinates.
 
     Rotations (n, loops, 3, 3) and distances (n, loops, 3) [length] from where the first body and the coordinates put

@@ -1,0 +1,81 @@
+"""``pfabrik import``: the mechanism in a MuJoCo model or a robot description, as a mechanism file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import pfabrik as pf
+
+from .group import complain
+from .whole import whole_file
+
+if TYPE_CHECKING:
+    from ..interop import Imported
+
+
+def words(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:
+    """Names separated by commas."""
+    return None if value is None else [word.strip() for word in value.split(",") if word.strip()]
+
+
+@click.command("import")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--base", metavar="BODY", help="The body that rests. Default: the world, or the root link.")
+@click.option("--end-effector", metavar="NAME", help="A body, a site, or a joint. Default: where most joints meet.")
+@click.option("--loops", type=click.Path(path_type=Path), metavar="YAML", help="The loops of a URDF, and its motors.")
+@click.option(
+    "--actuated", metavar="A,B,...", callback=words, help="Joints that are driven. Default: as the file says."
+)
+@click.option("--fixed", metavar="A,B,...", callback=words, help="Joints to hold where they are.")
+@click.option(
+    "--task", metavar="A,B,...", callback=words, help="What targets set, such as z,tilt. Default: everything."
+)
+@click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of MuJoCo: home.")
+@click.option("--unit", default="m", show_default=True, help="Unit of length of the mechanism.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), default="-", help="File to write. Default: print it.")
+@click.option("--force", is_flag=True, help="Replace the file if it exists.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout: what was found, and the file's text.")
+def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) -> int:
+    """Turn a MuJoCo model (MJCF) or a URDF into a mechanism file.
+
+    FILE is the model. Of a robot, what the end effector does not depend on is left out; loops that are open are closed.
+    All that is left out or changed is told on stderr, by name.
+    """
+    if output != Path("-") and output.exists() and not force:
+        raise click.ClickException(f"{output}: exists already; --force replaces it")
+    found = imported(file, **asked)
+    from ..files import dumps
+
+    text = dumps(found.mechanism)
+    if as_json:
+        notes = [{"what": note.what, "names": note.names} for note in found.notes]
+        told = {"name": found.mechanism.name, "gap": found.gap, "unit": found.mechanism.length_unit, "notes": notes}
+        click.echo(json.dumps(told | {"file": text}))
+        if output == Path("-"):
+            return 0
+    with whole_file(output, [file]) as handle:
+        handle.write(text)
+    if not as_json:
+        for note in found.notes:
+            complain(f"note: {note}")
+        if output != Path("-"):
+            click.echo(f"wrote {output}; next: pfabrik info {output}", err=True)
+    return 0
+
+
+def imported(
+    file: Path, loops: Path | None, configuration: str, unit: str, fixed: list[str] | None, **asked: Any
+) -> Imported:
+    """What a file holds, by its first element."""
+    asked |= {"fixed": fixed or (), "length_unit": unit}
+    if pf.interop.kind_of(file) == "urdf":
+        if configuration != "qpos0":
+            raise click.UsageError("--configuration: a URDF has one configuration; expected none")
+        return pf.interop.from_urdf(file, loops, **asked)
+    if loops is not None:
+        raise click.UsageError("--loops: a MuJoCo model tells its loops itself; expected none")
+    return pf.interop.from_mjcf(file, configuration=configuration, **asked)

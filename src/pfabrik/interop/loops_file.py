@@ -1,0 +1,209 @@
+"""The loops of a robot description, and its motors, in YAML: in our plain form, or in that of Gepetto's examples.
+
+loops:                                  closed_loop: [[frame_a, frame_b], ...]
+  - name: left                          type: [3d, ...]
+    type: ball                          name_mot: [motor_1, ...]
+    links: [rod, platform]              joint_name: [ankle, ...]
+    at: [[0, 0, 0.2], [0.1, 0, 0]]      joint_type: [SPHERICAL, ...]
+actuated: [motor_1, motor_2]
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.coercion import numbers
+from ..description.form_faults import is_numbers, key_faults, shown
+from ..errors import Fault, InvalidArgument, InvalidMechanism, near_miss
+from ..extras import require
+from .opened import Loop, LoopType
+from .xml_reading import fault
+
+LARGEST = 1_000_000
+"""Largest file read [bytes]."""
+
+KINDS: dict[str, LoopType] = {
+    "ball": "spherical",
+    "spherical": "spherical",
+    "3d": "spherical",
+    "hinge": "revolute",
+    "revolute": "revolute",
+    "weld": "fixed",
+    "fixed": "fixed",
+    "6d": "fixed",
+}
+"""What a loop may be called -> what it is."""
+
+PLAIN = ("loops", "actuated")
+GEPETTO = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
+LOOP = ("name", "type", "links", "at", "axis", "frames")
+RETYPED = r"SPHERICAL|FIXED|UJOINT_(XY|XZ|YX|YZ|ZX|ZY)"
+
+
+@dataclass(frozen=True)
+class LoopsFile:
+    """What such a file says.
+
+    Attributes
+    ----------
+    entries : the loops, each as a table of our plain form.
+    actuated : names of joints.
+    retyped : joint -> what it is instead of what the description says.
+    """
+
+    entries: Sequence[Mapping[str, Any]] = ()
+    actuated: Sequence[str] = ()
+    retyped: Mapping[str, str] = field(default_factory=dict)
+
+    def loops(self, frames: Mapping[str, Floats], link_of: Mapping[str, str]) -> list[Loop]:
+        """The loops of a robot.
+
+        Parameters
+        ----------
+        frames : link -> where it is, (4, 4) [m].
+        link_of : joint -> the link whose frame it is.
+        """
+        faults: list[Fault] = []
+        found = [
+            _loop(f"loops[{place}]", entry, place, frames, link_of, faults) for place, entry in enumerate(self.entries)
+        ]
+        if faults:
+            raise InvalidMechanism(faults)
+        return [loop for loop in found if loop is not None]
+
+
+def read_loops(source: str | os.PathLike[str] | Mapping[str, Any] | None) -> LoopsFile:
+    """What a file or table says of loops; InvalidMechanism with every fault of its form."""
+    if source is None:
+        return LoopsFile()
+    table = source if isinstance(source, Mapping) else _parsed(source)
+    if not isinstance(table, Mapping):
+        raise fault("loops", shown(table), f"a table of {', '.join(PLAIN)}, or of {', '.join(GEPETTO)}")
+    gepetto = any(key in table for key in GEPETTO)
+    faults = [*key_faults("loops", table, GEPETTO if gepetto else PLAIN)]
+    for key, value in table.items():
+        if not isinstance(value, Sequence) or isinstance(value, str):
+            faults.append(Fault(f"loops.{key}", shown(value), "a list"))
+    if faults:
+        raise InvalidMechanism(faults)
+    return _gepetto(table) if gepetto else _plain(table)
+
+
+def _parsed(path: str | os.PathLike[str]) -> Any:
+    """The content of a YAML file, of plain values: no tags, no aliases, of which a few lines can make gigabytes."""
+    if not isinstance(path, str | os.PathLike):
+        raise InvalidArgument("loops", shown(path), "a path, or a table")
+    require("loops in YAML", "yaml", "urdf")
+    import yaml
+
+    place = os.fspath(path)
+    if not Path(path).is_file():
+        raise fault(place, "no such file", "a YAML file")
+    with Path(path).open("rb") as file:
+        content = file.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise fault(place, f"more than {LARGEST} bytes", f"at most {LARGEST}")
+    try:
+        if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(content, Loader=yaml.SafeLoader)):
+            raise fault(place, "an alias", "every value written out")
+        return yaml.safe_load(content)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        if isinstance(error, InvalidMechanism):
+            raise
+        said = " ".join(str(error).split()) or "nested too deeply"
+        raise fault(place, f"no YAML: {said}", "YAML") from None
+
+
+def _plain(table: Mapping[str, Any]) -> LoopsFile:
+    faults: list[Fault] = []
+    for place, entry in enumerate(table.get("loops", [])):
+        if isinstance(entry, Mapping):
+            faults += key_faults(f"loops[{place}]", entry, LOOP)
+        else:
+            faults.append(Fault(f"loops[{place}]", shown(entry), f"a table of {', '.join(LOOP)}"))
+    names = table.get("actuated", [])
+    faults += [Fault("actuated", shown(name), "names of joints") for name in names if not isinstance(name, str)]
+    if faults:
+        raise InvalidMechanism(faults)
+    return LoopsFile(table.get("loops", []), names)
+
+
+def _gepetto(table: Mapping[str, Any]) -> LoopsFile:
+    pairs, kinds = table.get("closed_loop", []), table.get("type", [])
+    names, types = table.get("joint_name", []), table.get("joint_type", [])
+    faults = []
+    if kinds and len(kinds) != len(pairs):
+        faults.append(Fault("loops.type", f"{len(kinds)} types", f"one for each of {len(pairs)} loops"))
+    if len(names) != len(types):
+        faults.append(Fault("loops.joint_type", f"{len(types)} types", f"one for each of {len(names)} joints"))
+    for kind in types:
+        if not (isinstance(kind, str) and re.fullmatch(RETYPED, kind.upper())):
+            faults.append(Fault("loops.joint_type", shown(kind), "SPHERICAL, FIXED, or UJOINT_XY and the like"))
+    if faults:
+        raise InvalidMechanism(faults)
+    every = zip(pairs, kinds or ["6d"] * len(pairs), strict=True)
+    entries = [{"frames": pair, "type": str(kind).lower()} for pair, kind in every]
+    retyped = {str(name): str(kind).upper() for name, kind in zip(names, types, strict=True)}
+    return LoopsFile(entries, [str(name) for name in table.get("name_mot", [])], retyped)
+
+
+def _loop(
+    place: str,
+    entry: Mapping[str, Any],
+    number: int,
+    frames: Mapping[str, Floats],
+    link_of: Mapping[str, str],
+    faults: list[Fault],
+) -> Loop | None:
+    """One loop, where its two sides are at zero; None with faults."""
+    found = list(_entry_faults(place, entry, frames, link_of))
+    faults += found
+    if found:
+        return None
+    name, kind = str(entry.get("name", f"closure_{number + 1}")), KINDS[entry.get("type", "ball")]
+    ends = entry.get("links") or entry["frames"]
+    links = tuple(end if end in frames else link_of[end] for end in ends)
+    own = np.array(entry.get("at", np.zeros((2, 3))), dtype=float)
+    points = [frames[link][:3, :3] @ point + frames[link][:3, 3] for link, point in zip(links, own, strict=True)]
+    turned = np.array([frames[link][:3, :3] for link in links])
+    if kind == "revolute":
+        axes = np.array(entry.get("axis", [[0, 0, 1]] * 2), dtype=float)
+        turned = turned @ np.array([_about(axis) for axis in axes])
+    return Loop(name, kind, (links[0], links[1]), points, None if kind == "spherical" else turned)
+
+
+def _about(axis: Floats) -> Floats:
+    """A frame (3, 3) whose third column is along an axis."""
+    across = np.linalg.svd(axis.reshape(1, 3))[2][1:]
+    third = axis / np.linalg.norm(axis)
+    return np.column_stack([across[0], np.cross(third, across[0]), third])
+
+
+def _entry_faults(
+    place: str, entry: Mapping[str, Any], frames: Mapping[str, Floats], link_of: Mapping[str, str]
+) -> Iterator[Fault]:
+    kind = entry.get("type", "ball")
+    if not isinstance(kind, str) or kind not in KINDS:
+        yield Fault(f"{place}.type", shown(kind), f"one of {', '.join(KINDS)}")
+    key, known = ("links", [*frames]) if "links" in entry else ("frames", [*frames, *link_of])
+    ends = entry.get(key)
+    if not (isinstance(ends, Sequence) and len(ends) == 2 and all(isinstance(end, str) for end in ends)):
+        yield Fault(f"{place}.{key}", shown(ends), "two names")
+    else:
+        for end in ends:
+            if end not in known:
+                yield Fault(f"{place}.{key}", f"'{end}'{near_miss(end, known)}", "a link, or a joint for its frame")
+    for name in ("at", "axis"):
+        value = numbers(entry.get(name, [[0, 0, 1]] * 2))
+        if not (isinstance(value, tuple) and len(value) == 2 and all(is_numbers(part, 3) for part in value)):
+            yield Fault(f"{place}.{name}", shown(entry.get(name)), "two lists of three numbers, one for each link")
+        elif not np.isfinite(value).all() or (name == "axis" and not np.any(value, axis=1).all()):
+            yield Fault(f"{place}.{name}", shown(entry.get(name)), "finite numbers, of an axis not all zero")

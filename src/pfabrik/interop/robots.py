@@ -1,0 +1,193 @@
+"""A robot of another program, and the mechanism in it: between a base and an end effector, with what moves both."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.joint_types import KINDS, TASK_COORDINATES
+from ..description.joints import Cone, Joint
+from ..description.mechanism import Mechanism
+from ..errors import InvalidArgument, UnknownName
+from ..motion.first_order import generic_of
+from .assembling import Imported, assemble
+from .opened import Loop, Note, OpenMechanism
+from .pruning import prune
+from .units import metres_of
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A tree of bodies and what closes its loops, in metres and radians, in the frame of its root.
+
+    Attributes
+    ----------
+    joints : from the root outward, each from its parent to its child; bodies welded to each other have a fixed one.
+    root : the body that the others hang on.
+    places : what an end effector may be called besides a joint -> its body, and the point of it that targets place [m].
+    base, end_effector, task, cones : what the file says of a mechanism in it, if anything.
+    """
+
+    name: str
+    joints: Sequence[Joint]
+    loops: Sequence[Loop]
+    root: str
+    places: Mapping[str, tuple[str, Floats]]
+    base: str | None = None
+    end_effector: str | None = None
+    task: tuple[str, ...] | None = None
+    cones: Mapping[str, Cone] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What of a robot is asked for; see `from_mjcf`."""
+
+    base: str | None
+    end_effector: str | None
+    actuated: Iterable[str] | None
+    fixed: Iterable[str]
+    length_unit: str
+    task: Sequence[str] | None
+
+
+def mechanism_of(robot: Robot, wanted: Wanted, told: list[Note]) -> Imported:
+    """The mechanism between the base and the end effector of a robot, its loops closed."""
+    metres = metres_of(wanted.length_unit)
+    robot = _driven(_locked(robot, wanted.fixed), wanted.actuated)
+    base = _base(robot, wanted.base)
+    end_effector = _end_effector(robot, wanted.end_effector, base, told)
+    tip, point = _place(robot, end_effector)
+    as_told = (base, end_effector) == (robot.base, robot.end_effector)
+    joints, loops = _merged(robot, base, tip)
+    opened = OpenMechanism(
+        robot.name,
+        tuple(_in_unit(joint, metres) for joint in joints),
+        tuple(dataclasses.replace(loop, points=loop.at / metres) for loop in loops),
+        tip,
+        None if point is None else tuple((point / metres).tolist()),
+        base,
+        wanted.length_unit,
+        tuple(wanted.task) if wanted.task is not None else robot.task if as_told else None,
+        robot.cones,
+    )
+    found = assemble(prune(opened, told), told)
+    return dataclasses.replace(found, notes=(*found.notes, *_of_task(found.mechanism)))
+
+
+def _of_task(mechanism: Mechanism) -> Iterator[Note]:
+    """That targets set more than the end effector can do, where nobody has said what they are to set."""
+    freedoms = generic_of(mechanism).mobility.platform
+    whole = 3 if mechanism.end_effector_is_joint else 6
+    if mechanism.task == mechanism.whole_task and freedoms < whole:
+        coordinates = ", ".join(TASK_COORDINATES)
+        yield Note(
+            f"the end effector has {freedoms} freedoms of {whole}: `task` says which of {coordinates} targets set"
+        )
+
+
+def _names(what: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
+    """Names that are all known; UnknownName for the first that is not."""
+    if isinstance(names, str):
+        raise InvalidArgument(what, f"the text '{names}'", "a list of names")
+    listed, every = list(names), list(known)
+    for name in listed:
+        if name not in every:
+            raise UnknownName(f"joint to be {what}", name, every)
+    return set(listed)
+
+
+def _locked(robot: Robot, fixed: Iterable[str]) -> Robot:
+    """With some joints held where they are."""
+    held = _names("fixed", fixed, (joint.name for joint in robot.joints))
+    joints = [Joint(each.name, "fixed", each.connects) if each.name in held else each for each in robot.joints]
+    return dataclasses.replace(robot, joints=joints)
+
+
+def _driven(robot: Robot, actuated: Iterable[str] | None) -> Robot:
+    """With other joints actuated than the file says."""
+    if actuated is None:
+        return robot
+    able = [joint.name for joint in robot.joints if KINDS[joint.type].actuatable]
+    driven = _names("actuated", actuated, able)
+    joints = [dataclasses.replace(joint, actuated=joint.name in driven) for joint in robot.joints]
+    return dataclasses.replace(robot, joints=joints)
+
+
+def _bodies(robot: Robot) -> dict[str, None]:
+    """All bodies, in order."""
+    return dict.fromkeys([robot.root, *(body for joint in robot.joints for body in joint.connects)])
+
+
+def _base(robot: Robot, base: str | None) -> str:
+    """The body asked for, else the file's own, else the root."""
+    if base is None:
+        return robot.base or robot.root
+    if base not in _bodies(robot):
+        raise UnknownName("body", base, _bodies(robot))
+    return base
+
+
+def _end_effector(robot: Robot, end_effector: str | None, base: str, told: list[Note]) -> str:
+    """What was asked for, else the file's own, else the one body at which most joints and loops meet."""
+    joints = [each.name for each in robot.joints] + [each.name for each in robot.loops]
+    if end_effector is not None:
+        if end_effector not in robot.places and end_effector not in joints:
+            raise UnknownName("body, site or joint", end_effector, [*robot.places, *joints])
+        return end_effector
+    if robot.end_effector is not None:
+        return robot.end_effector
+    merged, loops = _merged(robot, base, base)
+    pairs = [each.connects for each in merged] + [each.connects for each in loops]
+    touching = Counter(body for pair in pairs for body in pair if body != base)
+    counts = touching.most_common()
+    if not loops or len(counts) < 2 or counts[0][1] == counts[1][1]:
+        raise InvalidArgument("end_effector", "none, and no body where most legs meet", f"one of {', '.join(touching)}")
+    told.append(Note("taken for the end effector, for most joints meet there", (counts[0][0],)))
+    return counts[0][0]
+
+
+def _place(robot: Robot, end_effector: str) -> tuple[str, Floats | None]:
+    """The body of an end effector and its point there [m]; of a joint that moves, its own name, and None."""
+    for joint in robot.joints:
+        if joint.name == end_effector and joint.type == "fixed":
+            return robot.places[joint.connects[1]]
+    is_joint = end_effector in [each.name for each in robot.joints] + [each.name for each in robot.loops]
+    if end_effector in _bodies(robot) or not is_joint:
+        return robot.places[end_effector]
+    return end_effector, None
+
+
+def _merged(robot: Robot, base: str, tip: str) -> tuple[list[Joint], list[Loop]]:
+    """Joints and loops with the bodies that are welded to each other as one, called as asked for."""
+    group = {body: body for body in _bodies(robot)}
+    for joint in robot.joints:
+        if joint.type == "fixed":
+            old, new = group[joint.connects[1]], group[joint.connects[0]]
+            group = {body: new if of == old else of for body, of in group.items()}
+    called = {of: of for of in group.values()}
+    called |= {group[name]: name for name in (tip, base) if name in group}
+
+    def named(pair: tuple[str, str]) -> tuple[str, str]:
+        return called[group[pair[0]]], called[group[pair[1]]]
+
+    joints = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.joints if each.type != "fixed"]
+    loops = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.loops]
+    return joints, [loop for loop in loops if loop.connects[0] != loop.connects[1]]
+
+
+def _in_unit(joint: Joint, metres: float) -> Joint:
+    """A joint in the unit of the mechanism."""
+    changes: dict[str, object] = {"at": None if joint.at is None else np.array(joint.at) / metres}
+    if joint.type != "prismatic":
+        return dataclasses.replace(joint, **changes)  # type: ignore[arg-type]
+    changes |= {"home": np.divide(joint.home, metres)}
+    for name in ("range", "max_speed"):
+        value = getattr(joint, name)
+        changes[name] = None if value is None else np.divide(value, metres)
+    return dataclasses.replace(joint, **changes)  # type: ignore[arg-type]

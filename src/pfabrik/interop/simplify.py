@@ -1,0 +1,131 @@
+"""Joints said more plainly: what is welded is one body, two balls are a hinge, two hinges a universal joint."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..description.joints import Cone, Joint
+from ..tolerances import TOLERANCES
+from .opened import Note
+
+SKEW = 0.1
+"""Least sine between the axes of what is called a universal joint."""
+
+
+def simplified(
+    joints: Sequence[Joint], base: str, end_effector: str, cones: Mapping[str, Cone], told: list[Note]
+) -> list[Joint]:
+    """The same machine in fewer words.
+
+    Parameters
+    ----------
+    base, end_effector : names that stay.
+    cones : joint -> the cone that limits it.
+    """
+    kept = {base, end_effector}
+    single = _grouped(_without_welds(_hinged(joints), kept), kept, told)
+    return [dataclasses.replace(each, cone=cones[each.name]) if each.name in cones else each for each in single]
+
+
+def _hinged(joints: Sequence[Joint]) -> list[Joint]:
+    """Balls that share their two bodies: two make a hinge, three that are not in line hold all."""
+    between: dict[frozenset[str], list[Joint]] = defaultdict(list)
+    for joint in joints:
+        if joint.type == "spherical":
+            between[frozenset(joint.connects)].append(joint)
+    replaced: dict[str, Joint | None] = {}
+    for balls in between.values():
+        points = np.array([ball.at for ball in balls])
+        spread, axes = np.linalg.svd(points - points[0])[1:] if len(balls) > 1 else (np.zeros(3), np.eye(3))
+        directions = int((spread > TOLERANCES.alignment * max(1e-300, float(np.abs(points).max()))).sum())
+        if directions == 0:
+            continue
+        kind = "revolute" if directions == 1 else "fixed"
+        axis = axes[0] if directions == 1 else None
+        replaced |= {ball.name: None for ball in balls}
+        replaced[balls[0].name] = dataclasses.replace(balls[0], type=kind, axis=axis)  # type: ignore[arg-type]
+    left = [replaced.get(joint.name, joint) for joint in joints]
+    return [joint for joint in left if joint is not None]
+
+
+def _without_welds(joints: Sequence[Joint], kept: set[str]) -> list[Joint]:
+    """Bodies that are fixed to each other as one."""
+    stands_for: dict[str, str] = {}
+
+    def of(body: str) -> str:
+        while body in stands_for:
+            body = stands_for[body]
+        return body
+
+    for joint in joints:
+        if joint.type == "fixed":
+            first, second = map(of, joint.connects)
+            if first != second and not {first, second} <= kept:
+                first, second = (second, first) if second in kept else (first, second)
+                stands_for[second] = first
+    moved = [dataclasses.replace(each, connects=(of(each.connects[0]), of(each.connects[1]))) for each in joints]
+    return [joint for joint in moved if joint.connects[0] != joint.connects[1]]
+
+
+def _grouped(joints: Sequence[Joint], kept: set[str], told: list[Note]) -> list[Joint]:
+    """Two passive joints with nothing else on the body between them, as the one that they are together.
+
+    Two hinges whose axes cross are a universal joint. J[0] and J[1], a hinge and a slide along it, are a cylindrical
+    joint J: as this library writes it.
+    """
+    on_body: dict[str, list[Joint]] = defaultdict(list)
+    for joint in joints:
+        for body in joint.connects:
+            on_body[body].append(joint)
+    made = {joint.name: joint for joint in joints}
+    crossing = []
+    for between, pair in on_body.items():
+        if len(pair) != 2 or between in kept or not all(made.get(joint.name) is joint for joint in pair):
+            continue
+        first, second = sorted(pair, key=lambda joint: joint.name.endswith("[1]"))
+        one = _one(first, second, between)
+        if one is not None:
+            made = {name: one if joint is first else joint for name, joint in made.items() if joint is not second}
+            if one.name not in (stem_of(first), stem_of(second)):
+                crossing.append(one.name)
+    if crossing:
+        told.append(Note("hinges whose axes cross are a universal joint", tuple(crossing)))
+    return list(made.values())
+
+
+def _one(first: Joint, second: Joint, between: str) -> Joint | None:
+    """The joint that two are together, or None where they are not."""
+    kinds = (first.type, second.type)
+    if kinds not in (("revolute", "revolute"), ("revolute", "prismatic")) or first.actuated or second.actuated:
+        return None
+    ranges = (first.range, second.range)
+    if (first.range is None) != (second.range is None):
+        return None
+    signs = (1.0 if first.connects[1] == between else -1.0), (1.0 if second.connects[0] == between else -1.0)
+    axes = np.array([first.axis, second.axis]) * np.reshape(signs, (2, 1))
+    ends = [next(body for body in joint.connects if body != between) for joint in (first, second)]
+    stem, ours = stem_of(first), stem_of(first) == stem_of(second) is not None
+    both = {"home": (first.home, second.home), "range": None if first.range is None else ranges}
+    if kinds[1] == "prismatic":
+        along = np.linalg.norm(np.cross(*axes)) < TOLERANCES.alignment and axes[0] @ axes[1] > 0.0
+        return Joint(stem, "cylindrical", ends, first.at, axes[0], **both) if ours and along else None  # type: ignore[arg-type]
+    if not ours and (stem_of(first) or stem_of(second) or not _cross(first, second)):
+        return None
+    name = stem if stem and ours else f"{first.name}+{second.name}"
+    return Joint(name, "universal", ends, first.at, axes=axes, **both)  # type: ignore[arg-type]
+
+
+def stem_of(joint: Joint) -> str | None:
+    """The name of the joint of which this one is a coordinate, as `coordinate_names` writes it: J of J[0]."""
+    return joint.name[:-3] if joint.name.endswith(("[0]", "[1]")) else None
+
+
+def _cross(first: Joint, second: Joint) -> bool:
+    """Whether two hinges are at one place and not nearly parallel."""
+    apart = float(np.linalg.norm(np.subtract(first.at, second.at)))  # type: ignore[arg-type]
+    sine = float(np.linalg.norm(np.cross(first.axis, second.axis)))  # type: ignore[arg-type]
+    return apart <= TOLERANCES.alignment * float(np.abs(first.at).max()) and sine >= SKEW  # type: ignore[arg-type]
