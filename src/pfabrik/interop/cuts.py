@@ -84,7 +84,7 @@ def _kept(mechanism: Structure) -> set[Joint]:
 
 
 def _ease_of_cutting(joint: Joint) -> int:
-    if joint.actuated:
+    if joint.driven:
         return 0
     return 2 if joint.type == "spherical" else 1
 

@@ -137,7 +137,7 @@ def _servos(mechanism: Mechanism, metres: float, physics: Physics) -> ET.Element
         turning = drive.kind == "angle"
         gains = as_attributes(physics.servo(turning))
         servo = ET.SubElement(actuator, "position", {"name": drive.name, "joint": drive.name, **gains})
-        if drive.joint.range is not None:
+        if np.isfinite(drive.limits).all():
             servo.set("ctrlrange", vector(np.array(drive.limits) * (1.0 if turning else metres)))
     return actuator
 
@@ -145,4 +145,4 @@ def _servos(mechanism: Mechanism, metres: float, physics: Physics) -> ET.Element
 def _home(mechanism: Mechanism, metres: float) -> Iterator[float]:
     """The actuated coordinates at home [rad or m]."""
     for drive in mechanism.drives:
-        yield drive.home * (1.0 if drive.kind == "angle" else metres)
+        yield float(drive.home) * (1.0 if drive.kind == "angle" else metres)

@@ -128,9 +128,9 @@ def reached_at_random(mechanism: Mechanism, count: int, rng: np.random.Generator
 def _actuators(mechanism: Mechanism, count: int, near: float, rng: np.random.Generator) -> Floats:
     """Actuated values (n, n_a) off home; `near` scales how far."""
     shift, turn = SPREAD
-    turns = np.array([mechanism.joint(name).type == "revolute" for name in mechanism.actuator_names])
+    turns = np.array([drive.kind == "angle" for drive in mechanism.drives])
     most = near * np.where(turns, turn, shift * mechanism.characteristic_length)
-    home = [np.ravel(mechanism.home_coordinate(name))[0] for name in mechanism.actuator_names]
+    home = [drive.home for drive in mechanism.drives]
     return np.asarray(home + rng.uniform(-most, most, (count, len(most))))
 
 
@@ -160,7 +160,7 @@ class Referee:
         self._forward = {branch.joint.name: branch.forward for branch in tree.branches}
         self._reference = names_of(mechanism, tree).reference
         self._held = [int(self.model.joint(name).dofadr[0]) for name in mechanism.actuator_names]
-        self._determined = end_effector_freedom(mechanism, frozenset(mechanism.actuator_names)) == 0
+        self._determined = end_effector_freedom(mechanism, frozenset(drive.column for drive in mechanism.drives)) == 0
 
     def compare(self, solution: Solution, rng: np.random.Generator) -> tuple[float, float, float]:
         """Loop gap at one answer [length], and how far it is from the pose that MuJoCo closes to [length], [rad]."""

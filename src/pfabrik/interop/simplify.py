@@ -72,10 +72,10 @@ def _without_welds(joints: Sequence[Joint], kept: set[str]) -> list[Joint]:
 
 
 def _grouped(joints: Sequence[Joint], kept: set[str], told: list[Note]) -> list[Joint]:
-    """Two passive joints with nothing else on the body between them, as the one that they are together.
+    """Two joints with nothing else on the body between them, as the one that they are together.
 
-    Two hinges whose axes cross are a universal joint. J[0] and J[1], a hinge and a slide along it, are a cylindrical
-    joint J: as this library writes it.
+    Two passive hinges whose axes cross are a universal joint. J[0] and J[1], a hinge and a slide along it, are a
+    cylindrical joint J: as this library writes it.
     """
     on_body: dict[str, list[Joint]] = defaultdict(list)
     for joint in joints:
@@ -100,7 +100,7 @@ def _grouped(joints: Sequence[Joint], kept: set[str], told: list[Note]) -> list[
 def _one(first: Joint, second: Joint, between: str) -> Joint | None:
     """The joint that two are together, or None where they are not."""
     kinds = (first.type, second.type)
-    if kinds not in (("revolute", "revolute"), ("revolute", "prismatic")) or first.actuated or second.actuated:
+    if kinds not in (("revolute", "revolute"), ("revolute", "prismatic")):
         return None
     ranges = (first.range, second.range)
     if (first.range is None) != (second.range is None):
@@ -110,10 +110,11 @@ def _one(first: Joint, second: Joint, between: str) -> Joint | None:
     ends = [next(body for body in joint.connects if body != between) for joint in (first, second)]
     stem, ours = stem_of(first), stem_of(first) == stem_of(second) is not None
     both = {"home": (first.home, second.home), "range": None if first.range is None else ranges}
+    driven = (first.actuated is True, second.actuated is True)
     if kinds[1] == "prismatic":
         along = np.linalg.norm(np.cross(*axes)) < TOLERANCES.alignment and axes[0] @ axes[1] > 0.0
-        return Joint(stem, "cylindrical", ends, first.at, axes[0], **both) if ours and along else None  # type: ignore[arg-type]
-    if not ours and (stem_of(first) or stem_of(second) or not _cross(first, second)):
+        return Joint(stem, "cylindrical", ends, first.at, axes[0], actuated=driven, **both) if ours and along else None  # type: ignore[arg-type]
+    if any(driven) or (not ours and (stem_of(first) or stem_of(second) or not _cross(first, second))):
         return None
     name = stem if stem and ours else f"{first.name}+{second.name}"
     return Joint(name, "universal", ends, first.at, axes=axes, **both)  # type: ignore[arg-type]
