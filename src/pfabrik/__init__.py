@@ -76,6 +76,9 @@ _HOMES = {
     "plot": "view.machine",
     "plot_track": "view.track",
     "plot_travel": "view.travel",
+    "PlatformSpeed": "timing.platform_speed",
+    "platform_speed": "timing.platform_speed",
+    "read_path": "paths.read_path",
     "Timed": "timing.timed",
     "time_path": "timing.time_path",
 }
@@ -92,6 +95,7 @@ __all__ = [
     "Mechanism",
     "Mobility",
     "Options",
+    "PlatformSpeed",
     "Singularity",
     "Solution",
     "Solver",
@@ -123,7 +127,9 @@ __all__ = [
     "plot",
     "plot_track",
     "plot_travel",
+    "platform_speed",
     "pose",
+    "read_path",
     "save",
     "singularity",
     "solve_fk",
@@ -158,8 +164,10 @@ if TYPE_CHECKING:
     from .modes.assembly import AssemblyModes, assembly_modes
     from .modes.working import WorkingModes, working_modes
     from .options import Options
+    from .paths.read_path import read_path
     from .poses import pose
     from .solver import Solver
+    from .timing.platform_speed import PlatformSpeed, platform_speed
     from .timing.time_path import time_path
     from .timing.timed import Timed
     from .track import track

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -21,6 +22,8 @@ from ..description.readouts import readouts
 from ..description.task import task_of
 from ..errors import near_miss
 from ..motion.first_order import generic_of
+from ..paths.path import MOST_STEPS
+from ..paths.read_path import GCODE
 from ..rotations import to_rpy
 from ..tolerances import TOLERANCES
 from .finite import is_finite
@@ -71,12 +74,17 @@ def read_path(path: Path, mechanism: Mechanism) -> PathFile:
     A header line names the columns: x, y, z and, optionally, roll, pitch, yaw, in degrees, or in the unit that their
     names end in. Coordinates that the end effector cannot change, and those that its task leaves out, may be missing.
     """
+    if path.suffix.lower() in GCODE:
+        return PathFile(pf.read_path(path, mechanism).targets)
     try:
         source = nullcontext(sys.stdin) if path == STANDARD else path.open(newline="", encoding="utf-8-sig")
         with source as handle:
-            lines = [(number, cells) for number, cells in numbered(csv.reader(handle)) if any(cells)]
+            told = ((number, cells) for number, cells in numbered(csv.reader(handle)) if any(cells))
+            lines = list(islice(told, MOST_STEPS + 2))
     except (UnicodeDecodeError, csv.Error) as error:
         raise WrongPath(path, [f"not a CSV text file: {error}"]) from error
+    if len(lines) > MOST_STEPS + 1:
+        raise WrongPath(path, [f"more than {MOST_STEPS} targets; expected a shorter path, or parts of it"])
     if not lines:
         raise WrongPath(path, [f"empty; {EXPECTED} in the first line"])
     (header_line, header), *rows = lines

@@ -65,9 +65,10 @@ def track(
 
     Reads the targets from a CSV file and writes the answers to another. Each answer starts from the one before.
 
-    PATH has a header line and the columns x, y, z and, optionally, roll, pitch, yaw [deg] or roll_rad, pitch_rad,
-    yaw_rad; - is standard input. Coordinates that the machine cannot change may be missing, as z in a plane. Further
-    columns go out as they came in, and angles in the unit they came in.
+    PATH is G-code, by its ending (.nc, .ngc, .gcode), or a CSV file: a header line and the columns x, y, z and,
+    optionally, roll, pitch, yaw [deg] or roll_rad, pitch_rad, yaw_rad; - is standard input. Coordinates that the
+    machine cannot change may be missing, as z in a plane. Further columns go out as they came in, and angles in the
+    unit they came in.
 
     --plot draws the path, every actuator between its limits, and all margins; --animate the machine on its way.
 
@@ -143,7 +144,7 @@ def note_ignored(mechanism: Mechanism, targets: Floats) -> None:
     note_left_out((f"column {name}" for name in columns), mechanism)
 
 
-def speed_limits(mechanism: Mechanism, given: Sequence[str]) -> dict[str, float]:
+def speed_limits(mechanism: Mechanism, given: Sequence[str], option: str = "--speed") -> dict[str, float]:
     """Speeds by name [rad/s or length/s], from words as of ``--speed``; what is said of one counts before all."""
     from ..description.readouts import readouts
 
@@ -153,15 +154,15 @@ def speed_limits(mechanism: Mechanism, given: Sequence[str]) -> dict[str, float]
         name, _, value = word.rpartition("=")
         if "=" in word and name not in shown:
             hint = near_miss(name, tuple(shown)) or f" (known: {', '.join(shown)})"
-            raise click.UsageError(f"--speed {word}: no actuator '{name}'{hint}")
-        said |= dict.fromkeys([name] if "=" in word else shown, positive(word, value))
+            raise click.UsageError(f"{option} {word}: no actuator '{name}'{hint}")
+        said |= dict.fromkeys([name] if "=" in word else shown, positive(option, word, value))
     return {name: shown[name].coordinate(value) for name, value in said.items()}
 
 
-def positive(word: str, value: str) -> float:
+def positive(option: str, word: str, value: str) -> float:
     """A speed as a positive number."""
     if not is_finite(value) or float(value) <= 0.0:
-        raise click.UsageError(f"--speed {word}: found '{value}'; expected a positive number")
+        raise click.UsageError(f"{option} {word}: found '{value}'; expected a positive number")
     return float(value)
 
 

@@ -1,0 +1,1 @@
+"""Paths as people have them: CSV and G-code."""

@@ -1,0 +1,192 @@
+"""G-code: straight moves and arcs, in planes, absolute and relative, in inches and millimetres, with feeds."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats
+
+WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
+COMMENT = re.compile(r"\([^()]*\)|;.*")
+AXES = "XYZABC"
+OFFSETS = "IJK"
+PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "um": 1e-3, "µm": 1e-3}
+IGNORED = {4, 40, 49, 54, 61, 64, 80, 94}
+"""Codes that change no position here: dwell, no compensation of the tool, the first work offset, feed per minute."""
+
+MESSAGES = ("M117", "M118")
+"""Codes followed by words for people."""
+
+FARTHEST = 1e9
+"""Numbers beyond are no places of a machine."""
+
+
+class WrongGCode(ValueError):
+    """A line that cannot be followed; its text names the line and what was found."""
+
+
+class Step(NamedTuple):
+    """A place on the way: x, y, z, and a, b, c [deg]; the feed toward it, infinite in rapid moves; the line."""
+
+    place: Floats
+    feed: float
+    line: int
+
+
+@dataclass
+class State:
+    """What holds until another word changes it.
+
+    Attributes
+    ----------
+    place : x, y, z [length of the machine], and a, b, c [deg].
+    unit : of the program's lengths, in those of the machine.
+    feed : as the program says it, per minute; NaN before it does.
+    """
+
+    place: Floats
+    unit: float
+    motion: int | None = None
+    is_relative: bool = False
+    plane: int = 17
+    feed: float = math.nan
+    units: dict[int, float] = field(default_factory=dict)
+
+
+def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: float, longest: float) -> Iterator[Step]:
+    """The steps of a program, the first at home.
+
+    Parameters
+    ----------
+    home : where the program begins, (6,): x, y, z [length], a, b, c [deg].
+    length_unit : of the machine; one that is not known counts as millimetres.
+    tolerance : how far chords may be off their arc [length].
+    longest : of a straight part of a move [length].
+    """
+    unit = MILLIMETRES.get(length_unit.strip(), 1.0)
+    state = State(np.array(home, dtype=float), 1.0 / unit, units={20: 25.4 / unit, 21: 1.0 / unit})
+    yield Step(state.place.copy(), math.nan, 0)
+    for number, text in enumerate(lines, 1):
+        words = _words(text, number)
+        if _obey(state, words, number):
+            return
+        moves = any(letter in words for letter in AXES)
+        if not moves and not any(letter in words for letter in OFFSETS + "R"):
+            continue
+        if state.motion is None:
+            if moves:
+                raise WrongGCode(f"line {number}: a position without G0, G1, G2 or G3")
+            continue
+        yield from _move(state, words, number, tolerance, longest)
+
+
+def _words(text: str, number: int) -> dict[str, list[float]]:
+    """The words of a line by their letter."""
+    plain = COMMENT.sub(" ", text).strip().upper()
+    if plain.startswith(("%", "/", *MESSAGES)):
+        return {}
+    found: dict[str, list[float]] = {}
+    rest = WORD.sub(" ", plain).split()
+    if rest:
+        raise WrongGCode(f"line {number}: found '{rest[0][:20]}'; expected words such as X12.5")
+    for letter, value in WORD.findall(plain):
+        if abs(float(value)) > FARTHEST:
+            raise WrongGCode(f"line {number}: found {letter}{value[:20]}; expected a number below {FARTHEST:g}")
+        found.setdefault(letter, []).append(float(value))
+    return found
+
+
+def _obey(state: State, words: dict[str, list[float]], number: int) -> bool:
+    """Take in what is no motion; whether the program ends."""
+    for code in words.get("G", []):
+        if code in (0, 1, 2, 3):
+            state.motion = int(code)
+        elif code in PLANES:
+            state.plane = int(code)
+        elif code in state.units:
+            state.unit = state.units[int(code)]
+        elif code in (90, 91):
+            state.is_relative = code == 91
+        elif code == 92 and not any(letter in words for letter in AXES):
+            continue  # of the extruder alone
+        elif code == 28 and state.motion is None:
+            continue  # homing, before anything else
+        elif code not in IGNORED and code != 91.1:
+            raise WrongGCode(f"line {number}: found G{code:g}; expected G0 to G3, G17 to G21, G90 or G91")
+    if "F" in words:
+        state.feed = words["F"][-1]
+        if not state.feed > 0.0:
+            raise WrongGCode(f"line {number}: found F{state.feed:g}; expected a feed above zero")
+    return any(code in (2, 30) for code in words.get("M", []))
+
+
+def _move(state: State, words: dict[str, list[float]], number: int, tolerance: float, longest: float) -> Iterator[Step]:
+    end = state.place.copy()
+    for place, letter in enumerate(AXES):
+        if letter in words:
+            value = words[letter][-1] * (state.unit if place < 3 else 1.0)
+            end[place] = end[place] + value if state.is_relative else value
+    begin, feed = state.place, state.feed * state.unit / 60.0
+    if state.motion in (2, 3):
+        places = _arc(state, words, end, number, tolerance, longest)
+    else:
+        feed = math.inf if state.motion == 0 else feed
+        count = _parts(float(np.linalg.norm(end[:3] - begin[:3])), longest, number)
+        places = (begin + (end - begin) * (part / count) for part in range(1, count + 1))
+    for each in places:
+        yield Step(each, feed, number)
+    state.place = end
+
+
+def _parts(length: float, longest: float, number: int) -> int:
+    if length / longest > FARTHEST:
+        raise WrongGCode(f"line {number}: a move of {length:g}, in steps of {longest:g}: too many")
+    return max(1, math.ceil(length / longest * (1.0 - 1e-12)))
+
+
+def _arc(
+    state: State, words: dict[str, list[float]], end: Floats, number: int, tolerance: float, longest: float
+) -> Iterator[Floats]:
+    """Places on a circle or a helix, clockwise (G2) or not, seen against the plane's normal."""
+    u, v, _ = plane = PLANES[state.plane]
+    begin, sense = state.place, -1.0 if state.motion == 2 else 1.0
+    chord = end[[u, v]] - begin[[u, v]]
+    if "R" in words:
+        centre = _centre_of(chord, words["R"][-1] * state.unit, sense, number)
+    else:
+        offsets = [words.get(OFFSETS[axis], [0.0])[-1] * state.unit for axis in plane[:2]]
+        centre = np.array(offsets)
+    radius, off = float(np.hypot(*centre)), float(np.hypot(*(chord - centre)))
+    if not radius > 0.0 or abs(radius - off) > max(1e-3 * radius, 2.0 * tolerance):
+        raise WrongGCode(f"line {number}: an arc from radius {radius:g} to {off:g}; expected the same")
+    start, stop = math.atan2(-centre[1], -centre[0]), math.atan2(*(chord - centre)[::-1])
+    turn = (sense * (stop - start)) % (2.0 * math.pi)
+    turn = 2.0 * math.pi if turn < 1e-9 else turn
+    flat = 2.0 * math.acos(max(1.0 - tolerance / radius, 0.0)) if tolerance < radius else math.pi / 2.0
+    count = max(_parts(radius * turn, longest, number), math.ceil(turn / flat))
+    for part in range(1, count):
+        share = part / count
+        place = begin + (end - begin) * share
+        here = start + sense * turn * share
+        around = radius + (off - radius) * share
+        place[[u, v]] = begin[[u, v]] + centre + around * np.array([math.cos(here), math.sin(here)])
+        yield place
+    yield end.copy()
+
+
+def _centre_of(chord: Floats, radius: float, sense: float, number: int) -> Floats:
+    """The centre of an arc given by its radius; a negative one is that of the longer arc."""
+    half = float(np.hypot(*chord)) / 2.0
+    if half == 0.0 or half > abs(radius) * (1.0 + 1e-6):
+        raise WrongGCode(
+            f"line {number}: found R{radius:g} for ends {2.0 * half:g} apart; expected at least half of it"
+        )
+    height = math.sqrt(max(radius * radius - half * half, 0.0)) * math.copysign(1.0, radius) * sense
+    return chord / 2.0 + height * np.array([-chord[1], chord[0]]) / (2.0 * half)

@@ -1,0 +1,137 @@
+"""Paths from CSV and G-code: every move where it should be, and one sentence for what is no path."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from pfabrik.errors import InvalidArgument
+from pfabrik.paths import path as path_module
+
+
+def read(tmp_path: Path, text: str, name: str = "path.nc", machine: str = "stewart", **options: float) -> Any:
+    (tmp_path / name).write_text(text)
+    return pf.read_path(tmp_path / name, pf.load(machine), **options)
+
+
+def positions(found: Any) -> np.ndarray:
+    return found.targets[:, :3, 3]
+
+
+def test_straight_moves_in_both_ways_of_counting_and_both_units(tmp_path: Path) -> None:
+    text = "G21 G90\nG0 X0 Y0 Z180 (over the middle)\nG1 X10 F600 ; away\nG91 Y5\nG20 G1 X1\nG90 X0 Y0\nM2\nX99\n"
+    found = read(tmp_path, text, longest=1000.0)
+    expected = [[0, 0, 180], [10, 0, 180], [10, 5, 180], [35.4, 5, 180], [0, 0, 180]]
+    np.testing.assert_allclose(positions(found)[1:], expected, atol=1e-12)
+    assert found.lines[1:] == [2, 3, 4, 5, 6]
+    assert np.isinf(found.feeds[1])
+    np.testing.assert_allclose(found.feeds[2:4], 10.0)
+    np.testing.assert_allclose(found.feeds[4:], 254.0)
+
+
+@pytest.mark.parametrize(("plane", "axes", "offsets"), [("G17", "XY", "IJ"), ("G18", "ZX", "KI"), ("G19", "YZ", "JK")])
+@pytest.mark.parametrize("code", ["G2", "G3"])
+def test_arcs_stay_on_their_circle(plane: str, axes: str, offsets: str, code: str, tmp_path: Path) -> None:
+    home = dict(zip("XYZ", pf.load("stewart").home_pose[:3, 3], strict=True))
+    begin, (u, v) = dict(home), axes
+    end = {u: begin[u] + 10.0, v: begin[v] + 10.0}
+    text = f"{plane} {code} {u}{end[u]} {v}{end[v]} {offsets[0]}10 {offsets[1]}0 F100"
+    found = positions(read(tmp_path, text, tolerance=1e-3))
+    centre = np.array([begin["XYZ"[i]] for i in range(3)])
+    centre["XYZ".index(u)] += 10.0
+    np.testing.assert_allclose(np.linalg.norm(found - centre, axis=1), 10.0, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(0.5 * (found[1:] + found[:-1]) - centre, axis=1), 10.0, atol=1.001e-3)
+    # from (-1, 0) to (0, 1) as seen against the normal: a quarter clockwise, three quarters the other way
+    length = np.linalg.norm(np.diff(found, axis=0), axis=1).sum()
+    assert length == pytest.approx((0.5 if code == "G2" else 1.5) * np.pi * 10.0, rel=1e-3)
+
+
+def test_an_arc_by_its_radius_and_a_helix(tmp_path: Path) -> None:
+    by_radius = positions(read(tmp_path, "G91 G2 X10 Y10 R10 F1"))
+    by_centre = positions(read(tmp_path, "G91 G2 X10 Y10 I10 J0 F1"))
+    np.testing.assert_allclose(by_radius, by_centre, atol=1e-9)
+    helix = positions(read(tmp_path, "G91 G3 I5 J0 Z3 F1"))
+    assert helix[-1] - helix[0] == pytest.approx([0.0, 0.0, 3.0], abs=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(helix[:, :2] - helix[0, :2] - [5.0, 0.0], axis=1), 5.0, atol=1e-9)
+
+
+def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
+    found = read(tmp_path, "G1 Z185 A5 B-3 C2 F100", longest=1000.0)
+    expected = pf.pose([*pf.load("stewart").home_pose[:2, 3], 185.0], rpy=[5, -3, 2], degrees=True)
+    np.testing.assert_allclose(found.targets[-1], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("G1 X1 F0", "line 1: found F0"),
+        ("G5 X1", "line 1: found G5"),
+        ("X10", "line 1: a position without"),
+        ("G1 X1\nG2 X5 Y5 I100 J0", "line 2: an arc from radius"),
+        ("G2 X100 R1", "line 1: found R1"),
+        ("G1 X#5", "line 1: found '"),
+        ("G1 X=4", "line 1: found '"),
+        ("hello world", "found 'HELLO'"),
+        ("", "no moves"),
+        ("(nothing but words)", "no moves"),
+        ("G1 X99999999999", "line 1: found X"),
+        ("G1 X1 " + "X" * 200_000, "no text of a path"),
+        ("G1 X1\0", "no text of a path"),
+    ],
+)
+def test_gcode_that_cannot_be_followed_is_one_sentence(text: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument) as caught:
+        read(tmp_path, text)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 300
+
+
+def test_columns_in_any_order_and_either_unit(tmp_path: Path) -> None:
+    text = "note,z,t,yaw_rad,x,feed,y,roll\nfirst,180,0,0.1,1,5,2,3\nlast,181,0.5,0.2,3,6,4,-3\n"
+    found = read(tmp_path, text, "path.csv")
+    expected = pf.pose([[1, 2, 180], [3, 4, 181]], rpy=[[np.radians(3), 0, 0.1], [-np.radians(3), 0, 0.2]])
+    np.testing.assert_allclose(found.targets, expected, atol=1e-12)
+    assert found.times is not None
+    assert found.times.tolist() == [0.0, 0.5]
+    assert found.feeds.tolist() == [5.0, 6.0]
+    assert read(tmp_path, "z\n180\n", "z.csv", "rps").targets[0, 2, 3] == 180.0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x,y,z\n1,2,nan\n", "line 2: column 'z': found 'nan'"),
+        ("x,y,z\n1,2\n", "line 2: found 2 cells"),
+        ("x,y,zz\n1,2,3\n", "did you mean 'zz'"),
+        ("x,y,z,x\n1,2,3,4\n", "column 'x' appears twice"),
+        ("x,y,z,roll,roll_rad\n1,2,3,4,5\n", "expected one of them"),
+        ("x,y,z\n", "no targets"),
+        ("x,y,z,t\n1,2,180,1\n1,2,180,1\n", "times that grow"),
+        ("x,y,z,feed\n1,2,180,0\n", "a feed above zero"),
+    ],
+)
+def test_tables_that_are_no_path_are_one_sentence(text: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument) as caught:
+        read(tmp_path, text, "path.csv")
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_binary_and_endless_paths_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "binary.nc").write_bytes(bytes(range(256)) * 1000)
+    with pytest.raises(InvalidArgument, match="no text"):
+        pf.read_path(tmp_path / "binary.nc", pf.load("stewart"))
+    for module in ("pfabrik.paths.table", "pfabrik.paths.read_path"):
+        monkeypatch.setattr(f"{module}.MOST_STEPS", 1000)
+    assert path_module.MOST_STEPS == 1_000_000
+    with pytest.raises(InvalidArgument, match="more than 1000 targets"):
+        read(tmp_path, "x,y,z\n" + "1,2,180\n" * 1001, "long.csv")
+    with pytest.raises(InvalidArgument, match="more than 1000 steps"):
+        read(tmp_path, "G1 X1 F1\nX2\n" * 10_000)
+    with pytest.raises(InvalidArgument, match="more than 1000 steps"):
+        read(tmp_path, "G1 X100000 F1", longest=1.0)
