@@ -9,8 +9,8 @@ import click
 
 import pfabrik as pf
 
+from ..answers.table import aligned, plain
 from .mech import MECH, load
-from .table import aligned
 from .target import Triple, target_of, targeted
 from .track import speed_limits
 
@@ -38,8 +38,6 @@ def speed(
 
     Along and about each axis at a pose (default: home), and along the slowest direction of all.
     """
-    from .answer import plain
-
     mechanism = load(mech)
     at = pf.solve_ik(mechanism, target_of(mechanism, position, rpy, joint))
     if not at:

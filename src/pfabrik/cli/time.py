@@ -11,10 +11,10 @@ import click
 
 import pfabrik as pf
 
+from ..answers.table import aligned
 from .finite import FINITE
 from .mech import MECH, load
 from .progress import progress
-from .table import aligned
 from .track import speed_limits
 from .whole import whole_file
 
