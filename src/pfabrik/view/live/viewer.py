@@ -24,6 +24,7 @@ from ...extras import require
 from ...files import load
 from ...modes.assembly import assembly_modes
 from ...modes.working import working_modes
+from ...warm_up import warm_up
 from ...writing import whole_path
 from ..plane import plane_of
 from ..saving import checked_ending
@@ -101,7 +102,9 @@ class Viewer:
         self._modes: tuple[Solution, ...] = ()
         self._playing = threading.Event()
         self._player: threading.Thread | None = None
+        self._ready: Mechanism | None = None
         self._build(what)
+        self._server.on_client_connect(lambda _: self._newest.post(self._prepare))
         atexit.register(self.close)
         self._watch = Watch(path, self._changed) if path is not None and path.is_file() else None
 
@@ -316,6 +319,17 @@ class Viewer:
             self._panel = Panel(self._server.gui, mechanism, self._session, actions, steps)
             self._look_at(mechanism, skeleton.points)
             self._refresh()
+        if self._server.get_clients():
+            self._prepare()
+
+    def _prepare(self) -> None:
+        """Compile what answers need before the first is asked for: for once, that takes longer than a motion."""
+        mechanism, panel = self.mechanism, self._panel
+        if mechanism != self._ready:
+            panel.tell("getting ready; a new version compiles what answers need, once …")
+            warm_up(mechanism)
+            self._ready = mechanism
+            panel.tell("")
 
     def _look_at(self, mechanism: Mechanism, points: Floats) -> None:
         """Where the camera starts: a planar machine is seen from the front."""
