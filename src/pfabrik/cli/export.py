@@ -36,10 +36,26 @@ def c_float(mechanism: Mechanism) -> str:
     return c_source(mechanism, precision="float")
 
 
+def linuxcnc(mechanism: Mechanism) -> str:
+    """What LinuxCNC needs."""
+    from ..export.controllers import linuxcnc as settings
+
+    return settings(mechanism)
+
+
+def klipper(mechanism: Mechanism) -> str:
+    """What Klipper needs."""
+    from ..export.controllers import klipper as settings
+
+    return settings(mechanism)
+
+
 TARGETS: dict[str, tuple[Callable[[Mechanism], str], str]] = {
     "mjcf": (mjcf, "A MuJoCo model, which starts closed; what weighs and drives it is made up."),
     "c": (c_double, "One file of C99: inverse and forward kinematics with every limit."),
     "c_float": (c_float, "The same in single precision."),
+    "linuxcnc": (linuxcnc, "HAL lines where LinuxCNC has these kinematics, else a module in C for halcompile."),
+    "klipper": (klipper, "[printer] and [stepper_*] of a delta printer."),
 }
 """Name of an option -> the text that a mechanism becomes, and what the help says of it."""
 

@@ -1,0 +1,104 @@
+"""Settings of controllers: put into their published formulas, they give the same joints as the library."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from pfabrik.errors import UnsupportedMechanism
+from pfabrik.export.controllers import klipper, linuxcnc
+from test_export_c import COMPILERS, needs_compiler
+
+STUBS = {
+    "rtapi_app.h": "#define EXPORT_SYMBOL(name) struct unused_##name { int i; }\n"
+    "#define MODULE_LICENSE(text) static const char license[] = text\n#define KINS_NOT_SWITCHABLE\n",
+    "hal.h": "int hal_init(const char *name);\nint hal_ready(int id);\nint hal_exit(int id);\n",
+    "kinematics.h": "typedef struct { struct { double x, y, z; } tran; double a, b, c, u, v, w; } EmcPose;\n"
+    "typedef unsigned long KINEMATICS_FORWARD_FLAGS;\ntypedef unsigned long KINEMATICS_INVERSE_FLAGS;\n"
+    "typedef enum { KINEMATICS_BOTH = 4 } KINEMATICS_TYPE;\n",
+}
+MAIN = """
+#include <stdio.h>
+int hal_init(const char *name) { (void)name; return 1; }
+int hal_ready(int id) { (void)id; return 0; }
+int hal_exit(int id) { (void)id; return 0; }
+int main(void)
+{
+    EmcPose world = {{2.0, -3.0, %r}, 0, 0, 0, 0, 0, 0}, back = {{0, 0, 0}, 0, 0, 0, 0, 0, 0};
+    double joints[16];
+    if (kinematicsInverse(&world, joints, 0, 0) || kinematicsForward(joints, &back, 0, 0))
+        return 1;
+    printf("%%.12g %%.12g %%.12g %%.12g %%.12g %%.12g\\n", joints[0], joints[1], joints[2], back.tran.x, back.tran.y,
+           back.tran.z);
+    world.tran.x = 1e6;
+    return kinematicsInverse(&world, joints, 0, 0) == -1 ? 0 : 2;
+}
+"""
+
+
+def test_a_hexapod_of_struts_is_genhexkins() -> None:
+    mechanism = pf.load("stewart")
+    pins = {(part, int(n), axis): float(value) for part, n, axis, value in re.findall(
+        r"setp genhexkins\.(base|platform)\.(\d)\.([xyz]) (\S+)", linuxcnc(mechanism)
+    )}  # fmt: skip
+    assert len(pins) == 36
+    base, platform = (np.array([[pins[part, n, a] for a in "xyz"] for n in range(6)]) for part in ("base", "platform"))
+    pose = pf.pose([5, -8, 200], rpy=[4, -3, 6], degrees=True)
+    turned = platform @ Rotation.from_euler("xyz", [4, -3, 6], degrees=True).as_matrix().T
+    lengths = np.linalg.norm(turned + [5, -8, 200] - base, axis=1)
+    np.testing.assert_allclose(lengths, pf.solve_ik(mechanism, pose).actuators, rtol=1e-9)
+
+
+def test_a_delta_printer_is_klipper_s() -> None:
+    mechanism = pf.load("linear_delta")
+    text = klipper(mechanism)
+    radius = float(re.findall(r"delta_radius: (\S+)", text)[0])
+    arms, angles, ends = (
+        np.array(re.findall(rf"^{name}: (\S+)", text, re.MULTILINE), float)
+        for name in ("arm_length", "angle", "position_endstop")
+    )
+    towers = radius * np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
+    x, y, z = 12.0, -20.0, 8.0
+    heights = z + np.sqrt(arms**2 - ((towers - [x, y]) ** 2).sum(axis=1))
+    actuators = pf.solve_ik(mechanism, [x, y, z]).actuators
+    np.testing.assert_allclose(heights - heights[0], actuators - actuators[0], atol=1e-6)
+    # at its end a carriage is as high as Klipper reckons for a nozzle in the middle
+    top = pf.solve_ik(mechanism.without_limits(), [0.0, 0.0, ends[0]]).actuators
+    np.testing.assert_allclose(top, [joint.range[1] for joint in mechanism.joints if joint.actuated], atol=1e-6)
+
+
+def test_a_delta_whose_towers_stand_elsewhere_is_no_lineardeltakins() -> None:
+    assert "kinematicsInverse" in linuxcnc(pf.load("linear_delta"))
+
+
+@pytest.mark.parametrize("name", ["stewart", "delta", "five_bar"])
+def test_what_klipper_has_no_kinematics_for_is_refused(name: str) -> None:
+    with pytest.raises(UnsupportedMechanism, match=r"cannot be exported: Klipper's delta has three upright rails"):
+        klipper(pf.load(name))
+
+
+@needs_compiler
+def test_other_machines_are_a_module_around_their_own_code(tmp_path: Path) -> None:
+    mechanism = pf.load("delta")
+    for name, text in STUBS.items():
+        (tmp_path / name).write_text(text)
+    height = float(mechanism.reference_point[2]) - 20.0
+    (tmp_path / "module.c").write_text(linuxcnc(mechanism) + MAIN % height)
+    built = subprocess.run(
+        [COMPILERS[0], "-std=c99", "-Wall", "-I.", "module.c", "-o", "module", "-lm"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert built.returncode == 0, built.stderr
+    told = subprocess.run([str(tmp_path / "module")], capture_output=True, text=True)
+    assert told.returncode == 0
+    numbers = np.array(told.stdout.split(), float)
+    expected = np.degrees(pf.solve_ik(mechanism, [2.0, -3.0, height]).actuators)
+    np.testing.assert_allclose(numbers, [*expected, 2.0, -3.0, height], atol=1e-8)
