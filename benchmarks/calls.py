@@ -10,9 +10,10 @@ import numpy as np
 import pfabrik as pf
 from closed_forms import Array, Struts
 from pfabrik.closure.solve import ClosureEngine
-from pfabrik.motion.first_order import measures
+from pfabrik.motion.displacements import rate_units
+from pfabrik.motion.first_order import actuated_columns, measures
 from table import Row, cells, machine, table
-from timing import best_times, draw
+from timing import best_times
 
 CALLS = 200
 
@@ -31,9 +32,11 @@ def strut_jacobian(struts: Struts, pose: Array) -> Array:
 
 
 def near(mechanism: pf.Mechanism, rng: np.random.Generator) -> list[Array]:
-    """Targets that are reached, one by one."""
-    drawn = draw(mechanism, rng, 4 * CALLS, 0.1, 0.1)
-    return list(drawn[pf.solve_ik(mechanism, drawn).status == pf.Status.REACHED][:CALLS])
+    """Targets that are reached, one by one: poses at actuator values up to 0.1 L or 0.1 rad from home's."""
+    home = pf.solve_ik(mechanism, mechanism.home_pose).actuators
+    units = rate_units(mechanism)[actuated_columns(mechanism)]
+    drawn = pf.solve_fk(mechanism, home + rng.uniform(-0.1, 0.1, (2 * CALLS, len(home))) * units)
+    return list(drawn.pose[drawn.status == pf.Status.REACHED][:CALLS])
 
 
 def questions(name: str, what: str, rng: np.random.Generator, runs: int) -> Iterator[Row]:

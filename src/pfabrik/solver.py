@@ -27,7 +27,7 @@ class Solver:
     """Asks one machine again and again, one question at a time.
 
     Everything is compiled, or loaded, when it is made, which is announced on standard error; questions compile nothing.
-    Targets that legs in closed form reach are answered without allocating anything; others take what `solve_ik` takes.
+    Targets that legs in closed form reach are answered in arrays made once; others take what `solve_ik` takes.
     An instance is for one thread: make one for each.
 
     Attributes
