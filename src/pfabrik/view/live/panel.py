@@ -15,7 +15,7 @@ from ...description.readouts import Readout, readouts
 from ...description.task import task_of
 from ...rotations import to_rpy
 from ..looks import ACHIEVED, HELD
-from .session import Session
+from .session import DIGITS, Session
 
 if TYPE_CHECKING:
     import viser
@@ -128,7 +128,7 @@ class Panel:
 
     def _set(self, slider: Any, value: float) -> None:
         if slider is not self._touched:
-            slider.value = float(np.clip(value, slider.min, slider.max))
+            slider.value = float(np.clip(round(value, DIGITS), slider.min, slider.max)) + 0.0
 
     def _target_slider(self, gui: viser.GuiApi, mechanism: Mechanism, name: str) -> Any:
         if name in ("x", "y", "z"):

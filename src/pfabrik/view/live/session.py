@@ -21,6 +21,9 @@ from ...motion.displacements import home_coordinates
 from ...poses import pose
 from ...rotations import to_rpy
 
+DIGITS = 9
+"""Digits after the point of what is shown: below is rounding, and no -0.0."""
+
 
 @dataclass(frozen=True)
 class Margin:
@@ -89,8 +92,9 @@ class Session:
     @property
     def pose_as_python(self) -> str:
         """The target as what is typed in Python."""
-        place = ", ".join(f"{value:.6g}" for value in self.target[:3, 3] + 0.0)
-        angles = ", ".join(f"{value:.6g}" for value in np.degrees(to_rpy(self.target[:3, :3])) + 0.0)
+        place = ", ".join(f"{value:.6g}" for value in self.target[:3, 3].round(DIGITS) + 0.0)
+        turned = np.degrees(to_rpy(self.target[:3, :3])).round(DIGITS) + 0.0
+        angles = ", ".join(f"{value:.6g}" for value in turned)
         return f"pf.pose([{place}], rpy=[{angles}], degrees=True)"
 
 
