@@ -67,6 +67,10 @@ _HOMES = {
     "solve_fk": "fk",
     "Solver": "solver",
     "warm_up": "warm_up",
+    "Inscribed": "workspace.inscribed",
+    "SingularityMap": "workspace.singular",
+    "SingularityTrack": "workspace.singular",
+    "singularity_map": "workspace.singular",
     "Workspace": "workspace.result",
     "workspace": "workspace.ask",
     "export_c": "export.export_c",
@@ -90,6 +94,7 @@ __all__ = [
     "AssemblyModes",
     "Cone",
     "Feasibility",
+    "Inscribed",
     "Joint",
     "Leg",
     "Mechanism",
@@ -97,6 +102,8 @@ __all__ = [
     "Options",
     "PlatformSpeed",
     "Singularity",
+    "SingularityMap",
+    "SingularityTrack",
     "Solution",
     "Solver",
     "Status",
@@ -132,6 +139,7 @@ __all__ = [
     "read_path",
     "save",
     "singularity",
+    "singularity_map",
     "solve_fk",
     "solve_ik",
     "time_path",
@@ -179,7 +187,9 @@ if TYPE_CHECKING:
     from .view.travel import plot_travel
     from .warm_up import warm_up
     from .workspace.ask import workspace
+    from .workspace.inscribed import Inscribed
     from .workspace.result import Workspace
+    from .workspace.singular import SingularityMap, SingularityTrack, singularity_map
 
 
 def __getattr__(name: str) -> Any:

@@ -26,7 +26,7 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
     cls=CommandGroup,
     subcommands=(
         *("catalog", "new", "info", "check"),
-        *("ik", "fk", "track", "travel", "time", "speed"),
+        *("ik", "fk", "track", "travel", "workspace", "time", "speed"),
         *("plot", "view"),
         *("import", "export", "verify"),
         *("compile", "demo", "reproduce"),

@@ -29,6 +29,7 @@ from ..description.home_mobility import (
     orthonormal_rates,
 )
 from ..description.mechanism import Mechanism
+from ..description.task import task_of
 from ..tolerances import TOLERANCES
 from .displacements import end_effector_pose, gaps, loop_errors, screws, stepped
 
@@ -125,6 +126,27 @@ def singularity_of(found: Floats, lost: Floats, gained: Floats) -> Singularity:
         gained=_unit(gained),
         kinds=[tuple(kind for kind, is_near in zip(KINDS, row, strict=True) if is_near) for row in near],
     )
+
+
+def parallel_signs(mechanism: Mechanism, q: Floats) -> Floats:
+    """On which side of the parallel singularities coordinates q (n, c) are, (n,): 1 or -1; 0 on one; NaN if untold.
+
+    It is the sign of det Q_A det D'Q_T, the same for any basis of the motions, with D the directions of the end
+    effector's freedoms. It changes where the actuators lose hold, or the end effector a freedom. It is told where there
+    are as many actuators as freedoms, which are the same everywhere or those of the task.
+    """
+    invalid, q = _set_aside(q)
+    generic, freedoms = generic_of(mechanism), generic_of(mechanism).mobility.platform
+    axes, turns = task_of(mechanism).axes, task_of(mechanism).rotations
+    directions = generic.directions
+    if directions.shape[1] != freedoms:
+        turned = {0: (), 1: (5,), 2: (3, 4), 3: (3, 4, 5)}[turns]
+        directions = np.eye(6)[:, [*np.flatnonzero(axes).tolist(), *turned]]
+    if not len(mechanism.actuator_names) == directions.shape[1] == freedoms:
+        return np.full(len(q), np.nan)
+    motion = _motion(mechanism, q)
+    signs = np.sign(np.linalg.det(motion.actuators)) * np.sign(np.linalg.det(directions.T @ motion.twists))
+    return np.asarray(np.where(invalid, np.nan, signs))
 
 
 def _set_aside(q: Floats) -> tuple[NDArray[np.bool_], Floats]:

@@ -20,16 +20,17 @@ from ..errors import InvalidArgument, UnknownName
 from ..poses import SupportsMatrix
 from .blocks import Measure, OnProgress
 from .lattice import Lattice
+from .orientations import tilts_up_to
 from .parts import Parts
 from .refining import refined
 from .result import Workspace
 from .space import Space, space_of
 from .surface import mesh_of
 from .telling import telling
-from .verdicts import Question, all_rotations, tilts_up_to
+from .verdicts import Question
 
 FINENESS, FINENESS_OF_SETS, FINENESS_ONE_BY_ONE = 1 / 100, 1 / 50, 1 / 25
-"""Resolutions [L or rad]: where closed forms tell margins; where they do for each of many orientations; elsewhere."""
+"""Resolutions [L or rad]: where closed forms tell margins; where they do for each of many tilts; elsewhere."""
 
 FIRST_CELLS = {(2, True): 1 / 48, (3, True): 1 / 12, (2, False): 1 / 12, (3, False): 1 / 5}
 """How wide the first cells are [L or rad], by coordinates, and whether closed forms tell margins."""
@@ -68,13 +69,13 @@ def workspace(
         "tilt_x", "tilt_y", "yaw": R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw) R_0, with R_0 the orientation held.
     fixed : values of other coordinates [length or rad]; what is neither is as at the start.
     orientation : R_0, a matrix (3, 3) or a SciPy Rotation, by default the start's; or "any": positions that are reached
-        with some orientation or other (the reachable workspace).
+        with some orientation or other (the reachable workspace), without a start in any working mode.
     tilt : the largest angle by which the platform must be able to lean to every side [rad]: only positions count where
         it can ("total" workspace up to a tilt).
     within : coordinate -> (least, greatest), where to look; default: as far as anything is within reach.
     resolution : size of the smallest cells, at the border [length; rad where all coordinates are angles]; angles beside
-        lengths: that divided by L. Default: L/100 or 0.01 rad, L/50 for many orientations, L/25 where no closed forms
-        answer; halved where a workspace would be smaller than 24 cells.
+        lengths: that divided by L. Default: L/100 or 0.01 rad, L/50 with a tilt, L/25 where no closed
+        forms answer; halved where a workspace would be smaller than 24 cells.
     start : a single Solution or joint vector q: whose working mode is meant, and what hangs together with it is
         `at_start`; default home.
     executor : of `concurrent.futures`, or one like it: where points are measured; default: here, on all cores.
@@ -91,13 +92,14 @@ def workspace(
     """
     begin = _start(checked_mechanism(mechanism), start)
     pose = mechanism.home_pose if begin is None else begin.pose
-    is_any = isinstance(orientation, str)
-    if is_any and orientation != "any":
-        raise InvalidArgument("orientation", repr(orientation), "a rotation, or 'any'")
+    is_any = isinstance(orientation, str) and orientation == "any"
     space = space_of(mechanism, over, fixed, None if is_any else orientation, pose)
-    turns, wanted = _turns(space, is_any, tilt)
-    lowest, highest = _ends(space, within)
-    question = Question(space, begin, turns, wanted, lowest, highest)
+    if is_any:
+        _require_turning(space, "orientation")
+        if tilt is not None:
+            raise InvalidArgument("tilt", "an angle", "None with orientation='any'")
+    hold: Literal["orientation", "position"] = "position" if is_any else "orientation"
+    question = Question(space, begin, _turns(space, tilt), hold, *_ends(space, within))
     step = _step(question, resolution)
     with telling("workspace", on_progress) as tell:
         for _ in range(MOST_HALVINGS):
@@ -133,20 +135,20 @@ def _start(mechanism: Mechanism, start: Start | None) -> Solution | None:
     return begin
 
 
-def _turns(space: Space, is_any: bool, tilt: float | None) -> tuple[Floats, Literal["all", "any"]]:
-    """Rotations to ask each pose for, and whether all or any of them count."""
-    if not is_any and tilt is None:
-        return np.eye(3)[None], "all"
-    if is_any and tilt is not None:
-        raise InvalidArgument("tilt", "an angle", "None with orientation='any'")
-    if any(space.is_angle) or not task_of(space.mechanism).rotations:
-        found = f"a workspace over {', '.join(space.names)}"
-        raise InvalidArgument("orientation" if is_any else "tilt", found, "positions, of a machine that can turn")
-    if is_any:
-        return all_rotations(space.mechanism), "any"
+def _turns(space: Space, tilt: float | None) -> Floats:
+    """Rotations (k, 3, 3) that all are asked of each pose."""
+    if tilt is None:
+        return np.eye(3)[None]
     if isinstance(tilt, bool) or not isinstance(tilt, int | float | np.number) or not 0.0 <= tilt <= math.pi:
         raise InvalidArgument("tilt", repr(tilt), "an angle from 0 to pi [rad]")
-    return tilts_up_to(float(tilt)), "all"
+    _require_turning(space, "tilt")
+    return tilts_up_to(float(tilt))
+
+
+def _require_turning(space: Space, argument: str) -> None:
+    if any(space.is_angle) or not task_of(space.mechanism).rotations:
+        expected = "None: it is for positions, of a machine whose task has a rotation"
+        raise InvalidArgument(argument, f"a value, for a workspace over {', '.join(space.names)}", expected)
 
 
 def _ends(space: Space, within: Mapping[str, tuple[float, float]] | None) -> tuple[Floats, Floats]:

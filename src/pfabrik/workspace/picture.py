@@ -99,7 +99,7 @@ def _draw_plane(axes: Any, found: Workspace, groups: list[Group]) -> None:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    points = _shown(found, found.vertices)
+    points = shown(found, found.vertices)
     segments = points[found.faces]
     loops = _loops(found.faces)
     if loops:
@@ -114,7 +114,7 @@ def _draw_plane(axes: Any, found: Workspace, groups: list[Group]) -> None:
             capstyle="round",
         )
     )
-    axes.set(**dict(zip(("xlabel", "ylabel"), _labels(found), strict=True)))
+    axes.set(**dict(zip(("xlabel", "ylabel"), labels(found), strict=True)))
     axes.autoscale_view()
     axes.margins(0.06)
     axes.tick_params(labelsize=SMALL)
@@ -126,7 +126,7 @@ def _draw_solid(axes: Any, found: Workspace, groups: list[Group]) -> None:
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
-    vertices, faces, limits = _thinned(_shown(found, found.vertices), found.faces, found.face_limit)
+    vertices, faces, limits = _thinned(shown(found, found.vertices), found.faces, found.face_limit)
     spans = np.ptp(vertices, axis=0) if len(vertices) else np.ones(3)
     box = spans if len(set(found.units)) == 1 else np.ones(3)
     corners = vertices[faces]
@@ -141,17 +141,17 @@ def _draw_solid(axes: Any, found: Workspace, groups: list[Group]) -> None:
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(tuple(box / box.max()), zoom=0.86)
     axes.view_init(ELEVATION, AZIMUTH)
-    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), _labels(found), strict=True)))
+    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(found), strict=True)))
     axes.tick_params(labelsize=SMALL)
     axes.locator_params(nbins=5)
 
 
-def _shown(found: Workspace, points: Floats) -> Floats:
+def shown(found: Workspace, points: Floats) -> Floats:
     """Coordinates as people read them: angles in degrees."""
     return points * np.where([unit == "rad" for unit in found.units], 180.0 / np.pi, 1.0)
 
 
-def _labels(found: Workspace) -> list[str]:
+def labels(found: Workspace) -> list[str]:
     return [f"{name} [{'deg' if unit == 'rad' else unit}]" for name, unit in zip(found.names, found.units, strict=True)]
 
 

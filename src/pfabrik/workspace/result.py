@@ -22,6 +22,8 @@ from .words import in_words
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from .inscribed import Inscribed, Kind
+
 EXPONENTS = {1: "", 2: "²", 3: "³"}
 
 
@@ -191,6 +193,25 @@ class Workspace:
         from .ask import sliced
 
         return sliced(self._question, fixed, self.resolution if resolution is None else resolution)
+
+    def inscribed(
+        self,
+        kind: Kind,
+        centre: ArrayLike | None = None,
+        *,
+        proportions: ArrayLike | None = None,
+    ) -> Inscribed:
+        """The largest sphere (in a plane: circle), box or cylinder within reach.
+
+        Parameters
+        ----------
+        centre : (d,); default: where the largest has its own, as far as a search finds.
+        proportions : sides of the box, (d,), default all equal; diameter and height of the cylinder, which stands along
+            the last coordinate, default equal.
+        """
+        from .inscribed import inscribed
+
+        return inscribed(self, kind, centre, proportions)
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the border, each face in the colour of the limit that forms it, and return the axes.

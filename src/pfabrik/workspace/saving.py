@@ -23,7 +23,7 @@ def save(found: Workspace, path: str | PathLike[str]) -> None:
     """Write a workspace in the format that the ending says; the file is there whole, or not at all."""
     write = _FORMATS.get(Path(path).suffix.lower())
     if write is None:
-        raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(_FORMATS)}")
+        raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(ENDINGS)}")
     content = write(found)
     with whole_path(path) as part:
         part.write_bytes(content)
@@ -97,3 +97,5 @@ def _as_csv(found: Workspace) -> bytes:
 
 
 _FORMATS: dict[str, Callable[[Workspace], bytes]] = {".npz": _as_npz, ".stl": _as_stl, ".ply": _as_ply, ".csv": _as_csv}
+
+ENDINGS = tuple(_FORMATS)

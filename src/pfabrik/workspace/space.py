@@ -118,21 +118,23 @@ def space_of(
     rotation = _rotation(mechanism, orientation, start)
     held = {name: float(value) for name, value in zip(POSITIONS, start[:3, 3], strict=True)} | dict.fromkeys(TURNS, 0.0)
     held |= fixed
-    names = tuple(name for name in _free(mechanism) if name not in fixed) if asked is None else asked
+    names = tuple(name for name in free_coordinates(mechanism) if name not in fixed) if asked is None else asked
     if asked is None:
         places = tuple(name for name in names if name in POSITIONS)
         names = places if len(places) > 1 or len(names) > MOST else names
         if not places:
             names = tuple(name for name in names if name in TURNS)
     if not 2 <= len(names) <= MOST:
-        expected = f"two or three coordinates to look over, of those that move: {', '.join(_free(mechanism))}"
+        expected = (
+            f"two or three coordinates to look over, of those that move: {', '.join(free_coordinates(mechanism))}"
+        )
         raise InvalidArgument("over", ", ".join(names) or "no coordinate", expected)
     _require_task(mechanism, "over", names)
     _require_task(mechanism, "fixed", [name for name in fixed if name not in names])
     return Space(mechanism, names, np.array([held[name] for name in names]), held, rotation)
 
 
-def _free(mechanism: Mechanism) -> tuple[str, ...]:
+def free_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
     """Coordinates of the task that the end effector can change."""
     task, directions = task_of(mechanism), generic_of(mechanism).directions
     moves = np.linalg.norm(directions, axis=1) > TOLERANCES.alignment

@@ -76,7 +76,14 @@ class Mesh(NamedTuple):
 
 def mesh_of(lattice: Lattice, cells: Cells) -> Mesh:
     """The mesh of the border through cells that it does not leave."""
-    d = lattice.d
+    first, last, faces = crossed_edges(cells)
+    vertices, limits, inner = _vertices(lattice, first, last, cells.width)
+    return Mesh(vertices, faces, limits, inner)
+
+
+def crossed_edges(cells: Cells) -> tuple[Ints, Ints, Ints]:
+    """The ends (e, d) each, lower and upper, of edges that the border crosses, and its faces (f, d) between those."""
+    d = cells.lows.shape[1]
     low = codes(cells.lows[:, None] + cells.width * corners(d))
     case = ((cells.margins >= 0.0) << np.arange(2**d)).sum(axis=1)
     order = np.argsort(case, kind="stable")
@@ -87,8 +94,9 @@ def mesh_of(lattice: Lattice, cells: Cells) -> Mesh:
         for face in _faces(which, d):
             edges.append(np.stack([(own[:, a] << d) + (a ^ b) for a, b in face], axis=1))
     distinct, faces = np.unique(np.concatenate(edges), return_inverse=True)
-    vertices, limits, inner = _vertices(lattice, distinct, cells.width)
-    return Mesh(vertices, faces.reshape(-1, d), limits, inner)
+    ways = (distinct & (2**d - 1))[:, None] >> np.arange(d)[::-1] & 1
+    first = places_of(distinct >> d, d)
+    return first, first + cells.width * ways, faces.reshape(-1, d)
 
 
 @lru_cache(maxsize=512)
@@ -130,16 +138,12 @@ def _segments(case: int, side: Sequence[int]) -> Iterator[tuple[Edge, Edge]]:
             yield edges[leaving % 4], edges[k - 1]
 
 
-def _vertices(lattice: Lattice, edges: Ints, width: int) -> tuple[Floats, Ints, Ints]:
-    """Where the border crosses edges (e,), what forms it there, and the codes of the ends within."""
-    d = lattice.d
-    ways = (edges & (2**d - 1))[:, None] >> np.arange(d)[::-1] & 1
-    first = places_of(edges >> d, d)
-    ends = np.stack([first, first + width * ways])
+def _vertices(lattice: Lattice, first: Ints, last: Ints, width: int) -> tuple[Floats, Ints, Ints]:
+    """Where the border crosses edges, what forms it there, and the codes of the ends within; (e, ...) each."""
+    ends = np.stack([first, last])
     code = codes(ends)
     margins = lattice.margins(code)
-    within = (margins[1] >= 0.0).astype(np.int64)
-    every = np.arange(len(edges))
+    within, every = (margins[1] >= 0.0).astype(np.int64), np.arange(len(first))
     inner, outer = (lattice.coordinates(ends[side, every]) for side in (within, 1 - within))
     points, limits = crossings(
         lattice.measure, inner, outer, margins[within, every], margins[1 - within, every], CLOSE / width

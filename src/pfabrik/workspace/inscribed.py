@@ -1,0 +1,177 @@
+"""The largest sphere, box or cylinder within a workspace."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
+from ..errors import InvalidArgument, UnknownName
+from ..poses import as_floats
+
+if TYPE_CHECKING:
+    from .result import Workspace
+
+Kind = Literal["sphere", "box", "cylinder"]
+
+NEAREST_FACES, POINTS_A_SIDE = 400, 12
+"""Faces that are looked at closely, those nearest to the shape, and points along each of their sides."""
+
+SAMPLES = 4096
+"""Points on the shape that must be within the workspace."""
+
+GIVES, MOST_GIVES = 0.998, 50
+"""By how much the shape shrinks where one of them is not, and how often at most."""
+
+FIRST_GRID, LOOKED_AT, MOST_STEPS = 13, 4, 60
+"""A search for the best centre: points on each axis that it begins with, the best of them that it goes on from."""
+
+MOST_VERTICES = 20_000
+
+
+@dataclass(frozen=True)
+class Inscribed:
+    """A shape all of which is within reach.
+
+    Attributes
+    ----------
+    kind : "sphere" (in a plane: a circle), "box" or "cylinder".
+    centre : (d,) [length or rad].
+    extents : how long it is along each coordinate, (d,): the sides of a box, diameters, and a cylinder's height last.
+    """
+
+    kind: Kind
+    centre: Floats
+    extents: Floats
+
+    @property
+    def size(self) -> float:
+        """Its area or volume [product of the units of the coordinates]."""
+        share = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / (4.0 if len(self.extents) == 2 else 6.0)}
+        return float(share[self.kind] * np.prod(self.extents))
+
+
+def inscribed(found: Workspace, kind: Kind, centre: ArrayLike | None, proportions: ArrayLike | None) -> Inscribed:
+    """The largest shape of a kind about a centre, or anywhere."""
+    extents = _extents(found, kind, proportions)
+    vertices = found.vertices[np.unique(found.faces)]
+    if not len(vertices):
+        raise InvalidArgument("workspace", "nothing within reach", "a workspace that a shape fits into")
+    middle = _best_centre(found, kind, extents, vertices) if centre is None else _checked_centre(found, centre)
+    scale = _distance_to_faces(found, kind, extents, middle)
+    shell = _shell(kind, extents)
+    for _ in range(MOST_GIVES):
+        if np.all(found.contains(middle + scale * shell)):
+            return Inscribed(kind, middle, scale * extents)
+        scale *= GIVES
+    raise InvalidArgument(
+        "centre", f"{middle.tolist()}", "a point with room around it: here the border is too fine for the mesh"
+    )
+
+
+def _extents(found: Workspace, kind: Kind, proportions: ArrayLike | None) -> Floats:
+    """The shape of size one: how long it is along each coordinate, (d,)."""
+    d = len(found.names)
+    if kind not in get_args(Kind):
+        raise UnknownName("shape", str(kind), get_args(Kind))
+    if kind == "cylinder" and d != 3:
+        raise InvalidArgument("kind", "'cylinder'", "a sphere or a box: the workspace lies in a plane")
+    alike = len(set(found.units[:2] if kind == "cylinder" else found.units)) == 1
+    if kind != "box" and not alike:
+        raise InvalidArgument(
+            "kind", f"'{kind}'", f"a box: the coordinates {', '.join(found.names)} differ in their units"
+        )
+    if proportions is None:
+        return np.ones(d) if len(set(found.units)) == 1 else np.ptp(found.bounds, axis=0)
+    n = {"sphere": 0, "box": d, "cylinder": 2}[kind]
+    expected = f"{n} positive numbers" if n else "None: a sphere has but one"
+    given = as_floats("proportions", proportions, expected)
+    if given.shape != (n,) or not (np.isfinite(given) & (given > 0.0)).all():
+        raise InvalidArgument("proportions", f"{np.asarray(proportions).tolist()}", expected)
+    return given[[0, 0, 1]] if kind == "cylinder" else given
+
+
+def _checked_centre(found: Workspace, centre: ArrayLike) -> Floats:
+    expected = f"a point of shape ({len(found.names)},) within reach: {', '.join(found.names)}"
+    point = as_floats("centre", centre, expected)
+    if point.shape != (len(found.names),) or not np.isfinite(point).all() or not found.contains(point):
+        raise InvalidArgument("centre", f"{np.asarray(centre).tolist()}", expected)
+    return point
+
+
+def _scales(kind: Kind, extents: Floats, away: Floats) -> Floats:
+    """How large the shape is whose surface goes through points (..., d) seen from its centre."""
+    shares = 2.0 * np.abs(away) / extents
+    if kind == "box":
+        return np.asarray(shares.max(axis=-1))
+    if kind == "sphere":
+        return np.asarray(np.linalg.norm(shares, axis=-1))
+    return np.maximum(np.hypot(shares[..., 0], shares[..., 1]), shares[..., 2])
+
+
+def _distance_to_faces(found: Workspace, kind: Kind, extents: Floats, centre: Floats) -> float:
+    """The size at which the shape meets the mesh: its nearest faces are looked at closely."""
+    corners = found.vertices[found.faces]
+    nearest = _scales(kind, extents, corners - centre).min(axis=1)
+    chosen = np.argsort(nearest)[:NEAREST_FACES]
+    d = corners.shape[1]
+    shares = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, POINTS_A_SIDE)] * (d - 1), indexing="ij"), axis=-1)
+    shares = shares.reshape(-1, d - 1)
+    shares = shares[shares.sum(axis=1) <= 1.0 + 1e-12]
+    weights = np.column_stack([1.0 - shares.sum(axis=1), shares])
+    return float(_scales(kind, extents, np.einsum("kc,fcd->fkd", weights, corners[chosen]) - centre).min())
+
+
+def _shell(kind: Kind, extents: Floats) -> Floats:
+    """Points (n, d) on the shape of size one about zero: evenly spread directions, and those that lead to its edges."""
+    d = len(extents)
+    steps = np.arange(SAMPLES) + 0.5
+    turn = np.pi * (1.0 + math.sqrt(5.0)) * steps
+    if d == 2:
+        directions = np.column_stack([np.cos(2.0 * np.pi * steps / SAMPLES), np.sin(2.0 * np.pi * steps / SAMPLES)])
+    else:
+        height = 1.0 - 2.0 * steps / SAMPLES
+        across = np.sqrt(1.0 - height**2)
+        directions = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
+    ends = np.stack(np.meshgrid(*[[-1.0, 1.0]] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    if kind == "cylinder":
+        rim = np.linspace(0.0, 2.0 * np.pi, 128, endpoint=False)
+        ends = np.concatenate([np.column_stack([np.cos(rim), np.sin(rim), np.full(128, side)]) for side in (-1, 1)])
+    directions = np.concatenate([directions, ends]) * extents
+    return directions / _scales(kind, extents, directions)[:, None]
+
+
+def _best_centre(found: Workspace, kind: Kind, extents: Floats, vertices: Floats) -> Floats:
+    """Where the shape can be largest, as far as a search from the best points of a grid finds."""
+    vertices = vertices[:: max(1, len(vertices) // MOST_VERTICES)]
+    low, high = found.bounds
+    axes = [np.linspace(a, b, FIRST_GRID + 2)[1:-1] for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(low))
+    inside = grid[np.asarray(found.contains(grid))]
+
+    def size(centre: Floats) -> float:
+        return float(_scales(kind, extents, vertices - centre).min())
+
+    begins = inside if len(inside) else found._question.space.start[None]
+    best = sorted(begins, key=size, reverse=True)[:LOOKED_AT]
+    return max((_climbed(size, found, centre, (high - low) / FIRST_GRID) for centre in best), key=size)
+
+
+def _climbed(size: Any, found: Workspace, centre: Floats, steps: Floats) -> Floats:
+    """From a centre to better ones, a step along a coordinate at a time; steps halve where none is better."""
+    best = size(centre)
+    for _ in range(MOST_STEPS):
+        tried = [centre + sign * way for way in np.diag(steps) for sign in (1.0, -1.0)]
+        sizes = [size(each) for each in tried]
+        place = int(np.argmax(sizes))
+        if sizes[place] > best and found.contains(tried[place]):
+            centre, best = tried[place], sizes[place]
+        else:
+            steps = 0.5 * steps
+        if (steps < 0.1 * found.resolution).all():
+            break
+    return centre

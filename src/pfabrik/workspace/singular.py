@@ -1,0 +1,276 @@
+"""Where a workspace is singular, and which of its parts no motion joins without passing there; along a path too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, overload
+
+import numpy as np
+
+from ..answers.differential import singularity
+from ..answers.solution import Solution, Status
+from ..answers.tracked import Track
+from ..arrays import Floats, Ints
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..errors import InvalidArgument
+from ..ik import solve_ik
+from ..motion.first_order import Singularity, parallel_signs
+from ..options import Options
+from .blocks import OnProgress
+from .lattice import codes, corners
+from .parts import connected
+from .refining import Cells
+from .result import Workspace
+from .surface import crossed_edges
+from .telling import telling
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+POINTS = 20_000
+"""Points that a map has by default, about."""
+
+ROWS_A_BLOCK = 512
+
+LEAST_SHARE = 1e-3
+"""Share of the points below which a part is not counted in words: at the border single points stand alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class SingularityMap:
+    """Measures of singularity over a workspace, on a lattice of points.
+
+    Attributes
+    ----------
+    workspace : the workspace it is of.
+    step : distance of the points along each coordinate, (d,) [length or rad].
+    points : those within reach, (n, d) [length or rad].
+    measures : as of `singularity`, (n,) each.
+    signs : on which side of the parallel singularities each point is, 1 or -1; NaN where that has no meaning, as with
+        more actuators than freedoms.
+    parts : which part each point is in, (n,): no motion within the workspace leads from one to another but through a
+        parallel singularity, or over a gap. 0 is the largest.
+    locus_vertices, locus_faces : where the parallel measure changes its sign: points (v, d), and segments or triangles
+        between them, (f, d).
+    """
+
+    workspace: Workspace
+    step: Floats
+    points: Floats
+    measures: Singularity
+    signs: Floats
+    parts: Ints
+    locus_vertices: Floats
+    locus_faces: Ints
+
+    @property
+    def sizes(self) -> Floats:
+        """The share of the points that each part has, the largest first."""
+        return np.bincount(self.parts) / max(len(self.parts), 1)
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the parallel measure and the locus of parallel singularities. Needs the extra `plot`."""
+        from .singular_picture import plot_map
+
+        return plot_map(self, axes)
+
+    def __repr__(self) -> str:
+        least = float(np.min(self.measures.parallel, initial=np.inf))
+        n = int((self.sizes > LEAST_SHARE).sum())
+        found = f"{n} part{'s' * (n != 1)} between parallel singularities" if len(self.locus_faces) else "none parallel"
+        return f"<SingularityMap of {len(self.points)} points: {found}, least parallel measure {least:.3g}>"
+
+
+@dataclass(frozen=True, eq=False)
+class SingularityTrack:
+    """Measures of singularity along a path.
+
+    Attributes
+    ----------
+    measures : as of `singularity`, (n,) each.
+    signs : as of a `SingularityMap`, (n,).
+    crossings : rows before which the sign changes: the path leads through a parallel singularity on the way to them.
+    """
+
+    measures: Singularity
+    signs: Floats
+    crossings: Ints
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the measures along the path, crossings marked. Needs the extra `plot`."""
+        from .singular_picture import plot_track
+
+        return plot_track(self, axes)
+
+
+@overload
+def singularity_map(
+    mechanism: Mechanism,
+    over: Workspace,
+    *,
+    resolution: float | None = None,
+    on_progress: OnProgress | None = None,
+) -> SingularityMap: ...
+@overload
+def singularity_map(
+    mechanism: Mechanism,
+    over: Track,
+    *,
+    resolution: float | None = None,
+    on_progress: OnProgress | None = None,
+) -> SingularityTrack: ...
+def singularity_map(
+    mechanism: Mechanism,
+    over: Workspace | Track,
+    *,
+    resolution: float | None = None,
+    on_progress: OnProgress | None = None,
+) -> SingularityMap | SingularityTrack:
+    """How near to singular a mechanism is over a workspace, or along a path, and where it is.
+
+    Parameters
+    ----------
+    over : a workspace, or a slice of one; or a path that was followed.
+    resolution : distance of the points, along lengths [length], or [rad] where all coordinates are angles; default: so
+        that there are some 20,000 of them. None for a path.
+    on_progress : as of `workspace`.
+
+    Raises
+    ------
+    InvalidArgument : a workspace or path of another mechanism, or one of positions with any orientation or several.
+    """
+    checked_mechanism(mechanism)
+    if not isinstance(over, Workspace | Track):
+        raise InvalidArgument("over", type(over).__name__, "a Workspace or a Track")
+    if over.mechanism != mechanism:
+        raise InvalidArgument("over", f"that of '{over.mechanism.name}'", f"one of '{mechanism.name}'")
+    if isinstance(over, Track):
+        return _along(over)
+    question = over._question
+    if question.hold == "position" or len(question.turns) > 1:
+        raise InvalidArgument("over", "positions of several orientations", "a workspace with one pose at each point")
+    step = _step(over, resolution)
+    places = _places(over, step)
+    with telling("singularities", on_progress) as tell:
+        reached, found, signs = _measured(over, places * step + question.space.start, tell)
+    places = places[reached]
+    signed = np.where(np.isnan(signs), 1.0, signs) * np.asarray(found.parallel)
+    vertices, faces = _locus(places, signed)
+    return SingularityMap(
+        workspace=over,
+        step=step,
+        points=places * step + question.space.start,
+        measures=found,
+        signs=signs,
+        parts=_parts(places, signed),
+        locus_vertices=vertices * step + question.space.start,
+        locus_faces=faces,
+    )
+
+
+def _along(track: Track) -> SingularityTrack:
+    found, signs = _of(track)
+    kept = np.asarray(track.status) < Status.FAILED
+    signs = np.where(kept, signs, np.nan)
+    crossings = np.flatnonzero(signs[1:] * signs[:-1] < 0.0) + 1
+    return SingularityTrack(found, signs, crossings)
+
+
+def _of(answers: Solution) -> tuple[Singularity, Floats]:
+    return singularity(answers), parallel_signs(answers.mechanism, answers._coordinates)
+
+
+def _step(over: Workspace, resolution: float | None) -> Floats:
+    """The distance of the points, (d,): the resolution of the workspace times what makes for so many points."""
+    d = len(over.names)
+    if resolution is None:
+        cells = over.size / float(np.prod(over.resolution))
+        return np.asarray(over.resolution * max(1.0, (cells / POINTS) ** (1.0 / d)))
+    if (
+        isinstance(resolution, bool)
+        or not isinstance(resolution, int | float | np.number)
+        or not 0.0 < resolution < np.inf
+    ):
+        raise InvalidArgument("resolution", repr(resolution), "a positive number")
+    return np.asarray(over.resolution * resolution / over.resolution[_leading(over)])
+
+
+def _leading(over: Workspace) -> int:
+    """The coordinate that a resolution is of: the first length, if there is one."""
+    return next((axis for axis, unit in enumerate(over.units) if unit != "rad"), 0)
+
+
+def _places(over: Workspace, step: Floats) -> Ints:
+    """Places on the lattice about the start that are within reach, (n, d)."""
+    bounds = (over.bounds - over._question.space.start) / step
+    if not np.isfinite(bounds).all():
+        return np.zeros((0, len(step)), np.int64)
+    axes = [np.arange(np.floor(low), np.ceil(high) + 1).astype(np.int64) for low, high in bounds.T]
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+    inside = np.asarray(over.contains(places * step + over._question.space.start))
+    return np.asarray(places[inside])
+
+
+def _measured(over: Workspace, points: Floats, tell: OnProgress | None) -> tuple[Ints, Singularity, Floats]:
+    """Which points were reached in the working mode asked for, and their measures and signs."""
+    question, options = over._question, Options(working_mode="keep", on_invalid="mark")
+    rows, blocks, signs = [np.zeros(0, np.int64)], [], [np.zeros(0)]
+    for begin in range(0, max(len(points), 1), ROWS_A_BLOCK):
+        poses = question.space.poses(points[begin : begin + ROWS_A_BLOCK])
+        answers = solve_ik(question.mechanism, poses, start=question.start, options=options)
+        reached = np.flatnonzero(np.asarray(answers.status) == Status.REACHED)
+        found, sign = _of(answers[reached])
+        rows.append(reached + begin)
+        blocks.append(found)
+        signs.append(sign)
+        if tell is not None:
+            tell(begin + len(poses), len(points))
+    return np.concatenate(rows), _joined(blocks), np.concatenate(signs)
+
+
+def _joined(blocks: list[Singularity]) -> Singularity:
+    def every(name: str) -> Floats:
+        return np.concatenate([np.asarray(getattr(block, name)) for block in blocks])
+
+    return Singularity(
+        serial=every("serial"),
+        parallel=every("parallel"),
+        constraint=every("constraint"),
+        passive=every("passive"),
+        lost=every("lost"),
+        gained=every("gained"),
+        kinds=[kinds for block in blocks for kinds in block.kinds],  # type: ignore[misc]
+    )
+
+
+def _locus(places: Ints, signed: Floats) -> tuple[Floats, Ints]:
+    """Where a signed measure of lattice places (n, d) is zero: vertices (v, d) in steps, and faces (f, d)."""
+    d = places.shape[1]
+    code = codes(places)
+    order = np.argsort(code)
+    around = codes(places[:, None] + corners(d))
+    where = np.minimum(np.searchsorted(code[order], around), max(len(code) - 1, 0))
+    whole = (code[order][where] == around).all(axis=1) if len(code) else np.zeros(0, bool)
+    cells = Cells(places[whole], 1, signed[order][where[whole]])
+    first, last, faces = crossed_edges(cells.at(cells.crossed))
+    ends = [signed[order][np.searchsorted(code[order], codes(side))] for side in (first, last)]
+    share = ends[0] / np.where(ends[0] == ends[1], 1.0, ends[0] - ends[1])
+    return np.asarray(first + share[:, None] * (last - first), np.float64), faces
+
+
+def _parts(places: Ints, signed: Floats) -> Ints:
+    """The part of each lattice place, (n,): those hang together that lie next to each other and have the same sign."""
+    n, d = places.shape
+    code = codes(places)
+    order = np.argsort(code)
+    pairs = [np.zeros((0, 2), np.int64)]
+    for axis in range(d):
+        after = codes(places + np.eye(d, dtype=np.int64)[axis])
+        where = np.minimum(np.searchsorted(code[order], after), max(n - 1, 0))
+        beside = order[where] if n else where
+        joined = np.flatnonzero((code[beside] == after) & ((signed[beside] >= 0.0) == (signed >= 0.0)))
+        pairs.append(np.stack([joined, beside[joined]], axis=1))
+    _, labels, counts = np.unique(connected(n, np.concatenate(pairs)), return_inverse=True, return_counts=True)
+    rank = np.empty(len(counts), np.int64)
+    rank[np.argsort(-counts, kind="stable")] = np.arange(len(counts))
+    return np.asarray(rank[labels])
