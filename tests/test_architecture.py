@@ -102,7 +102,7 @@ def loaded_by(heavy: str, lines: list[list[str]]) -> tuple[list[tuple[int | None
 
 
 COMMANDS = (
-    *("catalog", "new", "info", "check", "ik", "fk", "track", "travel", "plot", "view"),
+    *("catalog", "new", "info", "check", "ik", "fk", "track", "travel", "workspace", "plot", "view"),
     *("import", "export", "verify", "demo", "reproduce"),
 )
 HELP = [["--help"], *[[command, "--help"] for command in COMMANDS]]

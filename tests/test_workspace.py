@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import itertools
 from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +17,7 @@ from numpy.typing import NDArray
 
 import pfabrik as pf
 from oracles.annuli import Ring, area, within
+from pfabrik.errors import InvalidArgument, PfabrikError
 
 Array = NDArray[np.float64]
 
@@ -110,3 +117,276 @@ def test_the_mesh_is_closed_and_encloses_what_is_contained(name: str, resolution
     box = float(np.prod(high - low))
     noise = box * np.sqrt(hits * (1.0 - hits) / n)
     assert abs(found.size - box * hits) <= 4.0 * noise + found.uncertainty
+
+
+@pytest.mark.parametrize("name", ["stewart", "five_bar", "linear_delta", "rpr", "rps", "ankle_ups", "hexaglide", "rrr"])
+def test_what_is_contained_is_what_is_reached(name: str) -> None:
+    machine = pf.load(name)
+    found = pf.workspace(machine, resolution=0.05 * machine.characteristic_length if name != "ankle_ups" else 0.05)
+    middle, half = found.bounds.mean(axis=0), 0.55 * np.ptp(found.bounds, axis=0)
+    points = np.random.default_rng(2).uniform(middle - half, middle + half, (1250, len(half)))
+    reached = pf.solve_ik(machine, found.poses(points)).status == pf.Status.REACHED
+    assert 0.1 < reached.mean() < 0.9
+    assert (found.contains(points) == reached).all()
+
+
+@pytest.mark.parametrize("name", ["stewart", "delta", "rps"])
+def test_vertices_are_on_the_limits_they_name(name: str) -> None:
+    found = pf.workspace(pf.load(name), resolution=0.08 * pf.load(name).characteristic_length)
+    told = pf.feasibility(found.mechanism, found.poses(found.vertices))
+    bounds = np.array([bound for _, bound in found.limits])[found.vertex_limit]
+    assert (told.margin >= 0.0).all()
+    assert (
+        np.mean(told.margin[np.isin(bounds, ["min", "max", "cone"])] < 0.01) > 0.99
+    )  # beside where a leg just reaches
+    assert np.mean(told.binding == found.vertex_limit) > 0.98  # at edges the limit beyond is another
+    assert {found.limits[limit] for limit in found.face_limit.tolist()} == set(found.shares)
+    assert sum(found.shares.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.campaign
+def test_an_orthoglide_without_limits_fills_three_cylinders() -> None:
+    machine = pf.load("orthoglide").without_limits()
+    rod = 310.582854123025
+    found = pf.workspace(machine, resolution=rod / 16)
+    assert found.volume == pytest.approx(8.0 * (2.0 - np.sqrt(2.0)) * rod**3, rel=1e-3)
+
+
+def test_a_box_that_grows_holds_all_of_a_workspace_far_from_home() -> None:
+    """A rail ten times as long as what else there is: a box about home would cut it."""
+    machine = pf.load("linear_delta").with_limits(A1=(-3000.0, 420.0), A2=(-3000.0, 420.0), A3=(-3000.0, 420.0))
+    found = pf.workspace(machine, resolution=15.0)
+    low, high = found.bounds[:, 2]
+    lowest = pf.solve_ik(machine, [[0.0, 0.0, low + 1.0], [0.0, 0.0, low - 10.0]]).status
+    assert lowest.tolist() == [pf.Status.REACHED, pf.Status.PROJECTED]
+    assert high - low > 3000.0
+    assert is_closed(found.faces)
+
+
+def test_a_workspace_that_nothing_ends_must_be_cut_off() -> None:
+    machine = pf.load("linear_delta").without_limits()
+    with pytest.raises(InvalidArgument, match=r"'z'.*nothing ends the workspace"):
+        pf.workspace(machine, resolution=15.0)
+
+
+def test_parts_that_do_not_hang_together_are_told_apart() -> None:
+    """A 5-bar whose holes cut what is between them off, seen in a strip."""
+    found = pf.workspace(pf.load("five_bar").without_limits(), within={"z": (-20.0, 20.0)})
+    rings = [(y, 0.0, 35.0, 255.0) for y in (-50.0, 50.0)]
+    assert len(found.components) == 3
+    assert found.at_start is None  # home is above the strip
+    assert sum(part.area for part in found.components) == pytest.approx(found.area)
+    middle = next(part for part in found.components if part.contains([0.0, 0.0]))
+    assert not middle.contains([150.0, 0.0])
+    assert found.contains([150.0, 0.0])
+    points = grid(middle, 60)
+    between = within(rings, points) & (np.abs(points[:, 1]) <= 20.0) & (np.abs(points[:, 0]) < 50.0)
+    assert (middle.contains(points) == between).all()
+
+
+def test_the_part_of_the_start_comes_first() -> None:
+    found = pf.workspace(pf.load("five_bar"))
+    assert found.at_start is found.components[0]
+    assert found.at_start is not None
+    assert found.at_start.contains(found.mechanism.reference_point[1:])
+
+
+def test_a_start_tells_the_working_mode() -> None:
+    machine = pf.load("five_bar").without_limits().with_limits(p2=(np.radians(-140.0), np.radians(-10.0)))
+    (first, other, *_) = [mode for mode in pf.working_modes(machine, [0.0, 10.0, 180.0]) if mode]
+    sizes = {}
+    for mode in (first, other):
+        found = pf.workspace(machine, start=mode)
+        points = grid(found, 12)
+        reached = [bool(pf.solve_ik(machine, pose, start=mode)) for pose in found.poses(points)]
+        assert found.contains(points).tolist() == reached
+        sizes[mode.actuators[1]] = found.area
+    assert len(sizes) == 2
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.1])
+def test_where_it_can_lean_to_every_side_it_can(angle: float) -> None:
+    machine = struts_only(pf.load("stewart"))
+    found = pf.workspace(machine, tilt=angle, fixed={"z": 200.0}, resolution=4.0)
+    azimuths = np.arange(24 if angle else 1) * np.pi / 12.0
+    leaning = [pf.pose([0, 0, 0], rotvec=[angle * np.cos(each), angle * np.sin(each), 0])[:3, :3] for each in azimuths]
+    rings = [ring for rotation in leaning for ring in strut_rings(machine, rotation, 200.0)]
+    assert found.area == pytest.approx(area(rings), rel=2e-3)
+
+
+def test_any_orientation_reaches_what_some_orientation_reaches() -> None:
+    machine = pf.load("rpr")
+    found = pf.workspace(machine, orientation="any", resolution=0.15)
+    turned = [
+        pf.workspace(machine, orientation=pf.pose([0, 0, 0], rpy=[0, 0, yaw])[:3, :3]) for yaw in (-0.6, 0.0, 0.6)
+    ]
+    points = grid(found, 20)
+    some = np.any([each.contains(points) for each in turned], axis=0)
+    assert found.contains(points[some]).all()
+    assert found.area > max(each.area for each in turned)
+
+
+def test_orientations_at_a_place_are_those_that_are_reached_there() -> None:
+    machine = pf.load("stewart")
+    found = pf.workspace(machine, fixed={"x": 10.0, "y": 0.0, "z": 200.0}, resolution=0.1)
+    assert found.names == ("tilt_x", "tilt_y", "yaw")
+    assert found.units == ("rad", "rad", "rad")
+    points = grid(found, 7)
+    turns = [pf.pose([10, 0, 200], rotvec=[a, b, 0]) @ pf.pose([0, 0, 0], rpy=[0, 0, c]) for a, b, c in points]
+    assert np.allclose(found.poses(points), turns, atol=1e-12)
+
+
+def test_a_slice_is_what_a_plane_cuts_out() -> None:
+    whole = pf.workspace(pf.load("stewart"), resolution=6.0)
+    cut = whole.slice({"z": 200.0}, resolution=2.0)
+    assert cut.names == ("x", "y")
+    assert cut.area == pytest.approx(pf.workspace(whole.mechanism, fixed={"z": 200.0}, resolution=2.0).area)
+    points = grid(cut, 20)
+    assert (cut.contains(points) == whole.contains(np.column_stack([points, np.full(400, 200.0)]))).all()
+
+
+@pytest.mark.parametrize("centre", [(0.0, 150.0), None])
+def test_the_largest_circle_touches_the_border(centre: tuple[float, float] | None) -> None:
+    found = pf.workspace(pf.load("five_bar").without_limits())
+    largest = found.inscribed("sphere", centre)
+    away = [np.hypot(largest.centre[0] - y, largest.centre[1]) for y in (-50.0, 50.0)]
+    room = min(min(255.0 - each, each - 35.0) for each in away)
+    assert largest.extents == pytest.approx(np.full(2, 2.0 * room), rel=5e-3)
+    if centre is None:
+        assert room > 109.5  # on the axis of symmetry it is 110: (255 - 35) / 2
+
+
+@pytest.mark.parametrize("kind", ["sphere", "box", "cylinder"])
+def test_all_of_the_largest_shape_is_within(kind: str) -> None:
+    found = pf.workspace(pf.load("delta"), resolution=10.0)
+    largest = found.inscribed(
+        kind, proportions=None if kind == "sphere" else (2, 1) if kind == "cylinder" else (3, 2, 1)
+    )
+    share = np.random.default_rng(3).uniform(-0.5, 0.5, (5000, 3))
+    if kind == "sphere":
+        share = share[np.linalg.norm(share, axis=1) <= 0.5]
+    if kind == "cylinder":
+        share = share[np.hypot(share[:, 0], share[:, 1]) <= 0.5]
+        assert largest.extents[0] == pytest.approx(2.0 * largest.extents[2])
+    assert found.contains(largest.centre + share * largest.extents).all()
+    assert largest.size > 0.05 * found.volume
+
+
+@contextmanager
+def dask_workers() -> Iterator[Executor]:
+    """Two worker processes of a Dask cluster on this machine."""
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "processes": True}
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+        yield client.get_executor()
+
+
+EXECUTORS: dict[str, Callable[[], AbstractContextManager[Executor]]] = {
+    "threads": partial(ThreadPoolExecutor, 2),
+    "processes": partial(ProcessPoolExecutor, 2),
+    "dask": dask_workers,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_the_answer_is_the_same_wherever_it_is_worked_out(kind: str) -> None:
+    machine = pf.load("five_bar")
+    with EXECUTORS[kind]() as executor:
+        there = pf.workspace(machine, resolution=4.0, executor=executor)
+    here = pf.workspace(machine, resolution=4.0)
+    assert np.array_equal(there.vertices, here.vertices)
+    assert np.array_equal(there.faces, here.faces)
+    assert np.array_equal(there.face_limit, here.face_limit)
+
+
+def test_who_interrupts_leaves_nothing_behind(tmp_path: Path) -> None:
+    def stop(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        pf.workspace(pf.load("five_bar"), on_progress=stop)
+    with ThreadPoolExecutor(1) as executor, pytest.raises(KeyboardInterrupt):
+        pf.workspace(pf.load("five_bar"), on_progress=stop, executor=executor)
+    found = pf.workspace(pf.load("five_bar"))
+    with pytest.raises(OSError, match="nowhere"):
+        found.save(tmp_path / "nowhere" / "ws.npz")
+    with pytest.raises(InvalidArgument, match="plane"):
+        found.save(tmp_path / "ws.stl")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_progress_counts_up_to_all() -> None:
+    told: list[tuple[int, int]] = []
+    pf.workspace(pf.load("five_bar"), on_progress=lambda done, total: told.append((done, total)))
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert all(done <= total for done, total in told)
+
+
+def test_what_is_saved_can_be_read_again(tmp_path: Path) -> None:
+    found = pf.workspace(pf.load("stewart"), resolution=20.0)
+    for ending in ("npz", "stl", "ply", "csv"):
+        found.save(tmp_path / f"ws.{ending}")
+    arrays = np.load(tmp_path / "ws.npz")
+    assert np.array_equal(arrays["vertices"], found.vertices)
+    assert arrays["limits"][arrays["face_limit"]].shape == (len(found.faces), 2)
+    stl = (tmp_path / "ws.stl").read_bytes()
+    rows = np.frombuffer(stl[84:], [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    assert len(rows) == len(found.faces) == int.from_bytes(stl[80:84], "little")
+    corners = rows["corners"].astype(float)
+    enclosed = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+    assert enclosed == pytest.approx(found.volume, rel=1e-4)
+    assert (np.einsum("ij,ij->i", rows["normal"], corners.mean(axis=1) - [0, 0, 200]) > 0.0).mean() > 0.95
+    header, _, body = (tmp_path / "ws.ply").read_bytes().partition(b"end_header\n")
+    assert f"element face {len(found.faces)}".encode() in header
+    assert len(body) == 24 * len(found.vertices) + 17 * len(found.faces)
+    with (tmp_path / "ws.csv").open(encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    assert len(lines) == len(found.vertices)
+    assert {(line["joint"], line["bound"]) for line in lines} >= set(found.shares)
+
+
+@pytest.mark.parametrize("name", ["stewart", "five_bar", "ankle_ups"])
+def test_a_picture_shows_every_limit_of_the_border(name: str) -> None:
+    pytest.importorskip("matplotlib")
+    found = pf.workspace(pf.load(name), resolution=8.0 if name == "stewart" else None)
+    axes = found.plot()
+    legend = axes.get_legend()
+    assert legend is not None
+    words = " ".join(text.get_text() for text in legend.get_texts())
+    assert all(bound in words for _, bound in found.shares)
+    axes.figure.canvas.draw()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "argument"),
+    [
+        ({"resolution": 0.0}, "resolution"),
+        ({"resolution": float("nan")}, "resolution"),
+        ({"fixed": {"w": 1.0}}, "coordinate"),
+        ({"fixed": {"z": float("inf")}}, "fixed"),
+        ({"fixed": 3}, "fixed"),
+        ({"over": ["x"]}, "over"),
+        ({"over": ["x", "x"]}, "over"),
+        ({"over": ["x", "y"], "fixed": {"x": 1.0}}, "over"),
+        ({"orientation": "all"}, "orientation"),
+        ({"orientation": np.ones((3, 3))}, "orientation"),
+        ({"tilt": -1.0}, "tilt"),
+        ({"tilt": 0.1, "orientation": "any"}, "tilt"),
+        ({"within": {"x": (1.0, 0.0)}}, "within"),
+        ({"within": {"yaw": (0.0, 1.0)}}, "coordinate"),
+        ({"start": np.zeros(3)}, "start"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_by_name(arguments: dict[str, object], argument: str) -> None:
+    with pytest.raises(PfabrikError, match=argument):
+        pf.workspace(pf.load("stewart"), **arguments)  # type: ignore[arg-type]
+
+
+def test_where_nothing_is_within_reach_the_workspace_is_empty() -> None:
+    found = pf.workspace(pf.load("stewart"), fixed={"z": 5000.0})
+    assert found.area == 0.0
+    assert len(found.faces) == 0
+    assert found.components == ()
+    assert not found.contains([0.0, 0.0])

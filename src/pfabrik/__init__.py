@@ -10,6 +10,7 @@ Describe   load, save, catalog; Mechanism, Joint, Cone, Leg
 Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, working_modes; pose, Options
            Solver (one machine, asked again and again)
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
+Look over   workspace, singularity_map
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 See        plot, plot_track, plot_travel, animate; view (in the browser)
 Structure  decompose, SubChain; geometric (closed forms of the paper's machines); errors

@@ -12,11 +12,11 @@ import click
 
 import pfabrik as pf
 
+from ..answers.table import aligned
 from ..extras import require
 from ..writing import whole_path
 from .finite import FINITE, is_finite
 from .mech import MECH, load
-from .table import aligned
 from .target import Triple
 
 if TYPE_CHECKING:
@@ -30,8 +30,12 @@ MOST_LIMITS = 12
 
 @click.command()
 @click.argument("mech", type=MECH)
-@click.option("--over", metavar="NAME,NAME[,NAME]", help="Coordinates: of x, y, z, tilt_x, tilt_y, yaw. Default: x,y,z.")
-@click.option("--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Hold a coordinate [length or deg]. May be repeated.")
+@click.option(
+    "--over", metavar="NAME,NAME[,NAME]", help="Coordinates: of x, y, z, tilt_x, tilt_y, yaw. Default: x,y,z."
+)
+@click.option(
+    "--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Hold a coordinate [length or deg]. May be repeated."
+)
 @click.option("--rpy", type=FINITE, nargs=3, metavar="R P Y", help="Roll, pitch, yaw [deg] from home. Default: 0 0 0.")
 @click.option("--any-orientation", is_flag=True, help="Positions that are reached with some orientation or other.")
 @click.option("--tilt", type=FINITE, metavar="DEG", help="Positions where it can lean so far to every side.")
@@ -135,7 +139,9 @@ def point(found: Workspace, words: str) -> list[float]:
     """A point [length or rad] from words such as ``0,0,200``."""
     values = words.split(",")
     if len(values) != len(found.names) or not all(map(is_finite, values)):
-        raise click.UsageError(f"--centre: found '{words}'; expected {len(found.names)} finite numbers with commas between")
+        raise click.UsageError(
+            f"--centre: found '{words}'; expected {len(found.names)} finite numbers with commas between"
+        )
     return [math.radians(float(v)) if unit == "rad" else float(v) for v, unit in zip(values, found.units, strict=True)]
 
 
@@ -144,8 +150,10 @@ def write(found: Workspace, path: Path) -> None:
     if path.suffix.lower() not in PICTURES:
         found.save(path)
         return
+    figure = found.plot().get_figure(root=True)
+    assert figure is not None
     with whole_path(path) as part:
-        found.plot().figure.savefig(part, bbox_inches="tight", pad_inches=0.05)
+        figure.savefig(part, bbox_inches="tight", pad_inches=0.05)
 
 
 def plain_object(found: Workspace, shape: Inscribed | None) -> dict[str, object]:

@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..answers.solution import Solution, checked_solution
-from ..answers.starts import Start
+from ..answers.solution import Solution
+from ..answers.starts import Start, start_of
 from ..arrays import Floats
 from ..configuration import configuration
 from ..description.mechanism import Mechanism, checked_mechanism
@@ -126,9 +126,8 @@ def _found(question: Question, step: Floats, measure: Measure) -> Workspace:
 def _start(mechanism: Mechanism, start: Start | None) -> Solution | None:
     if start is None:
         return None
+    start_of(mechanism, start, np.shape(start)[:-1] if not isinstance(start, Solution) else start.shape)
     begin = start if isinstance(start, Solution) else configuration(mechanism, start)
-    if checked_solution(begin).mechanism != mechanism:
-        raise InvalidArgument("start", f"a solution of '{begin.mechanism.name}'", f"one of '{mechanism.name}'")
     if begin.shape != () or begin.status > 1:
         found = f"batch shape {begin.shape}" if begin.shape else f"an answer that is {begin.status}"
         raise InvalidArgument("start", found, "one feasible configuration")

@@ -39,7 +39,9 @@ def plot_map(found: SingularityMap, axes: Axes | None = None) -> Axes:
     parallel = np.asarray(found.measures.parallel)
     faces = list(locus[found.locus_faces])
     if d == 2:
-        drawn = axes.scatter(points[:, 0], points[:, 1], c=parallel, s=MARK, marker="s", linewidths=0, cmap="cividis", vmin=0.0)
+        drawn = axes.scatter(
+            points[:, 0], points[:, 1], c=parallel, s=MARK, marker="s", linewidths=0, cmap="cividis", vmin=0.0
+        )
         axes.add_collection(LineCollection(faces, colors=LOCUS, linewidths=2.0))
         if len(set(space.units)) == 1:
             axes.set_aspect("equal")

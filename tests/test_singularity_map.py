@@ -1,0 +1,99 @@
+"""Maps of singularities show closed forms' loci, and the parts that these divide a workspace into."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import pfabrik as pf
+from pfabrik.errors import InvalidArgument
+
+Array = NDArray[np.float64]
+
+
+def forearms_cross(tips: Array) -> Array:
+    """The sine between the catalogue 5-bar's forearms, elbows bent as at home, (n,): 0 where they are in line."""
+    crank, forearm = np.hypot(66.0, 88.0), np.hypot(116.0, 87.0)
+    ways = []
+    for shoulder, side in ((-50.0, 1.0), (50.0, -1.0)):
+        away = tips - [shoulder, 0.0]
+        far = np.linalg.norm(away, axis=1)
+        along = (crank**2 - forearm**2 + far**2) / (2.0 * far)
+        across = np.sqrt(np.maximum(crank**2 - along**2, 0.0))
+        unit = away / far[:, None]
+        elbow = [shoulder, 0.0] + along[:, None] * unit + side * across[:, None] * unit[:, ::-1] * [-1.0, 1.0]
+        ways.append((tips - elbow) / forearm)
+    return np.asarray(ways[0][:, 0] * ways[1][:, 1] - ways[0][:, 1] * ways[1][:, 0])
+
+
+@pytest.fixture(scope="module")
+def free_five_bar() -> pf.Workspace:
+    return pf.workspace(pf.load("five_bar").without_limits(), resolution=6.0)
+
+
+def test_a_five_bar_is_singular_where_its_forearms_are_in_line(free_five_bar: pf.Workspace) -> None:
+    found = pf.singularity_map(free_five_bar.mechanism, free_five_bar)
+    sines = forearms_cross(found.points)
+    assert abs(np.sum(found.signs * np.sign(sines))) == len(sines)
+    assert {-1.0, 1.0} == set(np.unique(found.signs))
+    on = forearms_cross(found.locus_vertices)
+    assert len(on) > 30
+    assert np.median(np.abs(on)) < 0.01
+    assert np.abs(on).max() < 0.1  # between points 6 mm apart, near a stretched arm
+    assert (np.asarray(found.measures.parallel)[np.abs(sines) > 0.2] > 0.02).all()
+
+
+def test_parts_have_one_sign_each(free_five_bar: pf.Workspace) -> None:
+    found = pf.singularity_map(free_five_bar.mechanism, free_five_bar, resolution=8.0)
+    for part in range(found.parts.max() + 1):
+        assert len(set(found.signs[found.parts == part].tolist())) == 1
+    assert found.sizes.sum() == pytest.approx(1.0)
+    assert (np.diff(found.sizes) <= 0.0).all()
+    above, between = (
+        found.parts[np.linalg.norm(found.points - place, axis=1).argmin()] for place in ([0.0, 150.0], [0.0, 10.0])
+    )
+    assert above != between
+
+
+def test_a_path_through_a_singularity_is_told_where() -> None:
+    machine = pf.load("five_bar").without_limits()
+    heights = np.linspace(150.0, 20.0, 60)
+    path = np.stack([np.zeros(60), np.full(60, 3.0), heights], axis=1)
+    found = pf.singularity_map(machine, pf.track(machine, path))
+    sines = forearms_cross(path[:, 1:])
+    (row,) = np.flatnonzero(sines[1:] * sines[:-1] < 0.0) + 1
+    assert found.crossings.tolist() == [row]
+
+
+def test_redundant_machines_have_no_sides() -> None:
+    machine = pf.load("nrpm")
+    along = pf.singularity_map(machine, pf.track(machine, [machine.reference_point] * 2))
+    assert np.isnan(along.signs).all()
+    assert along.crossings.tolist() == []
+
+
+def test_a_spatial_machine_is_looked_at_likewise() -> None:
+    machine = pf.load("rps")
+    space = pf.workspace(machine, resolution=20.0)
+    found = pf.singularity_map(machine, space, resolution=20.0)
+    assert (np.abs(found.signs) == 1.0).all()
+    assert len(found.points) == len(found.parts) == len(np.asarray(found.measures.serial))
+    assert space.contains(found.points).all()
+
+
+def test_a_map_and_a_path_can_be_drawn(free_five_bar: pf.Workspace) -> None:
+    pytest.importorskip("matplotlib")
+    machine = free_five_bar.mechanism
+    assert pf.singularity_map(machine, free_five_bar, resolution=20.0).plot().collections
+    along = pf.singularity_map(machine, pf.track(machine, [machine.reference_point] * 3))
+    assert along.plot().lines
+
+
+def test_what_is_no_workspace_of_the_machine_is_refused(free_five_bar: pf.Workspace) -> None:
+    with pytest.raises(InvalidArgument, match="a Workspace or a Track"):
+        pf.singularity_map(free_five_bar.mechanism, 3)  # type: ignore[call-overload]
+    with pytest.raises(InvalidArgument, match="one of"):
+        pf.singularity_map(pf.load("stewart"), free_five_bar)
+    with pytest.raises(InvalidArgument, match="resolution"):
+        pf.singularity_map(free_five_bar.mechanism, free_five_bar, resolution=-1.0)
