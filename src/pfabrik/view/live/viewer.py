@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
-import io
 import os
 import threading
-import time
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -26,31 +23,22 @@ from ...modes.assembly import assembly_modes
 from ...modes.working import working_modes
 from ...warm_up import warm_up
 from ...writing import whole_path
-from ..plane import plane_of
 from ..saving import checked_ending
 from ..skeleton import checked_shown, skeleton_of
 from ..track import checked_track
 from .handles import Handles
 from .newest import Newest
 from .panel import Actions, Panel
+from .player import Player, due_after
 from .scene import Scene
+from .serving import aim_camera, quietly, serve
 from .session import Session, moved
 from .watching import Watch
-
-if TYPE_CHECKING:
-    import viser
 
 Shown: TypeAlias = tuple[Mechanism, Solution | None, Track | None]
 """A machine, the configuration that it is first shown in (default: home), and the path that can be played."""
 
 LOOPBACK, PORT = "127.0.0.1", 8080
-
-FRAMES_A_SECOND = 20
-
-DISTANCE = 2.1
-"""How far the camera is from the middle of the machine, in radii of it."""
-
-SEEN_FROM = np.array([0.5, -0.8, 0.35]) / np.linalg.norm([0.5, -0.8, 0.35])
 
 
 def view(shown: Mechanism | Solution | str | os.PathLike[str], *, port: int = PORT, host: str = LOOPBACK) -> Viewer:
@@ -95,13 +83,12 @@ class Viewer:
         what = _shown(load(shown) if isinstance(shown, str | os.PathLike) else shown)
         self._lock = threading.RLock()
         self._closed = threading.Event()
-        self._server = _serve(host, port)
+        self._server = serve(host, port)
         shown_host = "localhost" if host in ("0.0.0.0", "::") else host
         self.url = f"http://{shown_host}:{self._server.get_port()}"
         self._newest, self._search = Newest(self._complain), Newest(self._complain)
         self._modes: tuple[Solution, ...] = ()
-        self._playing = threading.Event()
-        self._player: threading.Thread | None = None
+        self._player: Player | None = None
         self._ready: Mechanism | None = None
         self._build(what)
         self._server.on_client_connect(lambda _: self._newest.post(self._prepare))
@@ -153,12 +140,13 @@ class Viewer:
         if self._closed.is_set():
             return
         self._closed.set()
-        self._playing.clear()
+        if self._player is not None:
+            self._player.stop()
         if self._watch is not None:
             self._watch.end()
         for worker in (self._newest, self._search):
             worker.end()
-        with _quietly():
+        with quietly():
             self._server.stop()
         atexit.unregister(self.close)
 
@@ -244,22 +232,13 @@ class Viewer:
 
     def _play(self, playing: bool) -> None:
         self._panel.release()
-        if not playing:
-            self._playing.clear()
-        elif self._track is not None and not self._playing.is_set():
-            self._playing.set()
-            self._player = threading.Thread(target=self._run, args=(self._track,), daemon=True)
-            self._player.start()
+        if self._player is not None:
+            self._player.stop()
+        self._player = Player(self._track, self._play_step) if playing and self._track is not None else None
 
-    def _run(self, track: Track) -> None:
-        """Steps of a path, each when it is due, over and over."""
-        due = track.sample_time or 1.0 / FRAMES_A_SECOND
-        start = time.perf_counter()
-        while self._playing.is_set() and self._track is track:
-            step = 1 + int((time.perf_counter() - start) / due) % len(track)
-            self._take_step(step)
-            self._panel.show_step(step)
-            time.sleep(max(due, 1.0 / FRAMES_A_SECOND))
+    def _play_step(self, step: int) -> None:
+        self._take_step(step)
+        self._panel.show_step(step)
 
     def _show_workspace(self, wanted: bool) -> None:
         session, scene, panel = self._session, self._scene, self._panel
@@ -303,7 +282,8 @@ class Viewer:
             self._send,
         )
         with self._lock:
-            self._playing.clear()
+            if self._player is not None:
+                self._player.stop()
             self._session, self._track, self._modes = Session(mechanism, first), track, ()
             self._server.gui.reset()
             self._server.scene.reset()
@@ -317,7 +297,7 @@ class Viewer:
             self._handles = Handles(self._server, mechanism, self._drag)
             steps = 0 if track is None else len(track)
             self._panel = Panel(self._server.gui, mechanism, self._session, actions, steps)
-            self._look_at(mechanism, skeleton.points)
+            aim_camera(self._server, mechanism, skeleton.points)
             self._refresh()
         if self._server.get_clients():
             self._prepare()
@@ -330,17 +310,6 @@ class Viewer:
             warm_up(mechanism)
             self._ready = mechanism
             panel.tell("")
-
-    def _look_at(self, mechanism: Mechanism, points: Floats) -> None:
-        """Where the camera starts: a planar machine is seen from the front."""
-        seen = points / mechanism.characteristic_length
-        middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-        radius = max(1.0, float(np.linalg.norm(seen - middle, axis=1).max()))
-        plane = plane_of(mechanism)
-        direction = SEEN_FROM if plane is None else np.cross(*plane)
-        camera = self._server.initial_camera
-        camera.position, camera.look_at = middle + DISTANCE * radius * direction, middle
-        camera.up = (0.0, 0.0, 1.0) if plane is None else plane[1]
 
     def _changed(self, path: Path) -> None:
         """The file was written: show what is in it now, or say what is wrong with it."""
@@ -362,11 +331,10 @@ class Viewer:
             self._handles.show_all(False)
             serializer = self._server.get_scene_serializer()
             if self._track is not None:
-                due = self._track.sample_time or 1.0 / FRAMES_A_SECOND
                 for step in self._track:
                     if np.isfinite(step.pose).all():
                         self._scene.show(skeleton_of(step), step.pose)
-                        serializer.insert_sleep(due)
+                        serializer.insert_sleep(due_after(self._track))
                 self._scene.show(skeleton_of(self._session.solution), self._session.solution.pose)
             page = str(serializer.as_html())
             self._handles.show_all(True)
@@ -390,22 +358,3 @@ def _kept(mode: Solution) -> str:
     """Whether a mode keeps the limits, and which it does not."""
     beyond = by_bound(exceeded(mode))
     return f"beyond {beyond}" if beyond else "within limits"
-
-
-def _quietly() -> contextlib.AbstractContextManager[object]:
-    """What the server says of itself is not what a command prints."""
-    return contextlib.redirect_stdout(io.StringIO())
-
-
-def _serve(host: str, port: int) -> viser.ViserServer:
-    """A server that says nothing, and opens no way in from elsewhere."""
-    import viser
-
-    with _quietly():
-        server = viser.ViserServer(host=host, port=port, verbose=False)
-
-    def refuse(verbose: bool = True) -> None:
-        """A page could ask for a tunnel to the outside; this one is of this computer alone."""
-
-    server.request_share_url = refuse  # type: ignore[method-assign]
-    return server

@@ -1,0 +1,52 @@
+"""The server of the page: silent, of this computer alone, its camera where the machine is seen."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...arrays import Floats
+from ...description.mechanism import Mechanism
+from ..plane import plane_of
+
+if TYPE_CHECKING:
+    import viser
+
+DISTANCE = 2.1
+"""How far the camera is from the middle of the machine, in radii of it."""
+
+SEEN_FROM = np.array([0.5, -0.8, 0.35]) / np.linalg.norm([0.5, -0.8, 0.35])
+
+
+def quietly() -> contextlib.AbstractContextManager[object]:
+    """What the server says of itself is not what a command prints."""
+    return contextlib.redirect_stdout(io.StringIO())
+
+
+def serve(host: str, port: int) -> viser.ViserServer:
+    """A server at an address, and at the next free port; it opens no way in from elsewhere."""
+    import viser
+
+    with quietly():
+        server = viser.ViserServer(host=host, port=port, verbose=False)
+
+    def refuse(verbose: bool = True) -> None:
+        """A page could ask for a tunnel to the outside; this one is of this computer alone."""
+
+    server.request_share_url = refuse  # type: ignore[method-assign]
+    return server
+
+
+def aim_camera(server: viser.ViserServer, mechanism: Mechanism, points: Floats) -> None:
+    """Where the camera starts, so that points (n, 3) [length] are seen; a planar machine from the front."""
+    seen = points / mechanism.characteristic_length
+    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+    radius = max(1.0, float(np.linalg.norm(seen - middle, axis=1).max()))
+    plane = plane_of(mechanism)
+    direction = SEEN_FROM if plane is None else np.cross(*plane)
+    camera = server.initial_camera
+    camera.position, camera.look_at = middle + DISTANCE * radius * direction, middle
+    camera.up = (0.0, 0.0, 1.0) if plane is None else plane[1]
