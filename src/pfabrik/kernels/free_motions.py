@@ -31,7 +31,7 @@ class Elimination(NamedTuple):
     """Equations being solved."""
 
     A: Floats  # (rows, unknowns + 1 + rows): equations, right-hand side, identity
-    taken: Floats  # (unknowns,): 1 for pivot columns
+    taken: Floats  # (unknowns,): 1 for pivot columns, and for what does not move
     filled: Ints  # (unknowns + 1 + rows,): where a row of A is not zero: legs have few unknowns in common
     used: Ints  # (unknowns,): 0 for what does not move, more than 1 for what legs have in common
 
@@ -59,7 +59,7 @@ def eliminate(rows: int, scratch: Elimination, view: FreeMotions) -> None:
     width = n + 1 + rows
     for j in range(n):
         shift[j] = 0.0
-        taken[j] = 0.0
+        taken[j] = 0.0 if used[j] > 0 else 1.0
     for row in range(rows):
         largest, pivot = 0.0, -1
         for j in range(n):
@@ -87,7 +87,7 @@ def eliminate(rows: int, scratch: Elimination, view: FreeMotions) -> None:
         rank += 1
     motions = 0
     for j in range(n):
-        if taken[j] == 0.0 and used[j] > 0:
+        if taken[j] == 0.0:
             for i in range(n):
                 basis[i, motions] = 0.0
             basis[j, motions] = 1.0

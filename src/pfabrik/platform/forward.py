@@ -9,10 +9,10 @@ from ..arrays import Floats
 from ..closure.configurations import Configurations, new_rows
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..kernels.platform.nearest import Starts
+from ..kernels.platform.nearest import Found, Starts
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
-from .nearest import corners_of, home_start, in_lengths, no_starts, starts_at
+from .nearest import corners_of, home_start, in_lengths, nearest_actuators, no_starts, starts_at
 from .table import kernel_table
 
 ROWS_A_BLOCK = 256
@@ -44,10 +44,45 @@ def assembled(
     rest = np.flatnonzero(rows.status == P.PENDING)
     if start is None and len(rest):
         _assemble(mechanism, table, wanted, own, corners_of(mechanism), rest, rows, found)
+        rest = np.flatnonzero(rows.status == P.PENDING)
+    if len(rest):
+        _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
     rows.poses[:] = in_lengths(found.poses, mechanism.characteristic_length)
-    rows.actuators[:] = values
+    assembled_rows = rows.status == P.REACHED
+    rows.actuators[assembled_rows] = values[assembled_rows]
     rows.measures[:, P.RESIDUAL] *= mechanism.characteristic_length
     return rows, found.q, found.sides
+
+
+def _project(
+    mechanism: Mechanism,
+    table: LegTable,
+    values: Floats,
+    own: Starts,
+    places: NDArray[np.intp],
+    rows: P.Rows,
+    found: Starts,
+    *,
+    anywhere: bool,
+) -> None:
+    """Answer rows by feasible configurations with actuators as near to their values as searches bring them."""
+    from ..kernels.platform.nearest import judge
+
+    first = own if len(own.poses) == 1 else Starts._make(array[places] for array in own)
+    ended = nearest_actuators(mechanism, table, values[places], first, corners=anywhere)
+    near = np.flatnonzero(np.isfinite(ended.distances))
+    ended, places = Found._make(array[near] for array in ended), places[near]
+    actuators, measures = rows.actuators[places], rows.measures[places]
+    judge(kernel_table(table), ended.poses, ended.q, ended.sides, actuators, measures)
+    for driven in table.driven:
+        column = driven["column"]
+        off = (actuators[:, column] - driven["home"]) / driven["unit"] - values[places, column]
+        measures[:, P.ACTUATOR_ERROR] = np.maximum(measures[:, P.ACTUATOR_ERROR], np.abs(off))
+    rows.actuators[places], rows.measures[places] = actuators, measures
+    rows.status[places] = P.PROJECTED
+    rows.counters[places, P.ITERATIONS] = ended.steps
+    for array, part in zip(found, ended[1:4], strict=True):
+        array[places] = part
 
 
 def _assemble(

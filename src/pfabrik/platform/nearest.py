@@ -30,8 +30,9 @@ from .table import kernel_table
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
-CORNERS, HITS = 12, 3
-"""How many configurations searches start from at most, and how many of them must end at the nearest one."""
+CORNERS, HITS, HITS_OF_STRUTS = 12, 3, 2
+"""How many configurations searches start from at most, and how many of them must end at the nearest one: of legs whose
+rods nothing carries, fewer."""
 
 DRAWS, DRAWN_STEPS = 240, 30
 """How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
@@ -39,7 +40,7 @@ DRAWS, DRAWN_STEPS = 240, 30
 SAMPLES, NEARBY = 8, 0.05
 """How many poses about home are looked at, and how far off they are [L]."""
 
-FAR, TURNED = 2.0, 0.8
+FAR, TURNED = 1.0, 0.8
 """How far from home they are [L], and how far they are turned [rad]."""
 
 TURNING = 0.2
@@ -94,17 +95,31 @@ def _search(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts,
     return _approach(table, PoseObjective(wanted, weights, frame, MARGIN, TOLERANCES.active, MOST_STEPS), own, others)
 
 
-def _approach(table: LegTable, objective: PoseObjective, own: Starts, others: Starts) -> Found:
+def nearest_actuators(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts, *, corners: bool) -> Found:
+    """Feasible configurations whose actuators are nearest to values (n, n_a), deviations from home [L or rad]."""
+    poses = own.poses if len(own.poses) == len(values) else np.repeat(own.poses, len(values), axis=0)
+    weights = np.zeros(6)
+    if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
+        weights[3:] = LOCKED
+    objective = PoseObjective(poses, weights, BASE_AXES, MARGIN, TOLERANCES.active, MOST_STEPS)
+    return _approach(table, objective, own, corners_of(mechanism) if corners else no_starts(table), values)
+
+
+def _approach(
+    table: LegTable, objective: PoseObjective, own: Starts, others: Starts, values: Floats | None = None
+) -> Found:
     """The kernel over all rows, on all cores."""
+    if values is None:
+        values = np.zeros((0, len(table.driven)))
     from ..kernels.platform.nearest import approach
 
-    legs, no_values = kernel_table(table), np.zeros((0, len(table.driven)))
-    found = _new_found(len(objective.targets), len(table.legs))
+    legs, found = kernel_table(table), _new_found(len(objective.targets), len(table.legs))
+    hits = HITS if (legs.columns >= 0).any() else HITS_OF_STRUTS
 
     def run(block: slice) -> None:
         first = own if len(own.poses) == 1 else Starts._make(array[block] for array in own)
-        aim = Aim(objective._replace(targets=objective.targets[block]), no_values)
-        approach(legs, aim, first, others, HITS, Found._make(array[block] for array in found))
+        aim = Aim(objective._replace(targets=objective.targets[block]), values[block])
+        approach(legs, aim, first, others, hits, Found._make(array[block] for array in found))
 
     in_blocks(run, len(found.distances), ROWS_A_BLOCK)
     return found

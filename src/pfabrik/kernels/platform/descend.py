@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import allocator, routine
+from ..closure.loops import BASE_AXES, LOCKED
 from ..closure.pose_objective import PoseGradient, PoseObjective, pose_gradient
 from ..free_motions import (
     Elimination,
@@ -36,8 +37,8 @@ from ..sqp import (
     MOTIONS,
     NEARLY_CLOSED,
     PROBE,
+    PROMISE,
     RANK,
-    REACH,
     RESTORING,
     VALUE,
     Hessian,
@@ -64,6 +65,12 @@ from .equations import (
     place,
     put_slopes,
 )
+
+HOPELESS = 20.0
+"""A search that is farther than the nearest yet by so many times what its last step promised is given up."""
+
+NEAR = 0.5
+"""Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
 
 
 class Aim(NamedTuple):
@@ -129,11 +136,15 @@ def copy_now(source: Now, to: Now) -> None:
 
 @routine
 def put_objective(table: Table, row: int, aim: Aim, now: Now, search: Search) -> tuple[float, int]:
-    """The objective, its gradient into `search.force`; how many components of the twist are held."""
+    """The objective, its gradient into `search.force`; how many components of the twist are held by equations.
+
+    None are where what is held is in its place and does not move: see `fix`.
+    """
     force, slope = search.force, search.look.slope
     for j in range(6, force.shape[0]):
         force[j] = 0.0
     value, held = pose_gradient(aim.pose, aim.pose.targets[row], now.pose, search.gradient)
+    held = held if search.elimination.used[3] > 0 and search.elimination.used[0] > 0 else 0
     for j in range(6):
         force[j] = search.gradient.force[j]
     for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
@@ -144,6 +155,14 @@ def put_objective(table: Table, row: int, aim: Aim, now: Now, search: Search) ->
         for j in range(force.shape[0]):
             force[j] += search.gradient.unit[0] * off * slope[j]
     return value, held
+
+
+@routine
+def fix(aim: PoseObjective, in_place: bool, search: Search) -> None:
+    """Leave out the components of the twist that are held, if the platform is in place and they are its velocities."""
+    used = search.elimination.used
+    for j in range(6):
+        used[j] = 0 if in_place and aim.frame == BASE_AXES and aim.platform[j] == LOCKED else 2
 
 
 @routine
@@ -190,19 +209,19 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
         limited = table.limited[i]
         value = deviation(limited, values)
         below, above = limited["lo"] + margin - value, value - limited["hi"] + margin
-        if max(below, above) <= -REACH:
+        if max(below, above) <= -NEAR:
             continue
         excess = max(excess, max(below, above))
         coordinate_slope(table, limited, search.look)
-        if above > -REACH:
+        if above > -NEAR:
             k = add_limit(k, above, 2 * i + 1, search.look.slope, view)
-        if below > -REACH:
+        if below > -NEAR:
             for j in range(slope.shape[0]):
                 slope[j] = -slope[j]
             k = add_limit(k, below, 2 * i, search.look.slope, view)
     for i in range(table.cones.shape[0]):
         over = cone_slope(table, table.cones[i], search.look) - table.cones[i]["half_angle"] + margin
-        if over > -REACH:
+        if over > -NEAR:
             excess = max(excess, over)
             k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.look.slope, view)
     view.linear.counts[LIMITS] = k
@@ -325,8 +344,11 @@ def scale_objective(table: Table, row: int, aim: Aim, search: Search, view: Free
 
 
 @routine
-def descend(table: Table, row: int, aim: Aim, search: Search) -> float:
-    """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible."""
+def descend(table: Table, row: int, aim: Aim, least: float, search: Search) -> float:
+    """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible.
+
+    And infinite where what steps promise says that it will not come as near as `least`.
+    """
     view, other, hessian, control = search.first, search.second, search.hessian, search.control
     unit = search.gradient.unit
     unit[0] = 1.0
@@ -346,4 +368,6 @@ def descend(table: Table, row: int, aim: Aim, search: Search) -> float:
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view
+                    if HOPELESS * control.scalars[PROMISE] < view.linear.scalars[VALUE] - 0.5 * unit[0] * least * least:
+                        return math.inf
     return math.sqrt(2.0 * view.linear.scalars[VALUE] / unit[0])

@@ -12,16 +12,20 @@ from .._jit import kernel, routine
 from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES
 from ..closure.pose_objective import PoseGradient, PoseObjective, pose_gradient
 from ..legs.answer import column, deviation, excess_of, make_exact, set_frames, turn_pose
-from ..legs.records import CARRIER, CRANK, Floats, Record, Records
+from ..legs.records import CARRIER, CRANK, PIVOT, SLIDE, Floats, Record, Records
 from ..legs.rods import carry
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..sqp import STEPS
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
-from .descend import Aim, Search, copy_now, descend, new_search
+from .descend import Aim, Search, copy_now, descend, fix, new_search
 from .equations import Now, Table, View, is_carried, new_now, new_view, place
 
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
+
+
+STRETCHED = 1e-7
+"""Difference of a carrier's two solutions below which it is at a dead point, and its side is the start's [L or rad]."""
 
 
 class Starts(NamedTuple):
@@ -101,7 +105,8 @@ def put_sides(table: Table, now: Now, look: View) -> None:
                 carry(leg, head, side, look.values[k])
                 away = look.values[k, CARRIER] - q[k]
                 off = (off[1], abs(wrap(away, 0.0) if leg["carrier"] == CRANK else away))
-            sides[k] = 1.0 if off[1] <= off[0] else -1.0
+            if abs(off[1] - off[0]) > STRETCHED:
+                sides[k] = 1.0 if off[1] < off[0] else -1.0
 
 
 @kernel
@@ -151,6 +156,34 @@ def nearest_start(aim: PoseObjective, target: Floats, starts: Starts, gradient: 
 
 
 @routine
+def is_global(table: Table, aim: PoseObjective, search: Search) -> bool:
+    """Whether no feasible configuration is nearer than where a descent has ended.
+
+    So if the Lagrangian of what holds it there is convex: with the orientation held and all legs struts, the bounds of
+    a strut s = |o| are (s^2 - hi^2) / 2 hi and (lo^2 - s^2) / 2 lo, with the gradients of s - hi and lo - s; a cone of
+    at most a right angle is convex; and the distance outweighs the least lengths if the sum of their multipliers, each
+    over its length, is below 1.
+    """
+    if aim.frame != BASE_AXES or aim.platform[3] != LOCKED or search.look.rows.shape[0] > 0:
+        return False
+    for i in range(3):
+        if aim.platform[i] != 1.0:
+            return False
+    multipliers, pull, ranges = search.hessian.multipliers, 0.0, table.limited.shape[0]
+    for i in range(ranges):
+        limited = table.limited[i]
+        leg = table.legs[limited["leg"]]
+        if leg["kind"] != PIVOT and limited["place"] == SLIDE:
+            pull += multipliers[2 * i] / (leg["length"] + limited["lo"])
+        elif multipliers[2 * i] + multipliers[2 * i + 1] > 0.0:
+            return False
+    for i in range(table.cones.shape[0]):
+        if multipliers[2 * ranges + i] > 0.0 and table.cones[i]["half_angle"] > 0.5 * math.pi:
+            return False
+    return bool(pull < search.gradient.unit[0])
+
+
+@routine
 def search_row(
     table: Table, row: int, aim: Aim, own: Starts, others: Starts, hits: int, search: Search, best: Now
 ) -> float:
@@ -168,15 +201,17 @@ def search_row(
             begin(others, near if start == 1 else (start - 2 if start - 2 < near else start - 1), search.best)
         if start == n + 1 and least < math.inf:
             break
-        if (start <= n) == (n > 0):
+        in_place = (start <= n) == (n > 0)
+        fix(aim.pose, in_place, search)
+        if in_place:
             put_held(table, aim.pose, target, search.look, search.best)
-        distance = descend(table, row, aim, search)
+        distance = descend(table, row, aim, least, search)
         if distance < (1.0 - SAME) * least:
             least, met = distance, 1
             copy_now(search.best, best)
         elif distance <= (1.0 + SAME) * least and least < math.inf:
             met += 1
-        if met >= hits:
+        if met >= hits or (met == 1 and distance == least and is_global(table, aim.pose, search)):
             break
     return least
 
