@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats
-from ..kernels.closure.loops import BASE_AXES, Closed
+from ..kernels.closure.loops import BASE_AXES, Closed, PoseObjective
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .close import MARGIN, Closing, Closure
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
-    from ..kernels.closure.pose_objective import PoseObjective
 
 
 SIGHT = 1e6
@@ -83,8 +82,6 @@ def _run(closure: Closure, coordinates: Floats, objective: PoseObjective) -> tup
 
 
 def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> PoseObjective:
-    from ..kernels.closure.pose_objective import PoseObjective
-
     wanted = targets.copy()
     wanted[:, :3, 3] /= closure.mechanism.characteristic_length
     return PoseObjective(wanted, np.array(platform, dtype=float), frame, MARGIN, TOLERANCES.active, steps)

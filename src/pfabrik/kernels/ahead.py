@@ -13,17 +13,15 @@ from ._jit import _config, _name_of
 from .closure.close import close
 from .closure.descend import approach
 from .closure.first_order import first_order
-from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Layout, Loops
-from .closure.pose_objective import PoseObjective
+from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Layout, Loops, PoseObjective
 from .legs import records as R
 from .legs.answer import answer, measure_rows, read_coordinates
 from .legs.feasibility import feasibility
-from .platform.descend import Aim
-from .platform.equations import Table
 from .platform.forward import assemble
-from .platform.nearest import Found, Starts, judge, read_configurations
 from .platform.nearest import approach as approach_by_pose
+from .platform.nearest import judge, read_configurations
 from .platform.otherwise import answer_otherwise
+from .platform.records import Aim, Found, Starts, Table
 from .reaching import plan as P
 from .reaching.solve import solve_by_iteration, solve_directly
 

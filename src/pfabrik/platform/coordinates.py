@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,7 @@ from ..closure.configurations import Configurations
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.legs import records as K
+from ..kernels.reaching import plan as P
 from ..motion.limits import within_turns
 from ..tolerances import TOLERANCES
 from .table import kernel_table
@@ -18,6 +21,29 @@ Floats = NDArray[np.float64]
 
 RESTARTS = 24
 """Random starts for joints that closed forms do not tell and that do not close from where they began."""
+
+
+class LegAnswers(Configurations):
+    """Configurations of legs that are told by their platforms.
+
+    Attributes
+    ----------
+    sides : which of its two solutions each leg takes, (n, legs).
+    carriers : coordinates of the legs' carriers, (n, legs) [L or rad], where closed forms tell them less exactly: near
+        dead points; NaN elsewhere, None where nowhere.
+    """
+
+    def __init__(
+        self, rows: P.Rows, coordinates: Callable[[], Floats], sides: Floats, carriers: Floats | None = None
+    ) -> None:
+        super().__init__(rows, coordinates)
+        self.sides, self.carriers = sides, carriers
+
+    def at(self, places: NDArray[np.intp]) -> Configurations:
+        """The configurations at some places, copied."""
+        rows = super().at(places).rows
+        carriers = None if self.carriers is None else self.carriers[places]
+        return LegAnswers(rows, lambda: self.coordinates[places], self.sides[places], carriers)
 
 
 def settled(
@@ -90,6 +116,8 @@ def _read_with(
 
 def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Floats:
     """Which of its two solutions each leg takes in configurations, (n, legs); 0 where it has but one."""
+    if isinstance(start, LegAnswers):
+        return start.sides
     sides = np.repeat(table.home_sides, len(start), axis=0)
     choosing = np.flatnonzero(table.home_sides[0])
     if not len(choosing):

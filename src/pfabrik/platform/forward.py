@@ -9,7 +9,7 @@ from ..arrays import Floats
 from ..closure.configurations import Configurations, new_rows
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..kernels.platform.nearest import Found, Starts
+from ..kernels.platform.records import Found, Starts
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from .nearest import corners_of, home_start, in_lengths, nearest_actuators, no_starts, starts_at
@@ -17,9 +17,12 @@ from .table import kernel_table
 
 ROWS_A_BLOCK = 256
 
+SIGHT = 1e3
+"""How far off values are looked for: no search could tell those that are farther from others there [L or rad]."""
+
 
 def assembled(
-    mechanism: Mechanism, table: LegTable, values: Floats, start: Configurations | None, sides: Floats
+    mechanism: Mechanism, table: LegTable, values: Floats, start: Configurations | None, sides: Floats, tolerance: float
 ) -> tuple[P.Rows, Floats, Floats]:
     """Configurations that have actuated values (n, n_a), within all limits; rows without one are PENDING.
 
@@ -38,18 +41,20 @@ def assembled(
     found = Starts(np.zeros((n, 4, 4)), np.zeros((n, len(table.legs))), np.zeros((n, len(table.legs))))
     wanted = np.zeros_like(values)
     for driven in table.driven:
-        wanted[:, driven["column"]] = (values[:, driven["column"]] - driven["home"]) / driven["unit"]
-    everything = np.arange(n)
-    _assemble(mechanism, table, wanted, own, no_starts(table), everything, rows, found)
+        off = (values[:, driven["column"]] - driven["home"]) / driven["unit"]
+        is_endless = driven["turns"] == 1 and np.isinf(driven["hi"] - driven["lo"])
+        wanted[:, driven["column"]] = np.remainder(off, 2.0 * np.pi) if is_endless else np.clip(off, -SIGHT, SIGHT)
+    rows.actuators[:] = values
+    _assemble(mechanism, table, wanted, own, no_starts(table), np.arange(n), rows, found)
     rest = np.flatnonzero(rows.status == P.PENDING)
     if start is None and len(rest):
         _assemble(mechanism, table, wanted, own, corners_of(mechanism), rest, rows, found)
         rest = np.flatnonzero(rows.status == P.PENDING)
     if len(rest):
         _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
+        near = rest[rows.measures[rest, P.ACTUATOR_ERROR] <= tolerance]
+        rows.status[near[rows.status[near] == P.PROJECTED]] = P.REACHED
     rows.poses[:] = in_lengths(found.poses, mechanism.characteristic_length)
-    assembled_rows = rows.status == P.REACHED
-    rows.actuators[assembled_rows] = values[assembled_rows]
     rows.measures[:, P.RESIDUAL] *= mechanism.characteristic_length
     return rows, found.q, found.sides
 
@@ -77,6 +82,8 @@ def _project(
     for driven in table.driven:
         column = driven["column"]
         off = (actuators[:, column] - driven["home"]) / driven["unit"] - values[places, column]
+        if driven["turns"] == 1 and driven["hi"] - driven["lo"] > 2.0 * np.pi:
+            off = np.remainder(off + np.pi, 2.0 * np.pi) - np.pi
         measures[:, P.ACTUATOR_ERROR] = np.maximum(measures[:, P.ACTUATOR_ERROR], np.abs(off))
     rows.actuators[places], rows.measures[places] = actuators, measures
     rows.status[places] = P.PROJECTED

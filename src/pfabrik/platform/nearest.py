@@ -15,11 +15,9 @@ from ..closure.projection import Way
 from ..decomposition.leg_table import LegTable, Records, leg_table
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..kernels.closure.loops import BASE_AXES, LOCKED
-from ..kernels.closure.pose_objective import PoseObjective
+from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..kernels.legs import records as K
-from ..kernels.platform.descend import Aim
-from ..kernels.platform.nearest import Found, Starts
+from ..kernels.platform.records import STRETCHED, Aim, Found, Starts
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..rotations import from_rotvec
@@ -30,9 +28,8 @@ from .table import kernel_table
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
-CORNERS, HITS, HITS_OF_STRUTS = 12, 3, 2
-"""How many configurations searches start from at most, and how many of them must end at the nearest one: of legs whose
-rods nothing carries, fewer."""
+CORNERS, HITS = 16, 4
+"""How many configurations searches start from at most, and how many of them must end at the nearest one."""
 
 DRAWS, DRAWN_STEPS = 240, 30
 """How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
@@ -40,7 +37,7 @@ DRAWS, DRAWN_STEPS = 240, 30
 SAMPLES, NEARBY = 8, 0.05
 """How many poses about home are looked at, and how far off they are [L]."""
 
-FAR, TURNED = 1.0, 0.8
+FAR, TURNED = 1.0, 1.5
 """How far from home they are [L], and how far they are turned [rad]."""
 
 TURNING = 0.2
@@ -48,6 +45,9 @@ TURNING = 0.2
 
 OTHER_SIDE = 0.02
 """The same for the square of the sine of half the angle by which carriers differ."""
+
+BENT = 1e-2
+"""How far rods that are stretched out are bent where a search starts [L or rad]."""
 
 ROWS_A_BLOCK = 16
 
@@ -114,12 +114,11 @@ def _approach(
     from ..kernels.platform.nearest import approach
 
     legs, found = kernel_table(table), _new_found(len(objective.targets), len(table.legs))
-    hits = HITS if (legs.columns >= 0).any() else HITS_OF_STRUTS
 
     def run(block: slice) -> None:
         first = own if len(own.poses) == 1 else Starts._make(array[block] for array in own)
         aim = Aim(objective._replace(targets=objective.targets[block]), values[block])
-        approach(legs, aim, first, others, hits, Found._make(array[block] for array in found))
+        approach(legs, aim, first, others, HITS, Found._make(array[block] for array in found))
 
     in_blocks(run, len(found.distances), ROWS_A_BLOCK)
     return found
@@ -136,13 +135,24 @@ def no_starts(table: LegTable) -> Starts:
 
 
 def starts_at(mechanism: Mechanism, table: LegTable, poses: Floats, sides: Floats) -> Starts:
-    """Poses (n, 4, 4) [length] with legs on given sides, (n, legs), as starts."""
+    """Poses (n, 4, 4) [length] with legs on given sides, (n, legs), as starts.
+
+    Rods that are stretched out over what carries them are bent a little to their sides: stretched out, nothing says to
+    first order that they could bend, and a search would stay there.
+    """
+    own, other = (_carriers_at(table, poses, sign * sides) for sign in (1.0, -1.0))
+    q = np.where(np.abs(own - other) < STRETCHED, own + BENT * sides, own)
+    return Starts(in_lengths(poses, 1.0 / mechanism.characteristic_length), q, sides)
+
+
+def _carriers_at(table: LegTable, poses: Floats, sides: Floats) -> Floats:
+    """Coordinates of carriers (n, legs) [L or rad] at poses (n, 4, 4) [length]."""
     columns = np.zeros((len(poses), 1 + table.known["column"].max(initial=0)))
     read_into(table, poses, sides, columns)
     q = np.zeros(sides.shape)
     for carrier in _carriers(table):
         q[:, carrier["leg"]] = carrier["sense"] * columns[:, carrier["column"]] / carrier["unit"]
-    return Starts(in_lengths(poses, 1.0 / mechanism.characteristic_length), q, sides)
+    return q
 
 
 def _carriers(table: LegTable) -> Records:
@@ -168,17 +178,22 @@ def keeps_rotation(mechanism: Mechanism) -> bool:
         return False
     if table.task[0]["rows"] < 3:
         return False
-    from ..kernels.legs.answer import measure_rows
-
     poses = np.repeat(mechanism.home_pose[None], SAMPLES, axis=0)
     shifts = np.random.default_rng(0).uniform(-NEARBY, NEARBY, (SAMPLES, 3))
     poses[:, :3, 3] += mechanism.characteristic_length * shifts
-    rows, slopes = np.zeros((SAMPLES, table.task[0]["rows"])), np.zeros((SAMPLES, table.task[0]["rows"], 6))
+    rows, slopes = _constraints(table, poses)
+    stays = np.abs(rows).max(initial=0.0) <= TOLERANCES.position
+    return bool(stays and (np.linalg.svd(slopes[:, :, 3:])[1][:, -1] > TOLERANCES.nearly_implied).all())
+
+
+def _constraints(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
+    """The constraints of home's legs on poses (n, 4, 4) [length], (n, rows), and their derivatives, (n, rows, 6)."""
+    from ..kernels.legs.answer import measure_rows
+
+    n_rows = table.task[0]["rows"]
+    rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6))
     measure_rows(table.legs, table.task, poses, table.home_sides, rows, slopes)
-    turns = np.linalg.svd(slopes[:, :, 3:])[1]
-    return bool(
-        np.abs(rows).max(initial=0.0) <= TOLERANCES.position and (turns[:, -1] > TOLERANCES.nearly_implied).all()
-    )
+    return rows, slopes
 
 
 @lru_cache(maxsize=64)
@@ -188,12 +203,16 @@ def corners_of(mechanism: Mechanism) -> Starts:
     assert isinstance(table, LegTable)
     rng, home = np.random.default_rng(0), home_start(mechanism, table)
     poses = np.repeat(home.poses, DRAWS, axis=0)
-    poses[:, :3, 3] += rng.uniform(-FAR, FAR, (DRAWS, 3))
+    twists = rng.uniform(-1.0, 1.0, (DRAWS, 6)) * np.repeat([FAR, TURNED], 3)
+    _, sizes, directions = np.linalg.svd(_constraints(table, mechanism.home_pose[None])[1][0])
+    bound = directions[: (sizes > TOLERANCES.alignment).sum()]
+    twists -= twists @ bound.T @ bound  # what the legs do not allow at home they hardly do elsewhere
+    poses[:, :3, 3] += twists[:, :3]
     weights = np.array([1.0, 1.0, 1.0, TURNING, TURNING, TURNING])
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:] = LOCKED
     else:
-        poses[:, :3, :3] = from_rotvec(rng.uniform(-TURNED, TURNED, (DRAWS, 3))) @ poses[:, :3, :3]
+        poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
     q = np.zeros((DRAWS, len(table.legs)))
     for carrier in _carriers(table):
         lo, hi = max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi)

@@ -10,26 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.configurations import Configurations
 from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable, Records
 from ..description.mechanism import Mechanism
-from ..kernels.platform.nearest import Starts
+from ..kernels.platform.records import Starts
 from ..kernels.reaching import plan as P
-from .coordinates import settled
 from .nearest import home_start, no_starts
 from .table import kernel_table
-
-
-class LegAnswer(Configurations):
-    """One target that legs reach, and which of its two solutions each leg takes there, (1, legs)."""
-
-    def __init__(
-        self, mechanism: Mechanism, table: LegTable, rows: P.Rows, sides: Floats, begin: Callable[[], Floats | None]
-    ) -> None:
-        """Wrap an answer; `begin` gives the joint coordinates from which its own are the nearest, None for home."""
-        super().__init__(rows, lambda: settled(mechanism, table, rows.poses, rows.actuators, sides, begin()))
-        self.sides = sides
 
 
 class OneTarget:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..closure.close import Closing, measured
-from ..closure.configurations import Configurations, new_rows, put_rows
+from ..closure.configurations import Configurations, new_rows, put_rows, rows_at
 from ..closure.parasitic import has_other_assemblies
 from ..closure.solve import STRANGE, ClosureEngine
 from ..decomposition.leg_table import LegTable
@@ -17,15 +17,19 @@ from ..description.mechanism import Mechanism
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..options import Options
+from ..poses import are_poses
 from ..reaching.solve import ReachingEngine
-from .coordinates import settled, sides_at
+from .coordinates import LegAnswers, settled, sides_at
 from .forward import assembled
-from .one import LegAnswer, OneAssembly, OneTarget
+from .one import OneAssembly, OneTarget
 from .unreached import Question, answer_unreached
 
 Floats = NDArray[np.float64]
 
 ROWS_A_BLOCK = 1024
+
+STEPS_A_REPORT = 16
+"""Steps along a path between two reports of progress."""
 
 
 class LegsEngine:
@@ -49,7 +53,7 @@ class LegsEngine:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
         if not options.exact and isinstance(self._inner, ReachingEngine):
             return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
-        if len(targets) == 1 and (start is None or isinstance(start, LegAnswer)):
+        if len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1)):
             found = self._reach_one(targets, start, keep_mode)
             if found is not None:
                 return found
@@ -64,16 +68,15 @@ class LegsEngine:
             question = Question(self.mechanism, self._table, targets, poses, options, keep_mode)
             carriers = answer_unreached(question, rest, sides, rows)
             rest = np.flatnonzero(rows.status == P.PENDING)
+            if start is not None:
+                self._count_turns(start.rows.actuators, rows)
         if len(rest) == len(targets):
             return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
         if len(rest):
             begin = start if start is None or len(start) == 1 else start.at(rest)
             others = self._inner.answer(targets[rest], self._start(begin), options, keep_mode=keep_mode)
             put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
-        begins = _begins(self.mechanism, self._table, start, first)
-        return Configurations(
-            rows, partial(_coordinates, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
-        )
+        return self._answers(rows, sides, carriers, start, first, rest, others)
 
     def prepared(
         self, target: Floats, start: Configurations | None, options: Options, rows: P.Rows, *, keep_mode: bool
@@ -98,7 +101,51 @@ class LegsEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        return self._inner.follow(targets, self._start(start), options, on_progress)
+        if not options.exact or options.projection != "nearest":
+            return self._inner.follow(targets, self._start(start), options, on_progress)
+        targets, known = np.require(targets, requirements=["C", "W"]), are_poses(targets)
+        found: list[Configurations] = []
+        for i in range(len(targets)):
+            if known[i]:
+                before = found[-1] if found else start
+                found.append(self.answer(targets[i : i + 1], before, options, keep_mode=True))
+            if on_progress is not None and ((i + 1) % STEPS_A_REPORT == 0 or i + 1 == len(targets)):
+                on_progress(i + 1, len(targets))
+        return self._joined(found, start).among(known)
+
+    def _joined(self, found: Sequence[Configurations], start: Configurations | None) -> Configurations:
+        """Single answers as a batch; `start` is where the first began."""
+        rows, legs = new_rows(self.mechanism, len(found)), len(self._table.legs)
+        sides, carriers = np.repeat(self._table.home_sides, len(found), axis=0), np.full((len(found), legs), np.nan)
+        rest = np.array([i for i, each in enumerate(found) if not isinstance(each, LegAnswers)], dtype=np.intp)
+        for i, each in enumerate(found):
+            own = slice(i, i + 1)
+            put_rows(rows, own, each.rows._replace(nodes=rows.nodes[own], trunks=rows.trunks[own]))
+            if isinstance(each, LegAnswers):
+                sides[i] = each.sides
+                if each.carriers is not None:
+                    carriers[i] = each.carriers
+        others = None
+        if len(rest):
+            others = Configurations(rows_at(rows, rest), np.concatenate([found[i].coordinates for i in rest]))
+        first_sides = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        return self._answers(rows, sides, carriers, start, first_sides, rest, others)
+
+    def _answers(
+        self,
+        rows: P.Rows,
+        sides: Floats,
+        carriers: Floats | None,
+        start: Configurations | None,
+        first: Floats,
+        rest: NDArray[np.intp],
+        others: Configurations | None,
+    ) -> LegAnswers:
+        """Rows as answers, from a start on sides `first`; those at `rest` are the other engine's."""
+        begins = _begins(self.mechanism, self._table, start, first)
+        coordinates = partial(_coordinates, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
+        every = sides if len(sides) == len(rows.status) else np.repeat(sides, len(rows.status), axis=0)
+        return LegAnswers(rows, coordinates, every, carriers)
 
     def advance(self, targets: Floats, start: Configurations, options: Options) -> Configurations:
         """Go on to targets (n, 4, 4) in the working mode of as many configurations."""
@@ -119,7 +166,7 @@ class LegsEngine:
             if found is not None:
                 return found
         first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
-        rows, carriers, sides = assembled(self.mechanism, self._table, values, start, first)
+        rows, carriers, sides = assembled(self.mechanism, self._table, values, start, first, tolerance)
         rest, others = np.flatnonzero(rows.status == P.PENDING), None
         if len(rest) == len(values):
             return self._inner.forward(values, start, tolerance)
@@ -127,10 +174,7 @@ class LegsEngine:
             begin = start if start is None or len(start) == 1 else start.at(rest)
             others = self._inner.forward(values[rest], begin, tolerance)
             put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
-        begins = _begins(self.mechanism, self._table, start, first)
-        return Configurations(
-            rows, partial(_coordinates, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
-        )
+        return self._answers(rows, sides, carriers, start, first, rest, others)
 
     def prepared_forward(self, rows: P.Rows) -> Callable[[Floats], bool]:
         """A call that answers actuated values (1, n_a) from home into `rows`; whether they assemble."""
@@ -142,9 +186,9 @@ class LegsEngine:
         if not self._one_forward.assemble(values, rows, ends):
             return None
         end = rows.poses, rows.actuators, ends.sides, None, ends.q
-        return Configurations(rows, partial(settled, self.mechanism, self._table, *end))
+        return LegAnswers(rows, partial(settled, self.mechanism, self._table, *end), ends.sides, ends.q)
 
-    def _reach_one(self, target: Floats, start: LegAnswer | None, keep_mode: bool) -> LegAnswer | None:
+    def _reach_one(self, target: Floats, start: LegAnswers | None, keep_mode: bool) -> LegAnswers | None:
         """Answer one target from home or from an answer before, if legs reach it."""
         one, rows = self._one, self._one.new_rows()
         begin, sides = (one.home, one.home_sides) if start is None else (start.rows.poses, start.sides)
@@ -152,7 +196,8 @@ class LegsEngine:
             return None
         if start is not None:
             self._count_turns(start.rows.actuators, rows)
-        return LegAnswer(self.mechanism, self._table, rows, sides, _begins(self.mechanism, self._table, start, sides))
+        mechanism, table, begins = self.mechanism, self._table, _begins(self.mechanism, self._table, start, sides)
+        return LegAnswers(rows, lambda: settled(mechanism, table, rows.poses, rows.actuators, sides, begins()), sides)
 
     def _reach(
         self, targets: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: P.Rows

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..decomposition.leg_table import LegTable
 from ..kernels.legs import records as K
-from ..kernels.platform.equations import Table
+from ..kernels.platform.records import Table
 
 
 def kernel_table(table: LegTable) -> Table:

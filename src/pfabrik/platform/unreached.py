@@ -15,7 +15,7 @@ from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..kernels.platform.nearest import Found
+from ..kernels.platform.records import Found
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..options import Options

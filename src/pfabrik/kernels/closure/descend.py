@@ -46,9 +46,9 @@ from .linearise import (
     new_workspace,
     walk_all,
 )
-from .loops import BALL, Closed, Floats, Layout, Loops
+from .loops import BALL, Closed, Floats, Layout, Loops, PoseObjective
 from .path_kinematics import State, copy_state, load_row, new_state, store_row
-from .pose_objective import PoseObjective, pose_gradient
+from .pose_objective import pose_gradient
 
 SHARING = 1e-10
 """Weight of the sum of their squares against the balance of multipliers: far below what a limit's gradient counts."""

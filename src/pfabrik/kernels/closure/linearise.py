@@ -10,9 +10,9 @@ import numpy as np
 from .._jit import allocator, routine
 from ..free_motions import Elimination, FreeMotions, add_limit, eliminate, new_elimination, project_gradient
 from ..sqp import EXCESS, GAP, LIMITS, MOTIONS, REACH, VALUE, Hessian, StepControl, new_hessian, new_step_control
-from .loops import BALL, Floats, Layout, Loops
+from .loops import BALL, Floats, Layout, Loops, PoseObjective
 from .path_kinematics import Equations, State, compare_end, end_path, new_equations, pose_cone, walk_path
-from .pose_objective import PoseGradient, PoseObjective, pose_gradient
+from .pose_objective import PoseGradient, pose_gradient
 
 
 class Workspace(NamedTuple):

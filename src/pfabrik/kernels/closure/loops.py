@@ -114,3 +114,14 @@ class FirstOrder(NamedTuple):
     measures: Floats  # (n, 4): serial, parallel, constraint, passive
     lost: Floats  # (n, twists): not yet unit vectors
     gained: Floats
+
+
+class PoseObjective(NamedTuple):
+    """What is to come near: lengths in L."""
+
+    targets: Floats  # (n, 4, 4)
+    platform: Floats  # (6,): weights of the squares of position and rotation; 0 for what does not count; LOCKED holds
+    frame: int  # of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY
+    margin: float  # by how much inside their limits coordinates stay
+    near: float  # limits farther away are not looked at when multipliers are asked for
+    max_iterations: int

@@ -8,21 +8,10 @@ from typing import NamedTuple
 from .._jit import routine
 from ..rotations import UPSIDE_DOWN, difference, yaw_difference
 from ..vectors import Vec, cross, dot, norm, scale
-from .loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, Floats
+from .loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, Floats, PoseObjective
 
 ALIGNED = 1e-9
 """Sine below which two directions have no axis across them."""
-
-
-class PoseObjective(NamedTuple):
-    """What is to come near: lengths in L."""
-
-    targets: Floats  # (n, 4, 4)
-    platform: Floats  # (6,): weights of the squares of position and rotation; 0 for what does not count; LOCKED holds
-    frame: int  # of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY
-    margin: float  # by how much inside their limits coordinates stay
-    near: float  # limits farther away are not looked at when multipliers are asked for
-    max_iterations: int
 
 
 class PoseGradient(NamedTuple):

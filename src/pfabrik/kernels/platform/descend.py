@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import allocator, routine
-from ..closure.loops import BASE_AXES, LOCKED
-from ..closure.pose_objective import PoseGradient, PoseObjective, pose_gradient
+from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
+from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import (
     Elimination,
     FreeMotions,
@@ -55,29 +55,23 @@ from ..sqp import (
 from ..vectors import copy_row, copy_table, wrap
 from .equations import (
     Now,
-    Table,
     View,
     cone_slope,
     coordinate_slope,
     count_unknowns,
+    counts_turns,
     new_now,
     new_view,
     place,
     put_slopes,
 )
+from .records import Aim, Table
 
 HOPELESS = 20.0
 """A search that is farther than the nearest yet by so many times what its last step promised is given up."""
 
 NEAR = 0.5
 """Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
-
-
-class Aim(NamedTuple):
-    """What is to come near: the pose of the platform, or the values of actuators."""
-
-    pose: PoseObjective
-    values: Floats  # (n, n_a): deviations from home [L or rad] that actuators are to have; no rows if that is no aim
 
 
 class Search(NamedTuple):
@@ -150,7 +144,7 @@ def put_objective(table: Table, row: int, aim: Aim, now: Now, search: Search) ->
     for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
         driven = table.driven[i]
         off = coordinate_slope(table, driven, search.look) - aim.values[row, driven["column"]]
-        off = wrap(off, 0.0) if driven["turns"] == 1 else off
+        off = wrap(off, 0.0) if counts_turns(driven) else off
         value += 0.5 * search.gradient.unit[0] * off * off
         for j in range(force.shape[0]):
             force[j] += search.gradient.unit[0] * off * slope[j]

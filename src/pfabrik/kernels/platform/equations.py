@@ -15,7 +15,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._jit import allocator, routine
 from ..legs.answer import deviation, set_frames
@@ -39,27 +38,14 @@ from ..legs.records import (
     TRIPLE,
     Floats,
     Record,
-    Records,
 )
 from ..legs.rods import NOWHERE, carried, carrier_rate, mark, read_rod, rod_rows, twist_rate
 from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, turn, vec
-
-Ints = NDArray[np.int64]
+from .records import Table
 
 AT_FOOT, AT_HEAD = 0, 1
 # Sine below which a line is straight along the axis of its cone: no direction leads in or out.
 ALIGNED = 1e-12
-
-
-class Table(NamedTuple):
-    """A mechanism's legs, as `decomposition.leg_table` has them."""
-
-    legs: Records
-    limited: Records
-    cones: Records
-    driven: Records
-    task: Records  # one
-    columns: Ints  # (legs,): the unknown that is the coordinate of a leg's carrier; -1 where it has none
 
 
 class Now(NamedTuple):
@@ -214,6 +200,12 @@ def seen(table: Table, k: int, main: int, end: int, v: Vec, view: View) -> Vec:
     if end == AT_FOOT:
         return carried(table.legs[main], view.values[main], v, 1.0)
     return turn(view.frames[table.legs[k]["reversed"]], v)
+
+
+@routine
+def counts_turns(coordinate: Record) -> bool:
+    """Whether an angle may be a full turn from where it is."""
+    return bool(coordinate["turns"] == 1 and coordinate["hi"] - coordinate["lo"] > 2.0 * math.pi)
 
 
 @routine

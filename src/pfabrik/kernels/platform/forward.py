@@ -20,8 +20,18 @@ from ..linear import solve_spd
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..vectors import copy_row, copy_table, wrap
 from .descend import copy_now, move
-from .equations import Now, Table, View, coordinate_slope, count_unknowns, new_now, new_view, place, put_slopes
-from .nearest import Starts
+from .equations import (
+    Now,
+    View,
+    coordinate_slope,
+    count_unknowns,
+    counts_turns,
+    new_now,
+    new_view,
+    place,
+    put_slopes,
+)
+from .records import Starts, Table
 
 ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
 """Largest equation of an assembled configuration, and of one that no step makes more so [L or rad]: more actuators than
@@ -122,7 +132,7 @@ def put_normal(table: Table, work: Newton) -> float:
         if not drives_carrier(table, i):
             driven = table.driven[i]
             off = coordinate_slope(table, driven, look) - work.values[driven["column"]]
-            off = wrap(off, 0.0) if driven["turns"] == 1 else off
+            off = wrap(off, 0.0) if counts_turns(driven) else off
             worst = max(worst, abs(off))
             add_equation(off, look.slope, work)
     return worst

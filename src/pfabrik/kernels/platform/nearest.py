@@ -3,47 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from .._jit import kernel, routine
-from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES
-from ..closure.pose_objective import PoseGradient, PoseObjective, pose_gradient
+from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES, PoseObjective
+from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..legs.answer import column, deviation, excess_of, make_exact, set_frames, turn_pose
 from ..legs.records import CARRIER, CRANK, PIVOT, SLIDE, Floats, Record, Records
 from ..legs.rods import carry
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..sqp import STEPS
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
-from .descend import Aim, Search, copy_now, descend, fix, new_search
-from .equations import Now, Table, View, is_carried, new_now, new_view, place
+from .descend import Search, copy_now, descend, fix, new_search
+from .equations import Now, View, is_carried, new_now, new_view, place
+from .records import STRETCHED, Aim, Found, Starts, Table
 
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
-
-
-STRETCHED = 1e-7
-"""Difference of a carrier's two solutions below which it is at a dead point, and its side is the start's [L or rad]."""
-
-
-class Starts(NamedTuple):
-    """Configurations that searches start from: poses [L], coordinates of carriers and sides, as of `Now`."""
-
-    poses: Floats  # (s, 4, 4)
-    q: Floats  # (s, legs)
-    sides: Floats  # (s, legs)
-
-
-class Found(NamedTuple):
-    """Where the searches of each row ended."""
-
-    distances: Floats  # (n,) [L]; infinite where nothing feasible was found
-    poses: Floats  # (n, 4, 4) [L]
-    q: Floats  # (n, legs)
-    sides: Floats  # (n, legs)
-    steps: NDArray[np.int64]  # (n,)
 
 
 @routine

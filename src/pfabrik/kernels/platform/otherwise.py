@@ -22,7 +22,8 @@ from ..legs.answer import (
 )
 from ..legs.feasibility import largest_row
 from ..legs.records import N_VALUES, Floats
-from .equations import Table, main_of
+from .equations import main_of
+from .records import Table
 
 MOST_CHOICES = 8
 """Legs with two solutions beyond which not every combination of them is tried, where a pose is completed by all."""

@@ -1,0 +1,50 @@
+"""What the kernels in the platform's pose are given and what they fill; lengths in L, angles in radians."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..closure.loops import PoseObjective
+from ..legs.records import Floats, Records
+
+STRETCHED = 1e-4
+"""Difference of a carrier's two solutions below which it is at a dead point, and its side is the start's [L or rad]."""
+
+
+class Table(NamedTuple):
+    """A mechanism's legs, as `decomposition.leg_table` has them."""
+
+    legs: Records
+    limited: Records
+    cones: Records
+    driven: Records
+    task: Records  # one
+    columns: NDArray[np.int64]  # (legs,): the unknown that is the coordinate of a leg's carrier; -1 where it has none
+
+
+class Aim(NamedTuple):
+    """What is to come near: the pose of the platform, or the values of actuators."""
+
+    pose: PoseObjective
+    values: Floats  # (n, n_a): deviations from home [L or rad] that actuators are to have; no rows if that is no aim
+
+
+class Starts(NamedTuple):
+    """Configurations that searches start from: poses [L], coordinates of carriers and sides, as of `Now`."""
+
+    poses: Floats  # (s, 4, 4)
+    q: Floats  # (s, legs)
+    sides: Floats  # (s, legs)
+
+
+class Found(NamedTuple):
+    """Where the searches of each row ended."""
+
+    distances: Floats  # (n,) [L]; infinite where nothing feasible was found
+    poses: Floats  # (n, 4, 4) [L]
+    q: Floats  # (n, legs)
+    sides: Floats  # (n, legs)
+    steps: NDArray[np.int64]  # (n,)
