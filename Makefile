@@ -54,4 +54,6 @@ $(READY): pyproject.toml
 $(STAMP): $(READY)
 	@echo "installing what tests and checks need" >&2
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[plot,view,dev]'
+	@# the model of a robot, which tests read from its maker's wheel: without what its programs need, and skipped without it
+	@-$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps reachy-mini reachy-mini-rust-kinematics
 	@touch $@

@@ -16,6 +16,7 @@ from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..motion.first_order import generic_of
 from .assembling import Imported, assemble
+from .cuts import unique
 from .opened import Loop, Note, OpenMechanism
 from .pruning import prune
 from .units import metres_of
@@ -65,6 +66,8 @@ def mechanism_of(robot: Robot, wanted: Wanted, told: list[Note]) -> Imported:
     tip, point = _place(robot, end_effector)
     as_told = (base, end_effector) == (robot.base, robot.end_effector)
     joints, loops = _merged(robot, base, tip)
+    if point is not None:
+        joints, loops = _not_called(tip, joints, loops, told)
     opened = OpenMechanism(
         robot.name,
         tuple(_in_unit(joint, metres) for joint in joints),
@@ -179,6 +182,16 @@ def _merged(robot: Robot, base: str, tip: str) -> tuple[list[Joint], list[Loop]]
     joints = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.joints if each.type != "fixed"]
     loops = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.loops]
     return joints, [loop for loop in loops if loop.connects[0] != loop.connects[1]]
+
+
+def _not_called(tip: str, joints: list[Joint], loops: list[Loop], told: list[Note]) -> tuple[list[Joint], list[Loop]]:
+    """With another name for a joint that is called as the end effector, a body."""
+    taken = {tip, *(joint.name for joint in joints), *(loop.name for loop in loops)}
+    name = unique(f"{tip}_joint", taken)
+    if any(each.name == tip for each in joints) or any(each.name == tip for each in loops):
+        told.append(Note(f"a joint is called as the end effector, '{tip}', and here", (name,)))
+    renamed = [dataclasses.replace(each, name=name) if each.name == tip else each for each in joints]
+    return renamed, [dataclasses.replace(each, name=name) if each.name == tip else each for each in loops]
 
 
 def _in_unit(joint: Joint, metres: float) -> Joint:
