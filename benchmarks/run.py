@@ -20,6 +20,7 @@ from closure_engine import closed_chains, forward, joint_coordinates, modes
 from pfabrik.reproduce.timing import one_core
 from table import Row, cells, machine, table
 from timing import Solve, best_times, draw, in_blocks
+from workspaces import workspaces
 
 CENTROID, NEAREST = pf.Options(projection="centroid"), pf.Options(projection="nearest")
 
@@ -160,6 +161,7 @@ def main() -> None:
         *joint_coordinates(rng, runs, 200 if given.quick else 2000),
         *closed_chains(rng, runs, 100 if given.quick else 1000),
         *modes(min(runs, 5)),
+        *workspaces(rng, runs, 20_000 if given.quick else 200_000),
         *([] if given.quick else start_up(5)),
     ]
     if given.markdown:

@@ -148,7 +148,7 @@ def test_vertices_are_on_the_limits_they_name(name: str) -> None:
 def test_an_orthoglide_without_limits_fills_three_cylinders() -> None:
     machine = pf.load("orthoglide").without_limits()
     rod = 310.582854123025
-    found = pf.workspace(machine, resolution=rod / 16)
+    found = pf.workspace(machine, resolution=rod / 22)
     assert found.volume == pytest.approx(8.0 * (2.0 - np.sqrt(2.0)) * rod**3, rel=1e-3)
 
 
