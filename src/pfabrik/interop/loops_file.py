@@ -30,6 +30,9 @@ from .xml_reading import fault
 LARGEST = 1_000_000
 """Largest file read [bytes]."""
 
+DEEPEST = 20
+"""Deepest nesting of values."""
+
 KINDS: dict[str, LoopType] = {
     "ball": "spherical",
     "spherical": "spherical",
@@ -112,8 +115,11 @@ def _parsed(path: str | os.PathLike[str]) -> Any:
     if len(content) > LARGEST:
         raise fault(place, f"more than {LARGEST} bytes", f"at most {LARGEST}")
     try:
-        if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(content, Loader=yaml.SafeLoader)):
-            raise fault(place, "an alias", "every value written out")
+        depth = 0
+        for event in yaml.parse(content, Loader=yaml.SafeLoader):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if isinstance(event, yaml.AliasEvent) or depth > DEEPEST:
+                raise fault(place, "an alias, or values nested too deeply", "every value written out")
         return yaml.safe_load(content)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         if isinstance(error, InvalidMechanism):

@@ -1,0 +1,635 @@
+"""MuJoCo models and robot descriptions as mechanisms: in the styles found in the wild, with what was changed told by
+name, against MuJoCo's own kinematics; and files that mean harm."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import pfabrik as pf
+from in_mujoco import Model
+from pfabrik.cli import main
+from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
+from pfabrik.interop import Imported, Loop, OpenMechanism, assemble, from_mjcf, from_urdf, verify
+
+pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+
+
+def told(found: Imported) -> str:
+    return "\n".join(map(str, found.notes))
+
+
+def chains(found: Imported) -> list[str]:
+    return sorted(str(chain) for chain in pf.decompose(found.mechanism))
+
+
+def agrees(found: Imported, model: Model, body: str, off: Sequence[Sequence[float]], tolerance: float = 1e-12) -> None:
+    """Forward kinematics against MuJoCo, in metres, with the actuated joints off home by so much."""
+    mechanism = found.mechanism
+    home = np.array([mechanism.home_coordinate(name) for name in mechanism.actuator_names])
+    model.lead(mechanism.actuator_names, home)
+    _, begin = model.pose(body)
+    for step in off:
+        assert model.lead(mechanism.actuator_names, home + step) <= 1e-13
+        position, turned = model.pose(body)
+        solution = pf.solve_fk(mechanism, home + step)
+        assert solution
+        assert np.linalg.norm(solution.pose[:3, 3] - position) <= tolerance
+        assert np.abs(solution.pose[:3, :3] - turned @ begin.T).max() <= 10 * tolerance
+
+
+# A five-bar in a plane, its loop closed between sites; a spring, a tendon, a coupling and a sensor that do not count.
+
+FIVE_BAR = """
+<mujoco model="five bar">
+  <compiler angle="degree"/>
+  <default><joint damping="0.1"/>
+    <default class="arm"><joint axis="0 1 0" range="-80 80" limited="true"/></default></default>
+  <asset><mesh name="m" file="nowhere.stl"/><material name="red"/></asset>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <body name="frame" pos="0 0 0.1">
+      <geom type="mesh" mesh="m"/>
+      <body name="left" pos="-0.05 0 0"><joint name="qL" class="arm"/><geom size="0.01"/>
+        <body name="fore_left" pos="-0.05 0 0.1"><joint name="eL" axis="0 1 0" stiffness="2"/>
+          <site name="tip_left" pos="0.1 0 0.1"/></body></body>
+      <body name="right" pos="0.05 0 0"><joint name="qR" class="arm"/>
+        <body name="fore_right" pos="0.05 0 0.1"><joint name="eR" axis="0 1 0"/>
+          <site name="tip_right" pos="-0.1 0 0.1"/></body></body>
+      <body name="gripper" pos="0.3 0 0"><joint name="finger" axis="0 0 1"/></body>
+    </body>
+  </worldbody>
+  <equality>
+    <connect name="tip" site1="tip_left" site2="tip_right"/>
+    <joint joint1="finger" joint2="qL" polycoef="0 1 0 0 0"/>
+  </equality>
+  <tendon><spatial name="cable"><site site="tip_left"/><site site="tip_right"/></spatial></tendon>
+  <sensor><jointpos joint="qL"/></sensor>
+  <actuator><position joint="qL" kp="5"/><motor joint="qR"/><motor name="winch" tendon="cable"/></actuator>
+  <keyframe><key name="up" qpos="0.1 0 -0.1 0 0" ctrl="0 0 0"/></keyframe>
+</mujoco>
+"""
+
+
+def test_a_loop_between_sites_is_closed_and_all_that_is_left_out_is_named() -> None:
+    found = from_mjcf(FIVE_BAR, base="frame", end_effector="fore_left", task=["x", "z"])
+    assert found.gap == pytest.approx(0.0, abs=1e-15)
+    assert found.mechanism.actuator_names == ("qL", "qR")
+    assert found.mechanism.joint("qL").range == pytest.approx(np.radians([-80, 80]))
+    assert chains(found) == ["R*-R", "R*-R-S"]
+    for name in ("geom (2)", "mesh (1)", "cable", "winch", "eL", "finger, qL", "finger", "jointpos"):
+        assert name in told(found), name
+    stripped = FIVE_BAR.replace('<geom type="mesh" mesh="m"/>', "").replace('<mesh name="m" file="nowhere.stl"/>', "")
+    light = stripped.replace("<body name", "<body gravcomp='1' name").replace(
+        '<compiler angle="degree"/>', '<compiler angle="degree" boundmass="1" boundinertia="1"/>'
+    )
+    held = Model.of(light.replace('<joint joint1="finger" joint2="qL" polycoef="0 1 0 0 0"/>', ""), finger=0.0)
+    agrees(found, held, "fore_left", [(0.2, 0.1), (-0.3, 0.2), (0.1, -0.4)])
+
+
+def test_an_end_effector_may_be_a_site_or_the_equality_itself() -> None:
+    at_site = from_mjcf(FIVE_BAR, base="frame", end_effector="tip_right").mechanism
+    assert (at_site.end_effector, at_site.reference_point) == ("fore_right", pytest.approx((0, 0, 0.3)))
+    at_tip = from_mjcf(FIVE_BAR, base="frame", end_effector="tip").mechanism
+    assert at_tip.end_effector_is_joint
+    assert pf.solve_ik(at_tip, [0.01, 0, 0.29])
+
+
+def test_home_may_be_a_keyframe_that_is_then_closed() -> None:
+    found = from_mjcf(FIVE_BAR, base="frame", end_effector="fore_left", configuration="up")
+    assert 1e-4 < found.gap < 0.05
+    assert [found.mechanism.joint(name).home for name in ("qL", "qR")] == [0.1, -0.1]
+    assert pf.closure_residual(pf.solve_fk(found.mechanism, [0.1, -0.1])) <= 1e-12
+    assert "loops were open" in told(found)
+
+
+def test_names_that_do_not_exist_come_with_those_that_do() -> None:
+    for wrong in ({"base": "fram"}, {"end_effector": "tipp"}, {"actuated": ["qX"]}, {"fixed": ["qX"]}):
+        with pytest.raises(UnknownName):
+            from_mjcf(FIVE_BAR, **{"end_effector": "fore_left", **wrong})
+    with pytest.raises(UnknownName, match="known: qpos0, up"):
+        from_mjcf(FIVE_BAR, end_effector="fore_left", configuration="down")
+    with pytest.raises(InvalidArgument, match="end_effector: found none"):
+        from_mjcf(FIVE_BAR, base="frame")
+    with pytest.raises(InvalidArgument, match="a list of names"):
+        from_mjcf(FIVE_BAR, end_effector="fore_left", actuated="qL")
+
+
+def test_lengths_are_in_the_unit_asked_for() -> None:
+    small = from_mjcf(FIVE_BAR, base="frame", end_effector="fore_left", length_unit="mm")
+    assert small.mechanism.length_unit == "mm"
+    assert small.mechanism.joint("tip").at == pytest.approx((0, 0, 300))
+
+
+# An ankle: two hinges on one body, a connect between bodies, a rod with a ball and a spin of its own, a range off home.
+
+ANKLE = """
+<mujoco model="ankle">
+  <worldbody>
+    <body name="pelvis" pos="0 0 1"><freejoint/>
+    <body name="shank" pos="0 0 -0.6"><joint name="knee" axis="0 1 0"/>
+      <body name="foot">
+        <joint name="pitch" axis="0 1 0" range="-40 40"/><joint name="roll" axis="1 0 0" range="-20 20"/>
+        <site name="heel_left" pos="-0.05 0.04 0"/>
+      </body>
+      <body name="crank_left" pos="0 0.04 0.2"><joint name="motor_left" axis="0 1 0" range="-60 60"/>
+        <body name="rod_left" pos="-0.05 0 0"><joint name="ball_left" type="ball" range="0 40"/>
+          <body name="clevis" pos="0 0 -0.1"><joint name="spin" axis="0 0 1"/>
+            <site name="end_left" pos="0 0 -0.1"/></body></body></body>
+      <body name="crank_right" pos="0 -0.04 0.15"><joint name="motor_right" axis="0 1 0" range="5 60"/>
+        <body name="rod_right" pos="-0.05 0 0"><joint name="hinge_right" axis="0 1 0"/>
+          <joint name="cross_right" axis="1 0 0"/></body></body>
+    </body></body>
+  </worldbody>
+  <equality>
+    <connect site1="end_left" site2="heel_left"/>
+    <connect name="right" body1="rod_right" body2="foot" anchor="0 0 -0.15"/>
+    <connect name="spare" body1="rod_right" body2="foot" anchor="0 0 -0.15" active="false"/>
+  </equality>
+  <actuator><motor joint="motor_left"/><motor joint="motor_right"/><motor joint="knee"/></actuator>
+</mujoco>
+"""
+
+
+def test_of_a_whole_leg_the_ankle_alone_is_taken_and_hinges_that_cross_are_universal() -> None:
+    found = from_mjcf(ANKLE, base="shank", end_effector="foot", task=["tilt"])
+    assert chains(found) == ["R*-S-R-S", "R*-U-S", "U"]
+    assert found.mechanism.actuator_names == ("motor_left", "motor_right")
+    for name in ("knee", "ball_left", "pitch+roll", "hinge_right+cross_right", "spare", "motor_right"):
+        assert name in told(found), name
+    assert found.mechanism.joint("motor_right").home == pytest.approx(np.radians(5))  # the range does not have 0
+    assert found.mechanism.joint("pitch+roll").range == pytest.approx(np.radians([[-40, 40], [-20, 20]]))
+    model = Model.of(ANKLE.replace("<worldbody>", BOUND + "<worldbody>"), knee=0.0)
+    for name in ("motor_left", "motor_right"):
+        assert found.mechanism.joint(name).actuated
+    poses = [(0.1, 0.05), (-0.2, 0.2), (0.0, 0.3)]
+    home = np.array([found.mechanism.home_coordinate(name) for name in found.mechanism.actuator_names])
+    model.lead(found.mechanism.actuator_names, home)
+    begin = relative(model, "shank", "foot")
+    for step in poses:
+        assert model.lead(found.mechanism.actuator_names, home + step) <= 1e-12
+        moved = relative(model, "shank", "foot") @ np.linalg.inv(begin)
+        solution = pf.solve_fk(found.mechanism, home + step)
+        assert solution
+        assert np.abs(solution.pose[:3, :3] - moved[:3, :3]).max() <= 1e-11
+
+
+BOUND = '<compiler boundmass="1" boundinertia="1"/>'
+
+
+def relative(model: Model, base: str, body: str) -> np.ndarray:
+    """The pose of a body in the frame of another."""
+    frames = []
+    for name in (base, body):
+        frame = np.eye(4)
+        frame[:3, 3], frame[:3, :3] = model.pose(name)
+        frames.append(frame)
+    return np.linalg.inv(frames[0]) @ frames[1]
+
+
+def test_actuated_and_fixed_joints_are_as_asked_for() -> None:
+    found = from_mjcf(ANKLE, base="pelvis", end_effector="foot", actuated=["knee", "motor_left"], fixed=["spin"])
+    assert found.mechanism.actuator_names == ("knee", "motor_left")
+    assert "R*-S-S" in " ".join(chains(found))
+
+
+# A delta with five closures and a wrist behind its platform.
+
+
+def delta() -> str:
+    arms, equalities = [], []
+    for index, angle in enumerate(np.radians([0, 120, 240])):
+        degrees = np.degrees(angle)
+        rods = ""
+        for side, shift in (("a", -0.03), ("b", 0.03)):
+            plate = ""
+            if (index, side) == (0, "a"):
+                plate = PLATE
+            else:
+                equalities.append(f'<connect name="c{index}{side}" site1="r{index}{side}" site2="p{index}{side}"/>')
+            rods += f"""<body name="rod{index}{side}" pos="0.1 {shift} 0"><joint name="b{index}{side}" type="ball"/>
+                <site name="r{index}{side}" pos="-0.06 0 -0.2"/>{plate}</body>"""
+        arms.append(
+            f"""<body euler="0 0 {degrees}"><body name="arm{index}" pos="0.06 0 0">
+            <joint name="q{index}" axis="0 1 0" range="-60 60"/>{rods}</body></body>"""
+        )
+    motors = "".join(f'<position joint="q{index}"/>' for index in range(3))
+    return f"""<mujoco model="delta">{BOUND}<worldbody>{"".join(arms)}</worldbody>
+        <equality>{"".join(equalities)}</equality><actuator>{motors}<motor joint="wrist"/></actuator></mujoco>"""
+
+
+PLACES = [
+    (index, side, np.round([0.1 * np.cos(a) - s * np.sin(a), 0.1 * np.sin(a) + s * np.cos(a), 0.0], 17))
+    for index, a in enumerate(np.radians([0, 120, 240]))
+    for side, s in (("a", -0.03), ("b", 0.03))
+]
+PLATE = (
+    '<body name="plate" pos="-0.16 0.03 -0.2"><joint name="plate" type="ball" pos="0.1 -0.03 0"/>'
+    + "".join(f'<site name="p{i}{s}" pos="{" ".join(map(repr, at.tolist()))}"/>' for i, s, at in PLACES)
+    + '<body name="tool" pos="0 0 -0.02"><joint name="wrist" axis="0 0 1"/></body></body>'
+)
+
+
+def test_a_delta_with_five_closures_and_a_wrist() -> None:
+    text = delta()
+    found = from_mjcf(text, end_effector="tool", task=["x", "y", "z", "yaw"])
+    assert found.gap <= 1e-15
+    assert pf.mobility(found.mechanism).platform == 4
+    assert found.mechanism.actuator_names == ("q0", "wrist", "q1", "q2")
+    agrees(found, Model.of(text), "tool", [(0.1, 0.5, -0.1, 0.2), (0.3, 0.0, 0.25, 0.2), (-0.2, -0.4, 0.1, 0.1)])
+    plate = from_mjcf(text, task=["x", "y", "z"])
+    assert plate.mechanism.end_effector == "plate"
+    assert "taken for the end effector" in told(plate)
+    assert "wrist" in told(plate)
+    assert pf.solve_ik(plate.mechanism, np.array(plate.mechanism.reference_point) + [0.02, 0.01, -0.03])
+
+
+def test_rods_as_free_bodies_that_equalities_hold() -> None:
+    """A pendulum of two rods, of which the second is free in the air but for its connects; two make a hinge."""
+    text = f"""<mujoco>{BOUND}<worldbody>
+        <body name="arm"><joint name="q" axis="0 1 0"/></body>
+        <body name="rod" pos="0.2 0 0"><freejoint name="free"/></body></worldbody>
+        <equality><connect body1="arm" body2="rod" anchor="0.1 -0.02 0"/>
+        <connect body1="arm" body2="rod" anchor="0.1 0.02 0"/></equality>
+        <actuator><motor joint="q"/></actuator></mujoco>"""
+    found = from_mjcf(text, end_effector="rod", task=["x", "z"])
+    assert pf.mobility(found.mechanism).platform == 2
+    by_type = [joint.type for joint in found.mechanism.joints]
+    assert by_type == ["revolute", "prismatic", "prismatic", "prismatic", "spherical", "revolute"]
+    hinge = found.mechanism.joints[-1]
+    np.testing.assert_allclose(np.abs(hinge.axis), [0, 1, 0], atol=1e-15)
+
+
+# The robot that thousands own, from the wheel that its maker publishes.
+
+
+def reachy(*parts: str) -> Path:
+    spec = importlib.util.find_spec("reachy_mini")
+    if spec is None or not spec.submodule_search_locations:
+        pytest.skip("reachy-mini is not installed: pip install --no-deps reachy-mini")
+    return Path(spec.submodule_search_locations[0]).joinpath(*parts)
+
+
+def test_reachy_mini_is_imported_from_its_makers_model_and_agrees_with_mujoco() -> None:
+    path = reachy("descriptions", "reachy_mini", "mjcf", "reachy_mini.xml")
+    found = from_mjcf(path, base="body_down_3dprint", end_effector="xl_330")
+    assert found.gap == pytest.approx(1.2e-7, abs=0.3e-7)
+    assert chains(found) == ["R*-S-S"] * 6
+    for name in ("yaw_body", "right_antenna", "left_antenna", "mesh"):
+        assert name in told(found)
+    others = dict.fromkeys(("yaw_body", "right_antenna", "left_antenna"), 0.0)
+    model = Model(mujoco.MjModel.from_xml_path(str(path)), others)
+    steps = np.random.default_rng(0).uniform(-0.3, 0.3, (100, 6))
+    agrees(found, model, "xl_330", steps, tolerance=1e-11)
+
+
+def test_the_head_answers_exactly_where_its_makers_kinematics_do() -> None:
+    kinematics = pytest.importorskip("reachy_mini_rust_kinematics")
+    data = json.loads(reachy("assets", "kinematics_data.json").read_text())
+    theirs = kinematics.ReachyMiniRustKinematics(data["motor_arm_length"], data["rod_length"])
+    for motor in data["motors"]:
+        inverse = np.linalg.inv(np.array(motor["T_motor_world"])).tolist()
+        theirs.add_branch(motor["branch_position"], inverse, 1 if motor["solution"] else -1)
+    mechanism = pf.load("reachy_mini").without_limits()
+    rng = np.random.default_rng(0)
+    positions = mechanism.reference_point + rng.uniform(-0.04, 0.04, (2000, 3))
+    targets = pf.pose(positions, rpy=rng.uniform(-0.5, 0.5, (2000, 3)))
+    angles = np.array([theirs.inverse_kinematics(target.tolist()) for target in targets])
+    ours = pf.solve_ik(mechanism, targets, options=pf.Options(working_mode="keep"))
+    answered = np.isfinite(angles).all(axis=1)
+    np.testing.assert_array_equal(np.asarray(ours.status) == pf.Status.REACHED, answered)
+    assert 1000 < answered.sum() < 1500
+    apart = np.abs(np.angle(np.exp(1j * (angles - ours.actuators))))[answered].max(axis=1)
+    assert np.sort(apart)[-2] <= 1e-11  # rad
+    assert apart.max() <= 1e-10  # of one pose, a rod's length times 1e-9 from full stretch, where digits are lost
+
+
+# Robot descriptions.
+
+URDF = """<robot name="five bar">
+  <link name="frame"/><link name="l1"/><link name="l2"/><link name="r1"/><link name="r2"/><link name="camera"/>
+  <joint name="motor_l" type="revolute"><parent link="frame"/><child link="l1"/>
+    <origin xyz="-0.05 0 0" rpy="1.5708 0 0"/>
+    <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="motor_r" type="revolute"><parent link="frame"/><child link="r1"/>
+    <origin xyz="0.05 0 0" rpy="1.5708 0 0"/>
+    <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="elbow_l" type="continuous"><parent link="l1"/><child link="l2"/><origin xyz="-0.05 0.1 0"/>
+    <axis xyz="0 0 1"/></joint>
+  <joint name="elbow_r" type="continuous"><parent link="r1"/><child link="r2"/><origin xyz="0.05 0.1 0"/>
+    <axis xyz="0 0 1"/></joint>
+  <joint name="mount" type="fixed"><parent link="frame"/><child link="camera"/><axis xyz="0 0 0"/></joint>
+</robot>"""
+TIP_L, TIP_R = (0.1, 0.1, 0.0), (-0.098, 0.1035, 0.0)  # 4 mm apart at zero
+PLAIN = {
+    "loops": [{"name": "tip", "type": "ball", "links": ["l2", "r2"], "at": [list(TIP_L), list(TIP_R)]}],
+    "actuated": ["motor_l", "motor_r"],
+}
+
+
+def in_mujoco(urdf: str, loops: Sequence[tuple[str, str, Sequence[float], Sequence[float]]]) -> Model:
+    """The same robot by MuJoCo's own reader of URDF, with its loops as equalities between sites."""
+    text = urdf.replace(
+        "<link", "<mujoco><compiler fusestatic='false' boundmass='1' boundinertia='1'/></mujoco><link", 1
+    )
+    spec = mujoco.MjSpec.from_string(text)
+    for number, (one, other, first, second) in enumerate(loops):
+        for side, (body, at) in enumerate(((one, first), (other, second))):
+            spec.body(body).add_site(name=f"s{number}{side}", pos=list(at))
+        equality = spec.add_equality(name=f"e{number}", type=mujoco.mjtEq.mjEQ_CONNECT)
+        equality.objtype = mujoco.mjtObj.mjOBJ_SITE
+        equality.name1, equality.name2 = f"s{number}0", f"s{number}1"
+    return Model(spec.compile())
+
+
+def yaml_file(folder: Path, table: dict) -> Path:
+    path = folder / "loops.yaml"
+    path.write_text(json.dumps(table))  # which is YAML too
+    return path
+
+
+def test_a_five_bar_open_by_millimetres_at_zero_is_closed_and_agrees_with_mujoco(tmp_path: Path) -> None:
+    (tmp_path / "robot.urdf").write_text(URDF)
+    found = from_urdf(tmp_path / "robot.urdf", yaml_file(tmp_path, PLAIN), end_effector="l2", task=["x", "z"])
+    assert found.gap == pytest.approx(np.hypot(0.002, 0.0035))
+    assert "open by 0.00403 m" in told(found)
+    assert pf.mobility(found.mechanism).platform == 2
+    for name in ("motor_l", "motor_r"):
+        assert found.mechanism.joint(name).home == 0.0  # the passive joints gave way
+    agrees(found, in_mujoco(URDF, [("l2", "r2", TIP_L, TIP_R)]), "l2", [(0.2, 0.1), (-0.3, 0.2), (0.1, -0.3)])
+
+
+def test_axes_that_a_few_digits_put_askew_do_not_lock_a_loop() -> None:
+    askew = URDF.replace('rpy="1.5708 0 0"', 'rpy="1.57075 0 0.00004"', 1)
+    hinge = {"name": "tip", "type": "hinge", "links": ["l2", "r2"], "at": [list(TIP_L), list(TIP_R)]}
+    found = from_urdf(askew, {**PLAIN, "loops": [hinge]}, end_effector="l2", task=["x", "z"])
+    assert "put straight" in told(found)
+    assert pf.mobility(found.mechanism).platform == 2
+    assert pf.solve_fk(found.mechanism, [0.2, 0.1])
+
+
+def urdf_delta() -> tuple[str, dict, list[tuple[str, str, list[float], list[float]]]]:
+    """A delta as a tree with five cuts, open by 4 mm; a rod carries the plate."""
+    parts, loops = ['<link name="frame"/><link name="plate"/>'], []
+    for index, angle in enumerate(np.radians([0, 120, 240])):
+        cos, sin = np.cos(angle), np.sin(angle)
+        parts.append(f"""<link name="arm{index}"/><joint name="q{index}" type="revolute"><parent link="frame"/>
+            <child link="arm{index}"/><origin xyz="{0.06 * cos} {0.06 * sin} 0" rpy="0 0 {angle}"/><axis xyz="0 1 0"/>
+            <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>""")
+        for side, shift in (("a", -0.03), ("b", 0.03)):
+            name = f"{index}{side}"
+            parts.append(f"""<link name="rod{name}"/><joint name="b{name}" type="floating"><parent link="arm{index}"/>
+                <child link="rod{name}"/><origin xyz="0.1 {shift} 0"/></joint>""")
+            plate = [0.1 * cos - shift * sin - 0.1, 0.1 * sin + shift * cos + 0.03, 0.004]
+            if name != "0a":
+                loops.append((f"rod{name}", "plate", [-0.06, 0.0, -0.2], plate))
+    parts.append("""<joint name="held" type="floating"><parent link="rod0a"/><child link="plate"/>
+        <origin xyz="-0.06 0 -0.2"/></joint>""")
+    entries = [{"type": "ball", "links": [one, other], "at": [a, b]} for one, other, a, b in loops]
+    joints = ["held", *(f"b{index}{side}" for index in range(3) for side in "ab")]
+    for name in joints:  # balls, which URDF has no word for
+        place = next(i for i, part in enumerate(parts) if f'name="{name}" type' in part)
+        parts[place] = parts[place].replace('"floating"', '"ball"')
+    return f'<robot name="delta">{"".join(parts)}</robot>', {"loops": entries, "actuated": ["q0", "q1", "q2"]}, loops
+
+
+def test_a_delta_with_balls_that_a_second_file_tells_of(tmp_path: Path) -> None:
+    """In the convention of Gepetto's examples: frames by name, joints that are something else than URDF can say."""
+    urdf, plain, loops = urdf_delta()
+    urdf = urdf.replace('type="ball"', 'type="continuous"')
+    frames = []
+    for number, (one, other, first, second) in enumerate(loops):
+        for side, (body, at) in (("A", (one, first)), ("B", (other, second))):
+            xyz = " ".join(repr(float(value)) for value in at)
+            urdf = urdf.replace(
+                "</robot>",
+                f"""<link name="f{number}{side}"/><joint name="loop{number}{side}" type="fixed"><parent link="{body}"/>
+                <child link="f{number}{side}"/><origin xyz="{xyz}"/></joint></robot>""",
+            )
+        frames.append([f"loop{number}A", f"f{number}B"])
+    balls = ["held", *(f"b{index}{side}" for index in range(3) for side in "ab")]
+    gepetto = {
+        "closed_loop": frames,
+        "type": ["3d"] * 5,
+        "name_mot": plain["actuated"],
+        "joint_name": balls,
+        "joint_type": ["SPHERICAL"] * 7,
+    }
+    found = from_urdf(urdf, yaml_file(tmp_path, gepetto), end_effector="plate", task=["x", "y", "z"], fixed=[])
+    assert found.gap == pytest.approx(0.004)
+    assert pf.mobility(found.mechanism).platform == 3
+    spec = urdf.replace('type="continuous"', 'type="spherical"')  # which MuJoCo's reader takes for a ball
+    model = in_mujoco(spec, loops)
+    agrees(found, model, "plate", [(0.1, -0.1, 0.2), (0.3, 0.25, 0.2), (-0.2, 0.1, 0.1)], tolerance=1e-11)
+
+
+def test_what_is_wrong_with_a_description_is_told_in_one_go() -> None:
+    wrong = URDF.replace('type="continuous"', 'type="contineous"', 1).replace(
+        '<child link="r1"/>', '<child link="r9"/>'
+    )
+    with pytest.raises(InvalidMechanism) as caught:
+        from_urdf(wrong.replace('xyz="-0.05 0 0"', 'xyz="-0.05 0"'))
+    for part in ("contineous", "r9", "'-0.05 0'"):
+        assert part in str(caught.value)
+    loops = {"loops": [{"links": ["l2", "r3"], "type": "bal"}, {"links": ["l2"], "at": 3}, 7], "actuated": []}
+    with pytest.raises(InvalidMechanism, match=r"loops\[2\]: found 7"):
+        from_urdf(URDF, loops)
+    with pytest.raises(InvalidMechanism) as caught:
+        from_urdf(URDF, {**loops, "loops": loops["loops"][:2]})
+    for part in ("'r3'", "'bal'", "loops[1].links", "loops[1].at"):
+        assert part in str(caught.value)
+    with pytest.raises(InvalidMechanism, match="unknown key"):
+        from_urdf(URDF, {"loop": []})
+
+
+def test_loops_that_cannot_close_are_refused_with_how_far_they_stay_open() -> None:
+    far = {**PLAIN, "loops": [{**PLAIN["loops"][0], "at": [[0.1, 0.1, 0], [-0.1, 3.0, 0]]}]}
+    with pytest.raises(InvalidMechanism, match=r"loop 'tip': found open by 2\.\d+ m"):
+        from_urdf(URDF, far, end_effector="l2")
+
+
+def test_an_open_machine_in_python_is_assembled_within_its_ranges() -> None:
+    joints = [
+        pf.Joint("A", "revolute", ("base", "a"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True),
+        pf.Joint("B", "revolute", ("base", "b"), at=(3, 0, 0), axis=(0, 0, 1), range=(0.1, 3)),
+        pf.Joint("C", "revolute", ("a", "rod"), at=(1, 0, 0), axis=(0, 0, 1)),
+    ]
+    points = [[3.5, 0.2, 0], [4.0, 0.0, 0]]
+    opened = OpenMechanism("four-bar", tuple(joints), (Loop("D", "spherical", ("rod", "b"), points),), "rod", (1, 0, 0))
+    found = assemble(opened)
+    assert found.gap == pytest.approx(np.hypot(0.5, 0.2))
+    assert found.mechanism.joint("A").home == 0.0
+    assert found.mechanism.joint("B").home >= 0.1 - 1e-9
+    assert pf.solve_fk(found.mechanism, [0.0])
+    with pytest.raises(InvalidArgument, match="points"):
+        Loop("D", "spherical", ("rod", "b"), [[0, 0, 0]])
+
+
+# Files that mean harm.
+
+BOMB = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;">]><mujoco>&b;</mujoco>'
+OUTSIDE = '<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot name="&e;"/>'
+
+
+@pytest.mark.parametrize("read", [from_mjcf, from_urdf])
+@pytest.mark.parametrize("text", [BOMB, OUTSIDE])
+def test_entities_are_refused_before_they_are_expanded(read, text: str) -> None:
+    with pytest.raises(InvalidMechanism, match="document type"):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<mujoco>" + "<body>" * 5000 + "</body>" * 5000 + "</mujoco>", "nested too deeply"),
+        ("<mujoco>" + " " * 11_000_000 + "</mujoco>", "more than 10000000 bytes"),
+        ("<mujoco><worldbody>", "no XML"),
+        ("<mujoco/>\0", "no XML"),
+        ("<robot/>", "expected <mujoco>"),
+        ("<mujoco><worldbody><body pos='a b c'/></worldbody></mujoco>", "what MuJoCo does not compile"),
+        ("<mujoco><worldbody><replicate count='1000000'><body/></replicate></worldbody></mujoco>", "1000000 copies"),
+        ("<mujoco><worldbody><flexcomp name='f' file='x.msh'/></worldbody></mujoco>", "flexible"),
+        ("<mujoco><include file='other.xml'/></mujoco>", "no folder"),
+    ],
+)
+def test_what_is_no_model_or_too_much_of_one_is_refused_with_a_sentence(text: str, said: str) -> None:
+    with pytest.raises(InvalidMechanism, match=said):
+        from_mjcf(text)
+
+
+def test_a_file_of_fifty_megabytes_is_refused_without_being_read(tmp_path: Path) -> None:
+    path = tmp_path / "large.xml"
+    with path.open("wb") as file:
+        file.truncate(50_000_000)
+    with pytest.raises(InvalidMechanism, match="more than 10000000 bytes"):
+        from_mjcf(path)
+
+
+def test_includes_stay_in_the_folder_and_end(tmp_path: Path) -> None:
+    folder = tmp_path / "robot"
+    (folder / "parts").mkdir(parents=True)
+    (tmp_path / "secret.xml").write_text("<mujoco/>")
+    (folder / "link.xml").symlink_to(tmp_path / "secret.xml")
+    arm = FIVE_BAR.strip().removeprefix('<mujoco model="five bar">').removesuffix("</mujoco>")
+    (folder / "parts" / "arm.xml").write_text(f"<mujocoinclude>{arm}</mujocoinclude>")
+    (folder / "scene.xml").write_text('<mujoco model="scene"><include file="parts/arm.xml"/></mujoco>')
+    assert from_mjcf(folder / "scene.xml", base="frame", end_effector="fore_left").mechanism.name == "scene"
+    for name, said in (
+        ("../secret.xml", "outside the folder"),
+        (str(tmp_path / "secret.xml"), "outside the folder"),
+        ("link.xml", "outside the folder"),
+        ("nothing.xml", "no such file"),
+        ("loop.xml", "includes itself"),
+    ):
+        (folder / "loop.xml").write_text(f'<mujoco><include file="{name}"/></mujoco>')
+        with pytest.raises(InvalidMechanism, match=said):
+            from_mjcf(folder / "loop.xml")
+
+
+def test_a_model_opens_no_file_but_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Meshes, textures, height fields and plugins are not even looked for."""
+    text = FIVE_BAR.replace(
+        '<material name="red"/>', '<hfield name="h" file="h.png"/><texture name="t" type="2d" file="t.png"/>'
+    )
+    path = tmp_path / "model.xml"
+    path.write_text(text)
+    opened: list[str] = []
+    whole = Path.open
+
+    def noted(self: Path, *args, **kwargs):
+        opened.append(self.name)
+        return whole(self, *args, **kwargs)
+
+    monkeypatch.setattr(Path, "open", noted)
+    from_mjcf(path, base="frame", end_effector="fore_left")
+    assert opened == ["model.xml"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a: &a [1]\nb: *a", "an alias"),
+        ("loops: [", "no YAML"),
+        ("!!python/object/apply:os.system ['true']", "no YAML"),
+        ("[" * 100_000, "nested too deeply"),
+        ("loops: 3", "a list"),
+        ("just words", "a table"),
+    ],
+)
+def test_a_hostile_second_file_is_refused_with_a_sentence(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "loops.yaml"
+    path.write_text(text)
+    with pytest.raises(InvalidMechanism, match=said):
+        from_urdf(URDF, path)
+
+
+# The command.
+
+
+def run(*words: str) -> tuple[int, str, str]:
+    result = CliRunner().invoke(main, list(words))
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_a_model_goes_through_the_command_to_answers_and_back(tmp_path: Path) -> None:
+    model, file, again = (tmp_path / name for name in ("model.xml", "machine.toml", "again.xml"))
+    model.write_text(FIVE_BAR)
+    words = ("--base", "frame", "--end-effector", "fore_left", "--task", "x,z", "--unit", "mm", "-o", str(file))
+    code, out, err = run("import", str(model), *words)
+    assert (code, out) == (0, "")
+    assert "note:" in err and "cable" in err
+    code, _, err = run("import", str(model), *words)
+    assert code == 2 and "--force" in err
+    assert run("check", str(file))[0] == 0
+    assert run("fk", str(file), "5", "-3")[0] == 0
+    code, out, _ = run("verify", str(file), "--with", "mujoco", "--poses", "3")
+    assert code == 0 and "agrees with MuJoCo on 3 poses" in out
+    assert run("export", str(file), "--mjcf", str(again))[0] == 0
+    assert verify(from_mjcf(again).mechanism, poses=2)
+    code, out, _ = run("verify", str(file), "--poses", "2", "--json")
+    assert json.loads(out)["agree"] is True
+
+
+def test_a_description_with_loops_goes_through_the_command(tmp_path: Path) -> None:
+    (tmp_path / "robot.urdf").write_text(URDF)
+    loops = str(yaml_file(tmp_path, PLAIN))
+    code, out, _ = run("import", str(tmp_path / "robot.urdf"), "--loops", loops, "--end-effector", "l2", "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert found["gap"] == pytest.approx(0.00403, abs=1e-5)
+    assert any("open by" in note["what"] for note in found["notes"])
+    assert "schema = 1" in found["file"]
+
+
+def test_the_command_says_what_is_wrong_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "robot.urdf").write_text(URDF)
+    (tmp_path / "model.xml").write_text(FIVE_BAR)
+    (tmp_path / "page.html").write_text("<html/>")
+    for words, said in (
+        (("import", str(tmp_path / "page.html")), "<mujoco> (MJCF) or <robot> (URDF)"),
+        (("import", str(tmp_path / "none.xml")), "no such file"),
+        (("import", str(tmp_path / "model.xml"), "--loops", "x.yaml"), "--loops"),
+        (("import", str(tmp_path / "robot.urdf"), "--configuration", "up"), "--configuration"),
+        (("check", str(tmp_path / "model.xml")), "pfabrik import"),
+        (("check", str(tmp_path / "robot.urdf")), "pfabrik import"),
+        (("export", "stewart"), "--mjcf FILE"),
+    ):
+        code, out, err = run(*words)
+        assert (code, out) == (2, "")
+        assert said in err and "Traceback" not in err
+
+
+def test_a_missing_library_is_told_with_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    from pfabrik import extras
+
+    monkeypatch.setattr(extras, "find_spec", lambda name: None)
+    for words in (("verify", "stewart"),):
+        code, _, err = run(*words)
+        assert code == 2 and "pip install 'pfabrik[mujoco]'" in err
