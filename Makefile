@@ -13,7 +13,7 @@ demo: $(READY)
 
 # In parallel: the kernels are compiled first, once, and every worker loads them. The routines that kernels are made of
 # are tested as plain Python: compiled alone, each would take longer than its tests.
-ROUTINES := tests/test_kernels.py tests/test_quadratic.py
+ROUTINES := tests/test_kernels.py tests/test_quadratic.py tests/test_platform_kernels.py
 
 test: $(STAMP)
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest $(ROUTINES)

@@ -1,0 +1,77 @@
+"""Derivatives in the platform's pose and the carriers' coordinates, next to differences; run with kernels as Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from conftest import INTERPRETED
+from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.kernels.legs import records as K
+from pfabrik.kernels.platform import equations as E
+from pfabrik.platform.table import kernel_table
+
+pytestmark = pytest.mark.skipif(not INTERPRETED, reason="routines are parts of compiled kernels")
+
+MACHINES = [name for name in pf.catalog() if isinstance(leg_table(pf.load(name)), LegTable)]
+STEP = 1e-6
+
+
+def moved(now: E.Now, unknown: int, step: float, columns: np.ndarray) -> E.Now:
+    """A configuration with one unknown changed: along an axis, about an axis, or of a carrier."""
+    pose, q = now.pose.copy(), now.q.copy()
+    if unknown < 3:
+        pose[unknown, 3] += step
+    elif unknown < 6:
+        pose[:3, :3] = Rotation.from_rotvec(step * np.eye(3)[unknown - 3]).as_matrix() @ pose[:3, :3]
+    else:
+        q[columns == unknown] += step
+    return E.Now(pose, q, now.sides)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: str) -> None:
+    """At any pose, on its legs or not; angles of two crossed hinges in a pivot only where it is kept, so not here."""
+    mechanism, rng = pf.load(name), np.random.default_rng(0)
+    described = leg_table(mechanism)
+    assert isinstance(described, LegTable)
+    table = kernel_table(described)
+    n, look = E.count_unknowns(table), E.new_view(table)
+    pivots = (table.legs["kind"] == K.PIVOT) & (table.legs["foot"] == K.CROSS)
+    told = [each for each in (*table.limited, *table.driven) if not pivots[each["leg"]] or each["place"] >= K.HEAD]
+
+    def values(now: E.Now) -> np.ndarray:
+        E.place(table, now, look)
+        return np.array(
+            [
+                *look.rows,
+                *(E.coordinate_slope(table, each, look) for each in told),
+                *(E.cone_slope(table, cone, look) for cone in table.cones),
+            ]
+        )
+
+    def slopes(measure: Callable[..., float], asked: list[np.void]) -> list[np.ndarray]:
+        found = []
+        for each in asked:
+            measure(table, each, look)
+            found.append(look.slope.copy())
+        return found
+
+    for _ in range(3):
+        now = E.new_now(len(table.legs))
+        now.sides[:], now.q[:] = described.home_sides[0], rng.uniform(-0.3, 0.3, len(table.legs))
+        now.pose[:] = pf.pose(
+            mechanism.home_pose[:3, 3] / mechanism.characteristic_length + rng.uniform(-0.1, 0.1, 3),
+            rotvec=rng.uniform(-0.2, 0.2, 3),
+        )
+        E.place(table, now, look)
+        E.put_slopes(table, look)
+        told_by = [*look.slopes.copy(), *slopes(E.coordinate_slope, told), *slopes(E.cone_slope, list(table.cones))]
+        for unknown in range(n):
+            ends = [values(moved(now, unknown, sign * STEP, table.columns)) for sign in (1.0, -1.0)]
+            difference = (ends[0] - ends[1]) / (2.0 * STEP)
+            np.testing.assert_allclose(np.array(told_by)[:, unknown], difference, atol=1e-7)
