@@ -257,7 +257,7 @@ def test_any_choice_of_parts_compiles_without_a_warning(parts: Any, tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("nrpm", "R*-P*-["), ("serial_arm", "R*-R*-P*-R*"), ("orthoglide", "P*-R-Pa-R")]
+    ("name", "said"), [("nrpm", "R*-P*-["), ("serial_arm", "R*-R*-P*-R*"), ("orthoglide", "A1, B1, CL1, DL1, E1")]
 )
 def test_chains_without_code_are_refused_by_name_and_nothing_is_written(name: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(UnsupportedMechanism) as caught:

@@ -15,6 +15,7 @@ from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.description.home_mobility import end_effector_freedom
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
+from pfabrik.feasibility import _Asked, feasibility_on_grid
 from pfabrik.kernels.legs.answer import measure_rows, read_coordinates
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
@@ -50,12 +51,27 @@ def poses_around_home(name: str, n: int, shift: float, turn: float, seed: int = 
     return poses
 
 
+def targets_around_home(name: str, n: int, shift: float, turn: float) -> np.ndarray:
+    """The same, of what a planar machine can do only that."""
+    poses, mechanism, own = poses_around_home(name, n, shift, turn), machine(name), table(name)
+    if own.task["unset"][0] or not own.task["rows"][0]:
+        return poses
+    slopes = constraints(name, mechanism.home_pose[None].copy())[1][0]
+    free = np.linalg.svd(slopes)[2][np.linalg.matrix_rank(slopes, tol=1e-6) :]
+    moves = np.random.default_rng(1).uniform(-1.0, 1.0, (n, len(free))) @ free
+    poses[:, :3, 3] = mechanism.home_pose[:3, 3] + shift * mechanism.characteristic_length * moves[:, :3]
+    poses[:, :3, :3] = np.eye(3)
+    if not mechanism.end_effector_is_joint:
+        poses[:, :3, :3] = Rotation.from_rotvec(turn * moves[:, 3:]).as_matrix()
+    return poses
+
+
 @lru_cache
 def both(name: str) -> tuple[np.ndarray, Any, Any]:
     """Targets in and out of reach, what legs alone reach of them, and what the engine behind answers."""
     engine = engine_of(machine(name))
     assert isinstance(engine, LegsEngine)
-    targets = poses_around_home(name, TARGETS, 0.25, 0.45)
+    targets = targets_around_home(name, TARGETS, 0.25, 0.45)
     rows = new_rows(machine(name), TARGETS)
     engine._reach(targets, None, engine._table.home_sides, False, rows)
     return targets, rows, engine._inner.answer(targets, None, Options(), keep_mode=False)
@@ -185,6 +201,22 @@ def test_an_answer_starts_the_next_one_as_its_joint_coordinates_do(name: str) ->
         before = found
 
 
+def test_a_slide_counts_as_its_joint_says_whichever_way_that_points() -> None:
+    joints = []
+    for place, joint in enumerate(machine("stewart").joints):
+        if joint.along is not None:
+            foot, head = (np.array(machine("stewart").joint(end).at) for end in joint.along)
+            axis = (head - foot) / np.linalg.norm(head - foot) * (1 if place % 2 else -1)
+            bodies = joint.connects if place % 4 < 2 else joint.connects[::-1]
+            joint = pf.Joint(joint.name, "prismatic", bodies, axis=axis, actuated=True, range=(-40.0, 40.0))
+        joints.append(joint)
+    mechanism = pf.Mechanism("slides both ways", joints, "platform", machine("stewart").reference_point)
+    assert isinstance(leg_table(mechanism), LegTable)
+    answers = pf.solve_ik(mechanism, poses_around_home("stewart", 20, 0.05, 0.1))
+    assert (answers.status == pf.Status.REACHED).all()
+    assert pf.closure_residual(answers).max() <= 1e-9 * mechanism.characteristic_length
+
+
 @pytest.mark.parametrize("name", ["nrpm", "serial_arm"])
 def test_a_chain_that_is_no_leg_is_named_with_the_reason(name: str) -> None:
     reason = leg_table(machine(name))
@@ -210,6 +242,31 @@ def test_feasibility_is_the_least_margin_and_tells_what_is_reached(name: str) ->
     for row in np.flatnonzero(reached)[:10]:
         named = pf.margins(answers[row])[found.limits[found.binding[row]]]
         assert named == pytest.approx(found.margin[row], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["stewart", "delta", "orthoglide"])
+def test_feasibility_on_a_grid_is_that_of_its_targets(name: str) -> None:
+    mechanism = machine(name)
+    begin, counts = mechanism.home_pose.copy(), (5, 4, 7)
+    steps = Rotation.from_rotvec([0.1, 0.2, 0.3]).as_matrix() * mechanism.characteristic_length * 0.2
+    begin[:3, 3] -= 2.0 * steps.sum(axis=0)
+    targets = np.tile(begin, (140, 1, 1))
+    targets[:, :3, 3] += np.stack(np.unravel_index(np.arange(140), counts), axis=1) @ steps
+    found, each = feasibility_on_grid(mechanism, begin, steps, counts), pf.feasibility(mechanism, targets)
+    assert found.margin.shape == counts
+    np.testing.assert_allclose(found.margin.ravel(), each.margin, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(found.margin.ravel() > 0.0, each.margin > 0.0)
+    assert 0 < (each.margin > 0.0).sum() < 140
+
+
+@pytest.mark.parametrize("name", ["stewart", "hexaglide", "delta", "rrr"])
+def test_blocks_measure_what_is_measured_one_by_one(name: str) -> None:
+    asked = _Asked(machine(name), None)
+    poses = targets_around_home(name, 200, 0.4, 0.8)
+    poses[7] = np.nan
+    (margins, _), (each, _) = asked.of_poses(poses), asked._one_by_one(poses)
+    np.testing.assert_allclose(margins, each, rtol=1e-9, atol=1e-9)
+    assert (each > 0.0).any() and (each < 0.0).any()
 
 
 def test_feasibility_of_one_target_is_a_number_and_of_no_pose_unknown() -> None:

@@ -20,6 +20,9 @@ from .track import track
 
 Step: TypeAlias = tuple[str, Callable[[], object]]
 
+NEAR = 0.01
+"""How far away from home a target is near, where what it leaves open may have to be completed [L or rad]."""
+
 FAR = 3.0
 """How far away from home a target is out of reach of any machine [L or rad]."""
 
@@ -50,12 +53,13 @@ def warm_up(mechanism: Mechanism | None = None, *, on_step: Callable[[str, float
 def _questions(mechanism: Mechanism) -> Iterator[Step]:
     """Questions to one machine, so chosen that whatever answers them is compiled."""
     home, shift = mechanism.home_pose, FAR * mechanism.characteristic_length
+    near = pose(home[:3, 3] + NEAR * np.array([3.0, 2.0, 1.0]) * mechanism.characteristic_length, rotvec=[NEAR] * 3)
     far = pose(home[:3, 3] + shift, rotvec=(FAR, 0.0, 0.0))
 
     def forward(change: float) -> Solution:
         return solve_fk(mechanism, solve_ik(mechanism, home).actuators + change)
 
-    yield "targets within reach", partial(solve_ik, mechanism, home)
+    yield "targets within reach", lambda: (solve_ik(mechanism, home), solve_ik(mechanism, near))
     yield "targets out of reach", partial(solve_ik, mechanism, far)
     yield "paths", partial(track, mechanism, np.stack([home, far]))
     yield "coordinates of all joints", lambda: solve_ik(mechanism, np.stack([home, far])).q

@@ -191,7 +191,7 @@ def why(chain: SubChain, mechanism: Mechanism) -> str:
     if legs_answer(mechanism):
         return f"closed forms; {engine_of(mechanism)} where they do not reach"
     for_all, no_legs = closure_reason(mechanism), leg_table(mechanism)
-    told = f"; no closed forms: {no_legs}" if for_all and isinstance(no_legs, str) else ""
+    told = f"; no closed forms: {no_legs}" if isinstance(no_legs, str) else ""
     if chain.reason is not None:
         return chain.reason + told
     return "positions alone express it" + (f", but {for_all}" if for_all else "") + told

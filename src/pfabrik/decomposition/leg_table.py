@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import accumulate
 
 import numpy as np
@@ -19,8 +19,8 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
-from .decompose import decompose, engine_of
-from .legs import Item, LegForm, NoLeg, Pivot, Rod, holds_spin, legs_of_chain
+from .decompose import decompose
+from .legs import Item, KeptAxis, LegForm, NoLeg, Pivot, Rod, holds_spin, legs_of_chain
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -66,6 +66,15 @@ class LegTable:
         """Which of two solutions each leg takes at home, (1, legs)."""
         return np.array(self.legs["side"], dtype=float)[None]
 
+    @cached_property
+    def is_for_blocks(self) -> bool:
+        """Whether blocks of poses serve: rods read from the base, of which no angle of crossed hinges is asked for."""
+        legs = self.legs
+        aimed = [(legs[f"{end}_aimed"] == 0) | (legs[end] == K.HINGE) for end in ("foot", "head")]
+        twists = (legs["twists"] == 0) | ((legs["foot"] == K.HINGE) & (legs["head"] == K.HINGE))
+        rods = (legs["kind"] == K.ROD) & (legs["reversed"] == 0)
+        return bool(np.all([rods, twists, *aimed]) and self.task["rotations"][0] != 2)
+
     def task_within(self, farthest: float) -> Records:
         """The task, with what it leaves open going no farther than that [L or rad]."""
         task = self.task.copy()
@@ -83,8 +92,8 @@ def leg_table(mechanism: Mechanism) -> LegTable | str:
 
 
 def legs_answer(mechanism: Mechanism) -> bool:
-    """Whether legs in closed form answer first: where they are faster than what would answer without them."""
-    return engine_of(mechanism) == "closure" and isinstance(leg_table(mechanism), LegTable)
+    """Whether legs in closed form answer first."""
+    return isinstance(leg_table(mechanism), LegTable)
 
 
 def _table(mechanism: Mechanism) -> LegTable:
@@ -103,6 +112,9 @@ def _table(mechanism: Mechanism) -> LegTable:
     driven["column"] = [drives[column] for column in driven["column"].tolist()]
     coned = [joint for joint in mechanism.joints if joint.cone is not None]
     cones = np.array([_cone(mechanism, forms, joint) for joint in coned], K.CONE)
+    by_leg = np.argsort(cones["leg"], kind="stable")
+    cones, coned = cones[by_leg], [coned[place] for place in by_leg]
+    cones["leader"] = np.argmax(cones["half_angle"] == cones["half_angle"][:, None], axis=1) if len(cones) else 0
     aimed = _aimed(legs, known)
     limits = [(joint.name, bound) for joint in joints if joint.range is not None for bound in ("min", "max")]
     limits += [(joint.name, "cone") for joint in coned]
@@ -150,6 +162,8 @@ def _require_all(mechanism: Mechanism, seen: set[tuple[str, int]]) -> None:
 
 def _places(form: LegForm) -> Iterator[tuple[Item, int]]:
     """Items whose coordinates a leg tells, each with its place in the leg's values."""
+    if isinstance(form, KeptAxis):
+        return
     if isinstance(form, Pivot):
         yield from ((item, K.HEAD + place) for place, item in enumerate(form.slides))
         if form.ending.kind != "ball":
@@ -164,6 +178,9 @@ def _places(form: LegForm) -> Iterator[tuple[Item, int]]:
     if holds_spin(form.head_ending):
         # as the body beyond sees the rod
         yield from ((item.back, K.HEAD + place) for place, item in enumerate(form.head_ending.items[::-1]))
+    if form.beside:
+        inner, outer = form.beside
+        yield from ((inner, K.FOOT + 1), (outer.back, K.HEAD + 1))
 
 
 def _coordinate(mechanism: Mechanism, leg: int, item: Item, place: int) -> tuple[float, ...]:
@@ -190,7 +207,9 @@ def _coordinate(mechanism: Mechanism, leg: int, item: Item, place: int) -> tuple
 
 
 def _record(mechanism: Mechanism, form: LegForm) -> Records:
-    return _rod_record(mechanism, form) if isinstance(form, Rod) else _pivot_record(mechanism, form)
+    if isinstance(form, Rod):
+        return _rod_record(mechanism, form)
+    return _pivot_record(mechanism, form) if isinstance(form, Pivot) else _kept_axis_record(form)
 
 
 def _head_point(mechanism: Mechanism, point: Floats, is_reversed: bool) -> Floats:
@@ -220,13 +239,26 @@ def _pivot_record(mechanism: Mechanism, pivot: Pivot) -> Records:
     directions = np.array([item.axis for item in pivot.slides]).reshape(-1, 3)
     record["slide_rows"][:n_slides] = np.linalg.pinv(directions.T) if n_slides else 0.0
     record["fixed_rows"][: 3 - n_slides] = np.linalg.svd(directions)[2][n_slides:] if n_slides else np.eye(3)
+    _put_axis_rows(record, kind, axes)
+    if kind == "triple":
+        record["side"] = _home_side(axes, axes[2])
+    return record
+
+
+def _kept_axis_record(form: KeptAxis) -> Records:
+    """A pivot that slides to all sides, and whose hinge is the axis."""
+    record = np.zeros((), K.LEG)
+    record["kind"], record["foot"], record["slides"] = K.PIVOT, K.HINGE, 3
+    record["foot_axes"][0] = form.ending.items[0].axis
+    _put_axis_rows(record, "hinge", record["foot_axes"])
+    return record
+
+
+def _put_axis_rows(record: Records, kind: str, axes: Floats) -> None:
     pairs = _axis_pairs(kind, axes)
     record["axis_rows"], record["upright"] = len(pairs), {"hinge": 1, "weld": 3}.get(kind, 0)
     for row, (kept, moved) in enumerate(pairs):
         record["kept"][row], record["moved"][row], record["value"][row] = kept, moved, kept @ moved
-    if kind == "triple":
-        record["side"] = _home_side(axes, axes[2])
-    return record
 
 
 def _axis_pairs(kind: str, axes: Floats) -> list[tuple[Floats, Floats]]:
@@ -258,7 +290,7 @@ def _rod_record(mechanism: Mechanism, rod: Rod) -> Records:
         record[end], record[f"{end}_axes"] = _ENDINGS[ending.kind], axes
         record[f"{end}_side"] = _home_side(axes, line) if ending.kind == "cross" else 0.0
     ends = (rod.foot_ending, rod.head_ending)
-    record["twists"] = all(map(holds_spin, ends)) and rod.twist is None
+    record["twists"] = all(map(holds_spin, ends)) and rod.twist is None and not rod.beside
     foot_mark, head_mark = rod.foot_ending.items[-1].axis, rod.head_ending.items[0].axis
     flat = foot_mark @ head_mark - (line @ foot_mark) * (line @ head_mark)
     record["twist"] = math.atan2(line @ np.cross(foot_mark, head_mark), flat)
@@ -292,7 +324,7 @@ def _cone(mechanism: Mechanism, forms: Sequence[LegForm], joint: Joint) -> tuple
     start, end = cone_line(mechanism, joint)
     length = mechanism.characteristic_length
     for leg, form in enumerate(forms):
-        if isinstance(form, Pivot):
+        if not isinstance(form, Rod):
             continue
         for place, ending, outer in ((K.FOOT_LINE, form.foot_ending, False), (K.HEAD_LINE, form.head_ending, True)):
             own = [item for item in ending.items if item.joint is joint]
@@ -309,7 +341,7 @@ def _cone(mechanism: Mechanism, forms: Sequence[LegForm], joint: Joint) -> tuple
             sense = math.copysign(1.0, (ends[1] - ends[0]) @ line)
             half_angle = joint.cone.half_angle
             least = math.cos(half_angle + TOLERANCES.limit)
-            return leg, place, tuple(sense * np.array(joint.cone.axis)), half_angle, least
+            return leg, place, tuple(sense * np.array(joint.cone.axis)), half_angle, least, 0
     raise NoLeg(reason)
 
 
@@ -319,8 +351,8 @@ def _task(mechanism: Mechanism, legs: Records) -> Records:
     task["reference"] = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
     task["axes"], task["rotations"] = asked.axes, asked.rotations
     task["unset"] = 0 if mechanism.end_effector_is_joint else 6 - sum(asked.axes) - asked.rotations
-    if mechanism.end_effector_is_joint:
-        task["rotations"] = 3
+    if mechanism.end_effector_is_joint:  # it has no orientation: home's
+        task["rotations"] = 0
     task["rows"], task["farthest"] = sum(_row_counts(legs)), COMPLETED_WITHIN
     return task
 

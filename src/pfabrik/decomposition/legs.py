@@ -7,7 +7,8 @@ With every joint as hinges (R), slides (P) and balls (S) in series, a chain is
 - a pivot: slides, then one ending of no length.
 
 Endings are a hinge, two that cross, three through one point, or a ball. Where a chain branches, its first branch places
-the carrier and the others are rods on it.
+the carrier and the others are rods on it. A pinned parallelogram between two parallel hinges is a rod between pairs of
+crossed hinges, and an axis that the platform keeps.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from ..description.home_mobility import universal_axes
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
-from .decompose import SubChain
+from .decompose import Part, Split, SubChain
 
 Floats = NDArray[np.float64]
 Kind = Literal["R", "P", "S"]
@@ -80,7 +81,14 @@ class Ending:
 
 @dataclass(frozen=True, eq=False)
 class Rod:
-    """A rod and what carries it; see above. `foot` and `head` are points at home [L]."""
+    """A rod and what carries it; see above.
+
+    Attributes
+    ----------
+    foot, head : its ends at home [L].
+    beside : of a parallelogram, the pins of the other rod: they turn as the last hinge at the foot does, and as the
+        first one at the head.
+    """
 
     carrier: Item | None
     foot_ending: Ending
@@ -91,6 +99,7 @@ class Rod:
     head: Floats
     is_reversed: bool
     is_shared: bool = False
+    beside: tuple[Item, ...] = ()
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -111,7 +120,19 @@ class Pivot:
         return (*self.slides, *self.ending.items)
 
 
-LegForm = Rod | Pivot
+@dataclass(frozen=True, eq=False)
+class KeptAxis:
+    """A direction that is the same on the base and on the platform: that of a hinge on the platform."""
+
+    ending: Ending
+    is_reversed: bool = False
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        return self.ending.items
+
+
+LegForm = Rod | Pivot | KeptAxis
 
 
 def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
@@ -125,7 +146,10 @@ def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
         raise NoLeg("has no joints")
     if chain.trunk:
         return _branched(mechanism, chain)
-    if not all(isinstance(part, Step) for part in chain.parts):
+    loops = [part for part in chain.parts if not isinstance(part, Step)]
+    if len(loops) == 1 and isinstance(loops[0], Split) and loops[0].parallelogram is not None:
+        return _with_parallelogram(mechanism, chain, loops[0])
+    if loops:
         raise NoLeg("has a loop of its own")
     return (_leg(_items(mechanism, chain.steps), most_carriers=1),)
 
@@ -139,6 +163,63 @@ def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
     main = _rod(trunk[0], first, is_reversed=False)
     rods = [_rod(None, other, is_reversed=False) for other in others]
     return (main, *(replace(rod, is_shared=True) for rod in rods))
+
+
+def _with_parallelogram(mechanism: Mechanism, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
+    """A pinned parallelogram between two parallel hinges: its outer body turns as its inner one does."""
+    if split.parallelogram is None or not split.parallelogram.pinned:
+        raise NoLeg("has a loop of its own")
+    place = chain.parts.index(split)
+    before, after = (_items(mechanism, _steps_of(parts)) for parts in (chain.parts[:place], chain.parts[place + 1 :]))
+    (inner, outer), (inner_beside, outer_beside) = (_items(mechanism, _steps_of(way)) for way in split.ways)
+    reasons = []
+    for is_reversed in (False, True):
+        if is_reversed:
+            before, after = [item.back for item in after[::-1]], [item.back for item in before[::-1]]
+            inner, outer, inner_beside, outer_beside = outer.back, inner.back, outer_beside.back, inner_beside.back
+        try:
+            rod = _parallelogram_rod(before, inner, outer, after, is_reversed)
+            beside = (_turned_as(inner, inner_beside), _turned_as(outer, outer_beside))
+            return replace(rod, beside=beside), KeptAxis(Ending("hinge", rod.head_ending.items[-1:], rod.head))
+        except NoLeg as reason:
+            reasons.append(str(reason))
+    raise NoLeg(reasons[0])
+
+
+def _steps_of(parts: Sequence[Part]) -> list[Step]:
+    return [step for part in parts for step in part.steps]
+
+
+def _turned_as(item: Item, other: Item) -> Item:
+    """The other of two parallel pins that turn together, counted as about the axis of the first."""
+    return _along(other, item.axis)
+
+
+def _parallelogram_rod(
+    before: Sequence[Item], inner: Item, outer: Item, after: Sequence[Item], is_reversed: bool
+) -> Rod:
+    """The rod that a parallelogram shifts its outer body by, from a hinge to a parallel one.
+
+    Parameters
+    ----------
+    before, after : what carries its inner body, and the platform on its outer one.
+    inner, outer : the pins of one of its rods.
+    """
+    *carriers, first = before or (inner,)
+    if len(after) != 1 or len(carriers) > 1 or {first.kind, after[0].kind} != {"R"} or not _parallel(first, after[0]):
+        raise NoLeg("a parallelogram that is not between two parallel hinges")
+    last, carrier = after[0], carriers[0] if carriers else None
+    if carrier is not None and carrier.kind == "R" and not _parallel(carrier, first):
+        raise NoLeg("a crank whose axis is not parallel to the hinges beside its parallelogram")
+    way = outer.point - inner.point
+    way = way - inner.axis * (inner.axis @ way)
+    if _area(last.point - way - first.point, first.axis) > TOLERANCES.implied:
+        raise NoLeg("a parallelogram that is not as long as the hinges beside it are apart")
+    foot = Ending("cross", (first, inner), first.point)
+    head = Ending("cross", (outer, last), first.point + way)
+    if _parallel(first, inner):
+        raise NoLeg("a parallelogram whose pins are parallel to the hinges beside it")
+    return _checked_rod(carrier, foot, (), head, is_reversed)
 
 
 def _items(mechanism: Mechanism, steps: Sequence[Step]) -> list[Item]:
@@ -269,7 +350,7 @@ def _checked_rod(carrier: Item | None, foot: Ending, middle: Sequence[Item], hea
     line /= np.linalg.norm(line)
     if any(item.kind == "S" or _area(item.axis, line) > TOLERANCES.implied for item in middle):
         raise NoLeg("a joint between the ends of its rod that is not along it")
-    slides, twists = ([item for item in middle if item.kind == kind] for kind in "PR")
+    slides, twists = ([_along(item, line) for item in middle if item.kind == kind] for kind in "PR")
     if len(slides) > 1 or len(twists) > 1:
         raise NoLeg("several joints along its rod")
     for ending, axes in ((foot, foot.items), (head, head.items[::-1])):
@@ -284,6 +365,11 @@ def _checked_rod(carrier: Item | None, foot: Ending, middle: Sequence[Item], hea
             raise NoLeg("a crank of no length")
     slide, twist = (found[0] if found else None for found in (slides, twists))
     return Rod(carrier, foot, slide, twist, head, start, end, is_reversed)
+
+
+def _along(item: Item, line: Floats) -> Item:
+    """The same slide or hinge, its axis in the direction of a line parallel to it."""
+    return item if item.axis @ line > 0.0 else replace(item, axis=-item.axis, sense=-item.sense)
 
 
 def _is_singular(axes: Sequence[Floats], line: Floats) -> bool:

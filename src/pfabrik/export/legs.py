@@ -87,6 +87,7 @@ def leg_codes(mechanism: Mechanism, forms: Sequence[LegForm]) -> list[LegCode]:
         if isinstance(form, Pivot):
             codes.append(_pivot(mechanism, form, place))
             continue
+        assert isinstance(form, Rod)
         main = main if form.is_shared else place
         first = forms[main]
         assert isinstance(first, Rod)

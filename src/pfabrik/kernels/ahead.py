@@ -16,7 +16,9 @@ from .closure.first_order import first_order
 from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Layout, Loops, PoseObjective
 from .legs import records as R
 from .legs.answer import answer, measure_rows, read_coordinates
+from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
+from .legs.maps import margins_in_blocks
 from .platform.forward import assemble
 from .platform.nearest import approach as approach_by_pose
 from .platform.nearest import judge, read_configurations
@@ -56,10 +58,12 @@ _KNOWN = np.zeros(0, R.COORDINATE)
 _TABLE = Table(_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("i1"))
 _STARTS = Starts(*_values("f3 f2 f2"))
 _POSE_OBJECTIVE = PoseObjective(*_values("f3 f1 i f f i"))
+_ANSWERS = (_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("f3 f3 f2 i1 f3 f2 f2"))
 
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
+    (answer_blocks, _ANSWERS),
+    (answer, _ANSWERS),
     (solve_directly, _ROWS),
-    (answer, (_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("f3 f3 f2 i1 f3 f2 f2"))),
     (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
     (solve_by_iteration, _ROWS),
     (approach, (_LOOPS, _LAYOUT, _POSE_OBJECTIVE, _CLOSED, np.zeros((0, 0)))),
@@ -74,6 +78,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (judge, (_TABLE, *_values("f3 f2 f2 f2 f2"))),
     (read_configurations, (_TABLE, _KNOWN, *_values("f3 f2 f2 f2"))),
     (assemble, (_TABLE, np.zeros((0, 0)), True, _STARTS, _STARTS, *_values("i1 f2"), _STARTS)),
+    (margins_in_blocks, (_LEGS, *_LIMITS, _TASK, *_values("f3 f2 i1 i f3 f2 f1 i1"))),
     (measure_rows, (_LEGS, _TASK, *_values("f3 f2 f2 f3"))),
 )
 """Every kernel with arguments of the types it takes, what most questions need first."""

@@ -27,12 +27,17 @@ class OneTarget:
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators = len(mechanism.actuator_names)
+        self._is_for_blocks = table.is_for_blocks
         machine = table.legs, table.limited, table.cones, table.driven
         self._anywhere, self._nearby = (*machine, table.task), (*machine, table.task_within(STRANGE))
         self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
+        if self._is_for_blocks:
+            from ..kernels.legs.blocks import answer_blocks
+
+            return answer_blocks
         from ..kernels.legs.answer import answer
 
         return answer
@@ -50,7 +55,7 @@ class OneTarget:
         )
 
     def reach(self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool) -> int:
-        """Answer a target (1, 4, 4) if legs on these sides (1, legs) reach it; 0 where they do.
+        """Answer a target (1, 4, 4) if legs on these sides (1, legs) reach it at once; 0 where they do.
 
         Parameters
         ----------

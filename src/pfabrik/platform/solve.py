@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +19,17 @@ from ..kernels.threads import in_blocks
 from ..options import Options
 from ..poses import are_poses
 from ..reaching.solve import ReachingEngine
+from ..tolerances import TOLERANCES
 from .coordinates import LegAnswers, settled, sides_at
 from .forward import assembled
 from .one import OneAssembly, OneTarget
 from .unreached import Question, answer_unreached
 
 Floats = NDArray[np.float64]
+Records = NDArray[np.void]
 
-ROWS_A_BLOCK = 1024
+ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
+"""Rows of one call of a kernel that answers one by one, or in blocks."""
 
 STEPS_A_REPORT = 16
 """Steps along a path between two reports of progress."""
@@ -37,7 +40,8 @@ class LegsEngine:
 
     The constraints that legs leave on the pose complete what the task leaves open. What they do not reach is answered
     in other working modes, then by the nearest feasible pose, by searches in the platform's pose; and what these leave,
-    near dead points above all, as if there were no closed forms.
+    near dead points above all, as if there were no closed forms. Where joint positions answer for the others, these
+    answer at once.
     """
 
     def __init__(self, table: LegTable, inner: ReachingEngine | ClosureEngine) -> None:
@@ -46,6 +50,11 @@ class LegsEngine:
         self._one_forward = OneAssembly(self.mechanism, table)
         driven = table.driven
         self._turning = driven[(driven["turns"] == 1) & (driven["hi"] - driven["lo"] > 2.0 * np.pi)]
+
+    @cached_property
+    def _searches(self) -> bool:
+        """Whether targets that legs do not reach are looked for in the platform's pose."""
+        return isinstance(self._inner, ClosureEngine) and not has_other_assemblies(self.mechanism)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -62,7 +71,7 @@ class LegsEngine:
         rows = new_rows(self.mechanism, len(targets))
         left = self._reach(targets, start, sides, keep_mode, rows)
         carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
-        if left and options.projection == "nearest" and not has_other_assemblies(self.mechanism):
+        if left and options.projection == "nearest" and self._searches:
             sides = np.array(np.broadcast_to(sides, (len(targets), sides.shape[1])))
             poses = self._one.home if start is None else start.rows.poses
             question = Question(self.mechanism, self._table, targets, poses, options, keep_mode)
@@ -101,7 +110,7 @@ class LegsEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        if not options.exact or options.projection != "nearest":
+        if options.projection != "nearest" or not self._searches:
             return self._inner.follow(targets, self._start(start), options, on_progress)
         targets, known = np.require(targets, requirements=["C", "W"]), are_poses(targets)
         found: list[Configurations] = []
@@ -203,11 +212,22 @@ class LegsEngine:
         self, targets: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: P.Rows
     ) -> int:
         """Answer the rows that legs reach; how many they do not."""
-        from ..kernels.legs.answer import answer
-
-        table = self._table
-        task = table.task_within(STRANGE) if keep_mode else table.task
         begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
+        task = self._table.task_within(STRANGE) if keep_mode else self._table.task
+        left = self._run(self._table.is_for_blocks, task, targets, begins, sides, rows)
+        if left and self._table.is_for_blocks and task["unset"][0]:
+            left -= self._complete(task, targets, begins, sides, rows)
+        if start is not None:
+            self._count_turns(start.rows.actuators, rows)
+        return left
+
+    def _run(self, by_blocks: bool, task: Records, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+        """Answer targets on all cores, in blocks of poses or one by one; how many are not reached."""
+        table = self._table
+        if by_blocks:
+            from ..kernels.legs.blocks import answer_blocks as answer
+        else:
+            from ..kernels.legs.answer import answer
 
         def run(block: slice) -> int:
             return answer(
@@ -225,10 +245,20 @@ class LegsEngine:
                 rows.measures[block],
             )
 
-        left = sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
-        if start is not None:
-            self._count_turns(start.rows.actuators, rows)
-        return left
+        return sum(in_blocks(run, len(targets), ROWS_A_RUN if by_blocks else ROWS_A_BLOCK))
+
+    def _complete(self, task: Records, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+        """Answer the rows that blocks left OPEN, whose poses are to be completed; how many of them are reached."""
+        from ..kernels.legs.blocks import OPEN
+
+        some = np.flatnonzero(rows.status == OPEN)
+        if not len(some):
+            return 0
+        own = rows_at(rows, some)
+        begins, sides = (array if len(array) == 1 else array[some] for array in (begins, sides))
+        left = self._run(False, task, targets[some], begins, sides, own)
+        put_rows(rows, some, own)
+        return len(some) - left
 
     def _count_turns(self, begin: Floats, rows: P.Rows) -> None:
         """Count the angles of actuators that may turn more than once from those of a start (n or 1, n_a)."""
@@ -242,12 +272,20 @@ class LegsEngine:
         return None if start is None else self._positioned(start)
 
     def _positioned(self, start: Configurations) -> Configurations:
-        """Configurations as the other engine starts from them: with the positions that it stores."""
+        """Configurations as the other engine starts from them: with the positions that it stores.
+
+        Where legs are as at home these follow from the pose; elsewhere all joints are worked out.
+        """
         if not isinstance(self._inner, ReachingEngine) or self._inner.stores(start):
             return start
-        found = self._inner.at(measured(self.mechanism, start.coordinates))
-        found.rows.status[:] = start.rows.status
-        return found
+        own = self._inner.directly(start.rows.poses)
+        off = np.abs(own.actuators - start.rows.actuators).max(axis=1, initial=0.0)
+        near = TOLERANCES.position * max(self.mechanism.characteristic_length, 1.0)
+        others = np.flatnonzero(~((own.status == P.REACHED) & (off <= near)))
+        if len(others):
+            put_rows(own, others, self._inner.at(measured(self.mechanism, start.coordinates[others])).rows)
+        rows = start.rows._replace(nodes=own.nodes, trunks=own.trunks)
+        return Configurations(rows, start.coordinates if start.were_given else lambda: start.coordinates)
 
 
 def _part(array: Floats, block: slice) -> Floats:

@@ -124,6 +124,15 @@ class ReachingEngine:
         positions_of(self.mechanism, self._compiled, closing.coordinates, rows)
         return Configurations(rows, closing.coordinates)
 
+    def directly(self, poses: Floats) -> P.Rows:
+        """Platforms at poses (n, 4, 4), with home's working modes; PENDING where closed forms do not reach."""
+        from ..kernels.reaching.solve import solve_directly
+
+        rows = self._new_rows(len(poses))
+        settings = settings_of(self.mechanism, Options(), keep_mode=True)
+        solve_directly(self._compiled.plan, np.ascontiguousarray(poses), self._compiled.home_seed, settings, rows)
+        return rows
+
     def stores(self, found: Configurations) -> bool:
         """Whether configurations hold the positions that this engine starts from."""
         own = self._new_rows(0)

@@ -25,7 +25,7 @@ MOST_STEPS = 8
 # Longest step [L or rad]: beyond, derivatives tell little.
 LONGEST_STEP = 0.5
 # Deviation from an orthonormal matrix up to which a target is a pose, and from which on it is not made one.
-NOT_A_ROTATION, ROUNDED = 1e-6, 1e-15
+NOT_A_ROTATION, ROUNDED = 1e-6, 1e-14
 # Excess up to which a limit counts as kept [L or rad].
 KEPT = 1e-9
 
@@ -75,9 +75,8 @@ def put_rows(legs: Records, frames: Floats, values: Floats, lines: Floats, rows:
             rod_rows(leg, legs[main], frames[leg["reversed"]], values[main], values[k], lines[k], rows)
     worst = 0.0
     for i in range(rows.shape[0]):
-        if not abs(rows[i]) <= worst:
-            worst = abs(rows[i])
-    return worst if worst == worst else math.inf
+        worst = max(worst, abs(rows[i])) if abs(rows[i]) < math.inf else math.inf
+    return worst
 
 
 @routine

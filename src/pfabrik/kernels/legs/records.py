@@ -82,8 +82,16 @@ COORDINATE = np.dtype(
     ]
 )
 
-CONE = np.dtype([("leg", "i8"), ("place", "i8"), ("axis", *_vector), ("half_angle", "f8"), ("least_cosine", "f8")])
-"""`axis` as seen by the body, toward the head; `least_cosine` is that of the half angle and its tolerance."""
+CONE = np.dtype(
+    [
+        ("leg", "i8"),
+        ("place", "i8"),
+        ("axis", *_vector),  # as seen by the body, toward the head
+        ("half_angle", "f8"),
+        ("least_cosine", "f8"),  # of the half angle and its tolerance
+        ("leader", "i8"),  # the first of the cones that have the same half angle
+    ]
+)
 
 TASK = np.dtype(
     [

@@ -1,0 +1,358 @@
+"""Poses answered in blocks by rods in closed form: what their limits, drivers and constraints need, and no more."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._jit import inlined, kernel, routine
+from ..vectors import ON_BOUND, Vec, add, along, cross, dot, scale, sub, vec, wrap
+from .answer import CLOSE, CLOSED, KEPT, PENDING, REACHED
+from .columns import (
+    AX,
+    AY,
+    AZ,
+    BLOCK,
+    BX,
+    BY,
+    BZ,
+    COS,
+    EXCESS,
+    INVERSE,
+    IS_SURE,
+    LENGTH,
+    MORE,
+    PX,
+    ROW,
+    SIDE,
+    SIN,
+    VALUE,
+    VALUES,
+    XX,
+    YY,
+    ZZ,
+    X,
+    Y,
+    Z,
+    arctangent,
+    lay_along,
+    lay_carried,
+    lay_moved,
+    lay_out,
+    lay_turned,
+)
+from .endings import SURE
+from .records import (
+    CARRIAGE,
+    CARRIER,
+    CRANK,
+    FOOT,
+    FOOT_LINE,
+    HEAD,
+    HINGE,
+    NO_CARRIER,
+    SHARED,
+    SLIDE,
+    Floats,
+    Record,
+    Records,
+)
+
+# Status of a row that is a pose and within reach, but does not close before what its target leaves open is completed.
+OPEN = 8
+TURN = 2.0 * math.pi
+
+
+@routine
+def lay_rod(rod: Record, carrier: Record, n: int, S: Floats) -> None:
+    """Columns of a rod: its line, its values, and what its constraints add to ROW.
+
+    Parameters
+    ----------
+    carrier : the rod whose carrier it is on, laid before; itself if it shares none.
+    """
+    head, point = vec(rod["head_point"]), vec(carrier["carrier_point"])
+    if carrier["carrier"] == CRANK:
+        axis, arm = vec(carrier["carrier_axis"]), sub(vec(rod["foot_point"]), point)
+        rest = scale(dot(axis, arm), axis)
+        lay_moved(head, add(point, rest), n, S)
+        if rod["carrier"] == CRANK:
+            lay_crank(rod, n, S)
+        leave_arm(sub(arm, rest), cross(axis, arm), n, S)
+    else:
+        lay_moved(head, vec(rod["foot_point"]), n, S)
+        if rod["carrier"] == CARRIAGE:
+            lay_carriage(rod, n, S)
+        if carrier["carrier"] == CARRIAGE:
+            leave_slide(vec(carrier["carrier_axis"]), n, S)
+    lay_length(rod["length"], n, S)
+    if rod["slides"] == 0 and (rod["carrier"] == NO_CARRIER or rod["carrier"] == SHARED):
+        note_row(VALUES + SLIDE, n, S)
+    lay_hinges(rod, carrier, n, S)
+
+
+@routine
+def lay_crank(rod: Record, n: int, S: Floats) -> None:
+    """Turn a crank until its rod reaches the head; see `rods.carry`."""
+    spoke, across = vec(rod["spoke"]), vec(rod["spoke_across"])
+    more = dot(spoke, spoke) - rod["length"] * rod["length"]
+    for i in range(n):
+        x, y, z = S[X, i], S[Y, i], S[Z, i]
+        A = spoke[0] * x + spoke[1] * y + spoke[2] * z
+        B = across[0] * x + across[1] * y + across[2] * z
+        C = 0.5 * (x * x + y * y + z * z + more)
+        square = A * A + B * B
+        rest = square - C * C
+        farthest = math.sqrt(square)
+        C = farthest if farthest < C else (-farthest if -farthest > C else C)
+        root, inverse = S[SIDE, i] * math.sqrt(rest if rest > 0.0 else 0.0), 1.0 / square
+        cosine, sine = (A * C - B * root) * inverse, (B * C + A * root) * inverse
+        S[IS_SURE, i] = S[IS_SURE, i] if rest > SURE * SURE * square else 0.0
+        S[COS, i], S[SIN, i] = cosine, sine
+        S[VALUES + CARRIER, i] = arctangent(sine, cosine)
+
+
+@routine
+def leave_arm(plain: Vec, across: Vec, n: int, S: Floats) -> None:
+    """Take the arm of a crank, as it has turned, from the line."""
+    for i in range(n):
+        cosine, sine = S[COS, i], S[SIN, i]
+        S[X, i] -= cosine * plain[0] + sine * across[0]
+        S[Y, i] -= cosine * plain[1] + sine * across[1]
+        S[Z, i] -= cosine * plain[2] + sine * across[2]
+
+
+@routine
+def lay_carriage(rod: Record, n: int, S: Floats) -> None:
+    """Move a carriage until its rod reaches the head; see `rods.carry`."""
+    axis, square = vec(rod["carrier_axis"]), rod["length"] * rod["length"]
+    for i in range(n):
+        x, y, z = S[X, i], S[Y, i], S[Z, i]
+        middle = x * axis[0] + y * axis[1] + z * axis[2]
+        rest = square - (x * x + y * y + z * z) + middle * middle
+        S[IS_SURE, i] = S[IS_SURE, i] if rest > SURE * SURE * square else 0.0
+        S[VALUES + CARRIER, i] = middle + S[SIDE, i] * math.sqrt(rest if rest > 0.0 else 0.0)
+
+
+@routine
+def leave_slide(axis: Vec, n: int, S: Floats) -> None:
+    """Take the way of a carriage from the line."""
+    for i in range(n):
+        way = S[VALUES + CARRIER, i]
+        S[X, i] -= way * axis[0]
+        S[Y, i] -= way * axis[1]
+        S[Z, i] -= way * axis[2]
+
+
+@routine
+def lay_length(length: float, n: int, S: Floats) -> None:
+    for i in range(n):
+        present = math.sqrt(S[X, i] * S[X, i] + S[Y, i] * S[Y, i] + S[Z, i] * S[Z, i])
+        S[LENGTH, i], S[INVERSE, i] = present, 1.0 / present
+        S[VALUES + SLIDE, i] = present - length
+
+
+@routine
+def lay_hinges(rod: Record, carrier: Record, n: int, S: Floats) -> None:
+    """Constraints and angles of single hinges at the ends of a rod, and that they do not twist."""
+    foot, head, home = vec(rod["foot_axes"][0]), vec(rod["head_axes"][0]), vec(rod["line"])
+    if rod["foot"] == HINGE:
+        lay_carried(foot, carrier, n, S)
+        lay_along(VALUE, n, S)
+        note_row(VALUE, n, S)
+        if rod["twists"] == 1:
+            for i in range(n):
+                S[BX, i], S[BY, i], S[BZ, i] = S[AX, i], S[AY, i], S[AZ, i]
+    if rod["head"] == HINGE:
+        lay_turned(head, n, S)
+        lay_along(VALUE, n, S)
+        note_row(VALUE, n, S)
+    if rod["twists"] == 1:
+        lay_twist(rod["twist"], n, S)
+        note_row(VALUE, n, S)
+    if rod["foot_aimed"] == 1:
+        lay_carried(cross(foot, home), carrier, n, S)
+        lay_along(VALUE, n, S)
+        lay_carried(along(home, -dot(foot, home), foot), carrier, n, S)
+        lay_angle(VALUES + FOOT, n, S)
+    if rod["head_aimed"] == 1:
+        lay_turned(cross(head, home), n, S)
+        lay_along(VALUE, n, S)
+        lay_turned(along(home, -dot(head, home), head), n, S)
+        lay_angle(VALUES + HEAD, n, S)
+
+
+@routine
+def lay_angle(to: int, n: int, S: Floats) -> None:
+    """An angle whose sine goes as VALUE, and its cosine as the line along AX, AY, AZ."""
+    for i in range(n):
+        cosine = S[AX, i] * S[X, i] + S[AY, i] * S[Y, i] + S[AZ, i] * S[Z, i]
+        S[to, i] = arctangent(S[VALUE, i], cosine)
+
+
+@routine
+def lay_twist(home: float, n: int, S: Floats) -> None:
+    """Fill VALUE with the angle about the line from BX, BY, BZ to AX, AY, AZ, less home's."""
+    for i in range(n):
+        scaled = S[INVERSE, i]
+        u, v, w = scaled * S[X, i], scaled * S[Y, i], scaled * S[Z, i]
+        a, b, c = S[AX, i], S[AY, i], S[AZ, i]
+        d, e, f = S[BX, i], S[BY, i], S[BZ, i]
+        sine = u * (e * c - f * b) + v * (f * a - d * c) + w * (d * b - e * a)
+        cosine = d * a + e * b + f * c - (u * d + v * e + w * f) * (u * a + v * b + w * c)
+        S[VALUE, i] = turned_into(arctangent(sine, cosine) - home, -0.5 * TURN, 0.5 * TURN)
+
+
+@routine
+def note_row(column: int, n: int, S: Floats) -> None:
+    """A constraint: ROW is the largest, infinite where one is not a number."""
+    for i in range(n):
+        size = abs(S[column, i])
+        size = size if size < math.inf else math.inf
+        S[ROW, i] = size if size > S[ROW, i] else S[ROW, i]
+
+
+@routine
+def lay_deviation(coordinate: Record, to: int, n: int, S: Floats) -> None:
+    """Fill a column with a coordinate's deviation from home; see `answer.deviation`."""
+    sense, place = coordinate["sense"], VALUES + coordinate["place"]
+    more, below, above = 0.0, -math.inf, math.inf
+    if coordinate["turns"] == 1:
+        lo, hi = coordinate["lo"], coordinate["hi"]
+        middle = 0.5 * (lo + hi)
+        below, above = lo - ON_BOUND, hi + ON_BOUND
+        if hi - lo <= TURN:
+            more, below, above = middle - wrap(middle, 0.0), middle - 0.5 * TURN, middle + 0.5 * TURN
+    for i in range(n):
+        S[to, i] = turned_into(sense * S[place, i] + more, below, above)
+
+
+@inlined
+def turned_into(angle: float, below: float, above: float) -> float:
+    """An angle less than a turn beyond either of two bounds, counted into them."""
+    return angle - TURN if angle > above else (angle + TURN if angle < below else angle)
+
+
+@routine
+def note_range(coordinate: Record, n: int, S: Floats) -> None:
+    """The excess of a coordinate over its range."""
+    lo, hi = coordinate["lo"], coordinate["hi"]
+    lay_deviation(coordinate, VALUE, n, S)
+    for i in range(n):
+        below, above = lo - S[VALUE, i], S[VALUE, i] - hi
+        excess = below if below > above else above
+        excess = excess if excess < math.inf else math.inf
+        S[EXCESS, i] = excess if excess > S[EXCESS, i] else S[EXCESS, i]
+
+
+@routine
+def lay_cone_axis(cone: Record, carrier: Record, n: int, S: Floats) -> None:
+    if cone["place"] == FOOT_LINE:
+        lay_carried(vec(cone["axis"]), carrier, n, S)
+    else:
+        lay_turned(vec(cone["axis"]), n, S)
+
+
+@routine
+def note_cone(cone: Record, carrier: Record, n: int, S: Floats) -> None:
+    """The excess of a rod over a cone at one of its ends: only that it is more than is kept."""
+    least = cone["least_cosine"]
+    lay_cone_axis(cone, carrier, n, S)
+    for i in range(n):
+        cosine = (S[AX, i] * S[X, i] + S[AY, i] * S[Y, i] + S[AZ, i] * S[Z, i]) * S[INVERSE, i]
+        excess = -math.inf if cosine >= least else 2.0 * KEPT
+        S[EXCESS, i] = excess if excess > S[EXCESS, i] else S[EXCESS, i]
+
+
+@kernel
+def answer_blocks(
+    legs: Records,
+    limited: Records,
+    cones: Records,
+    driven: Records,
+    task: Records,
+    targets: Floats,
+    begins: Floats,
+    sides: Floats,
+    status: NDArray[np.int64],
+    poses: Floats,
+    actuators: Floats,
+    measures: Floats,
+) -> int:
+    """Answer as `answer.answer` does where all legs are rods that blocks serve; how many targets are not reached.
+
+    Those that close once what they leave open is completed may be reached too: they are OPEN, the others PENDING.
+    """
+    S, pose, left = np.empty((MORE + driven.shape[0], BLOCK)), np.zeros((4, 4)), 0
+    for first in range(0, targets.shape[0], BLOCK):
+        n = min(BLOCK, targets.shape[0] - first)
+        lay_out(targets, begins, task[0], first, n, pose, S)
+        main, a, b, c = 0, 0, 0, 0
+        for k in range(legs.shape[0]):
+            if legs[k]["carrier"] != SHARED:
+                main = k
+            if legs[k]["carrier"] == CRANK or legs[k]["carrier"] == CARRIAGE:
+                lay_sides(sides, k, first, n, S)
+            lay_rod(legs[k], legs[main], n, S)
+            while a < limited.shape[0] and limited[a]["leg"] == k:
+                note_range(limited[a], n, S)
+                a += 1
+            while b < cones.shape[0] and cones[b]["leg"] == k:
+                note_cone(cones[b], legs[main], n, S)
+                b += 1
+            while c < driven.shape[0] and driven[c]["leg"] == k:
+                lay_deviation(driven[c], MORE + c, n, S)
+                c += 1
+        left += write_status(task[0], first, n, S, status, measures)
+        write_poses(targets, task[0], first, n, S, poses)
+        for c in range(driven.shape[0]):
+            write_actuator(driven[c], MORE + c, first, n, S, actuators)
+    return left
+
+
+@routine
+def lay_sides(sides: Floats, k: int, first: int, n: int, S: Floats) -> None:
+    for i in range(n):
+        S[SIDE, i] = sides[first + i if sides.shape[0] > 1 else 0, k]
+
+
+@routine
+def write_status(task: Record, first: int, n: int, S: Floats, status: NDArray[np.int64], measures: Floats) -> int:
+    """Write which rows are reached, and what is measured of them; how many are not."""
+    length, enough, left = task["length"], CLOSED if task["unset"] > 0 else CLOSE, 0
+    for i in range(n):
+        is_closed = S[ROW, i] <= enough
+        is_reached = (S[IS_SURE, i] == 1.0) & is_closed & (S[EXCESS, i] <= KEPT)
+        is_open = (S[IS_SURE, i] == 1.0) & (not is_closed) & (task["unset"] > 0)
+        status[first + i] = REACHED if is_reached else (OPEN if is_open else PENDING)
+        left += 0 if is_reached else 1
+        measures[first + i, 2], measures[first + i, 3] = S[ROW, i] * length, max(S[EXCESS, i], 0.0)
+    return left
+
+
+@routine
+def write_poses(targets: Floats, task: Record, first: int, n: int, S: Floats, poses: Floats) -> None:
+    """Write poses: what targets set as they have it, unless it had to be made orthonormal."""
+    length, is_set = task["length"], task["rotations"] == 3
+    for i in range(n):
+        target, pose = targets[first + i], poses[first + i]
+        for j in range(4):
+            for k in range(4):
+                pose[j, k] = target[j, k]
+        if not is_set or S[XX, i] != target[0, 0] or S[YY, i] != target[1, 1] or S[ZZ, i] != target[2, 2]:
+            for j in range(9):
+                pose[j // 3, j % 3] = S[XX + j, i]
+    for j in range(3):
+        if task["axes"][j] == 0:
+            for i in range(n):
+                poses[first + i, j, 3] = S[PX + j, i] * length
+
+
+@routine
+def write_actuator(driven: Record, column: int, first: int, n: int, S: Floats, actuators: Floats) -> None:
+    """Write the values of an actuator, of which the column has the deviations from home."""
+    to, home, unit = driven["column"], driven["home"], driven["unit"]
+    for i in range(n):
+        actuators[first + i, to] = home + S[column, i] * unit
