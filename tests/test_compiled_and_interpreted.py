@@ -242,7 +242,7 @@ def test_a_kernel_compiled_from_other_sources_is_not_taken_from_the_cache(
 ) -> None:
     """An edit in `vectors.py` makes what was compiled from `caller.py`, which has not changed, stale."""
     caller = copies / "caller.py"
-    caller.write_text("def double(x):\n    return 2.0 * x\n")
+    caller.write_text("def double(x):\n    return 2.0 * x\n\n\ndef norm(x):\n    from .vectors import norm\n")
     monkeypatch.setenv("NUMBA_CACHE_DIR", "")
     kernels = []  # all kept: a module that cannot be imported by name is found only while one of them lives
     for _ in range(2):

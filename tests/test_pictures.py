@@ -6,6 +6,7 @@ import itertools
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -308,8 +309,9 @@ def test_a_film_of_another_kind_is_refused(tmp_path: Path) -> None:
 
 
 def test_mp4_needs_a_program_that_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pfabrik.view.animation.shutil.which", lambda _: None)
-    monkeypatch.setattr("pfabrik.view.animation._own_ffmpeg", lambda: None)
+    animation = import_module("pfabrik.view.animation")  # `pfabrik.view` is a function
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    monkeypatch.setattr(animation, "_own_ffmpeg", lambda: None)
     with pytest.raises(MissingLibrary, match=r"need the program ffmpeg; install it with: .*apt"):
         pf.animate(circle_of(pf.load("five_bar"), 10.0, 3), tmp_path / "film.mp4")
 

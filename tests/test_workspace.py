@@ -139,7 +139,8 @@ def test_vertices_are_on_the_limits_they_name(name: str) -> None:
     assert (
         np.mean(told.margin[np.isin(bounds, ["min", "max", "cone"])] < 0.01) > 0.99
     )  # beside where a leg just reaches
-    assert np.mean(told.binding == found.vertex_limit) > 0.98  # at edges the limit beyond is another
+    # at edges the limit beyond is another, and the two rods of a pair meet theirs at once
+    assert np.mean(told.binding == found.vertex_limit) > (0.9 if name == "delta" else 0.98)
     assert {found.limits[limit] for limit in found.face_limit.tolist()} == set(found.shares)
     assert sum(found.shares.values()) == pytest.approx(1.0)
 

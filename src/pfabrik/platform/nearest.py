@@ -192,7 +192,7 @@ def _constraints(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
 
     n_rows = table.task[0]["rows"]
     rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6))
-    measure_rows(table.legs, table.task, poses, table.home_sides, rows, slopes)
+    measure_rows(table.legs, table.task, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
     return rows, slopes
 
 

@@ -63,7 +63,10 @@ def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, 
     own = starts_at(mechanism, table, begins[places % len(begins)], sides[places])
     ways = ways_of(mechanism, options.hold, options.rotation_length)
     found, holds = project(mechanism, table, within_sight(mechanism, wanted), own, ways, corners=not keep_mode)
-    placed = np.flatnonzero(np.isfinite(found.distances))
+    is_placed = np.isfinite(found.distances)
+    if keep_mode:  # through a dead point lies another working mode
+        is_placed &= ~(found.sides * own.sides < 0.0).any(axis=1)
+    placed = np.flatnonzero(is_placed)
     found, rest, wanted = Found._make(array[placed] for array in found), rest[placed], wanted[placed]
     sides[rest], carriers[rest] = found.sides, found.q
     _put_projected(question, rest, wanted, found, holds[placed], rows)
