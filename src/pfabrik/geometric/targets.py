@@ -103,15 +103,14 @@ def is_pose(T: Floats) -> bool:
 
 @routine
 def rectify(i: int, table: Floats) -> None:
-    """Make the rotation of column `i` orthonormal, its x axis first."""
-    xx, yx, zx = table[0, i], table[4, i], table[8, i]
-    size = math.sqrt(xx * xx + yx * yx + zx * zx)
-    xx, yx, zx = xx / size, yx / size, zx / size
-    xy, yy, zy = table[1, i], table[5, i], table[9, i]
-    shared = xx * xy + yx * yy + zx * zy
-    xy, yy, zy = xy - shared * xx, yy - shared * yx, zy - shared * zx
-    size = math.sqrt(xy * xy + yy * yy + zy * zy)
-    xy, yy, zy = xy / size, yy / size, zy / size
-    table[0, i], table[1, i], table[2, i] = xx, xy, yx * zy - zx * yy
-    table[4, i], table[5, i], table[6, i] = yx, yy, zx * xy - xx * zy
-    table[8, i], table[9, i], table[10, i] = zx, zy, xx * yy - yx * xy
+    """Make the rotation of column `i` the nearest that is orthonormal: two steps of R <- R (3 - R^T R) / 2."""
+    for _ in range(2):
+        xx, yx, zx = table[0, i], table[4, i], table[8, i]
+        xy, yy, zy = table[1, i], table[5, i], table[9, i]
+        xz, yz, zz = table[2, i], table[6, i], table[10, i]
+        a, b, c = xx * xx + yx * yx + zx * zx, xy * xy + yy * yy + zy * zy, xz * xz + yz * yz + zz * zz
+        d, e, f = xx * xy + yx * yy + zx * zy, xy * xz + yy * yz + zy * zz, xz * xx + yz * yx + zz * zx
+        for place, x, y, z in ((0, xx, xy, xz), (4, yx, yy, yz), (8, zx, zy, zz)):
+            table[place, i] = 0.5 * (x * (3.0 - a) - y * d - z * f)
+            table[place + 1, i] = 0.5 * (y * (3.0 - b) - x * d - z * e)
+            table[place + 2, i] = 0.5 * (z * (3.0 - c) - x * f - y * e)

@@ -77,14 +77,18 @@ def _project(
     ended = nearest_actuators(mechanism, table, values[places], first, corners=anywhere)
     near = np.flatnonzero(np.isfinite(ended.distances))
     ended, places = Found._make(array[near] for array in ended), places[near]
-    actuators, measures = rows.actuators[places], rows.measures[places]
+    asked, measures = rows.actuators[places], rows.measures[places]
+    actuators = asked.copy()
     judge(kernel_table(table), ended.poses, ended.q, ended.sides, actuators, measures)
     for driven in table.driven:
         column = driven["column"]
-        off = (actuators[:, column] - driven["home"]) / driven["unit"] - values[places, column]
+        now = actuators[:, column]  # a view
         if driven["turns"] == 1 and driven["hi"] - driven["lo"] > 2.0 * np.pi:
-            off = np.remainder(off + np.pi, 2.0 * np.pi) - np.pi
-        measures[:, P.ACTUATOR_ERROR] = np.maximum(measures[:, P.ACTUATOR_ERROR], np.abs(off))
+            counted = now + 2.0 * np.pi * np.round((asked[:, column] - now) / (2.0 * np.pi))
+            inside = (counted >= driven["home"] + driven["lo"]) & (counted <= driven["home"] + driven["hi"])
+            now[:] = np.where(inside, counted, now)
+        off = np.abs(now - asked[:, column]) / driven["unit"]
+        measures[:, P.ACTUATOR_ERROR] = np.maximum(measures[:, P.ACTUATOR_ERROR], off)
     rows.actuators[places], rows.measures[places] = actuators, measures
     rows.status[places] = P.PROJECTED
     rows.counters[places, P.ITERATIONS] = ended.steps

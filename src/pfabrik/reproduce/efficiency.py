@@ -20,7 +20,7 @@ from ..ik import solve_ik
 from ..kernels.reaching.plan import Rows, Seeds
 from ..options import Options
 from ..poses import pose
-from ..reaching.solve import settings_of
+from ..reaching.solve import ReachingEngine, settings_of
 from .checking import Feasibility, feasibility
 from .efficacy import rms
 from .one_by_one import closed_form_one_by_one, p_fabrik_one_by_one
@@ -176,7 +176,8 @@ def _single(
     seeds = compiled.home_seed
     rows = new_rows(mechanism, len(targets), seeds.nodes.shape[1], seeds.trunks.shape[1])
     if warm:
-        seeds = _answers_before(compiled, solve_ik(mechanism, targets, options=options)._rows)
+        answers = ReachingEngine(mechanism).answer(targets, None, options, keep_mode=False)
+        seeds = _answers_before(compiled, answers.rows)
     return lambda: p_fabrik_one_by_one(compiled.plan, targets, seeds, settings, rows)
 
 
