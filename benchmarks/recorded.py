@@ -127,6 +127,9 @@ def main() -> int:
     worse = 0
     for name in arguments.only or pf.catalog():
         mechanism = pf.load(name)
+        if arguments.what == "compare" and f"{name}/targets" not in recorded:
+            print(f"{name:16s} not recorded")
+            continue
         began = time.perf_counter()
         targets = targets_of(mechanism) if arguments.what == "record" else recorded[f"{name}/targets"]
         now = answers(mechanism, targets)
