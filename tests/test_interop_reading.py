@@ -308,7 +308,7 @@ def test_the_head_answers_exactly_where_its_makers_kinematics_do() -> None:
     assert 1000 < answered.sum() < 1500
     apart = np.abs(np.angle(np.exp(1j * (angles - ours.actuators))))[answered].max(axis=1)
     assert np.sort(apart)[-2] <= 1e-11  # rad
-    assert apart.max() <= 1e-10  # of one pose, a rod's length times 1e-9 from full stretch, where digits are lost
+    assert apart.max() <= 1e-10  # one pose of all is off by more than 1e-11, for a reason not known
 
 
 # Robot descriptions.
