@@ -14,6 +14,7 @@ from .closure.close import close
 from .closure.descend import approach
 from .closure.first_order import first_order
 from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Layout, Loops, PoseObjective
+from .lattice import join, number_points
 from .legs import records as R
 from .legs.answer import answer, measure_rows, read_coordinates
 from .legs.blocks import answer_blocks
@@ -80,6 +81,8 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (assemble, (_TABLE, np.zeros((0, 0)), True, _STARTS, _STARTS, *_values("i1 f2"), _STARTS)),
     (margins_in_blocks, (_LEGS, *_LIMITS, _TASK, *_values("f3 f2 i1 i f3 f2 f1 i1"))),
     (measure_rows, (_LEGS, _TASK, *_values("f3 f2 f2 f3"))),
+    (number_points, (*_values("i1 i1 i1 i"), True, *_values("i1"))),
+    (join, tuple(_values("i2 i1"))),
 )
 """Every kernel with arguments of the types it takes, what most questions need first."""
 

@@ -103,10 +103,9 @@ def joint_displacements(mechanism: Structure, name: str, values: Floats) -> Floa
     values : its coordinates as deviations from home, (n, own) [rad or length].
     """
     geometry = _geometry(mechanism)
-    span = columns(mechanism)[name]
-    q = np.zeros((len(values), len(geometry.owners)))
-    q[:, span] = values
-    return np.asarray(_motions(geometry, q)[0][:, [joint.name for joint in mechanism.joints].index(name)])
+    span, place = columns(mechanism)[name], [joint.name for joint in mechanism.joints].index(name)
+    first, second = from_rotvec(values @ geometry.turns[:, span, place])
+    return _about(geometry.centres[place], first @ second, values @ geometry.slides[span, place])
 
 
 def centres(mechanism: Structure, q: Floats) -> dict[str, Floats]:

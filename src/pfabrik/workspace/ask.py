@@ -120,7 +120,7 @@ def _found(question: Question, step: Floats, measure: Measure) -> Workspace:
     reach = math.ceil(FIRST_REACH[exact] / (widest * 2**levels))
     cells = refined(lattice, levels, max(reach, 2))
     mesh, coarser = mesh_of(lattice, cells.border), mesh_of(lattice, cells.coarser)
-    return Workspace(question, step, mesh, coarser, Parts(space.start, step, cells))
+    return Workspace(question, step, mesh, coarser, Parts(lattice, cells))
 
 
 def _start(mechanism: Mechanism, start: Start | None) -> Solution | None:

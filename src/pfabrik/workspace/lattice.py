@@ -6,9 +6,10 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from .blocks import Measure
+from .numbering import Numbering
 
 BITS = 20
-"""Bits of a place on each axis in the code of a lattice point: three fit into an integer, beside three more bits."""
+"""Bits of a place on each axis in the code of a lattice point: three fit into an integer."""
 
 MIDDLE = 1 << (BITS - 1)
 
@@ -19,6 +20,11 @@ def codes(places: Ints) -> Ints:
     for axis in range(1, places.shape[-1]):
         code = (code << BITS) + (places[..., axis] + MIDDLE)
     return np.asarray(code)
+
+
+def ways(places: Ints) -> Ints:
+    """By how much codes change from one place to another that is `places` (..., d) farther."""
+    return codes(places) - codes(np.zeros(places.shape[-1], np.int64))
 
 
 def places_of(code: Ints, d: int) -> Ints:
@@ -38,33 +44,33 @@ class Lattice:
     Attributes
     ----------
     origin, step : coordinates of the place 0, (d,), and from one place to the next, (d,) [length or rad].
+    points : the numbers of those that are known.
     """
 
     def __init__(self, origin: Floats, step: Floats, measure: Measure) -> None:
         self.origin, self.step, self.measure = origin, step, measure
-        self._codes = np.zeros(0, np.int64)
-        self._margins = np.zeros(0)
+        self.points = Numbering()
+        self._margins = [np.zeros(0)]
 
     @property
     def d(self) -> int:
         return len(self.step)
 
+    @property
+    def margins(self) -> Floats:
+        """Margins of all points by their numbers, (n,)."""
+        self._margins = [np.concatenate(self._margins)]
+        return self._margins[0]
+
     def coordinates(self, places: Ints) -> Floats:
         """Coordinates (n, d) of places (n, d)."""
         return np.asarray(self.origin + places * self.step)
 
-    def margins(self, code: Ints) -> Floats:
-        """Margins of lattice points by their codes, of any shape."""
-        distinct, back = np.unique(code, return_inverse=True)
-        where = np.searchsorted(self._codes, distinct)
-        known = np.zeros(len(distinct), bool)
-        within = where < len(self._codes)
-        known[within] = self._codes[where[within]] == distinct[within]
-        found = np.empty(len(distinct))
-        found[known] = self._margins[where[known]]
-        new = distinct[~known]
+    def number(self, code: Ints) -> Ints:
+        """The numbers of points by their codes, of any shape; they are measured if they were not yet."""
+        before = len(self.points)
+        numbers = self.points.number(code)
+        new = self.points.codes[before:]
         if len(new):
-            found[~known] = self.measure(self.coordinates(places_of(new, self.d)))[0]
-            self._codes = np.insert(self._codes, where[~known], new)
-            self._margins = np.insert(self._margins, where[~known], found[~known])
-        return np.asarray(found[back].reshape(code.shape))
+            self._margins.append(self.measure(self.coordinates(places_of(new, self.d)))[0])
+        return numbers

@@ -14,8 +14,8 @@ from ..rotations import from_rotvec
 AZIMUTHS, RING = 24, math.radians(6.0)
 """Tilts to every side are asked for in so many directions, and in steps no larger than this [rad]."""
 
-Verdict: TypeAlias = Callable[[Ints, Floats], tuple[Floats, Ints]]
-"""From rows, and a rotation (3, 3) that their poses are turned by, to margins and bindings (n,)."""
+Verdict: TypeAlias = Callable[[Floats], tuple[Floats, Ints]]
+"""From poses (n, 4, 4) to margins and bindings (n,)."""
 
 
 def tilts_up_to(angle: float) -> Floats:
@@ -29,12 +29,21 @@ def tilts_up_to(angle: float) -> Floats:
     return from_rotvec(turns)
 
 
-def least_of_all(turns: Floats, n: int, verdict: Verdict) -> tuple[Floats, Ints]:
-    """The least margin over all turns, and its binding, of n rows; of those beyond one turn, no further is asked."""
-    margins, bindings = np.full(n, np.inf), np.full(n, -1)
+def least_of_all(turns: Floats, poses: Floats, verdict: Verdict) -> tuple[Floats, Ints]:
+    """The least margin over all turns, and its binding, of poses (n, 4, 4); those beyond one are asked for no other."""
+    if len(turns) == 1:
+        return verdict(turned(turns[0], poses))
+    margins, bindings = np.full(len(poses), np.inf), np.full(len(poses), -1)
     for turn in turns:
         rows = np.flatnonzero(margins >= 0.0)
-        own, binding = verdict(rows, turn)
+        own, binding = verdict(turned(turn, poses[rows]))
         worse = own < margins[rows]
         margins[rows[worse]], bindings[rows[worse]] = own[worse], binding[worse]
     return margins, bindings
+
+
+def turned(turn: Floats, poses: Floats) -> Floats:
+    """Poses (n, 4, 4) turned in the base frame by a rotation (3, 3), each about its reference point."""
+    if not np.array_equal(turn, np.eye(3)):
+        poses[:, :3, :3] = turn @ poses[:, :3, :3]
+    return poses

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
-from .lattice import Lattice, codes, corners
+from .lattice import Lattice, codes, corners, ways
+from .numbering import Numbering
 
 GROWS = 0.5
 """By which share of its size a box grows to the side where something touches it."""
@@ -27,20 +28,43 @@ THIN = 4
 
 
 class Cells(NamedTuple):
-    """Cells of one size: their lowest corners (n, d), how many steps they are wide, and the margins at all corners."""
+    """Cells of one size.
 
-    lows: Ints
+    Attributes
+    ----------
+    codes : of their lowest corners, (n,).
+    width : how many steps they are wide.
+    corners : numbers of the lattice points at all corners, (n, 2^d).
+    margins : the margins there, (n, 2^d).
+    """
+
+    codes: Ints
     width: int
+    corners: Ints
     margins: Floats
 
     @property
-    def crossed(self) -> Mask:
-        """Whether the border passes between the corners of each."""
-        inside = self.margins >= 0.0
-        return np.asarray(inside.any(axis=1) & ~inside.all(axis=1))
+    def touched(self) -> Mask:
+        """Whether any corner of each is within reach."""
+        return np.asarray((self.margins >= 0.0).any(axis=1))
+
+    @property
+    def inside(self) -> Mask:
+        """Whether all corners of each are within reach."""
+        return np.asarray((self.margins >= 0.0).all(axis=1))
+
+    @property
+    def thin(self) -> Mask:
+        """Whether the border may enter each and leave it between its corners: margins fall towards it fast enough."""
+        if self.width < THIN:
+            return np.zeros(len(self.codes), bool)
+        with np.errstate(invalid="ignore"):
+            spread = self.margins.max(axis=1) - self.margins.min(axis=1)
+            near = np.abs(self.margins).min(axis=1) < SPREAD * spread
+        return np.asarray(near & np.isfinite(spread))
 
     def at(self, which: Mask) -> Cells:
-        return Cells(self.lows[which], self.width, self.margins[which])
+        return Cells(self.codes[which], self.width, self.corners[which], self.margins[which])
 
 
 class Refined(NamedTuple):
@@ -63,14 +87,16 @@ def refined(lattice: Lattice, levels: int, reach: int) -> Refined:
     within: list[Cells] = []
     coarser = cells
     while True:
-        cells = _with_neighbours(lattice, cells)
-        crossed, inside = cells.crossed, np.asarray((cells.margins >= 0.0).all(axis=1))
+        cells = _with_neighbours(lattice, cells.at(cells.touched | cells.thin))
+        inside = cells.inside
+        crossed = cells.touched & ~inside
         if cells.width == 2:
             coarser = cells.at(crossed)
         if cells.width == 1:
             return Refined(cells.at(crossed), coarser, (*within, cells.at(inside)))
-        divided = crossed | _thin(cells) if cells.width >= THIN else crossed
-        within.append(cells.at(~divided & inside))
+        divided = ~inside
+        divided[inside] = cells.at(inside).thin
+        within.append(cells.at(~divided))
         lattice.measure.expect(int(crossed.sum()), cells.width, lattice.d)
         cells = _divided(lattice, cells.at(divided))
 
@@ -80,7 +106,7 @@ def _first(lattice: Lattice, levels: int, reach: int) -> Cells:
     most = MORE * (2 * reach + 1) ** lattice.d
     while True:
         cells = _box(lattice, 1 << levels, reach)
-        if not levels or (cells.margins >= 0.0).any() or len(cells.lows) * 2**lattice.d > most:
+        if not levels or (cells.margins >= 0.0).any() or cells.corners.size > most:
             return cells
         levels, reach = levels - 1, 2 * reach
 
@@ -93,12 +119,14 @@ def _box(lattice: Lattice, width: int, reach: int) -> Cells:
     while True:
         axes = [np.arange(a, b + 1) * width for a, b in zip(low, high, strict=True)]
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        inside = lattice.margins(codes(places)) >= 0.0
+        code = codes(places)
+        numbers = lattice.number(code)
+        inside = lattice.margins[numbers] >= 0.0
         by = np.maximum(2, (GROWS * (high - low)).astype(np.int64))
         faces = [np.moveaxis(inside, axis, 0) for axis in range(d)]
         grow_low, grow_high = (np.array([face[end].any() for face in faces]) for end in (0, -1))
         if not (grow_low | grow_high).any():
-            return _measured(lattice, places[(slice(None, -1),) * d].reshape(-1, d), width)
+            return _cells(lattice, code, numbers, width)
         low, high = low - by * grow_low, high + by * grow_high
         if (high - low).max() > HORIZON * reach:
             _refuse_endless(lattice, int((high - low).argmax()))
@@ -110,45 +138,38 @@ def _refuse_endless(lattice: Lattice, axis: int) -> NoReturn:
     raise InvalidArgument("within", f"no ends of '{name}'", expected)
 
 
-def _measured(lattice: Lattice, lows: Ints, width: int) -> Cells:
-    return Cells(lows, width, lattice.margins(codes(lows[:, None] + width * corners(lattice.d))))
-
-
-def _thin(cells: Cells) -> Mask:
-    """Whether the border may enter a cell and leave it between its corners: its margins fall towards it fast enough."""
-    with np.errstate(invalid="ignore"):
-        spread = cells.margins.max(axis=1) - cells.margins.min(axis=1)
-        near = np.abs(cells.margins).min(axis=1) < SPREAD * spread
-    return np.asarray(near & np.isfinite(spread))
+def _cells(lattice: Lattice, code: Ints, numbers: Ints, width: int) -> Cells:
+    """All cells of a box, of whose points the codes and numbers are given, (n, ...) each."""
+    sides = [(slice(None, -1), slice(1, None))[side] for side in (0, 1)]
+    each = [numbers[tuple(sides[side] for side in corner)].ravel() for corner in corners(lattice.d).tolist()]
+    at_corners = np.stack(each, axis=1)
+    return Cells(code[(sides[0],) * lattice.d].ravel(), width, at_corners, lattice.margins[at_corners])
 
 
 def _divided(lattice: Lattice, cells: Cells) -> Cells:
-    width = cells.width // 2
-    lows = (cells.lows[:, None] + width * corners(lattice.d)).reshape(-1, lattice.d)
-    return _measured(lattice, lows, width)
+    """The halves of cells, along each coordinate."""
+    d, width = lattice.d, cells.width // 2
+    numbers = lattice.number(cells.codes[:, None] + ways(width * np.indices((3,) * d).reshape(d, -1).T))
+    places = (corners(d)[:, None] + corners(d)) @ 3 ** np.arange(d)[::-1]
+    at_corners = numbers[:, places].reshape(-1, 2**d)
+    code = (cells.codes[:, None] + ways(width * corners(d))).ravel()
+    return Cells(code, width, at_corners, lattice.margins[at_corners])
 
 
 def _with_neighbours(lattice: Lattice, cells: Cells) -> Cells:
     """With all cells that the border goes on into: so it has no end but where it began."""
-    d, every = lattice.d, corners(lattice.d)
-    known, latest = np.sort(codes(cells.lows)), cells
-    while True:
-        beyond = []
-        for axis in range(d):
+    d, every, width = lattice.d, corners(lattice.d), cells.width
+    known, latest, found = Numbering(), cells, [cells.corners]
+    known.number(cells.codes)
+    while len(latest.codes):
+        inside, before = latest.margins >= 0.0, len(known)
+        for axis, way in enumerate(width * ways(np.eye(d, dtype=np.int64))):
             for side in (0, 1):
-                face = latest.margins[:, every[:, axis] == side] >= 0.0
-                open_ = face.any(axis=1) & ~face.all(axis=1)
-                way = np.zeros(d, np.int64)
-                way[axis] = cells.width * (2 * side - 1)
-                beyond.append(latest.lows[open_] + way)
-        lows = np.concatenate(beyond)
-        code, first = np.unique(codes(lows), return_index=True)
-        where = np.minimum(np.searchsorted(known, code), max(len(known) - 1, 0))
-        new = known[where] != code
-        if not new.any():
-            return cells
-        latest = _measured(lattice, lows[first[new]], cells.width)
-        known = np.sort(np.concatenate([known, code[new]]))
-        cells = cells._replace(
-            lows=np.concatenate([cells.lows, latest.lows]), margins=np.concatenate([cells.margins, latest.margins])
-        )
+                face = inside[:, every[:, axis] == side]
+                known.number(latest.codes[face.any(axis=1) & ~face.all(axis=1)] + way * (2 * side - 1))
+        new = known.codes[before:]
+        numbers = lattice.number(new[:, None] + ways(width * every))
+        latest = Cells(new, width, numbers, lattice.margins[numbers])
+        found.append(numbers)
+    at_corners = np.concatenate(found)
+    return Cells(known.codes, width, at_corners, lattice.margins[at_corners])

@@ -121,8 +121,7 @@ class Workspace:
         """Least and greatest value of each coordinate, (2, d) [length or rad]; NaN where nothing is within reach."""
         if not len(self.vertices):
             return np.full((2, len(self.names)), np.nan)
-        used = self.vertices[np.unique(self.faces)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     @cached_property
     def shares(self) -> dict[tuple[str, str], float]:
@@ -137,7 +136,7 @@ class Workspace:
         """The parts that do not hang together, each a workspace of its own: the start's first, then by size."""
         if self._part is not None:
             return (self,)
-        labels, coarse = (self._parts.of_codes(mesh.inner) for mesh in (self._mesh, self._coarser))
+        labels, coarse = (self._parts.labels[mesh.inner] for mesh in (self._mesh, self._coarser))
         found = []
         for part in range(self._parts.count):
             mesh = self._mesh.among(labels == part)

@@ -18,6 +18,7 @@ from ..motion.first_order import Singularity, parallel_signs
 from ..options import Options
 from .blocks import OnProgress
 from .lattice import codes, corners
+from .numbering import Numbering
 from .parts import connected
 from .refining import Cells
 from .result import Workspace
@@ -245,30 +246,25 @@ def _joined(blocks: list[Singularity]) -> Singularity:
 
 def _locus(places: Ints, signed: Floats) -> tuple[Floats, Ints]:
     """Where a signed measure of lattice places (n, d) is zero: vertices (v, d) in steps, and faces (f, d)."""
-    d = places.shape[1]
-    code = codes(places)
-    order = np.argsort(code)
-    around = codes(places[:, None] + corners(d))
-    where = np.minimum(np.searchsorted(code[order], around), max(len(code) - 1, 0))
-    whole = (code[order][where] == around).all(axis=1) if len(code) else np.zeros(0, bool)
-    cells = Cells(places[whole], 1, signed[order][where[whole]])
-    first, last, faces = crossed_edges(cells.at(cells.crossed))
-    ends = [signed[order][np.searchsorted(code[order], codes(side))] for side in (first, last)]
-    share = ends[0] / np.where(ends[0] == ends[1], 1.0, ends[0] - ends[1])
-    return np.asarray(first + share[:, None] * (last - first), np.float64), faces
+    numbering = Numbering()
+    numbering.number(codes(places))
+    around = numbering.find(codes(places[:, None] + corners(places.shape[1])))
+    whole = (around >= 0).all(axis=1)
+    cells = Cells(codes(places[whole]), 1, around[whole], signed[around[whole]])
+    (first, last), faces = crossed_edges(cells.at(cells.touched & ~cells.inside), len(places))
+    share = signed[first] / np.where(signed[first] == signed[last], 1.0, signed[first] - signed[last])
+    return np.asarray(places[first] + share[:, None] * (places[last] - places[first]), np.float64), faces
 
 
 def _parts(places: Ints, signed: Floats) -> Ints:
     """The part of each lattice place, (n,): those hang together that lie next to each other and have the same sign."""
     n, d = places.shape
-    code = codes(places)
-    order = np.argsort(code)
+    numbering = Numbering()
+    numbering.number(codes(places))
     pairs = [np.zeros((0, 2), np.int64)]
-    for axis in range(d):
-        after = codes(places + np.eye(d, dtype=np.int64)[axis])
-        where = np.minimum(np.searchsorted(code[order], after), max(n - 1, 0))
-        beside = order[where] if n else where
-        joined = np.flatnonzero((code[beside] == after) & ((signed[beside] >= 0.0) == (signed >= 0.0)))
+    for way in np.eye(d, dtype=np.int64):
+        beside = numbering.find(codes(places + way))
+        joined = np.flatnonzero((beside >= 0) & ((signed[beside] >= 0.0) == (signed >= 0.0)))
         pairs.append(np.stack([joined, beside[joined]], axis=1))
     _, labels, counts = np.unique(connected(n, np.concatenate(pairs)), return_inverse=True, return_counts=True)
     rank = np.empty(len(counts), np.int64)

@@ -16,11 +16,11 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Mask
 from .blocks import Measure
-from .lattice import Lattice, codes, corners, places_of
+from .lattice import Lattice, places_of
 from .refining import Cells
 
-CLOSE = 1e-3
-"""How exactly a vertex is on the border [steps of the lattice]."""
+CLOSE, CLOSE_ONE_BY_ONE = 1e-3, 1e-2
+"""How exactly a vertex is on the border, where closed forms tell margins and elsewhere [steps of the lattice]."""
 
 MOST_LOOKS = 40
 """Looks at an edge after which its vertex is left where it is: halving alone takes ten."""
@@ -37,7 +37,7 @@ class Mesh(NamedTuple):
     vertices : (v, d), just inside the border.
     faces : (f, d) places of vertices.
     limits : which limit forms the border at each vertex, (v,).
-    inner : codes of the lattice points within reach that vertices are beside, (v,).
+    inner : numbers of the lattice points within reach that vertices are beside, (v,).
     """
 
     vertices: Floats
@@ -70,33 +70,42 @@ class Mesh(NamedTuple):
     def among(self, chosen: Mask) -> Mesh:
         """The faces all of whose vertices, (v,), are chosen, and these alone."""
         faces = self.faces[chosen[self.faces].all(axis=1)]
-        used, back = np.unique(faces, return_inverse=True)
-        return Mesh(self.vertices[used], back.reshape(faces.shape), self.limits[used], self.inner[used])
+        used = np.zeros(len(self.vertices), bool)
+        used[faces] = True
+        place = np.cumsum(used) - 1
+        return Mesh(self.vertices[used], place[faces], self.limits[used], self.inner[used])
 
 
 def mesh_of(lattice: Lattice, cells: Cells) -> Mesh:
     """The mesh of the border through cells that it does not leave."""
-    first, last, faces = crossed_edges(cells)
-    vertices, limits, inner = _vertices(lattice, first, last, cells.width)
+    ends, faces = crossed_edges(cells, len(lattice.points))
+    vertices, limits, inner = _vertices(lattice, ends, cells.width)
     return Mesh(vertices, faces, limits, inner)
 
 
-def crossed_edges(cells: Cells) -> tuple[Ints, Ints, Ints]:
-    """The ends (e, d) each, lower and upper, of edges that the border crosses, and its faces (f, d) between those."""
-    d = cells.lows.shape[1]
-    low = codes(cells.lows[:, None] + cells.width * corners(d))
-    case = ((cells.margins >= 0.0) << np.arange(2**d)).sum(axis=1)
-    order = np.argsort(case, kind="stable")
+def crossed_edges(cells: Cells, n: int) -> tuple[Ints, Ints]:
+    """The ends (2, e), lower and upper, of edges that the border crosses, and its faces (f, d) between those.
+
+    Parameters
+    ----------
+    n : how many points have numbers.
+    """
+    d = cells.corners.shape[1].bit_length() - 1
+    case = (cells.margins >= 0.0) @ (1 << np.arange(2**d))
+    order = np.argsort(case.astype(np.uint8), kind="stable")
     starts = np.searchsorted(case[order], np.arange(2 ** (2**d) + 1))
+    upper = np.full(n * d, -1)  # by the lower end of an edge, and its axis
     edges = [np.zeros((0, d), np.int64)]
-    for which in np.unique(case).tolist():
-        own = low[order[starts[which] : starts[which + 1]]]
+    for which in np.flatnonzero(np.diff(starts)).tolist():
+        own = cells.corners[order[starts[which] : starts[which + 1]]]
         for face in _faces(which, d):
-            edges.append(np.stack([(own[:, a] << d) + (a ^ b) for a, b in face], axis=1))
-    distinct, faces = np.unique(np.concatenate(edges), return_inverse=True)
-    ways = (distinct & (2**d - 1))[:, None] >> np.arange(d)[::-1] & 1
-    first = places_of(distinct >> d, d)
-    return first, first + cells.width * ways, faces.reshape(-1, d)
+            edge = np.stack([own[:, a] * d + (a ^ b).bit_length() - 1 for a, b in face], axis=1)
+            upper[edge] = own[:, [b for _, b in face]]
+            edges.append(edge)
+    distinct = np.flatnonzero(upper >= 0)
+    place = np.empty(n * d, np.int64)
+    place[distinct] = np.arange(len(distinct))
+    return np.stack([distinct // d, upper[distinct]]), place[np.concatenate(edges)]
 
 
 @lru_cache(maxsize=512)
@@ -138,17 +147,15 @@ def _segments(case: int, side: Sequence[int]) -> Iterator[tuple[Edge, Edge]]:
             yield edges[leaving % 4], edges[k - 1]
 
 
-def _vertices(lattice: Lattice, first: Ints, last: Ints, width: int) -> tuple[Floats, Ints, Ints]:
-    """Where the border crosses edges, what forms it there, and the codes of the ends within; (e, ...) each."""
-    ends = np.stack([first, last])
-    code = codes(ends)
-    margins = lattice.margins(code)
-    within, every = (margins[1] >= 0.0).astype(np.int64), np.arange(len(first))
-    inner, outer = (lattice.coordinates(ends[side, every]) for side in (within, 1 - within))
-    points, limits = crossings(
-        lattice.measure, inner, outer, margins[within, every], margins[1 - within, every], CLOSE / width
-    )
-    return points, limits, code[within, every]
+def _vertices(lattice: Lattice, ends: Ints, width: int) -> tuple[Floats, Ints, Ints]:
+    """Where the border crosses edges, what forms it there, and the ends within; (e, ...) each."""
+    margins = lattice.margins[ends]
+    within, every = (margins[1] >= 0.0).astype(np.int64), np.arange(ends.shape[1])
+    places = places_of(lattice.points.codes, lattice.d)
+    inner, outer = (lattice.coordinates(places[ends[side, every]]) for side in (within, 1 - within))
+    close = (CLOSE if lattice.measure.question.has_margins else CLOSE_ONE_BY_ONE) / width
+    points, limits = crossings(lattice.measure, inner, outer, margins[within, every], margins[1 - within, every], close)
+    return points, limits, ends[within, every]
 
 
 def crossings(
@@ -178,9 +185,8 @@ def crossings(
         limits[rows[~kept]] = binding[~kept]
         halve[rows] = far[rows] - near[rows] > 0.5 * wide
     unknown = np.flatnonzero(limits < 0) if measure.question.has_margins else np.arange(len(inner))
-    beyond = (inner + far[:, None] * (outer - inner))[unknown]
     if len(unknown):
-        limits[unknown] = measure.question.name_limits(beyond)
+        limits[unknown] = measure.question.name_limits((inner + far[:, None] * (outer - inner))[unknown])
     return inner + near[:, None] * (outer - inner), limits
 
 

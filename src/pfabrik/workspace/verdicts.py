@@ -65,31 +65,21 @@ class Question:
 
     def measure(self, points: Floats) -> tuple[Floats, Ints]:
         """Margins (n,) of points (n, d), negative beyond reach, and which of `limits` each is of; -1 for none."""
-        margins, bindings = self._least(points)
+        margins, bindings = least_of_all(self.turns, self.space.poses(points), self._of_poses)
+        first = len(_known_limits(self.mechanism, self.has_margins))
         lengths = np.where(self.space.is_angle, 1.0, self.mechanism.characteristic_length)
-        past = np.stack([points - self.lowest, self.highest - points], axis=2) / lengths[:, None]
-        past = past.reshape(len(points), -1)
-        worst = past.argmin(axis=1)
-        cut = np.take_along_axis(past, worst[:, None], axis=1)[:, 0]
-        is_cut = cut < np.minimum(margins, 0.0)
-        n_own = len(_known_limits(self.mechanism, self.has_margins))
-        return np.where(is_cut, cut, margins), np.where(is_cut, n_own + worst, bindings)
-
-    def _least(self, points: Floats) -> tuple[Floats, Ints]:
-        """The least margins over all turns."""
-        poses = self.space.poses(points)
-
-        def verdict(rows: Ints, turn: Floats) -> tuple[Floats, Ints]:
-            turned = poses[rows]
-            turned[:, :3, :3] = turn @ turned[:, :3, :3]
-            return self._of_poses(turned)
-
-        return least_of_all(self.turns, len(points), verdict)
+        for axis, column in enumerate(points.T):
+            for side, end in enumerate((self.lowest[axis], self.highest[axis])):
+                if np.isfinite(end):
+                    past = (column - end) / lengths[axis] * (1 - 2 * side)
+                    cut = past < np.minimum(margins, 0.0)
+                    margins[cut], bindings[cut] = past[cut], first + 2 * axis + side
+        return margins, bindings
 
     def _of_poses(self, poses: Floats) -> tuple[Floats, Ints]:
         if self.has_margins:
             found = feasibility(self.mechanism, poses, start=self.start)
-            return np.where(np.isnan(found.margin), -np.inf, found.margin), found.binding
+            return np.nan_to_num(found.margin, copy=False, nan=-np.inf, posinf=np.inf, neginf=-np.inf), found.binding
         return np.where(self._answers(poses)[1], INSIDE, OUTSIDE), np.full(len(poses), self._unknown)
 
     def _answers(self, poses: Floats) -> tuple[Solution, Mask]:
