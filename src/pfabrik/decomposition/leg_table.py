@@ -101,7 +101,9 @@ def _table(mechanism: Mechanism) -> LegTable:
         raise NoLeg("the task sets the yaw alone of the rotation")
     forms = _forms(mechanism)
     legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
-    legs["first_row"] = [0, *accumulate(_row_counts(legs))][:-1]
+    counts = _row_counts(legs)
+    legs["first_row"] = [0, *accumulate(counts)][:-1]
+    legs["bears"] = _bear(legs, counts)
     told = [(leg, item, place) for leg, form in enumerate(forms) for item, place in _places(form)]
     _require_all(mechanism, {(item.joint.name, item.place) for _, item, _ in told})
     known = np.array([_coordinate(mechanism, *each) for each in told], K.COORDINATE)
@@ -121,6 +123,12 @@ def _table(mechanism: Mechanism) -> LegTable:
     task = _task(mechanism, legs)
     legs = _aimed(legs, np.concatenate([limited, driven]))
     return LegTable(tuple(forms), legs, aimed, limited, cones, driven, known, task, tuple(limits))
+
+
+def _bear(legs: Records, counts: Sequence[int]) -> list[bool]:
+    """Whether each leg, or a rod on its carrier, leaves a constraint: these follow the leg that has the carrier."""
+    mains = np.maximum.accumulate(np.where(legs["carrier"] != K.SHARED, np.arange(len(legs)), 0))
+    return [bool(np.sum(np.array(counts)[mains == main])) for main in mains]
 
 
 def _forms(mechanism: Mechanism) -> list[LegForm]:

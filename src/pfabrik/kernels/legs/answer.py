@@ -47,9 +47,9 @@ def set_frames(pose: Floats, task: Record, frames: Floats) -> None:
 
 
 @routine
-def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lines: Floats) -> float:
-    """Fill the values of all legs at a pose; how sure the least sure of them are, see `SURE`."""
-    sure, main = 1.0, 0
+def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lines: Floats) -> tuple[float, float]:
+    """Fill the values of all legs at a pose; how sure the least sure of all are, see `SURE`, and of those that bear."""
+    sure, bearing, main = 1.0, 1.0, 0
     for k in range(legs.shape[0]):
         leg = legs[k]
         frame = frames[leg["reversed"]]
@@ -59,7 +59,8 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
             main = main if leg["carrier"] == SHARED else k
             found = place_rod(leg, legs[main], frame, sides[k], values[main], values[k], lines[k])
         sure = min(sure, found)
-    return sure
+        bearing = min(bearing, found) if leg["bears"] == 1 else bearing
+    return sure, bearing
 
 
 @routine
@@ -172,14 +173,20 @@ def load(target: Floats, begin: Floats, task: Record, pose: Floats) -> bool:
     if task["rotations"] == 3:
         make_exact(pose)
     elif task["rotations"] == 2:
-        now, wanted = (pose[0, 2], pose[1, 2], pose[2, 2]), (target[0, 2], target[1, 2], target[2, 2])
-        wanted = scale(1.0 / norm(wanted), wanted)
-        across = cross(now, wanted)
-        sine, cosine = norm(across), dot(now, wanted)
-        if sine > 0.0:
-            turn_pose(pose, scale(math.atan2(sine, cosine) / sine, across))
-        return cosine > SURE - 1.0
+        return lean_to(target, 1.0, pose)
     return True
+
+
+@routine
+def lean_to(target: Floats, share: float, pose: Floats) -> bool:
+    """Bring the z axis of a pose to a target's by the shortest turn, or a share of the way; False where turned over."""
+    now, wanted = (pose[0, 2], pose[1, 2], pose[2, 2]), (target[0, 2], target[1, 2], target[2, 2])
+    wanted = scale(1.0 / norm(wanted), wanted)
+    across = cross(now, wanted)
+    sine, cosine = norm(across), dot(now, wanted)
+    if sine > 0.0:
+        turn_pose(pose, scale(share * math.atan2(sine, cosine) / sine, across))
+    return cosine > SURE - 1.0
 
 
 @routine
@@ -327,19 +334,23 @@ def complete(
     normal: Floats,
     pose: Floats,
 ) -> bool:
-    """Move what is not set of a pose until all legs close; whether they do, none of them near a dead point."""
+    """Move what is not set of a pose until all legs close; whether they do, none of them near a dead point.
+
+    On the way legs that bear no constraint may be beyond one.
+    """
     gone, enough = 0.0, CLOSED if task["unset"] > 0 else CLOSE
     for _ in range(MOST_STEPS):
         set_frames(pose, task, frames)
-        if not place_legs(legs, frames, sides, values, lines) > SURE * SURE:
+        sure, bearing = place_legs(legs, frames, sides, values, lines)
+        if not bearing > SURE * SURE:
             return False
         if put_rows(legs, frames, values, lines, rows) <= enough:
-            return True
+            return sure > SURE * SURE
         if task["unset"] == 0:
             return False
         put_slopes(legs, frames, values, lines, follow, slopes)
         gone += newton_step(task, pose, rows, slopes, motions, normal)
-        if gone > task["farthest"]:
+        if not gone <= task["farthest"]:
             return False
     return False
 

@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from .._jit import kernel, routine
 from ..vectors import angle_between, vec
-from .answer import CLOSE, KEPT, complete, deviation, load, put_rows
+from .answer import CLOSE, KEPT, complete, deviation, lean_to, load, put_rows
 from .records import CARRIAGE, CRANK, N_VALUES, ROD, SLIDE, Floats, Record, Records
+
+PARTS = 4
+"""Parts of the way from the start in which a pose is completed where, all at once, it comes out beyond a limit."""
 
 
 @routine
@@ -60,23 +63,67 @@ def feasibility(
     frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
     follow, rows, slopes = np.zeros((n_legs, 6)), np.zeros(n_rows), np.zeros((n_rows, 6))
     pose, motions, normal = np.zeros((4, 4)), np.zeros((7, 6)), np.zeros((7, 8))
+    before, toward = np.zeros((4, 4)), np.zeros((4, 4))
     n_limits = 2 * limited.shape[0] + cones.shape[0]
     for row in range(targets.shape[0]):
         margins[row], bindings[row] = math.nan, -1
-        if not load(targets[row], begins[0], task[0], pose):
-            continue
-        closed = complete(legs, task[0], sides[0], frames, values, lines, follow, rows, slopes, motions, normal, pose)
-        least, binding = least_margin(limited, cones, values)
-        if not closed:
-            put_rows(legs, frames, values, lines, rows)
-            for k in range(n_legs):
-                share = reach_of(legs[k], values[k])
-                if share < -CLOSE and share < least:
-                    least, binding = share, n_limits + k
-                share = -largest_row(legs, rows, k)
-                if share < -CLOSE and share < least:
-                    least, binding = share, n_limits + n_legs + k
-        margins[row], bindings[row] = least, binding
+        for parts in (1, PARTS):
+            if parts > 1 and (task[0]["unset"] == 0 or not margins[row] < 0.0):
+                break
+            aim(begins[0], begins[0], 1.0, task[0], before)
+            is_pose, closed = True, True
+            for part in range(1, parts + 1):
+                aim(targets[row], begins[0], part / parts, task[0], toward)
+                is_pose = load(toward, before, task[0], pose)
+                closed = is_pose and complete(
+                    legs, task[0], sides[0], frames, values, lines, follow, rows, slopes, motions, normal, pose
+                )
+                if not closed:
+                    break
+                put_pose(pose, task[0]["length"], before)
+            if not is_pose or (parts > 1 and not closed):
+                break
+            least, binding = least_margin(limited, cones, values)
+            if not closed:
+                put_rows(legs, frames, values, lines, rows)
+                for k in range(n_legs):
+                    share = reach_of(legs[k], values[k])
+                    if share < -CLOSE and share < least:
+                        least, binding = share, n_limits + k
+                    share = -largest_row(legs, rows, k)
+                    if share < -CLOSE and share < least:
+                        least, binding = share, n_limits + n_legs + k
+            if parts == 1 or least > margins[row]:
+                margins[row], bindings[row] = least, binding
+
+
+@routine
+def aim(target: Floats, begin: Floats, share: float, task: Record, toward: Floats) -> None:
+    """Fill a target that is a share of the way from another pose, (4, 4) [length] each.
+
+    Of rotations, the z axis alone goes a share of its way.
+    """
+    for i in range(4):
+        for j in range(4):
+            toward[i, j] = target[i, j]
+    if share == 1.0:
+        return
+    for i in range(3):
+        toward[i, 3] = begin[i, 3] + share * (target[i, 3] - begin[i, 3])
+    if task["rotations"] == 2:
+        for i in range(3):
+            for j in range(3):
+                toward[i, j] = begin[i, j]
+        lean_to(target, share, toward)
+
+
+@routine
+def put_pose(pose: Floats, length: float, to: Floats) -> None:
+    """A pose [L], (4, 4), as one [length]."""
+    for i in range(3):
+        to[i, 3] = pose[i, 3] * length
+        for j in range(3):
+            to[i, j] = pose[i, j]
 
 
 @routine

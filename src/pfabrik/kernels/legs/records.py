@@ -58,6 +58,7 @@ LEG = np.dtype(
         ("moved", "f8", (3, 3)),
         ("value", *_vector),
         ("first_row", "i8"),  # place of its first constraint among all
+        ("bears", "i8"),  # 1: it, or a rod on its carrier, leaves a constraint
         ("upright", "i8"),  # of a pivot: how many of its `foot_axes` R must not turn over
     ]
 )
