@@ -106,7 +106,7 @@ def is_closed(faces: NDArray[np.int64]) -> bool:
 
 @pytest.mark.parametrize(
     ("name", "resolution"),
-    [("stewart", 6.0), ("delta", 9.0), ("hexaglide", 4.0), ("rps", 6.0), ("five_bar", None), ("ankle_ups", None)],
+    [("stewart", 6.0), ("delta", 9.0), ("hexaglide", 4.0), ("rps", 8.0), ("five_bar", None), ("ankle_ups", 0.02)],
 )
 def test_the_mesh_is_closed_and_encloses_what_is_contained(name: str, resolution: float | None) -> None:
     found = pf.workspace(pf.load(name), resolution=resolution)
@@ -119,12 +119,13 @@ def test_the_mesh_is_closed_and_encloses_what_is_contained(name: str, resolution
     assert abs(found.size - box * hits) <= 4.0 * noise + found.uncertainty
 
 
+@pytest.mark.parametrize("n", [150, pytest.param(10_000, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("name", ["stewart", "five_bar", "linear_delta", "rpr", "rps", "ankle_ups", "hexaglide", "rrr"])
-def test_what_is_contained_is_what_is_reached(name: str) -> None:
+def test_what_is_contained_is_what_is_reached(name: str, n: int) -> None:
     machine = pf.load(name)
     found = pf.workspace(machine, resolution=0.05 * machine.characteristic_length if name != "ankle_ups" else 0.05)
     middle, half = found.bounds.mean(axis=0), 0.55 * np.ptp(found.bounds, axis=0)
-    points = np.random.default_rng(2).uniform(middle - half, middle + half, (1250, len(half)))
+    points = np.random.default_rng(2).uniform(middle - half, middle + half, (n, len(half)))
     reached = pf.solve_ik(machine, found.poses(points)).status == pf.Status.REACHED
     assert 0.1 < reached.mean() < 0.9
     assert (found.contains(points) == reached).all()
@@ -213,12 +214,12 @@ def test_where_it_can_lean_to_every_side_it_can(angle: float) -> None:
     azimuths = np.arange(24 if angle else 1) * np.pi / 12.0
     leaning = [pf.pose([0, 0, 0], rotvec=[angle * np.cos(each), angle * np.sin(each), 0])[:3, :3] for each in azimuths]
     rings = [ring for rotation in leaning for ring in strut_rings(machine, rotation, 200.0)]
-    assert found.area == pytest.approx(area(rings), rel=2e-3)
+    assert found.area == pytest.approx(area(rings, lines=500), rel=2e-3)
 
 
 def test_any_orientation_reaches_what_some_orientation_reaches() -> None:
     machine = pf.load("rpr")
-    found = pf.workspace(machine, orientation="any", resolution=0.15)
+    found = pf.workspace(machine, orientation="any", resolution=0.3)
     turned = [
         pf.workspace(machine, orientation=pf.pose([0, 0, 0], rpy=[0, 0, yaw])[:3, :3]) for yaw in (-0.6, 0.0, 0.6)
     ]

@@ -23,16 +23,16 @@ def within(rings: Sequence[Ring], points: Array) -> NDArray[np.bool_]:
     return inside
 
 
-def area(rings: Sequence[Ring]) -> float:
-    """The area that is in all of them, to about a millionth."""
+def area(rings: Sequence[Ring], lines: int = LINES) -> float:
+    """The area that is in all of them, to about a millionth with so many lines across, or as exactly as with fewer."""
     low = max(x - outer for x, _, _, outer in rings)
     high = min(x + outer for x, _, _, outer in rings)
     if high <= low:
         return 0.0
     # nodes crowd at both ends, where lines across circles grow with a square root
-    angle = np.pi * (np.arange(LINES) + 0.5) / LINES
+    angle = np.pi * (np.arange(lines) + 0.5) / lines
     x = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(angle)
-    weight = 0.5 * (high - low) * np.sin(angle) * np.pi / LINES
+    weight = 0.5 * (high - low) * np.sin(angle) * np.pi / lines
     ends = []
     for cx, cy, inner, outer in rings:
         for radius in (inner, outer):
