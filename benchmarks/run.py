@@ -20,6 +20,7 @@ from closure_engine import closed_chains, forward, joint_coordinates, modes
 from pfabrik.reproduce.timing import one_core
 from table import Row, cells, machine, table
 from timing import Solve, best_times, draw, in_blocks
+from viewer import viewer
 from workspaces import workspaces
 
 CENTROID, NEAREST = pf.Options(projection="centroid"), pf.Options(projection="nearest")
@@ -49,8 +50,9 @@ and 0.5 rad; these are projected exactly where a row does not say "centroid"; th
 delta's partial task, has no other way. Newton's method in NumPy (benchmarks/newton.py) knows the hexapod, solves six
 equations in the pose for whole batches at a time, and looks at no passive joint and no limit; forward kinematics here
 closes all loops in all joint coordinates, and measures limits. Starts are answers up to 0.01 L and 0.01 rad away. The
-platform with 40 modes is that of Dietmaier (1998). Times of modes and of new processes are for all of it, not for a
-pose."""
+platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes are for all of
+it, not for a pose. The viewer's motions are timed in a page of headless Chromium, which draws without a graphics card,
+from the motion of the mouse until the answer has been drawn; these rows are left out where it is not installed."""
 
 
 def agree(solution: pf.Solution, values: Array) -> None:
@@ -162,6 +164,7 @@ def main() -> None:
         *closed_chains(rng, runs, 100 if given.quick else 1000),
         *modes(min(runs, 5)),
         *workspaces(rng, runs, 20_000 if given.quick else 200_000),
+        *viewer(min(runs, 5)),
         *([] if given.quick else start_up(5)),
     ]
     if given.markdown:

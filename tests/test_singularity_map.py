@@ -83,11 +83,12 @@ def test_a_spatial_machine_is_looked_at_likewise() -> None:
 
 
 def test_a_map_and_a_path_can_be_drawn(free_five_bar: pf.Workspace) -> None:
-    pytest.importorskip("matplotlib")
+    pyplot = pytest.importorskip("matplotlib.pyplot")
     machine = free_five_bar.mechanism
     assert pf.singularity_map(machine, free_five_bar, resolution=20.0).plot().collections
     along = pf.singularity_map(machine, pf.track(machine, [machine.reference_point] * 3))
     assert along.plot().lines
+    pyplot.close("all")
 
 
 def test_what_is_no_workspace_of_the_machine_is_refused(free_five_bar: pf.Workspace) -> None:

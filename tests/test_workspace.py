@@ -352,7 +352,7 @@ def test_what_is_saved_can_be_read_again(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["stewart", "five_bar", "ankle_ups"])
 def test_a_picture_shows_every_limit_of_the_border(name: str) -> None:
-    pytest.importorskip("matplotlib")
+    pyplot = pytest.importorskip("matplotlib.pyplot")
     found = pf.workspace(pf.load(name), resolution=8.0 if name == "stewart" else None)
     axes = found.plot()
     legend = axes.get_legend()
@@ -360,6 +360,11 @@ def test_a_picture_shows_every_limit_of_the_border(name: str) -> None:
     words = " ".join(text.get_text() for text in legend.get_texts())
     assert all(bound in words for _, bound in found.shares)
     axes.figure.canvas.draw()
+    assert found.plot(axes) is axes
+    if len(found.names) == 3:
+        with pytest.raises(InvalidArgument, match="two-dimensional axes for a workspace of three"):
+            found.plot(pyplot.figure().add_subplot())
+    pyplot.close("all")
 
 
 @pytest.mark.parametrize(

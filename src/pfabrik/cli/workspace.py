@@ -14,9 +14,10 @@ import pfabrik as pf
 
 from ..answers.table import aligned
 from ..extras import require
-from ..writing import whole_path
+from ..view.saving import PICTURES
 from .finite import FINITE, is_finite
 from .mech import MECH, load
+from .picture import picture
 from .target import Triple
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from ..workspace.inscribed import Inscribed, Kind
     from ..workspace.result import Workspace
 
-PICTURES = (".png", ".svg", ".pdf")
 MOST_LIMITS = 12
 
 
@@ -147,13 +147,12 @@ def point(found: Workspace, words: str) -> list[float]:
 
 def write(found: Workspace, path: Path) -> None:
     """A mesh, or a picture, whole or not at all."""
-    if path.suffix.lower() not in PICTURES:
-        found.save(path)
+    if path.suffix.lower() in PICTURES:
+        with picture(path):
+            found.plot()
         return
-    figure = found.plot().get_figure(root=True)
-    assert figure is not None
-    with whole_path(path) as part:
-        figure.savefig(part, bbox_inches="tight", pad_inches=0.05)
+    found.save(path)
+    click.echo(f"wrote {path}", err=True)
 
 
 def plain_object(found: Workspace, shape: Inscribed | None) -> dict[str, object]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..extras import require
+from .drawing import SMALL, axes_for
 from .words import in_words
 
 if TYPE_CHECKING:
@@ -37,21 +37,13 @@ Group: TypeAlias = tuple[str, str, list[int]]
 
 Strings: TypeAlias = NDArray[np.str_]
 
-SIZE = (6.4, 4.8)
-ELEVATION, AZIMUTH = 24.0, -58.0
-SMALL = 8.0
 
-
-def plot(found: Workspace, axes: Axes | None = None) -> Axes:
-    """Draw a workspace on matplotlib axes, or on those of a new figure, which is `axes.figure`."""
-    require("pictures", "matplotlib", "plot")
-    from matplotlib.figure import Figure
+def plot(found: Workspace, ax: Axes | None = None) -> Axes:
+    """Draw a workspace on matplotlib axes, or on those of a new figure, which is `ax.figure`."""
+    d = len(found.names)
+    axes = axes_for(ax, d)
     from matplotlib.lines import Line2D
 
-    d = len(found.names)
-    if axes is None:
-        figure = Figure(figsize=SIZE, dpi=150, layout="constrained")
-        axes = figure.add_subplot(projection="3d" if d == 3 else None)
     groups = _groups(found)
     (_draw_solid if d == 3 else _draw_plane)(axes, found, groups)
     handles = [Line2D([], [], color=colour, linewidth=4, label=label) for label, colour, _ in groups]
@@ -117,7 +109,6 @@ def _draw_plane(axes: Any, found: Workspace, groups: list[Group]) -> None:
     axes.set(**dict(zip(("xlabel", "ylabel"), labels(found), strict=True)))
     axes.autoscale_view()
     axes.margins(0.06)
-    axes.tick_params(labelsize=SMALL)
     if len(set(found.units)) == 1:
         axes.set_aspect("equal")
 
@@ -140,9 +131,7 @@ def _draw_solid(axes: Any, found: Workspace, groups: list[Group]) -> None:
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(tuple(box / box.max()), zoom=0.86)
-    axes.view_init(ELEVATION, AZIMUTH)
     axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(found), strict=True)))
-    axes.tick_params(labelsize=SMALL)
     axes.locator_params(nbins=5)
 
 

@@ -212,14 +212,21 @@ class Workspace:
 
         return inscribed(self, kind, centre, proportions)
 
-    def plot(self, axes: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the border, each face in the colour of the limit that forms it, and return the axes.
 
-        Needs the extra `plot`.
+        Parameters
+        ----------
+        ax : matplotlib axes to draw on, three-dimensional ones for three coordinates. Default: those of a new figure.
+
+        Raises
+        ------
+        InvalidArgument : two-dimensional axes for three coordinates.
+        MissingLibrary : matplotlib is not installed.
         """
         from .picture import plot
 
-        return plot(self, axes)
+        return plot(self, ax)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write .npz (all arrays), .stl or .ply (the mesh; .ply with limits), or .csv (points of the border)."""

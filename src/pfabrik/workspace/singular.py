@@ -69,11 +69,11 @@ class SingularityMap:
         """The share of the points that each part has, the largest first."""
         return np.bincount(self.parts) / max(len(self.parts), 1)
 
-    def plot(self, axes: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the parallel measure and the locus of parallel singularities. Needs the extra `plot`."""
         from .singular_picture import plot_map
 
-        return plot_map(self, axes)
+        return plot_map(self, ax)
 
     def __repr__(self) -> str:
         least = float(np.min(self.measures.parallel, initial=np.inf))
@@ -97,11 +97,11 @@ class SingularityTrack:
     signs: Floats
     crossings: Ints
 
-    def plot(self, axes: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the measures along the path, crossings marked. Needs the extra `plot`."""
         from .singular_picture import plot_track
 
-        return plot_track(self, axes)
+        return plot_track(self, ax)
 
 
 @overload

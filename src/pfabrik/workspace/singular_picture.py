@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..extras import require
-from .picture import AZIMUTH, ELEVATION, SIZE, SMALL, labels, shown
+from .drawing import SMALL, axes_for
+from .picture import labels, shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,17 +24,13 @@ LINES = {
 }
 
 
-def plot_map(found: SingularityMap, axes: Axes | None = None) -> Axes:
+def plot_map(found: SingularityMap, ax: Axes | None = None) -> Axes:
     """Draw the parallel measure of a plane, or of space, and the locus in it."""
-    require("pictures", "matplotlib", "plot")
-    from matplotlib.collections import LineCollection
-    from matplotlib.figure import Figure
-
     space = found.workspace
     d = len(space.names)
-    if axes is None:
-        figure = Figure(figsize=SIZE, dpi=150, layout="constrained")
-        axes = figure.add_subplot(projection="3d" if d == 3 else None)
+    axes = axes_for(ax, d)
+    from matplotlib.collections import LineCollection
+
     points, locus = shown(space, found.points), shown(space, found.locus_vertices)
     parallel = np.asarray(found.measures.parallel)
     faces = list(locus[found.locus_faces])
@@ -51,10 +47,8 @@ def plot_map(found: SingularityMap, axes: Axes | None = None) -> Axes:
         solid: Any = axes
         drawn = solid.scatter(*points.T, c=parallel, s=FINE, linewidths=0, cmap="cividis", vmin=0.0, alpha=FAINT)
         solid.add_collection3d(Poly3DCollection(faces, facecolors=LOCUS, edgecolors="none", alpha=0.8))
-        solid.view_init(ELEVATION, AZIMUTH)
     axes.figure.colorbar(drawn, ax=axes, label="parallel measure", shrink=0.8, pad=0.12 if d == 3 else 0.03)
     axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(space), strict=False)))
-    axes.tick_params(labelsize=SMALL)
     axes.set_title(_title(found), fontsize=SMALL + 1)
     return axes
 
@@ -64,13 +58,9 @@ def _title(found: SingularityMap) -> str:
     return f"{found.workspace.mechanism.name}: {what}"
 
 
-def plot_track(found: SingularityTrack, axes: Axes | None = None) -> Axes:
+def plot_track(found: SingularityTrack, ax: Axes | None = None) -> Axes:
     """Draw the measures along a path, one line each, and where it leads through parallel singularities."""
-    require("pictures", "matplotlib", "plot")
-    from matplotlib.figure import Figure
-
-    if axes is None:
-        axes = Figure(figsize=SIZE, dpi=150, layout="constrained").add_subplot()
+    axes = axes_for(ax, 2)
     for name, (colour, dashes) in LINES.items():
         values = np.asarray(getattr(found.measures, name))
         if np.isfinite(values).any():
@@ -80,5 +70,4 @@ def plot_track(found: SingularityTrack, axes: Axes | None = None) -> Axes:
         axes.axvline(row + 0.5, color=LOCUS, linewidth=1.2, label=label)
     axes.set(xlabel="target", ylabel="measure of singularity", ylim=(0.0, None))
     axes.legend(frameon=False, fontsize=SMALL)
-    axes.tick_params(labelsize=SMALL)
     return axes
