@@ -126,12 +126,12 @@ def test_binary_and_endless_paths_end(tmp_path: Path, monkeypatch: pytest.Monkey
     (tmp_path / "binary.nc").write_bytes(bytes(range(256)) * 1000)
     with pytest.raises(InvalidArgument, match="no text"):
         pf.read_path(tmp_path / "binary.nc", pf.load("stewart"))
-    for module in ("pfabrik.paths.table", "pfabrik.paths.read_path"):
+    for module in ("pfabrik.paths.sampling", "pfabrik.paths.read_path"):
         monkeypatch.setattr(f"{module}.MOST_STEPS", 1000)
     assert path_module.MOST_STEPS == 1_000_000
     with pytest.raises(InvalidArgument, match="more than 1000 targets"):
         read(tmp_path, "x,y,z\n" + "1,2,180\n" * 1001, "long.csv")
-    with pytest.raises(InvalidArgument, match="more than 1000 steps"):
+    with pytest.raises(InvalidArgument, match="more than 1000 targets"):
         read(tmp_path, "G1 X1 F1\nX2\n" * 10_000)
-    with pytest.raises(InvalidArgument, match="more than 1000 steps"):
+    with pytest.raises(InvalidArgument, match="more than 1000 targets"):
         read(tmp_path, "G1 X100000 F1", longest=1.0)

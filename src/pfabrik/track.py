@@ -6,16 +6,18 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .answers.solution import Solution, Wanted
+from .answers.solution import Solution, Status, Wanted
 from .answers.starts import Start, start_of
 from .answers.tracked import Track, pace_of
 from .description.mechanism import Mechanism
 from .engine import engine_of
 from .errors import InvalidArgument
+from .kernels.reaching.plan import Rows
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
+from .tolerances import TOLERANCES
 
 
 def track(
@@ -26,6 +28,7 @@ def track(
     options: Options | None = None,
     on_progress: Callable[[int, int], None] | None = None,
     sample_time: float | None = None,
+    times: ArrayLike | None = None,
     speed_limits: float | Mapping[str, float] | None = None,
 ) -> Track:
     """Follow a path: warm-started from step to step, in the working mode it starts in.
@@ -38,6 +41,7 @@ def track(
     start : a single Solution or joint vector q to start from; default home.
     on_progress : called with (steps done, steps in all) every few steps.
     sample_time : from one target to the next [s].
+    times : instead of it, when each target is to be there, (n,) [s], as of `read_path`.
     speed_limits : highest speeds of the actuators, by name or the same for all [length/s or rad/s]; those not named may
         be as fast as they like.
 
@@ -57,11 +61,27 @@ def track(
         raise InvalidArgument("targets", f"batch shape {shape}", "a path: shape (n, 4, 4) or (n, 3)")
     if options.working_mode == "any":
         raise InvalidArgument("options.working_mode", "'any'", "'keep' or None: a machine cannot change it on its way")
-    pace = pace_of(mechanism, sample_time, speed_limits)
-    found = engine_of(mechanism).follow(poses, start_of(mechanism, start, ()), options, on_progress)
+    pace = pace_of(mechanism, len(poses), sample_time, times, speed_limits)
+    begin = start_of(mechanism, start, ())
+    found = engine_of(mechanism).follow(poses, begin, options, on_progress)
+    if begin is not None:
+        _count_on(mechanism, found.rows, begin.rows.actuators[0])
     refuse_invalid(poses, shape, found.rows.status, options)
     wanted = Wanted(poses.copy(), options.hold, options.rotation_length)
     return Track(mechanism, found, wanted, partial(_tracked, mechanism, options), pace)
+
+
+def _count_on(mechanism: Mechanism, rows: Rows, begin: NDArray[np.float64]) -> None:
+    """Count the turns of actuators on from those of the start, (n_a,), as far as their ranges go."""
+    known = np.flatnonzero(rows.status != Status.INVALID)
+    for column, drive in enumerate(mechanism.drives):
+        low, high = drive.limits
+        if drive.kind != "angle" or high - low <= 2.0 * np.pi or not len(known):
+            continue
+        values = rows.actuators[known, column]
+        values += 2.0 * np.pi * np.round((begin[column] - values[0]) / (2.0 * np.pi))
+        if (values >= low - TOLERANCES.limit).all() and (values <= high + TOLERANCES.limit).all():
+            rows.actuators[known, column] = values
 
 
 def _tracked(mechanism: Mechanism, options: Options, targets: NDArray[np.float64], start: Solution) -> Track:

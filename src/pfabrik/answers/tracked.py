@@ -7,14 +7,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats
 from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..errors import InvalidArgument, UnknownName
-from ..poses import between
+from ..poses import as_floats, between
 from ..tolerances import TOLERANCES
 from .limits import ActiveLimit
 from .solution import Integers, Solution, Status, Wanted, as_plain
@@ -30,9 +30,17 @@ LEAP = 0.5
 
 
 class Pace(NamedTuple):
-    """Time from one target to the next [s], and the highest speeds of the actuators, (n_a,) [length/s or rad/s]."""
+    """When each target is to be there, and how fast actuators may be.
 
-    sample_time: float
+    Attributes
+    ----------
+    times : (n,) [s]; NaN where nothing is known.
+    sample_time : from each to the next [s]; None where times were given.
+    speed_limits : (n_a,) [length/s or rad/s].
+    """
+
+    times: Floats
+    sample_time: float | None
     speed_limits: Floats
 
 
@@ -42,14 +50,16 @@ class Track(Solution):
     Attributes
     ----------
     targets : what was asked for, poses (n, 4, 4) [length].
-    sample_time : from one target to the next [s]; None where nothing was said of it.
+    times : when each target is to be there, (n,) [s]; None where nothing was said of it.
+    sample_time : from one target to the next [s]; None where nothing was said of it, or `times` were.
     jumps : whether an answer leaps away from the one before it, (n,): no motion leads from one to the other while
         the target moves between theirs. So it is where the nearest feasible pose itself jumps, as it can where a
         workspace is not convex.
     speeds : mean speed of every actuator since the answer before, (n, n_a) [length/s or rad/s]; 0 in the first row.
-        None without a sample time.
-    too_fast : actuators that cannot move as fast as they would have to, one tuple of names a row; None without a
-        sample time.
+        NaN where no time passes or none is known; None without times.
+    accelerations : how fast the mean velocity changes from the step before to this one, (n, n_a) [per s^2]; 0 in the
+        first two rows. NaN and None as of speeds.
+    too_fast : actuators that cannot move as fast as they would have to, one tuple of names a row; None without times.
     """
 
     def __init__(
@@ -102,6 +112,10 @@ class Track(Solution):
         return self._wanted.targets
 
     @property
+    def times(self) -> Floats | None:
+        return None if self._pace is None else self._pace.times
+
+    @property
     def sample_time(self) -> float | None:
         return None if self._pace is None else self._pace.sample_time
 
@@ -130,7 +144,9 @@ class Track(Solution):
         """As that of a `Solution`, with the fields of a track."""
         plain = super().to_dict()
         plain["jumps"] = self.jumps.tolist()
-        plain["speeds"] = None if self.speeds is None else as_plain(self.speeds)
+        for name in ("times", "speeds", "accelerations"):
+            value = getattr(self, name)
+            plain[name] = None if value is None else as_plain(value)
         plain["too_fast"] = None if self.too_fast is None else [list(names) for names in self.too_fast]
         return plain
 
@@ -139,9 +155,25 @@ class Track(Solution):
 
     @property
     def speeds(self) -> Floats | None:
-        if self._pace is None:
+        rates = self._rates()
+        return None if rates is None else np.abs(rates)
+
+    @property
+    def accelerations(self) -> Floats | None:
+        rates, times = self._rates(), self.times
+        if rates is None or times is None:
             return None
-        return np.abs(np.diff(self.actuators, axis=0, prepend=self.actuators[:1])) / self._pace.sample_time
+        found = np.zeros_like(rates)
+        found[2:] = np.diff(rates[1:], axis=0) / _passed(0.5 * (times[2:] - times[:-2]))
+        return found
+
+    def _rates(self) -> Floats | None:
+        """Mean velocities of the actuators since the answer before, (n, n_a)."""
+        if self.times is None:
+            return None
+        found = np.zeros_like(self.actuators)
+        found[1:] = np.diff(self.actuators, axis=0) / _passed(np.diff(self.times))
+        return found
 
     @property
     def too_fast(self) -> list[tuple[str, ...]] | None:
@@ -154,15 +186,27 @@ class Track(Solution):
 
 
 def pace_of(
-    mechanism: Mechanism, sample_time: float | None, speed_limits: float | Mapping[str, float] | None
+    mechanism: Mechanism,
+    count: int,
+    sample_time: float | None,
+    times: ArrayLike | None,
+    speed_limits: float | Mapping[str, float] | None,
 ) -> Pace | None:
-    """What was said of time and speeds, checked."""
+    """What was said of time and speeds along a path of so many targets, checked."""
     names = mechanism.actuator_names
-    if sample_time is None:
+    if sample_time is None and times is None:
         if speed_limits is not None:
-            raise InvalidArgument("sample_time", "None beside speed limits", "the time between two targets [s]")
+            expected = "the time between two targets [s], or times"
+            raise InvalidArgument("sample_time", "None beside speed limits", expected)
         return None
-    _require_positive("sample_time", sample_time)
+    if sample_time is not None:
+        _require_positive("sample_time", sample_time)
+        if times is not None:
+            raise InvalidArgument("times", "times beside a sample time", "one of them")
+        sample_time = float(sample_time)
+        when = sample_time * np.arange(count, dtype=np.float64)
+    else:
+        when = _checked_times(times, count)
     limits = np.full(len(names), np.inf)
     if isinstance(speed_limits, Mapping):
         for name, limit in speed_limits.items():
@@ -173,7 +217,22 @@ def pace_of(
     elif speed_limits is not None:
         _require_positive("speed_limits", speed_limits)
         limits[:] = speed_limits
-    return Pace(float(sample_time), limits)
+    return Pace(when, sample_time, limits)
+
+
+def _checked_times(times: ArrayLike | None, count: int) -> Floats:
+    expected = f"shape ({count},): when each target is to be there [s], none before the one before it"
+    found = as_floats("times", times, expected).copy()
+    if found.shape != (count,):
+        raise InvalidArgument("times", f"shape {found.shape}", expected)
+    if np.isinf(found).any() or (np.diff(found) < 0.0).any():
+        raise InvalidArgument("times", "times that go back, or are infinite", expected)
+    return found
+
+
+def _passed(steps: Floats) -> Floats:
+    """Durations as a column to divide by, NaN where there are none."""
+    return np.where(steps > 0.0, steps, np.nan)[:, None]
 
 
 def _require_positive(name: str, value: Any) -> None:

@@ -88,10 +88,11 @@ def draw(run: Run, folder: Path) -> None:
 
 def write(run: Run, folder: Path) -> None:
     """The CSV file of one run, with the limits that hold: these take joint coordinates, and more kernels."""
-    from .pathfile import PathFile, write_track
+    from ..paths.path import Path as Targets
+    from .track_rows import write_track
 
     with (folder / f"{run.key}.csv").open("w", newline="", encoding="utf-8") as handle:
-        write_track(handle, PathFile(run.targets), run.solution)
+        write_track(handle, Targets.of(run.targets), run.solution)
 
 
 def table(runs: list[Run]) -> str:

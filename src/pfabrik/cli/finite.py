@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import math
-import re
 from typing import Any
 
 import click
 
-NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*")
-"""Python reads more as a number: 1_0, digits of other scripts, names of infinities."""
+from ..paths.numbers import is_finite
 
-
-def is_finite(text: str) -> bool:
-    """Whether a text is a finite number."""
-    return NUMBER.fullmatch(text) is not None and math.isfinite(float(text))
+__all__ = ["FINITE", "is_finite"]
 
 
 class Finite(click.types.FloatParamType):

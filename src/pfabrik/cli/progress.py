@@ -8,8 +8,8 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def progress(label: str) -> Iterator[Callable[[int, int], None] | None]:
-    """A function ``(done, total)`` that moves the bar, or None where nobody would see it."""
+def progress(label: str) -> Iterator[Callable[[int, int | None], None] | None]:
+    """A function ``(done, total)`` that moves the bar, or None where nobody would see it; a total may be unknown."""
     if not sys.stderr.isatty():
         yield None
         return

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
@@ -25,8 +26,12 @@ if TYPE_CHECKING:
     from ..answers.tracked import Track
     from ..arrays import Floats
     from ..description.mechanism import Mechanism
+    from ..options import Options
+    from ..paths import path as paths
+    from ..paths.along import Extremes
+    from .track_summary import Summary
 
-ROWS_NAMED = 5
+STANDARD = Path("-")
 
 
 @click.command()
@@ -37,12 +42,16 @@ ROWS_NAMED = 5
 )
 @projecting
 @click.option("--sample-time", type=FINITE, metavar="S", help="Time from one target to the next [s].")
+@click.option("--rapid", type=FINITE, metavar="V", help="Feed of rapid moves (G0), which say none [length/s].")
+@click.option("--rate", type=FINITE, metavar="HZ", help="Resample the path: targets per second.")
+@click.option("--longest", type=FINITE, metavar="D", help="Resample the path: longest step [length].")
+@click.option("--tolerance", type=FINITE, metavar="D", help="How far steps may be off an arc [length].")
 @click.option(
     "--speed",
     "speeds",
     multiple=True,
     metavar="[NAME=]VALUE",
-    help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated.",
+    help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated. Default: the file's max_speed.",
 )
 @click.option(
     "--plot", "picture_path", type=click.Path(path_type=Path), metavar="FILE", help="Picture: PNG, SVG or PDF."
@@ -56,6 +65,10 @@ def track(
     hold: str,
     projection: str,
     sample_time: float | None,
+    rapid: float | None,
+    rate: float | None,
+    longest: float | None,
+    tolerance: float | None,
     speeds: tuple[str, ...],
     picture_path: Path | None,
     film_path: Path | None,
@@ -63,19 +76,18 @@ def track(
 ) -> int:
     """Follow a path of targets.
 
-    Reads the targets from a CSV file and writes the answers to another. Each answer starts from the one before.
+    Reads the targets from a CSV file or G-code and writes the answers to a CSV file, a part at a time. Each answer
+    starts from the one before.
 
-    PATH is G-code, by its ending (.nc, .ngc, .gcode), or a CSV file: a header line and the columns x, y, z and,
-    optionally, roll, pitch, yaw [deg] or roll_rad, pitch_rad, yaw_rad; - is standard input. Coordinates that the
-    machine cannot change may be missing, as z in a plane. Further columns go out as they came in, and angles in the
-    unit they came in.
+    PATH is G-code, by its ending (.nc, .ngc, .gcode), or a CSV file: a header line and, in any order, the columns x, y,
+    z, roll, pitch, yaw [deg] or roll_rad, pitch_rad, yaw_rad, and t [s] or feed [length/s]; - is standard input.
+    Coordinates that the machine cannot change may be missing, as z in a plane. Further columns go out as they came in,
+    and angles in the unit they came in.
 
     --plot draws the path, every actuator between its limits, and all margins; --animate the machine on its way.
 
-    The exit code is 1 also where an actuator would have to be faster than --speed allows.
+    The exit code is 1 also where an actuator would have to be faster than it may.
     """
-    from .pathfile import STANDARD, read_path, write_track
-
     if output is None and not as_json and picture_path is None and film_path is None:
         raise click.UsageError("no place for the answers: give -o FILE, -o -, --json, --plot or --animate")
     if as_json and output == STANDARD:
@@ -86,23 +98,29 @@ def track(
     refuse_early(picture_path, film_path, inputs)
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
-    if limits and sample_time is None:
-        raise click.UsageError("--speed says nothing without --sample-time")
-    read = read_path(path, mechanism)
-    note_ignored(mechanism, read.targets)
+    from ..paths.path import joined
+    from ..paths.read_path import path_blocks
+    from .track_summary import Summary
+
+    def read() -> Iterator[paths.Path]:
+        options = {"longest": longest, "rate": rate, "rapid": rapid, "sample_time": sample_time}
+        return path_blocks(path, mechanism, tolerance=tolerance, **options)
+
+    blocks: Iterable[paths.Path]
+    total = None
+    if as_json or picture_path is not None or film_path is not None:
+        blocks = checked(read(), mechanism, is_timed=bool(limits))
+        blocks = [joined(blocks)]
+        total = len(blocks[0].lines)
+    elif path.is_file():
+        total = sum(len(block.lines) for block in checked(read(), mechanism, is_timed=bool(limits)))
+        blocks = read()
+    else:
+        blocks = checked(read(), mechanism, is_timed=bool(limits))
+    told = Summary(mechanism)
     options = options_projecting(hold, projection)
     with nullcontext() if output is None else whole_file(output, inputs) as handle:
-        with progress(f"tracking {len(read.targets)} targets") as on_progress:
-            followed = pf.track(
-                mechanism,
-                read.targets,
-                options=options,
-                on_progress=on_progress,
-                sample_time=sample_time,
-                speed_limits=limits or None,
-            )
-        if handle is not None:
-            write_track(handle, read, followed)
+        followed = answered(mechanism, blocks, options, own_limits(mechanism) | limits, handle, told, total)
     if picture_path is not None:
         with picture(picture_path):
             pf.plot_track(followed)
@@ -111,9 +129,11 @@ def track(
             pf.animate(followed, film_path, on_progress=on_progress)
         click.echo(f"wrote {film_path}", err=True)
     if as_json:
-        click.echo(json.dumps(followed.to_dict(), allow_nan=False))
-    click.echo(summary(followed), err=as_json or output == STANDARD)
-    return 0 if followed and not any(followed.too_fast or ()) else 1
+        click.echo(json.dumps(as_object(followed), allow_nan=False))
+    click.echo(told.line(), err=as_json or output == STANDARD)
+    if told.worst():
+        click.echo(told.worst(), err=True)
+    return 0 if told.is_well else 1
 
 
 def refuse_early(picture_path: Path | None, film_path: Path | None, inputs: tuple[Path, ...]) -> None:
@@ -126,22 +146,104 @@ def refuse_early(picture_path: Path | None, film_path: Path | None, inputs: tupl
             require("pictures", "matplotlib", "plot")
 
 
-def note_ignored(mechanism: Mechanism, targets: Floats) -> None:
-    """Say so when the task leaves out columns that are not as at home; refuse a path that sets nothing else."""
-    task, home = set(mechanism.task), mechanism.home_pose
-    moved = (targets[:, :3, 3] != home[:3, 3]).any(axis=0)
-    turned = (targets[:, :3, :3] != home[:3, :3]).any()
-    columns = [axis for axis, moves in zip("xyz", moved, strict=True) if moves and axis not in task]
-    if turned and not task - set("xyz"):
-        columns += ["roll", "pitch", "yaw"]
-    elif "yaw" in task and (targets[:, :3, 2] != home[:3, 2]).any():
-        columns += ["roll", "pitch"]
-    sets_some = any(moves and axis in task for axis, moves in zip("xyz", moved, strict=True))
-    if columns and not sets_some and not (turned and task - set("xyz")):
-        raise click.ClickException(
-            f"the path sets {', '.join(columns)} only, none of which the task has: {' '.join(mechanism.task)}"
-        )
-    note_left_out((f"column {name}" for name in columns), mechanism)
+def checked(blocks: Iterable[paths.Path], mechanism: Mechanism, is_timed: bool) -> Iterator[paths.Path]:
+    """Blocks of a path that sets something of the task, with notes of what it sets for nothing; see `Moves`."""
+    moves = Moves(mechanism)
+    for number, block in enumerate(blocks):
+        if number == 0:
+            if is_timed and block.times is None:
+                raise click.UsageError("--speed says nothing without --sample-time, or a path with times")
+            note_misspelt(block.others)
+        moves.add(block.targets)
+        yield block
+    moves.tell()
+
+
+class Moves:
+    """What a path changes of a pose, against home."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+        self._found = {"x": False, "y": False, "z": False, "turned": False, "tilted": False}
+
+    def add(self, targets: Floats) -> None:
+        """Targets (n, 4, 4) as well."""
+        off = (targets != self._mechanism.home_pose).any(axis=0)
+        found = (*off[:3, 3], off[:3, :3].any(), off[:3, 2].any())
+        self._found = {name: was or bool(now) for (name, was), now in zip(self._found.items(), found, strict=True)}
+
+    def tell(self) -> None:
+        """Say so when the task leaves out columns that are not as at home; refuse a path that sets nothing else."""
+        found, task = self._found, set(self._mechanism.task)
+        columns = [axis for axis in "xyz" if found[axis] and axis not in task]
+        if found["turned"] and not task - set("xyz"):
+            columns += ["roll", "pitch", "yaw"]
+        elif "yaw" in task and found["tilted"]:
+            columns += ["roll", "pitch"]
+        sets_some = any(found[axis] for axis in task & set("xyz"))
+        if columns and not sets_some and not (found["turned"] and task - set("xyz")):
+            raise click.ClickException(
+                f"the path sets {', '.join(columns)} only, none of which the task has: {' '.join(self._mechanism.task)}"
+            )
+        note_left_out((f"column {name}" for name in columns), self._mechanism)
+
+
+def note_misspelt(others: Iterable[str]) -> None:
+    """Say so where a further column is named nearly like one of a pose."""
+    from ..paths.table import NUMERIC
+
+    for name in others:
+        hint = "" if name in NUMERIC else near_miss(name, NUMERIC)
+        if hint:
+            click.echo(f"pfabrik: note: column '{name}' goes out as it came in{hint}", err=True)
+
+
+def answered(
+    mechanism: Mechanism,
+    blocks: Iterable[paths.Path],
+    options: Options,
+    limits: dict[str, float],
+    handle: TextIO | None,
+    told: Summary,
+    total: int | None,
+) -> Track:
+    """Follow a path part by part, write its rows and sum it up; the answers to the last part."""
+    from ..paths.along import largest_tilts, least_margins
+    from ..paths.follow import follow_parts
+    from .track_rows import Rows
+
+    rows: Rows | None = None
+    with progress(f"tracking {total or ''} targets") as show:
+        on_progress = None if show is None else lambda done: show(done, total)
+        parts = follow_parts(mechanism, blocks, options=options, speed_limits=limits or None, on_progress=on_progress)
+        for path, followed, first in parts:
+            room, tilts = least_margins(followed), largest_tilts(followed)
+            told.add(path, followed, room, tilts, first)
+            if handle is not None:
+                rows = rows or Rows(handle, mechanism, path, tilts is not None)
+                rows.write(path, followed, room, tilts, first)
+    return followed
+
+
+def as_object(followed: Track) -> dict[str, object]:
+    """The fields of a track, and in every row the least margin and the largest tilt of a rod [rad]."""
+    from ..answers.solution import as_plain
+    from ..paths.along import largest_tilts, least_margins
+
+    plain = followed.to_dict()
+    found: dict[str, Extremes | None] = {"margin": least_margins(followed), "tilt": largest_tilts(followed)}
+    for name, each in found.items():
+        plain[name] = None if each is None else as_plain(each.values)
+        plain[f"{name}_of"] = None if each is None else each.names
+    return plain
+
+
+def own_limits(mechanism: Mechanism) -> dict[str, float]:
+    """The speeds that the mechanism says, by name."""
+    from ..timing.time_path import limits_of
+
+    speeds = zip(mechanism.actuator_names, limits_of(mechanism, "speed", None).tolist(), strict=True)
+    return {name: speed for name, speed in speeds if math.isfinite(speed)}
 
 
 def speed_limits(mechanism: Mechanism, given: Sequence[str], option: str = "--speed") -> dict[str, float]:
@@ -164,40 +266,6 @@ def positive(option: str, word: str, value: str) -> float:
     if not is_finite(value) or float(value) <= 0.0:
         raise click.UsageError(f"{option} {word}: found '{value}'; expected a positive number")
     return float(value)
-
-
-def summary(followed: Track) -> str:
-    """What became of the targets, in one line."""
-    counts = count_statuses(followed)
-    told = [", ".join(f"{count} {name}" for name, count in counts.items() if count or name == "reached")]
-    if counts["projected"]:
-        unit = followed.mechanism.length_unit
-        told.append(f"farthest from its target {float(followed.position_error.max()):.3g} {unit}")
-    jumps = [row for row, leaps in enumerate(followed.jumps.tolist(), 1) if leaps]
-    if jumps:
-        told.append(f"{len(jumps)} jump{'s' * (len(jumps) > 1)} ({targets_named(jumps)})")
-    return "; ".join([*told, *hasty(followed)])
-
-
-def hasty(followed: Track) -> list[str]:
-    """The actuators that would have to be too fast, how fast, and where: one phrase each."""
-    from ..description.readouts import readouts
-
-    too_fast, speeds, phrases = followed.too_fast, followed.speeds, []
-    if too_fast is None or speeds is None:
-        return []
-    for column, readout in enumerate(readouts(followed.mechanism)):
-        rows = [row for row, names in enumerate(too_fast, 1) if readout.name in names]
-        if rows:
-            fastest = float(readout.display(speeds[:, column]).max())
-            phrases.append(f"{readout.name} too fast: {fastest:.3g} {readout.unit}/s ({targets_named(rows)})")
-    return phrases
-
-
-def targets_named(rows: Sequence[int]) -> str:
-    """Numbers of targets, counted from 1: the first of them."""
-    more = f", and {len(rows) - ROWS_NAMED} more" if len(rows) > ROWS_NAMED else ""
-    return f"target{'s' * (len(rows) > 1)} {', '.join(map(str, rows[:ROWS_NAMED]))}{more}"
 
 
 def count_statuses(solution: Track) -> dict[str, int]:

@@ -38,10 +38,8 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
         ending_checked(html, (".html", ".htm"), inputs=(Path(mech), *([path] if path else [])))
     shown: str | Mechanism | Track = mech if mech != STANDARD_INPUT and path is None else load(mech)
     if path is not None:
-        from .pathfile import read_path
-
         mechanism = load(mech)
-        targets = read_path(path, mechanism).targets
+        targets = pf.read_path(path, mechanism).targets
         with progress(f"tracking {len(targets)} targets") as on_progress:
             shown = pf.track(mechanism, targets, on_progress=on_progress)
     with pf.view(shown, port=port, host=host) as viewer:

@@ -123,59 +123,84 @@ def _rest(machine: Machine, given: str) -> Iterator[str]:
         yield "    }"
 
 
-def _ik(machine: Machine, limits: bool, forward: bool) -> Iterator[str]:
-    given = _given_argument(forward)
+def _lead(machine: Machine, forward: bool) -> Iterator[str]:
+    """Lead what a task sets of a pose to a target, and let the rest follow."""
     task = machine.task
-    whole = machine.mechanism.end_effector_is_joint or task.rotations == 3
+    yield "/* Leads a pose to a target in so many parts, each completed from the one before: 0, PFK_NO_POSE, or the"
+    yield "   number of a leg that does not reach or close. */"
+    yield "static int pfk_lead(const pfk_pose *target, int parts, pfk_pose *own, pfk_leg leg[PFK_LEGS])"
+    yield "{"
+    if task.rotations == 2:
+        yield "    pfk_real now[3], aim[3], turn[3], sine, cosine;"
+    yield f"    int {'i, ' if task.rotations == 2 else ''}left, steps, code = 0;"
+    yield "    pfk_real share;"
+    yield "    for (left = parts; left > 0 && !code; --left) {"
+    yield "        share = 1.0 / (pfk_real)left;"
+    for axis in range(3):
+        if task.axes[axis]:
+            along = f"own->p[{axis}] + share * (target->p[{axis}] - own->p[{axis}])"
+            yield f"        own->p[{axis}] = left > 1 ? {along} : target->p[{axis}];"
+    if task.rotations == 3:
+        yield "        pfk_turn_toward(own, target, share);"
+    elif task.rotations == 2:
+        yield "        /* the shortest turn that brings the platform's z axis to where it is wanted */"
+        yield "        for (i = 0; i < 3; ++i) {"
+        yield "            now[i] = own->R[i][2];"
+        yield "            aim[i] = target->R[i][2];"
+        yield "        }"
+        yield "        pfk_cross(now, aim, turn);"
+        yield "        sine = pfk_norm(turn);"
+        yield "        cosine = pfk_dot(now, aim);"
+        yield "        if (!(cosine > PFK_RANK - 1.0))"
+        yield "            return PFK_NO_POSE;"
+        yield "        if (sine > 0.0) {"
+        yield "            for (i = 0; i < 3; ++i)"
+        yield "                turn[i] *= share * atan2(sine, cosine) / sine;"
+        yield "            pfk_spin(own, turn);"
+        yield "        }"
+    yield f"        code = pfk_settle(own{_given_argument(forward)}, PFK_IK_STEPS, parts == 1, leg, &steps);"
+    yield "    }"
+    yield "    return code;"
+    yield "}"
+    yield ""
+
+
+def _ik(machine: Machine, limits: bool, forward: bool) -> Iterator[str]:
+    task, completes = machine.task, bool(machine.unset)
+    if completes:
+        yield from _lead(machine, forward)
     yield "int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS])"
     yield "{"
     yield "    pfk_leg leg[PFK_LEGS];"
-    yield f"    pfk_pose own = *{'target' if whole else 'pose'};"
+    yield f"    pfk_pose own = *{'pose, wanted = *target' if completes else 'target'};"
     if limits and machine.limits:
         yield "    pfk_real slack[PFK_LIMITS];"
-    if machine.rows_at_rest and not machine.unset:
+    if machine.rows_at_rest and not completes:
         yield "    pfk_real row[PFK_ROWS], slope[PFK_ROWS][6], worst;"
-    if not whole and task.rotations == 2:
-        yield "    pfk_pose wanted = *target;"
-        yield "    pfk_real now[3], aim[3], turn[3], sine, cosine;"
-    yield "    int code" + (", steps" if machine.unset else "") + ("" if whole or task.rotations == 0 else ", i") + ";"
-    source, taken = (
-        ("pose", [a for a in range(3) if not task.axes[a]])
-        if whole
-        else ("target", [a for a in range(3) if task.axes[a]])
-    )
-    if machine.mechanism.end_effector_is_joint:
-        taken = []
-    for axis in taken:
-        yield f"    own.p[{axis}] = {source}->p[{axis}];"
-    if not whole and task.rotations == 2:
-        yield "    /* the shortest turn that brings the platform's z axis to where it is wanted */"
+    yield "    int code;"
+    if completes:
         for axis in range(3):
             if not task.axes[axis]:
                 yield f"    wanted.p[{axis}] = 0.0;"
+        if task.rotations == 0:
+            yield "    pfk_home(&wanted);"
+            for axis in range(3):
+                if task.axes[axis]:
+                    yield f"    wanted.p[{axis}] = target->p[{axis}];"
         yield "    if (pfk_make_exact(&wanted) || pfk_make_exact(&own))"
         yield "        return PFK_NO_POSE;"
-        yield "    for (i = 0; i < 3; ++i) {"
-        yield "        now[i] = own.R[i][2];"
-        yield "        aim[i] = wanted.R[i][2];"
+        yield "    code = pfk_lead(&wanted, 1, &own, leg);"
+        yield "    if (code > 0) { /* there may be a way in small steps */"
+        yield "        own = *pose;"
+        yield "        pfk_make_exact(&own);"
+        yield "        code = pfk_lead(&wanted, PFK_PARTS, &own, leg);"
         yield "    }"
-        yield "    pfk_cross(now, aim, turn);"
-        yield "    sine = pfk_norm(turn);"
-        yield "    cosine = pfk_dot(now, aim);"
-        yield "    if (!(cosine > PFK_RANK - 1.0))"
-        yield "        return PFK_NO_POSE;"
-        yield "    if (sine > 0.0) {"
-        yield "        for (i = 0; i < 3; ++i)"
-        yield "            turn[i] *= atan2(sine, cosine) / sine;"
-        yield "        pfk_spin(&own, turn);"
-        yield "    }"
+        yield "    if (code < 0)"
+        yield "        return code;"
     else:
         yield "    if (pfk_make_exact(&own))"
         yield "        return PFK_NO_POSE;"
-    if machine.unset:
-        yield f"    code = pfk_settle(&own{given}, PFK_IK_STEPS, leg, &steps);"
-    else:
-        yield from _rest(machine, given)
+        yield from _rest(machine, _given_argument(forward))
     yield "    if (code)"
     yield "        return PFK_LEG + code;"
     if limits and machine.limits:
@@ -243,7 +268,7 @@ def _fk(machine: Machine) -> Iterator[str]:
     yield "            return PFK_NO_ACTUATORS;"
     yield "    if (pfk_make_exact(&own))"
     yield "        return PFK_NO_POSE;"
-    yield "    code = pfk_settle(&own, given, PFK_FK_STEPS, leg, &count);"
+    yield "    code = pfk_settle(&own, given, PFK_FK_STEPS, 0, leg, &count);"
     yield "    if (steps)"
     yield "        *steps = count;"
     yield "    if (code)"

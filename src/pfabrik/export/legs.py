@@ -138,22 +138,26 @@ def _rod(mechanism: Mechanism, rod: Rod, main: Rod, place: int) -> LegCode:
         flat = first @ last - (line @ first) * (line @ last)
         numbers["twist"] = math.atan2(line @ np.cross(first, last), flat)
     if rod.carrier is not None:
-        numbers |= _carrier_numbers(rod.carrier, rod.foot, line, length)
+        numbers |= _carrier_numbers(rod.carrier, rod.foot, rod.head, length)
     shape = RodShape(carrier, rod.is_shared, rod.slide is not None, twists, foot.kind, head.kind, rod.is_reversed)
     return LegCode(shape, place, numbers, _names(rod.items))
 
 
-def _carrier_numbers(carrier: Item, foot: Floats, line: Floats, length: float) -> dict[str, Number]:
-    """Of a crank the spoke from its axis to the foot, and that a quarter turn on; which solution is home's."""
+def _carrier_numbers(carrier: Item, foot: Floats, head: Floats, length: float) -> dict[str, Number]:
+    """Of a crank the spoke from its axis to the foot, and that a quarter turn on; which solution is home's.
+
+    What is to be reached at home counts from a crank's axis, or from the foot on a carriage.
+    """
     axis = carrier.axis
-    numbers: dict[str, Number] = {"axis": axis}
+    numbers: dict[str, Number] = {"axis": axis, "reach": (head - foot) * length}
     motion = axis
     if carrier.kind == "R":
         centre = carrier.point + axis * (axis @ (foot - carrier.point))
         motion = np.cross(axis, foot - centre)
+        numbers["reach"] = (head - centre) * length
         numbers |= {"centre": centre * length, "spoke": (foot - centre) * length, "across": motion * length}
     # a carriage has q = middle + side root, a crank q = middle + side acos: home's foot leaves the line or goes along
-    numbers["side"] = -1.0 if line @ motion >= 0.0 else 1.0
+    numbers["side"] = -1.0 if (head - foot) @ motion >= 0.0 else 1.0
     return numbers
 
 

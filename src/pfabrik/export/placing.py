@@ -83,9 +83,12 @@ def _place_rod(shape: RodShape, needs: Needs) -> Iterator[str]:
         yield "    pfk_real sure;"
     if shape.is_shared and shape.carrier == "crank":
         yield "    pfk_real arm[3];"
+    if own_carrier:
+        yield "    pfk_real moved[3];"
     yield "    pfk_map(frame, rod->head, leg->head);"
     if own_carrier:
-        find = f"leg->is_held = pfk_{shape.carrier}(rod, leg);"
+        find = f"leg->is_held = pfk_{shape.carrier}(rod, moved, leg);"
+        yield "    pfk_displaced(frame, rod->head, moved);"
         if can_be_given:
             yield "    if (given) {"
             yield "        leg->is_held = 1;"
@@ -112,9 +115,9 @@ def _place_rod(shape: RodShape, needs: Needs) -> Iterator[str]:
         yield "    pfk_along(rod->foot, 0.0, rod->foot, leg->foot);"
     yield "    pfk_along(leg->head, -1.0, leg->foot, leg->span);"
     yield "    leg->length = pfk_norm(leg->span);"
+    yield "    leg->u[0] = leg->u[1] = leg->u[2] = 0.0;"
     yield "    if (!(leg->length > 0.0))"
     yield "        return 1.0;"
-    yield "    leg->u[0] = leg->u[1] = leg->u[2] = 0.0;"
     yield "    pfk_along(leg->u, 1.0 / leg->length, leg->span, leg->u);"
     seen = needs.lines | {end for end, _ in ends}
     if "foot" in seen and shape.carrier == "crank":

@@ -51,19 +51,33 @@ static void pfk_map(const pfk_frame *frame, const pfk_real point[3], pfk_real ou
 static void pfk_frames(const pfk_pose *pose, pfk_frame *forward, pfk_frame *back)
 {
     static const pfk_real reference[3] = PFK_REFERENCE;
+    pfk_real moved[3];
     int i, j;
+    pfk_along(pose->p, -1.0, reference, moved);
     for (i = 0; i < 3; ++i) {
         forward->p[i] = forward->centre[i] = pose->p[i];
+        forward->moved[i] = moved[i];
         back->centre[i] = reference[i];
-        back->p[i] = reference[i];
+        back->moved[i] = 0.0;
         for (j = 0; j < 3; ++j) {
             forward->R[i][j] = pose->R[i][j];
             back->R[i][j] = pose->R[j][i];
-            back->p[i] -= pose->R[j][i] * pose->p[j];
+            back->moved[i] -= pose->R[j][i] * moved[j] + (pose->R[j][i] - (i == j ? 1.0 : 0.0)) * reference[j];
         }
+        back->p[i] = back->moved[i];
     }
     forward->is_back = 0;
     back->is_back = 1;
+}
+
+/* How far a point of the platform has moved since home. */
+static void pfk_displaced(const pfk_frame *frame, const pfk_real point[3], pfk_real out[3])
+{
+    int i;
+    for (i = 0; i < 3; ++i)
+        out[i] = frame->moved[i] + (frame->R[i][0] - (i == 0 ? 1.0 : 0.0)) * point[0]
+                 + (frame->R[i][1] - (i == 1 ? 1.0 : 0.0)) * point[1]
+                 + (frame->R[i][2] - (i == 2 ? 1.0 : 0.0)) * point[2];
 }
 
 /* v turned about a unit vector; `out` is not v. */
@@ -112,20 +126,19 @@ static pfk_real pfk_wrap_into(pfk_real angle, pfk_real lo, pfk_real hi)
     return angle < lo - PFK_KEPT ? angle + PFK_TURN : angle;
 }
 
-/* One of the two solutions of A cos q + B sin q = C; how far it is from the double root, negative where there is none:
-   then the angle is that of the double root. */
-static pfk_real pfk_either(pfk_real A, pfk_real B, pfk_real C, pfk_real side, pfk_real *cosine, pfk_real *sine)
+/* One of the two solutions of A cos q + B sin q = C, where over = A - C; how far it is from the double root, negative
+   where there is none: then the angle is that of the double root. */
+static pfk_real pfk_either(pfk_real A, pfk_real B, pfk_real C, pfk_real over, pfk_real side, pfk_real *cosine,
+                           pfk_real *sine)
 {
-    const pfk_real square = A * A + B * B, size = sqrt(square);
-    pfk_real rest, root;
+    const pfk_real square = A * A + B * B, size = sqrt(square), rest = over * (A + C) + B * B;
+    const pfk_real root = rest > 0.0 ? side * sqrt(rest) : 0.0;
     *cosine = 1.0;
     *sine = 0.0;
     if (!(square > 0.0))
         return -1.0;
-    rest = (size - C) * (size + C);
     if (rest < 0.0)
         C = C < 0.0 ? -size : size;
-    root = rest > 0.0 ? side * sqrt(rest) : 0.0;
     *cosine = (A * C - B * root) / square;
     *sine = (B * C + A * root) / square;
     return rest / square;
@@ -136,10 +149,12 @@ static pfk_real pfk_aim(const pfk_real axes[3][3], const pfk_real u[3], const pf
                         pfk_real angles[])
 {
     const pfk_real *a = axes[0], *b = axes[1], bu = pfk_dot(b, u);
-    pfk_real flat[3], across[3], turned[3], cosine, sine, sure;
+    pfk_real flat[3], across[3], turned[3], A, C, cosine, sine, sure;
     pfk_along(u, -bu, b, flat);
     pfk_cross(b, u, across);
-    sure = pfk_either(pfk_dot(a, flat), pfk_dot(a, across), pfk_dot(a, w) - pfk_dot(a, b) * bu, side, &cosine, &sine);
+    A = pfk_dot(a, flat);
+    C = pfk_dot(a, w) - pfk_dot(a, b) * bu;
+    sure = pfk_either(A, pfk_dot(a, across), C, A - C, side, &cosine, &sine);
     pfk_about(u, b, cosine, sine, turned);
     angles[0] = pfk_angle(a, turned, w);
     angles[1] = atan2(sine, cosine);
@@ -169,26 +184,22 @@ static pfk_real pfk_last_angle(const pfk_frame *frame, const pfk_real axes[3][3]
     return pfk_angle(axes[before], across, now);
 }
 
-/* Turns a crank until its rod reaches the head, or to where it comes nearest; whether it is near a dead point. */
-static int pfk_crank(const pfk_rod *rod, pfk_leg *leg)
+/* Turns a crank until its rod reaches the head, or to where it comes nearest; whether it is near a dead point. What
+   the head has moved since home tells more digits than where it is: with x = reach + moved, C = spoke . reach + c. */
+static int pfk_crank(const pfk_rod *rod, const pfk_real moved[3], pfk_leg *leg)
 {
-    pfk_real x[3], C, sure;
-    pfk_along(leg->head, -1.0, rod->centre, x);
-    C = 0.5 * (pfk_dot(x, x) + pfk_dot(rod->spoke, rod->spoke) - rod->length * rod->length);
-    sure = pfk_either(pfk_dot(rod->spoke, x), pfk_dot(rod->across, x), C, rod->side, &leg->cosine, &leg->sine);
+    const pfk_real a = pfk_dot(rod->spoke, moved), B = pfk_dot(rod->across, rod->reach) + pfk_dot(rod->across, moved);
+    const pfk_real c = pfk_dot(moved, rod->reach) + 0.5 * pfk_dot(moved, moved), A = pfk_dot(rod->spoke, rod->reach);
+    const pfk_real sure = pfk_either(A + a, B, A + c, a - c, rod->side, &leg->cosine, &leg->sine);
     leg->carrier = atan2(leg->sine, leg->cosine);
     return !(sure > PFK_DEAD);
 }
 
 /* Moves a carriage until its rod reaches the head, or to where it comes nearest; whether it is near a dead point. */
-static int pfk_carriage(const pfk_rod *rod, pfk_leg *leg)
+static int pfk_carriage(const pfk_rod *rod, const pfk_real moved[3], pfk_leg *leg)
 {
-    pfk_real x[3], middle, away, rest;
-    pfk_along(leg->head, -1.0, rod->foot, x);
-    middle = pfk_dot(x, rod->axis);
-    pfk_along(x, -middle, rod->axis, x);
-    away = pfk_norm(x);
-    rest = (rod->length - away) * (rod->length + away);
+    const pfk_real middle = pfk_dot(rod->reach, rod->axis) + pfk_dot(moved, rod->axis);
+    const pfk_real rest = middle * middle - 2.0 * pfk_dot(moved, rod->reach) - pfk_dot(moved, moved);
     leg->carrier = middle + (rest > 0.0 ? rod->side * sqrt(rest) : 0.0);
     return !(rest > PFK_DEAD * rod->length * rod->length);
 }
@@ -314,6 +325,44 @@ static void pfk_spin(pfk_pose *pose, const pfk_real vector[3])
         for (i = 0; i < 3; ++i)
             pose->R[i][j] = turned[i];
     }
+}
+
+/* Turns a pose a share of the way to another. */
+static void pfk_turn_toward(pfk_pose *pose, const pfk_pose *target, pfk_real share)
+{
+    pfk_real off[3][3], turn[3], sine, cosine;
+    int i, j;
+    for (i = 0; i < 3; ++i)
+        for (j = 0; j < 3; ++j)
+            off[i][j] = pfk_dot(target->R[i], pose->R[j]);
+    for (i = 0; i < 3; ++i)
+        turn[i] = 0.5 * (off[(i + 2) % 3][(i + 1) % 3] - off[(i + 1) % 3][(i + 2) % 3]);
+    sine = pfk_norm(turn);
+    cosine = 0.5 * (off[0][0] + off[1][1] + off[2][2] - 1.0);
+    for (i = 0; i < 3 && sine > 0.0; ++i)
+        turn[i] *= share * atan2(sine, cosine) / sine;
+    if (share < 1.0)
+        pfk_spin(pose, turn);
+    for (i = 0; i < 3 && !(share < 1.0); ++i)
+        for (j = 0; j < 3; ++j)
+            pose->R[i][j] = target->R[i][j];
+}
+
+/* Gives a pose the opposite of the turn that it has made since the start. */
+static void pfk_turn_back(const pfk_pose *start, pfk_pose *pose)
+{
+    pfk_pose turned;
+    int i, j, k, n;
+    for (i = 0; i < 3; ++i)
+        for (j = 0; j < 3; ++j) {
+            turned.R[i][j] = 0.0;
+            for (k = 0; k < 3; ++k)
+                for (n = 0; n < 3; ++n)
+                    turned.R[i][j] += start->R[i][k] * pose->R[n][k] * start->R[n][j];
+        }
+    for (i = 0; i < 3; ++i)
+        for (j = 0; j < 3; ++j)
+            pose->R[i][j] = turned.R[i][j];
 }
 
 /* Makes the rotation of a pose the nearest that is orthonormal; 1 where it is no rotation, or not of finite numbers. */

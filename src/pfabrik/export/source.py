@@ -28,6 +28,7 @@ ROD_FIELDS = {
     "spoke": "[3]",
     "across": "[3]",
     "side": "",
+    "reach": "[3]",
     "foot_axes": "[3][3]",
     "foot_side": "",
     "head_axes": "[3][3]",
@@ -134,6 +135,7 @@ def _constants(machine: Machine, precision: Precision, forward: bool) -> str:
         f"    PFK_ROWS = {max(n_rows, 1)},",
         f"    PFK_UNKNOWNS = {max(unknowns, 1)},",
         "    PFK_IK_STEPS = 20,",
+        "    PFK_PARTS = 8, /* of the way to a target that is not completed at once */",
         "    PFK_FK_STEPS = 40",
         "};",
         "",
@@ -143,7 +145,7 @@ def _constants(machine: Machine, precision: Precision, forward: bool) -> str:
 
 def _types(body: str) -> str:
     """The structures, with the fields that functions use."""
-    frame = ["pfk_real p[3];", "pfk_real R[3][3];", "pfk_real centre[3];", "int is_back;"]
+    frame = ["pfk_real p[3];", "pfk_real R[3][3];", "pfk_real centre[3];", "pfk_real moved[3];", "int is_back;"]
     blocks = ["/* The platform, or the base as seen from it: points map to R x + p, and turn about `centre`. */"]
     blocks += _struct("pfk_frame", frame)
     for kind, variables, fields in (("rod", ("rod", "main"), ROD_FIELDS), ("pivot", ("pivot",), PIVOT_FIELDS)):

@@ -38,7 +38,7 @@ class Accuracy(NamedTuple):
 
 ACCURACY: dict[Precision, Accuracy] = {
     "double": Accuracy(1e-9, 1e-13, 1e-10, 1e-12, 1e-9, 2e-6),
-    "float": Accuracy(1e-6, 1e-6, 2e-5, 1e-6, 1e-5, 2e-5),
+    "float": Accuracy(1e-6, 2e-7, 5e-6, 1e-6, 1e-5, 2e-5),
 }
 
 

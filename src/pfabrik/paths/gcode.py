@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats
+from .path import WrongPath
 
 WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
 COMMENT = re.compile(r"\([^()]*\)|;.*")
@@ -28,12 +29,8 @@ FARTHEST = 1e9
 """Numbers beyond are no places of a machine."""
 
 
-class WrongGCode(ValueError):
-    """A line that cannot be followed; its text names the line and what was found."""
-
-
 class Step(NamedTuple):
-    """A place on the way: x, y, z, and a, b, c [deg]; the feed toward it, infinite in rapid moves; the line."""
+    """A place on the way: x, y, z, and a, b, c [deg]; the feed toward it, as of a `Path`; the line."""
 
     place: Floats
     feed: float
@@ -82,7 +79,7 @@ def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: fl
             continue
         if state.motion is None:
             if moves:
-                raise WrongGCode(f"line {number}: a position without G0, G1, G2 or G3")
+                raise WrongPath(f"line {number}: a position without G0, G1, G2 or G3")
             continue
         yield from _move(state, words, number, tolerance, longest)
 
@@ -95,10 +92,10 @@ def _words(text: str, number: int) -> dict[str, list[float]]:
     found: dict[str, list[float]] = {}
     rest = WORD.sub(" ", plain).split()
     if rest:
-        raise WrongGCode(f"line {number}: found '{rest[0][:20]}'; expected words such as X12.5")
+        raise WrongPath(f"line {number}: found '{rest[0][:20]}'; expected words such as X12.5")
     for letter, value in WORD.findall(plain):
         if abs(float(value)) > FARTHEST:
-            raise WrongGCode(f"line {number}: found {letter}{value[:20]}; expected a number below {FARTHEST:g}")
+            raise WrongPath(f"line {number}: found {letter}{value[:20]}; expected a number below {FARTHEST:g}")
         found.setdefault(letter, []).append(float(value))
     return found
 
@@ -119,11 +116,11 @@ def _obey(state: State, words: dict[str, list[float]], number: int) -> bool:
         elif code == 28 and state.motion is None:
             continue  # homing, before anything else
         elif code not in IGNORED and code != 91.1:
-            raise WrongGCode(f"line {number}: found G{code:g}; expected G0 to G3, G17 to G21, G90 or G91")
+            raise WrongPath(f"line {number}: found G{code:g}; expected G0 to G3, G17 to G21, G90 or G91")
     if "F" in words:
         state.feed = words["F"][-1]
         if not state.feed > 0.0:
-            raise WrongGCode(f"line {number}: found F{state.feed:g}; expected a feed above zero")
+            raise WrongPath(f"line {number}: found F{state.feed:g}; expected a feed above zero")
     return any(code in (2, 30) for code in words.get("M", []))
 
 
@@ -134,6 +131,8 @@ def _move(state: State, words: dict[str, list[float]], number: int, tolerance: f
             value = words[letter][-1] * (state.unit if place < 3 else 1.0)
             end[place] = end[place] + value if state.is_relative else value
     begin, feed = state.place, state.feed * state.unit / 60.0
+    if state.motion not in (2, 3) and (end[:3] == begin[:3]).all():
+        feed = state.feed / 60.0  # of turning alone, in degrees
     if state.motion in (2, 3):
         places = _arc(state, words, end, number, tolerance, longest)
     else:
@@ -147,7 +146,7 @@ def _move(state: State, words: dict[str, list[float]], number: int, tolerance: f
 
 def _parts(length: float, longest: float, number: int) -> int:
     if length / longest > FARTHEST:
-        raise WrongGCode(f"line {number}: a move of {length:g}, in steps of {longest:g}: too many")
+        raise WrongPath(f"line {number}: a move of {length:g}, in steps of {longest:g}: too many")
     return max(1, math.ceil(length / longest * (1.0 - 1e-12)))
 
 
@@ -165,7 +164,7 @@ def _arc(
         centre = np.array(offsets)
     radius, off = float(np.hypot(*centre)), float(np.hypot(*(chord - centre)))
     if not radius > 0.0 or abs(radius - off) > max(1e-3 * radius, 2.0 * tolerance):
-        raise WrongGCode(f"line {number}: an arc from radius {radius:g} to {off:g}; expected the same")
+        raise WrongPath(f"line {number}: an arc from radius {radius:g} to {off:g}; expected the same")
     start, stop = math.atan2(-centre[1], -centre[0]), math.atan2(*(chord - centre)[::-1])
     turn = (sense * (stop - start)) % (2.0 * math.pi)
     turn = 2.0 * math.pi if turn < 1e-9 else turn
@@ -185,8 +184,6 @@ def _centre_of(chord: Floats, radius: float, sense: float, number: int) -> Float
     """The centre of an arc given by its radius; a negative one is that of the longer arc."""
     half = float(np.hypot(*chord)) / 2.0
     if half == 0.0 or half > abs(radius) * (1.0 + 1e-6):
-        raise WrongGCode(
-            f"line {number}: found R{radius:g} for ends {2.0 * half:g} apart; expected at least half of it"
-        )
+        raise WrongPath(f"line {number}: found R{radius:g} for ends {2.0 * half:g} apart; expected at least half of it")
     height = math.sqrt(max(radius * radius - half * half, 0.0)) * math.copysign(1.0, radius) * sense
     return chord / 2.0 + height * np.array([-chord[1], chord[0]]) / (2.0 * half)

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple, TypeAlias
 
-from ..arrays import Floats
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..poses import between
 
 MOST_STEPS = 1_000_000
 """Steps of a path at most: what is longer is read in parts."""
+
+BLOCK = 4096
+"""Steps that are read, answered and written at a time."""
+
+AngleUnit: TypeAlias = Literal["deg", "rad"]
+
+
+class WrongPath(ValueError):
+    """A file that is no path; its text names the line and what was found, then what was expected."""
 
 
 class Path(NamedTuple):
@@ -16,12 +29,64 @@ class Path(NamedTuple):
     Attributes
     ----------
     targets : (n, 4, 4) [length].
-    times : when each is to be there, (n,) [s]; None where the path does not say.
-    feeds : speed of the reference point toward each, (n,) [length/s]; infinite in rapid moves, NaN where not said.
+    times : when each is to be there, (n,) [s]: as the path says, or as its feeds come to; None where neither is said of
+        every step.
+    feeds : speed of the reference point toward each, (n,) [length/s], or of turning where it does not move [deg/s];
+        infinite in rapid moves, NaN where not said.
     lines : of the file that each comes from, (n,), counted from 1.
+    others : further columns by name, the cells as they were, n each.
+    angle_units : of roll, pitch and yaw, as the file has them.
     """
 
     targets: Floats
     times: Floats | None
     feeds: Floats
     lines: list[int]
+    others: Mapping[str, Sequence[str]]
+    angle_units: tuple[AngleUnit, AngleUnit, AngleUnit]
+
+    @classmethod
+    def of(cls, targets: Floats) -> Path:
+        """Targets of which nothing else is known."""
+        count = len(targets)
+        return cls(targets, None, np.full(count, np.nan), list(range(1, count + 1)), {}, ("deg", "deg", "deg"))
+
+    def at(self, ends: Ints, shares: Floats) -> Path:
+        """Places (k,) on the way to each of the steps `ends` from the one before it; feeds and cells are those of the
+        step that it leads to."""
+        begins = np.maximum(ends - 1, 0)
+        chosen = ends.tolist()
+        times = self.times
+        if times is not None:
+            times = times[begins] + shares * (times[ends] - times[begins])
+        return self._replace(
+            targets=between(self.targets[begins], self.targets[ends], shares[:, None, None]),
+            times=times,
+            feeds=self.feeds[ends],
+            lines=[self.lines[end] for end in chosen],
+            others={name: [cells[end] for end in chosen] for name, cells in self.others.items()},
+        )
+
+    def after(self, first: int) -> Path:
+        """The steps from one on."""
+        return self._replace(
+            targets=self.targets[first:],
+            times=None if self.times is None else self.times[first:],
+            feeds=self.feeds[first:],
+            lines=self.lines[first:],
+            others={name: cells[first:] for name, cells in self.others.items()},
+        )
+
+
+def joined(blocks: Iterable[Path]) -> Path:
+    """Parts of a path as one."""
+    parts = list(blocks)
+    first = parts[0]
+    times = None if first.times is None else np.concatenate([each.times for each in parts if each.times is not None])
+    return first._replace(
+        targets=np.concatenate([each.targets for each in parts]),
+        times=times,
+        feeds=np.concatenate([each.feeds for each in parts]),
+        lines=[line for each in parts for line in each.lines],
+        others={name: [cell for each in parts for cell in each.others[name]] for name in first.others},
+    )

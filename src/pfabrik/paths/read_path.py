@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
-from itertools import chain
+from itertools import chain, islice, repeat
 from os import PathLike
 from pathlib import Path as FilePath
 from typing import TextIO
@@ -17,9 +18,10 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..poses import pose
 from ..rotations import to_rpy
-from .gcode import Step, WrongGCode, steps_of
-from .path import MOST_STEPS, Path
-from .table import WrongTable, read_table
+from .gcode import COMMENT, Step, steps_of
+from .path import BLOCK, MOST_STEPS, Path, WrongPath, joined
+from .sampling import at_rate, divided, timed
+from .table import Table
 
 GCODE = (".gcode", ".nc", ".ngc", ".g", ".gco", ".tap")
 CHORD, LONGEST = 1e-5, 1e-2
@@ -28,6 +30,11 @@ CHORD, LONGEST = 1e-5, 1e-2
 LONGEST_LINE = 100_000
 """Characters of a line: what is longer is no text of a path."""
 
+MOST_LINES = 10 * MOST_STEPS
+"""Lines of a file at most, those that say nothing among them."""
+
+FIRST_WORD = re.compile(r"\s*[A-Z%/]\s*[-+.\d]*(\s|\d|$)", re.IGNORECASE)
+
 
 def read_path(
     path: str | PathLike[str],
@@ -35,41 +42,86 @@ def read_path(
     *,
     tolerance: float | None = None,
     longest: float | None = None,
+    rate: float | None = None,
+    rapid: float | None = None,
 ) -> Path:
     """A path for a mechanism from a CSV file, or from G-code.
 
     A CSV file has a header with columns in any order: x, y, z, and roll, pitch, yaw (in degrees, or in the unit that
-    their names end in), t [s] and feed [length/s]; others are left out, and coordinates that the machine cannot change
-    may be missing. G-code, by its file's ending or if the first line is no header, begins at home and has G0 to G3,
-    planes, G20, G21, G90, G91 and F per minute; A, B, C are roll, pitch, yaw [deg]. Its moves come in steps.
+    their names end in; or a_deg, b_rad and the like), t [s] and feed [length/s]; others are handed on, and coordinates
+    that the machine cannot change may be missing. G-code, by its file's ending or if the first line is no header,
+    begins at home and has G0 to G3, planes, G20, G21, G90, G91 and F per minute; A, B, C are roll, pitch, yaw [deg].
+    Its moves come in steps.
 
     Parameters
     ----------
     path : a file, or ``-`` for standard input.
     tolerance : how far steps may be off an arc [length]; default 1e-5 L.
-    longest : of a step [length]; default 1e-2 L.
+    longest : of a step [length]; default 1e-2 L for G-code; targets of a table are as they are.
+    rate : steps per second instead, between the targets straight on [1/s].
+    rapid : feed of rapid moves [length/s], which say none.
 
     Raises
     ------
-    InvalidArgument : a file that is no path, with its line; one of more than a million targets.
+    InvalidArgument : a file that is no path, with its line; one of more than a million targets; a rate for a path that
+        says nothing of time.
     """
-    checked_mechanism(mechanism)
-    length = mechanism.characteristic_length
-    off = CHORD * length if tolerance is None else _positive("tolerance", tolerance)
-    step = LONGEST * length if longest is None else _positive("longest", longest)
+    found = joined(path_blocks(path, mechanism, tolerance=tolerance, longest=longest, rate=rate, rapid=rapid))
+    if found.times is not None and not np.isfinite(found.times).all():
+        return found._replace(times=None)
+    return found
+
+
+def path_blocks(
+    path: str | PathLike[str],
+    mechanism: Mechanism,
+    *,
+    tolerance: float | None = None,
+    longest: float | None = None,
+    rate: float | None = None,
+    rapid: float | None = None,
+    sample_time: float | None = None,
+) -> Iterator[Path]:
+    """What `read_path` reads, in parts; their times are NaN from where they are not known.
+
+    Parameters
+    ----------
+    sample_time : from one target to the next [s], whatever the path says of it.
+    """
+    length = checked_mechanism(mechanism).characteristic_length
+    off = CHORD * length if tolerance is None else require_positive("tolerance", tolerance)
+    asked = {"longest": longest, "rate": rate, "rapid": rapid, "sample_time": sample_time}
+    for option, value in asked.items():
+        if value is not None:
+            require_positive(option, value)
     name = "standard input" if str(path) == "-" else str(path)
     try:
         with _opened(path) as handle:
-            lines = _text(handle)
-            first = next(lines, "")
-            every = chain([first], lines)
-            if FilePath(path).suffix.lower() in GCODE or not _is_header(first):
-                return _program(steps_of(every, _home(mechanism), mechanism.length_unit, off, step))
-            return read_table(every, mechanism)
-    except (WrongTable, WrongGCode) as error:
-        raise InvalidArgument(name, *_both(str(error))) from None
+            is_table, lines = _begun(_text(handle), FilePath(path).suffix.lower())
+            if is_table:
+                table = Table(lines, mechanism)
+                blocks, has_times = _counted(table.blocks()), table.has_times
+                if longest is not None:
+                    blocks = divided(blocks, longest)
+            else:
+                step = LONGEST * length if longest is None else longest
+                program = steps_of(lines, _home(mechanism), mechanism.length_unit, off, step)
+                blocks, has_times = _program(program), True
+            if has_times or sample_time is not None or rate is not None:
+                blocks = timed(blocks, sample_time, rapid)
+            yield from _counted(blocks if rate is None else at_rate(blocks, rate))
+    except WrongPath as error:
+        found, _, expected = str(error).partition("; expected ")
+        raise InvalidArgument(name, found, expected or "CSV or G-code that can be followed") from None
     except UnicodeDecodeError:
         raise InvalidArgument(name, "a file that is no text", "CSV or G-code") from None
+
+
+def require_positive(name: str, value: float) -> float:
+    """A number above zero."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < np.inf:
+        raise InvalidArgument(name, repr(value), "a positive number")
+    return float(value)
 
 
 def _opened(path: str | PathLike[str]) -> AbstractContextManager[TextIO]:
@@ -78,32 +130,34 @@ def _opened(path: str | PathLike[str]) -> AbstractContextManager[TextIO]:
     return FilePath(path).open(newline="", encoding="utf-8-sig")
 
 
-def _both(told: str) -> tuple[str, str]:
-    """What was found, and what was expected."""
-    found, _, expected = told.partition("; expected ")
-    return found, expected or "CSV or G-code that can be followed"
-
-
-def _positive(name: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < np.inf:
-        raise InvalidArgument(name, repr(value), "a positive number")
-    return float(value)
-
-
 def _text(handle: TextIO) -> Iterator[str]:
     """Lines, none of them endless."""
     number = 0
     while line := handle.readline(LONGEST_LINE):
         number += 1
         if len(line) == LONGEST_LINE or "\0" in line:
-            raise WrongTable(f"line {number}: no text of a path; expected CSV or G-code")
+            raise WrongPath(f"line {number}: no text of a path; expected CSV or G-code")
+        if number > MOST_LINES:
+            raise WrongPath(f"more than {MOST_LINES} lines; expected a shorter path, or parts of it")
         yield line
+
+
+def _begun(lines: Iterator[str], ending: str) -> tuple[bool, Iterator[str]]:
+    """Whether lines are a table, by the file's ending or by the first that says something; and all of them."""
+    blank, first = 0, ""
+    for line in lines:
+        first = line.removeprefix("\ufeff")
+        if first.strip():
+            break
+        blank += 1
+    every = chain(repeat("\n", blank), [first] if first.strip() else [], lines)
+    return ending == ".csv" or (ending not in GCODE and _is_header(first)), every
 
 
 def _is_header(line: str) -> bool:
     """Whether a line names columns: G-code has numbers after its letters."""
-    cells = [cell.strip() for cell in line.split(",")]
-    return len(cells) > 1 or cells[0].isidentifier()
+    plain = COMMENT.sub(" ", line)
+    return "," in plain or (plain.strip().isidentifier() and FIRST_WORD.match(plain) is None)
 
 
 def _home(mechanism: Mechanism) -> Floats:
@@ -111,19 +165,32 @@ def _home(mechanism: Mechanism) -> Floats:
     return np.concatenate([pose_at_home[:3, 3], np.degrees(to_rpy(pose_at_home[:3, :3]))])
 
 
-def _program(steps: Iterable[Step]) -> Path:
-    places: list[Floats] = []
-    feeds: list[float] = []
-    lines: list[int] = []
-    for step in steps:
-        if len(places) > MOST_STEPS:
-            found = f"line {step.line}: more than {MOST_STEPS} steps"
-            raise WrongGCode(f"{found}; expected a shorter path, parts of it, or longer steps")
-        places.append(step.place)
-        feeds.append(step.feed)
-        lines.append(step.line)
-    if len(places) < 2:
-        raise WrongGCode("no moves; expected CSV or G-code")
-    found_places = np.array(places)
-    targets = pose(found_places[:, :3], rpy=found_places[:, 3:], degrees=True)
-    return Path(targets, None, np.array(feeds), lines)
+def _program(steps: Iterator[Step]) -> Iterator[Path]:
+    """The steps of a program, in parts."""
+    count = 0
+    while part := list(islice(steps, BLOCK)):
+        count += len(part)
+        _require_few(count, part[-1].line)
+        if count < 2:
+            break
+        places = np.array([step.place for step in part])
+        targets = pose(places[:, :3], rpy=places[:, 3:], degrees=True)
+        feeds, lines = np.array([step.feed for step in part]), [step.line for step in part]
+        yield Path(targets, None, feeds, lines, {}, ("deg", "deg", "deg"))
+    if count < 2:
+        raise WrongPath("no moves; expected CSV or G-code")
+
+
+def _counted(blocks: Iterable[Path]) -> Iterator[Path]:
+    """Blocks, up to as many steps as a path may have."""
+    count = 0
+    for block in blocks:
+        count += len(block.lines)
+        _require_few(count, block.lines[-1])
+        yield block
+
+
+def _require_few(count: int, line: int) -> None:
+    if count > MOST_STEPS:
+        found = f"line {line}: more than {MOST_STEPS} targets"
+        raise WrongPath(f"{found}; expected a shorter path, parts of it, or longer steps")

@@ -4,110 +4,144 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 
 import numpy as np
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
+from ..description.task import task_of
 from ..errors import near_miss
 from ..motion.first_order import generic_of
 from ..poses import pose
 from ..tolerances import TOLERANCES
-from .path import MOST_STEPS, Path
+from .numbers import is_finite
+from .path import BLOCK, AngleUnit, Path, WrongPath
 
 POSITION = ("x", "y", "z")
-ANGLES = ("roll", "pitch", "yaw")
-NAMES = (*POSITION, *(f"{name}{unit}" for name in ANGLES for unit in ("", "_deg", "_rad")), "t", "feed")
+ANGLES = {"roll": "a", "pitch": "b", "yaw": "c"}
+"""Turns about x, y and z, and what machine tools call them; the latter only with a unit behind it."""
+
+UNITS: tuple[AngleUnit, ...] = ("deg", "rad")
+OF_ANGLES = {
+    name: (name, *(f"{each}_{unit}" for each in (name, letter) for unit in UNITS)) for name, letter in ANGLES.items()
+}
+OF_POSES = (*POSITION, *(column for columns in OF_ANGLES.values() for column in columns))
+NUMERIC = (*OF_POSES, "t", "feed")
+EXPECTED = "expected x, y, z and roll, pitch, yaw"
 
 
-class WrongTable(ValueError):
-    """A table that is no path; its text names the line and what was found."""
+class Table:
+    """The lines of a table, of which only the header is read at first.
 
-
-def read_table(lines: Iterable[str], mechanism: Mechanism) -> Path:
-    """A path from the lines of a table; columns of other names are left out.
+    Attributes
+    ----------
+    has_times : whether it says when targets are to be there, or how fast.
 
     Raises
     ------
-    WrongTable
+    WrongPath
     """
-    rows = ((number, cells) for number, cells in _numbered(lines) if any(cells))
-    try:
-        first, header = next(rows)
-    except StopIteration:
-        raise WrongTable("empty; expected a header with x, y, z") from None
-    _check_header(first, header, mechanism)
-    found: list[list[float]] = []
-    numbers: list[int] = []
-    wanted = [(place, name) for place, name in enumerate(header) if name in NAMES]
-    for number, cells in rows:
-        if len(found) == MOST_STEPS:
-            raise WrongTable(f"line {number}: more than {MOST_STEPS} targets; expected a shorter path, or parts of it")
-        if len(cells) != len(header):
-            raise WrongTable(f"line {number}: found {len(cells)} cells; expected {len(header)}")
-        found.append([_number(number, name, cells[place]) for place, name in wanted])
-        numbers.append(number)
-    if not found:
-        raise WrongTable("no targets below the header")
-    columns = dict(zip((name for _, name in wanted), np.array(found).T, strict=True))
-    return _path(columns, numbers, mechanism)
+
+    def __init__(self, lines: Iterable[str], mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+        self._rows = ((number, cells) for number, cells in _numbered(lines) if any(cells))
+        number, self._header = next(self._rows, (1, []))
+        if not self._header:
+            raise WrongPath("empty; expected a header with x, y, z")
+        _check_header(number, self._header, mechanism)
+        self.has_times = "t" in self._header or "feed" in self._header
+
+    def blocks(self) -> Iterator[Path]:
+        """The targets, in parts."""
+        last = -math.inf
+        rows = list(islice(self._rows, BLOCK))
+        if not rows:
+            raise WrongPath("no targets below the header")
+        while rows:
+            block = self._block(rows)
+            if block.times is not None:
+                _check_times(np.concatenate([[last], block.times]), block.lines)
+                last = float(block.times[-1])
+            yield block
+            rows = list(islice(self._rows, BLOCK))
+
+    def _block(self, rows: Sequence[tuple[int, list[str]]]) -> Path:
+        columns: dict[str, Floats] = {}
+        lines = [number for number, _ in rows]
+        for number, cells in rows:
+            if len(cells) != len(self._header):
+                raise WrongPath(f"line {number}: found {len(cells)} cells; expected {len(self._header)}")
+        told = dict(zip(self._header, zip(*(cells for _, cells in rows), strict=True), strict=True))
+        for name in self._header:
+            if name in NUMERIC:
+                columns[name] = _numbers(name, told[name], lines)
+        others = {name: cells for name, cells in told.items() if name not in OF_POSES}
+        return _path(columns, others, lines, self._mechanism)
 
 
-def _numbered(lines: Iterable[str]) -> Iterable[tuple[int, list[str]]]:
+def _numbered(lines: Iterable[str]) -> Iterator[tuple[int, list[str]]]:
     reader = csv.reader(lines)
     try:
         for cells in reader:
             yield reader.line_num, [cell.strip() for cell in cells]
     except csv.Error as error:
-        raise WrongTable(f"line {reader.line_num}: not a CSV text file: {error}") from error
+        raise WrongPath(f"line {reader.line_num}: not a CSV text file: {error}") from error
 
 
 def _check_header(line: int, header: Sequence[str], mechanism: Mechanism) -> None:
-    """Columns that a target needs, each once, angles in one unit."""
+    """Columns that a target needs, each once, each angle in one unit."""
     twice = [name for name in dict.fromkeys(header) if header.count(name) > 1]
     if twice:
-        raise WrongTable(f"line {line}: column '{twice[0]}' appears twice")
+        raise WrongPath(f"line {line}: column '{twice[0]}' appears twice")
     moves = np.abs(generic_of(mechanism).directions[:3]).max(axis=1, initial=0.0) > TOLERANCES.alignment
     missing = [
         name
-        for name, free in zip(POSITION, moves, strict=True)
-        if free and name in mechanism.task and name not in header
+        for name, asked, free in zip(POSITION, task_of(mechanism).axes, moves, strict=True)
+        if asked and free and name not in header
     ]
     if missing:
-        hint = near_miss(missing[0], header)
-        raise WrongTable(f"line {line}: no column {', '.join(missing)}{hint}; expected x, y, z and roll, pitch, yaw")
-    for name in ANGLES:
-        ways = [each for each in (name, f"{name}_deg", f"{name}_rad") if each in header]
+        hint = near_miss(missing[0], [name for name in header if name not in NUMERIC])
+        raise WrongPath(f"line {line}: no column {', '.join(missing)}{hint}; {EXPECTED}")
+    for columns in OF_ANGLES.values():
+        ways = [name for name in columns if name in header]
         if len(ways) > 1:
-            raise WrongTable(f"line {line}: found columns {' and '.join(ways)}; expected one of them")
-    if not any(name in NAMES[:-2] for name in header):
-        raise WrongTable(f"line {line}: no column of a pose; expected x, y, z and roll, pitch, yaw")
+            raise WrongPath(f"line {line}: found columns {' and '.join(ways)}; expected one of them")
+    if not any(name in OF_POSES for name in header):
+        raise WrongPath(f"line {line}: no column of a pose; {EXPECTED}")
 
 
-def _number(line: int, name: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise WrongTable(f"line {line}: column '{name}': found '{cell[:20]}'; expected a finite number")
-    return value
+def _numbers(name: str, cells: Sequence[str], lines: Sequence[int]) -> Floats:
+    for line, cell in zip(lines, cells, strict=True):
+        if not is_finite(cell):
+            raise WrongPath(f"line {line}: column '{name}': found '{cell[:20]}'; expected a finite number")
+    return np.array(cells, dtype=float)
 
 
-def _path(columns: dict[str, Floats], lines: list[int], mechanism: Mechanism) -> Path:
-    count = len(lines)
-    home = mechanism.reference_point
+def _path(
+    columns: Mapping[str, Floats], others: Mapping[str, Sequence[str]], lines: list[int], mechanism: Mechanism
+) -> Path:
+    count, home = len(lines), mechanism.reference_point
     positions = [columns.get(name, np.full(count, at)) for name, at in zip(POSITION, home, strict=True)]
-    angles = []
-    for name in ANGLES:
-        degrees = columns.get(name, columns.get(f"{name}_deg", np.zeros(count)))
-        angles.append(columns.get(f"{name}_rad", np.radians(degrees)))
-    times, feeds = columns.get("t"), columns.get("feed", np.full(count, math.nan))
-    if times is not None and not (np.diff(times) > 0.0).all():
-        place = int(np.flatnonzero(np.diff(times) <= 0.0)[0]) + 1
-        raise WrongTable(f"line {lines[place]}: column 't': found {times[place]:g}; expected times that grow")
+    given = [next((name for name in names if name in columns), "") for names in OF_ANGLES.values()]
+    units: list[AngleUnit] = ["rad" if name.endswith("_rad") else "deg" for name in given]
+    said = {unit for unit, name in zip(units, given, strict=True) if name} or {"deg"}
+    if len(said) == 1:  # angles that are not given come in the unit of the others
+        units = [*said] * 3
+    angles = [columns.get(name, np.zeros(count)) for name in given]
+    turned = [np.radians(each) if unit == "deg" else each for each, unit in zip(angles, units, strict=True)]
+    feeds = columns.get("feed", np.full(count, math.nan))
     if (feeds <= 0.0).any():
         place = int(np.flatnonzero(feeds <= 0.0)[0])
-        raise WrongTable(f"line {lines[place]}: column 'feed': found {feeds[place]:g}; expected a feed above zero")
-    return Path(pose(np.array(positions).T, rpy=np.array(angles).T), times, feeds, lines)
+        raise WrongPath(f"line {lines[place]}: column 'feed': found {feeds[place]:g}; expected a feed above zero")
+    targets = pose(np.array(positions).T, rpy=np.array(turned).T)
+    return Path(targets, columns.get("t"), feeds, lines, others, (units[0], units[1], units[2]))
+
+
+def _check_times(times: Floats, lines: Sequence[int]) -> None:
+    """Times, after the one before them."""
+    back = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(back):
+        place = int(back[0])
+        raise WrongPath(f"line {lines[place]}: column 't': found {times[place + 1]:g}; expected times that grow")

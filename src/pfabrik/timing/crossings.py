@@ -48,7 +48,7 @@ def _measured(track: Track, rows: Ints) -> tuple[Floats, Floats, Floats]:
     there are not as many actuators as freedoms.
     """
     mechanism = track.mechanism
-    slides = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names])
+    slides = np.array([drive.kind == "length" for drive in mechanism.drives])
     length = mechanism.characteristic_length
     jacobians = inverse_jacobian(track[rows]) / np.where(slides, length, 1.0)[:, None]
     jacobians[..., :3] *= length

@@ -85,7 +85,7 @@ class Curve:
 def curve_of(track: Track) -> Curve:
     """The curve through a path."""
     mechanism = track.mechanism
-    slides = np.array([mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names])
+    slides = np.array([drive.kind == "length" for drive in mechanism.drives])
     sizes = np.where(slides, mechanism.characteristic_length, 1.0)
     moves = np.linalg.norm(np.diff(track.actuators, axis=0) / sizes, axis=1)
     steps = np.concatenate([[0], 1 + np.flatnonzero(moves > STANDS)])

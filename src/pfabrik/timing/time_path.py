@@ -69,8 +69,12 @@ def time_path(
 def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
     """The highest speed or acceleration of every actuator, (n_a,); infinite where there is none."""
     names = mechanism.actuator_names
-    own = [getattr(mechanism.joint(name), f"max_{what}") for name in names]
-    limits = np.array([np.inf if value is None else value for value in own], dtype=float)
+    own = [getattr(drive.joint, f"max_{what}") for drive in mechanism.drives]
+    told = [
+        value[drive.place] if isinstance(value, tuple) else value
+        for value, drive in zip(own, mechanism.drives, strict=True)
+    ]
+    limits = np.array([np.inf if value is None else value for value in told], dtype=float)
     if isinstance(given, Mapping):
         for name, value in given.items():
             if name not in names:

@@ -1,0 +1,83 @@
+"""Paths that are followed part by part, so that no more than a part is held at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ..answers.solution import Solution, Status
+from ..answers.tracked import Track
+from ..arrays import Ints
+from ..description.mechanism import Mechanism
+from ..options import Options
+from ..track import track
+from .path import BLOCK, Path, joined
+
+BACK = BLOCK // 4
+"""How many steps a part is begun before the end of the one before it, at most."""
+
+
+class Part(NamedTuple):
+    """A part of a path and its answers; the rows before `first` were in the part before it too."""
+
+    path: Path
+    track: Track
+    first: int
+
+
+def follow_parts(
+    mechanism: Mechanism,
+    blocks: Iterable[Path],
+    *,
+    options: Options | None = None,
+    speed_limits: Mapping[str, float] | None = None,
+    on_progress: Callable[[int], None] | None = None,
+) -> Iterator[Part]:
+    """Answers along a path as of `track`, a part at a time.
+
+    Each part begins at an answer of the one before it, and with what follows there: two steps, for accelerations, or
+    back to where a target was last reached, for what a path remembers of links that are stretched out.
+
+    Parameters
+    ----------
+    on_progress : called with the steps done every few steps.
+    """
+    start: Solution | None = None
+    kept: Path | None = None
+    done = 0
+    for block in blocks:
+        path = block if kept is None else joined([kept, block])
+        first, before = len(path.lines) - len(block.lines), done
+
+        def report(steps: int, _: int, before: int = before - first) -> None:
+            if on_progress is not None:
+                on_progress(before + steps)
+
+        answers = track(
+            mechanism,
+            path.targets,
+            start=start,
+            options=options,
+            times=path.times,
+            speed_limits=None if path.times is None else speed_limits,
+            on_progress=report,
+        )
+        yield Part(path, answers, first)
+        done += len(block.lines)
+        place = _last_sure(answers.status)
+        if place is not None:
+            start = answers[place]
+        kept = path.after(max(len(path.lines) - 2, 0) if place is None else place)
+
+
+def _last_sure(status: Ints) -> int | None:
+    """The last but one answer, or one before it that was reached; None where none of them is feasible."""
+    end = max(len(status) - 1, 1)
+    begin = max(end - BACK, 0)
+    for most in (Status.REACHED, Status.PROJECTED):
+        rows = np.flatnonzero(status[begin:end] <= most)
+        if len(rows):
+            return begin + int(rows[-1])
+    return None
