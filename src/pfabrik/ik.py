@@ -42,7 +42,7 @@ def solve_ik(
     options = checked_options(options)
     targets, shape = as_targets(mechanism, target)
     begin = start_of(mechanism, start, shape)
-    found = engine_of(mechanism).answer(targets, begin, options, keep_mode=keeps_mode(options, begin))
+    found = engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keeps_mode(options, begin))
     refuse_invalid(targets, shape, found.rows.status, options)
     return Solution(mechanism, found, shape, Wanted(targets.copy(), options.hold, options.rotation_length))
 

@@ -56,13 +56,14 @@ class Solver:
         self.mechanism, self.options = checked_mechanism(mechanism), checked_options(options)
         self._start, begin = start, start_of(mechanism, start, ())
         warm_up(mechanism)
-        self._engine, self._rows, self._target = engine_of(mechanism), new_rows(mechanism, 1), np.eye(4)[None]
+        self._engine = engine_of(mechanism, self.options)
+        self._rows, self._target = new_rows(mechanism, 1), np.eye(4)[None]
         self._values = np.zeros((1, len(mechanism.actuator_names)))
         self._reach: Callable[[], int] | None = None
         self._assemble: Callable[[Floats], bool] | None = None
         if isinstance(self._engine, LegsEngine):
             keep_mode = keeps_mode(self.options, start)
-            self._reach = self._engine.prepared(self._target, begin, self.options, self._rows, keep_mode=keep_mode)
+            self._reach = self._engine.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
             if start is None:
                 self._assemble = self._engine.prepared_forward(self._rows)
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))

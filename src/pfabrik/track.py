@@ -63,7 +63,7 @@ def track(
         raise InvalidArgument("options.working_mode", "'any'", "'keep' or None: a machine cannot change it on its way")
     pace = pace_of(mechanism, len(poses), sample_time, times, speed_limits)
     begin = start_of(mechanism, start, ())
-    found = engine_of(mechanism).follow(poses, begin, options, on_progress)
+    found = engine_of(mechanism, options).follow(poses, begin, options, on_progress)
     if begin is not None:
         _count_on(mechanism, found.rows, begin.rows.actuators[0])
     refuse_invalid(poses, shape, found.rows.status, options)

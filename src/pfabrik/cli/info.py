@@ -189,7 +189,7 @@ def shown_engine(mechanism: Mechanism) -> str:
 def why(chain: SubChain, mechanism: Mechanism) -> str:
     """Why an engine answers for a sub-chain: for its own sake, or the mechanism's."""
     if legs_answer(mechanism):
-        return f"closed forms; {engine_of(mechanism)} where they do not reach"
+        return "closed forms; closure where they do not reach"
     for_all, no_legs = closure_reason(mechanism), leg_table(mechanism)
     told = f"; no closed forms: {no_legs}" if isinstance(no_legs, str) else ""
     if chain.reason is not None:

@@ -61,7 +61,14 @@ class Projected(NamedTuple):
 
 
 def project(
-    mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts, ways: Sequence[Way], *, corners: bool
+    mechanism: Mechanism,
+    table: LegTable,
+    targets: Floats,
+    own: Starts,
+    ways: Sequence[Way],
+    *,
+    corners: bool,
+    stays: bool,
 ) -> Projected:
     """The nearest feasible configurations that searches from several starts find.
 
@@ -71,20 +78,23 @@ def project(
     own : the first start of each row, or one for all; poses [L].
     ways : what counts and what is held, tried in turn until one has an answer.
     corners : start from elsewhere too. Without, a search stays about where it starts.
+    stays : in the working mode of the first start; through a dead point lies another.
     """
     best = Projected(_new_found(len(targets), len(table.legs)), np.full(len(targets), P.HOLD_NOTHING))
     for way in ways:
         rows = np.flatnonzero(np.isinf(best.found.distances))
         if len(rows):
             first = own if len(own.poses) == 1 else Starts._make(array[rows] for array in own)
-            found = _search(mechanism, table, targets[rows], first, way, corners)
+            found = _search(mechanism, table, targets[rows], first, way, corners, stays)
             for array, tried in zip(best.found, found, strict=True):
                 array[rows] = tried
             best.holds[rows] = way.hold
     return best
 
 
-def _search(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts, way: Way, corners: bool) -> Found:
+def _search(
+    mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts, way: Way, corners: bool, stays: bool
+) -> Found:
     wanted = in_lengths(targets, 1.0 / mechanism.characteristic_length)
     weights, frame = np.array(way.weights, dtype=float), task_of(mechanism).frame
     if keeps_rotation(mechanism):
@@ -92,7 +102,8 @@ def _search(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts,
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:], frame = LOCKED, BASE_AXES
     others = corners_of(mechanism) if corners else no_starts(table)
-    return _approach(table, PoseObjective(wanted, weights, frame, MARGIN, TOLERANCES.active, MOST_STEPS), own, others)
+    objective = PoseObjective(wanted, weights, frame, MARGIN, TOLERANCES.active, MOST_STEPS)
+    return _approach(table, objective, own, others, stays=stays)
 
 
 def nearest_actuators(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts, *, corners: bool) -> Found:
@@ -106,7 +117,13 @@ def nearest_actuators(mechanism: Mechanism, table: LegTable, values: Floats, own
 
 
 def _approach(
-    table: LegTable, objective: PoseObjective, own: Starts, others: Starts, values: Floats | None = None
+    table: LegTable,
+    objective: PoseObjective,
+    own: Starts,
+    others: Starts,
+    values: Floats | None = None,
+    *,
+    stays: bool = False,
 ) -> Found:
     """The kernel over all rows, on all cores."""
     if values is None:
@@ -118,7 +135,7 @@ def _approach(
     def run(block: slice) -> None:
         first = own if len(own.poses) == 1 else Starts._make(array[block] for array in own)
         aim = Aim(objective._replace(targets=objective.targets[block]), values[block])
-        approach(legs, aim, first, others, HITS, Found._make(array[block] for array in found))
+        approach(legs, aim, first, others, HITS, int(stays), Found._make(array[block] for array in found))
 
     in_blocks(run, len(found.distances), ROWS_A_BLOCK)
     return found

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closure.close import Closing, measured
+from ..closure.close import Closing
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at
 from ..closure.parasitic import has_other_assemblies
 from ..closure.solve import STRANGE, ClosureEngine
@@ -18,8 +18,6 @@ from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..options import Options
 from ..poses import are_poses
-from ..reaching.solve import ReachingEngine
-from ..tolerances import TOLERANCES
 from .coordinates import LegAnswers, settled, sides_at
 from .forward import assembled
 from .one import OneAssembly, OneTarget
@@ -40,13 +38,12 @@ class LegsEngine:
 
     The constraints that legs leave on the pose complete what the task leaves open. What they do not reach is answered
     in other working modes, then by the nearest feasible pose, by searches in the platform's pose; and what these leave,
-    near dead points above all, as if there were no closed forms. Where joint positions answer for the others, these
-    answer at once.
+    near dead points above all, as if there were no closed forms.
     """
 
-    def __init__(self, table: LegTable, inner: ReachingEngine | ClosureEngine) -> None:
-        self.mechanism = inner.mechanism
-        self._table, self._inner, self._one = table, inner, OneTarget(self.mechanism, table)
+    def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
+        self.mechanism, self._table = mechanism, table
+        self._inner, self._one = ClosureEngine(mechanism), OneTarget(mechanism, table)
         self._one_forward = OneAssembly(self.mechanism, table)
         driven = table.driven
         self._turning = driven[(driven["turns"] == 1) & (driven["hi"] - driven["lo"] > 2.0 * np.pi)]
@@ -54,14 +51,21 @@ class LegsEngine:
     @cached_property
     def _searches(self) -> bool:
         """Whether targets that legs do not reach are looked for in the platform's pose."""
-        return isinstance(self._inner, ClosureEngine) and not has_other_assemblies(self.mechanism)
+        return not has_other_assemblies(self.mechanism)
 
     def answer(
-        self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        *,
+        keep_mode: bool,
+        nearby: bool = False,
     ) -> Configurations:
-        """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        if not options.exact and isinstance(self._inner, ReachingEngine):
-            return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
+        """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose.
+
+        Projections are the nearest found in the working mode, if that is kept, or `nearby` those next to the start.
+        """
         if len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1)):
             found = self._reach_one(targets, start, keep_mode)
             if found is not None:
@@ -71,32 +75,30 @@ class LegsEngine:
         rows = new_rows(self.mechanism, len(targets))
         left = self._reach(targets, start, sides, keep_mode, rows)
         carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
-        if left and options.projection == "nearest" and self._searches:
+        if left and self._searches:
             sides = np.array(np.broadcast_to(sides, (len(targets), sides.shape[1])))
             poses = self._one.home if start is None else start.rows.poses
-            question = Question(self.mechanism, self._table, targets, poses, options, keep_mode)
+            question = Question(self.mechanism, self._table, targets, poses, options, keep_mode, nearby)
             carriers = answer_unreached(question, rest, sides, rows)
             rest = np.flatnonzero(rows.status == P.PENDING)
             if start is not None:
                 self._count_turns(start.rows.actuators, rows)
         if len(rest) == len(targets):
-            return self._inner.answer(targets, self._start(start), options, keep_mode=keep_mode)
+            return self._inner.answer(targets, start, options, keep_mode=keep_mode)
         if len(rest):
             begin = start if start is None or len(start) == 1 else start.at(rest)
-            others = self._inner.answer(targets[rest], self._start(begin), options, keep_mode=keep_mode)
+            others = self._inner.answer(targets[rest], begin, options, keep_mode=keep_mode)
             put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
         return self._answers(rows, sides, carriers, start, first, rest, others)
 
     def prepared(
-        self, target: Floats, start: Configurations | None, options: Options, rows: P.Rows, *, keep_mode: bool
+        self, target: Floats, start: Configurations | None, rows: P.Rows, *, keep_mode: bool
     ) -> Callable[[], int] | None:
         """A call that answers what stands in `target`, (1, 4, 4), into `rows`; it returns 0 where legs reach it.
 
-        None where others answer first.
+        None where the turns of its actuators are counted from a start.
         """
-        if (not options.exact and isinstance(self._inner, ReachingEngine)) or (
-            start is not None and len(self._turning)
-        ):
+        if start is not None and len(self._turning):
             return None
         one, begin = self._one, self._one.home if start is None else start.rows.poses
         sides = one.home_sides if start is None else sides_at(self.mechanism, self._table, start)
@@ -110,14 +112,14 @@ class LegsEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        if options.projection != "nearest" or not self._searches:
-            return self._inner.follow(targets, self._start(start), options, on_progress)
+        if not self._searches:
+            return self._inner.follow(targets, start, options, on_progress)
         targets, known = np.require(targets, requirements=["C", "W"]), are_poses(targets)
         found: list[Configurations] = []
         for i in range(len(targets)):
             if known[i]:
                 before = found[-1] if found else start
-                found.append(self.answer(targets[i : i + 1], before, options, keep_mode=True))
+                found.append(self.answer(targets[i : i + 1], before, options, keep_mode=True, nearby=True))
             if on_progress is not None and ((i + 1) % STEPS_A_REPORT == 0 or i + 1 == len(targets)):
                 on_progress(i + 1, len(targets))
         return self._joined(found, start).among(known)
@@ -157,8 +159,23 @@ class LegsEngine:
         return LegAnswers(rows, coordinates, every, carriers)
 
     def advance(self, targets: Floats, start: Configurations, options: Options) -> Configurations:
-        """Go on to targets (n, 4, 4) in the working mode of as many configurations."""
-        return self._inner.advance(targets, self._positioned(start), options)
+        """Go on to targets (n, 4, 4) in the working mode of as many configurations; PENDING where not reached.
+
+        Where legs can be as they are at the start, they decide; joint coordinates do where they are at dead points.
+        """
+        mechanism, table, sides = self.mechanism, self._table, sides_at(self.mechanism, self._table, start)
+        rows, present = (new_rows(mechanism, len(targets)) for _ in range(2))
+        coordinates = start.coordinates.copy()
+        self._reach(targets, start, sides, True, rows)
+        own = np.flatnonzero(rows.status == P.REACHED)
+        coordinates[own] = settled(mechanism, table, rows.poses[own], rows.actuators[own], sides[own], coordinates[own])
+        if len(own) < len(targets):
+            self._reach(start.rows.poses, start, sides, True, present)
+            rest = np.flatnonzero((rows.status != P.REACHED) & (present.status != P.REACHED))
+            others = self._inner.advance(targets[rest], start.at(rest), options)
+            put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
+            coordinates[rest] = others.coordinates
+        return Configurations(rows, coordinates)
 
     def at(self, closing: Closing) -> Configurations:
         """Configurations found on joint coordinates, as answers whose status is still to be told."""
@@ -166,7 +183,7 @@ class LegsEngine:
 
     def points(self, found: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
-        return self._inner.points(self._positioned(found))
+        return self._inner.points(found)
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
@@ -267,25 +284,6 @@ class LegsEngine:
             nearest = values - 2.0 * np.pi * np.round((values - begin[:, driven["column"]]) / (2.0 * np.pi))
             inside = (nearest >= driven["home"] + driven["lo"]) & (nearest <= driven["home"] + driven["hi"])
             values[:] = np.where(inside, nearest, values)
-
-    def _start(self, start: Configurations | None) -> Configurations | None:
-        return None if start is None else self._positioned(start)
-
-    def _positioned(self, start: Configurations) -> Configurations:
-        """Configurations as the other engine starts from them: with the positions that it stores.
-
-        Where legs are as at home these follow from the pose; elsewhere all joints are worked out.
-        """
-        if not isinstance(self._inner, ReachingEngine) or self._inner.stores(start):
-            return start
-        own = self._inner.directly(start.rows.poses)
-        off = np.abs(own.actuators - start.rows.actuators).max(axis=1, initial=0.0)
-        near = TOLERANCES.position * max(self.mechanism.characteristic_length, 1.0)
-        others = np.flatnonzero(~((own.status == P.REACHED) & (off <= near)))
-        if len(others):
-            put_rows(own, others, self._inner.at(measured(self.mechanism, start.coordinates[others])).rows)
-        rows = start.rows._replace(nodes=own.nodes, trunks=own.trunks)
-        return Configurations(rows, start.coordinates if start.were_given else lambda: start.coordinates)
 
 
 def _part(array: Floats, block: slice) -> Floats:

@@ -31,7 +31,10 @@ NEARLY = 1e-4
 
 
 class Question(NamedTuple):
-    """What is asked: targets (n, 4, 4) [length], to be reached from poses (n or 1, 4, 4)."""
+    """What is asked: targets (n, 4, 4) [length], to be reached from poses (n or 1, 4, 4).
+
+    With `keep_mode` in the working mode of the start; `nearby`, as along a path, about the start alone.
+    """
 
     mechanism: Mechanism
     table: LegTable
@@ -39,6 +42,7 @@ class Question(NamedTuple):
     begins: Floats
     options: Options
     keep_mode: bool
+    nearby: bool
 
 
 def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, rows: P.Rows) -> Floats:
@@ -52,7 +56,7 @@ def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, 
     -------
     Coordinates of the legs' carriers (n, legs) [L or rad] where closed forms tell them less exactly; else NaN.
     """
-    mechanism, table, targets, begins, options, keep_mode = question
+    mechanism, table, targets, begins, options, keep_mode, _ = question
     carriers = np.full(sides.shape, np.nan)
     rest = rest[are_poses(targets[rest])]
     if not keep_mode:
@@ -62,11 +66,9 @@ def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, 
     wanted, places = made_exact(targets[rest]), rest[:1] if len(begins) == 1 else rest
     own = starts_at(mechanism, table, begins[places % len(begins)], sides[places])
     ways = ways_of(mechanism, options.hold, options.rotation_length)
-    found, holds = project(mechanism, table, within_sight(mechanism, wanted), own, ways, corners=not keep_mode)
-    is_placed = np.isfinite(found.distances)
-    if keep_mode:  # through a dead point lies another working mode
-        is_placed &= ~(found.sides * own.sides < 0.0).any(axis=1)
-    placed = np.flatnonzero(is_placed)
+    sought = within_sight(mechanism, wanted)
+    found, holds = project(mechanism, table, sought, own, ways, corners=not question.nearby, stays=keep_mode)
+    placed = np.flatnonzero(np.isfinite(found.distances))
     found, rest, wanted = Found._make(array[placed] for array in found), rest[placed], wanted[placed]
     sides[rest], carriers[rest] = found.sides, found.q
     _put_projected(question, rest, wanted, found, holds[placed], rows)

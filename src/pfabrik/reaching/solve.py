@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..closure.assemble import assemble, judged
-from ..closure.close import Closing, closure_of, platform_poses
+from ..closure.close import Closing, closure_of, measured, platform_poses
 from ..closure.configurations import (
     Configurations,
     coordinates_for,
@@ -124,23 +124,9 @@ class ReachingEngine:
         positions_of(self.mechanism, self._compiled, closing.coordinates, rows)
         return Configurations(rows, closing.coordinates)
 
-    def directly(self, poses: Floats) -> P.Rows:
-        """Platforms at poses (n, 4, 4), with home's working modes; PENDING where closed forms do not reach."""
-        from ..kernels.reaching.solve import solve_directly
-
-        rows = self._new_rows(len(poses))
-        settings = settings_of(self.mechanism, Options(), keep_mode=True)
-        solve_directly(self._compiled.plan, np.ascontiguousarray(poses), self._compiled.home_seed, settings, rows)
-        return rows
-
-    def stores(self, found: Configurations) -> bool:
-        """Whether configurations hold the positions that this engine starts from."""
-        own = self._new_rows(0)
-        return found.rows.nodes.shape[1:] == own.nodes.shape[1:] and found.rows.trunks.shape[1:] == own.trunks.shape[1:]
-
     def points(self, found: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]; merged joints share a centre."""
-        return joint_points(self._compiled, found.rows)
+        return joint_points(self._compiled, self._positioned(found))
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
@@ -180,7 +166,15 @@ class ReachingEngine:
         """Where rows start, in positions."""
         if start is None:
             return self._compiled.home_seed
-        return P.Seeds(start.rows.poses, start.rows.nodes, start.rows.trunks)
+        rows = self._positioned(start)
+        return P.Seeds(rows.poses, rows.nodes, rows.trunks)
+
+    def _positioned(self, found: Configurations) -> P.Rows:
+        """Configurations with positions, as they are or, where another engine found them, from joint coordinates."""
+        own, rows = self._new_rows(0), found.rows
+        if rows.nodes.shape[1:] == own.nodes.shape[1:] and rows.trunks.shape[1:] == own.trunks.shape[1:]:
+            return rows
+        return self.at(measured(self.mechanism, found.coordinates)).rows
 
     def _found(self, rows: P.Rows, start: Configurations | None, chained: bool = False) -> Configurations:
         """Rows that were answered; joint coordinates, when asked for, are those nearest to the start's.

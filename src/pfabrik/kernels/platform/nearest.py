@@ -131,8 +131,17 @@ def nearest_start(aim: PoseObjective, target: Floats, starts: Starts, gradient: 
 
 
 @routine
+def is_other_mode(first: Floats, sides: Floats) -> bool:
+    """Whether some leg takes its other solution."""
+    for k in range(sides.shape[0]):
+        if first[k] * sides[k] < 0.0:
+            return True
+    return False
+
+
+@routine
 def search_row(
-    table: Table, row: int, aim: Aim, own: Starts, others: Starts, hits: int, search: Search, best: Now
+    table: Table, row: int, aim: Aim, own: Starts, others: Starts, hits: int, stays: int, search: Search, best: Now
 ) -> float:
     """The nearest configuration of a row, into `best`, and how far it is [L]; see `approach`.
 
@@ -141,18 +150,25 @@ def search_row(
     """
     least, met, target, n = math.inf, 0, aim.pose.targets[row], others.poses.shape[0]
     near = nearest_start(aim.pose, target, others, search.gradient)
+    first = row if own.poses.shape[0] > 1 else 0
     for start in range(n + 2):
         if start == 0 or start == n + 1:
-            begin(own, row if own.poses.shape[0] > 1 else 0, search.best)
+            begin(own, first, search.best)
         else:
             begin(others, near if start == 1 else (start - 2 if start - 2 < near else start - 1), search.best)
         if start == n + 1 and least < math.inf:
             break
+        if stays == 1 and is_other_mode(own.sides[first], search.best.sides):
+            continue
         in_place = (start <= n) == (n > 0)
         fix(aim.pose, in_place, search)
         if in_place:
             put_held(table, aim.pose, target, search.look, search.best)
         distance = descend(table, row, aim, least, search)
+        if distance < math.inf:
+            put_sides(table, search.best, search.look)
+            if stays == 1 and is_other_mode(own.sides[first], search.best.sides):
+                distance = math.inf
         if distance < (1.0 - SAME) * least:
             least, met = distance, 1
             copy_now(search.best, best)
@@ -164,22 +180,22 @@ def search_row(
 
 
 @kernel
-def approach(table: Table, aim: Aim, own: Starts, others: Starts, hits: int, found: Found) -> None:
+def approach(table: Table, aim: Aim, own: Starts, others: Starts, hits: int, stays: int, found: Found) -> None:
     """Fill the nearest feasible configuration of every row.
 
     Parameters
     ----------
     own : the first start of each row, or one for all.
     others : starts that follow, for any row, until the nearest configuration has been met as often as `hits` says.
+    stays : 1 for configurations in the working mode of a row's first start alone.
     """
     search, best = new_search(table), new_now(table.legs.shape[0])
     for row in range(found.distances.shape[0]):
-        least = search_row(table, row, aim, own, others, hits, search, best)
+        least = search_row(table, row, aim, own, others, hits, stays, search, best)
         found.distances[row] = least
         found.steps[row] = search.control.counts[STEPS]
         if least < math.inf:
             make_exact(best.pose)
             copy_table(best.pose, found.poses[row])
             copy_row(best.q, found.q[row])
-            put_sides(table, best, search.look)
             copy_row(best.sides, found.sides[row])
