@@ -70,7 +70,7 @@ from .records import Aim, Table
 HOPELESS = 20.0
 """A search that is farther than the nearest yet by so many times what its last step promised is given up."""
 
-NEAR = 0.5
+NEAR = 0.3
 """Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
 
 
@@ -214,7 +214,7 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
                 slope[j] = -slope[j]
             k = add_limit(k, below, 2 * i, search.look.slope, view)
     for i in range(table.cones.shape[0]):
-        over = cone_slope(table, table.cones[i], search.look) - table.cones[i]["half_angle"] + margin
+        over = cone_slope(table, table.cones[i], NEAR, search.look) - table.cones[i]["half_angle"] + margin
         if over > -NEAR:
             excess = max(excess, over)
             k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.look.slope, view)
@@ -247,7 +247,7 @@ def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Sear
     for i in range(table.cones.shape[0]):
         pull = multipliers[2 * ranges + i]
         if pull != 0.0:
-            cone_slope(table, table.cones[i], search.look)
+            cone_slope(table, table.cones[i], math.inf, search.look)
             for j in range(out.shape[0]):
                 out[j] += pull * slope[j]
 

@@ -285,14 +285,19 @@ def put_pivot_slope(pivot: Record, frame: Floats, own: Floats, spot: int, slope:
 
 
 @routine
-def cone_slope(table: Table, cone: Record, view: View) -> float:
-    """The angle of a rod's line from the axis of its cone, its derivative into `view.slope`."""
+def cone_slope(table: Table, cone: Record, horizon: float, view: View) -> float:
+    """The angle of a rod's line from the axis of its cone, its derivative into `view.slope`.
+
+    Of lines inside the cone by more than the horizon, they are not told: minus infinity.
+    """
     slope, k = view.slope, cone["leg"]
-    for j in range(slope.shape[0]):
-        slope[j] = 0.0
     end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
     main = main_of(table, k)
     axis, u = seen(table, k, main, end, vec(cone["axis"]), view), direction(view.lines[k])
+    if dot(axis, u) > math.cos(max(cone["half_angle"] - horizon, 0.0)):
+        return -math.inf
+    for j in range(slope.shape[0]):
+        slope[j] = 0.0
     sine = norm(cross(axis, u))
     if sine > ALIGNED:
         put_turning(table, k, main, end, scale(-1.0 / sine, axis), view)

@@ -8,7 +8,7 @@ from .._jit import kernel, routine
 from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..legs.answer import column, deviation, excess_of, make_exact, set_frames, turn_pose
-from ..legs.records import CARRIER, CRANK, Floats, Record, Records
+from ..legs.records import CARRIER, CRANK, PIVOT, SLIDE, Floats, Record, Records
 from ..legs.rods import carry
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..sqp import STEPS
@@ -131,6 +131,34 @@ def nearest_start(aim: PoseObjective, target: Floats, starts: Starts, gradient: 
 
 
 @routine
+def is_global(table: Table, aim: PoseObjective, search: Search) -> bool:
+    """Whether no feasible configuration is nearer than where a descent has ended.
+
+    So if the Lagrangian of what holds it there is convex: with the orientation held and all legs struts, the bounds of
+    a strut s = |o| are (s^2 - hi^2) / 2 hi and (lo^2 - s^2) / 2 lo, with the gradients of s - hi and lo - s; a cone of
+    at most a right angle is convex; and the distance outweighs the least lengths if the sum of their multipliers, each
+    over its length, is below 1.
+    """
+    if aim.frame != BASE_AXES or aim.platform[3] != LOCKED or search.look.rows.shape[0] > 0:
+        return False
+    for i in range(3):
+        if aim.platform[i] != 1.0:
+            return False
+    multipliers, pull, ranges = search.hessian.multipliers, 0.0, table.limited.shape[0]
+    for i in range(ranges):
+        limited = table.limited[i]
+        leg = table.legs[limited["leg"]]
+        if leg["kind"] != PIVOT and limited["place"] == SLIDE:
+            pull += multipliers[2 * i] / (leg["length"] + limited["lo"])
+        elif multipliers[2 * i] + multipliers[2 * i + 1] > 0.0:
+            return False
+    for i in range(table.cones.shape[0]):
+        if multipliers[2 * ranges + i] > 0.0 and table.cones[i]["half_angle"] > 0.5 * math.pi:
+            return False
+    return bool(pull < search.gradient.unit[0])
+
+
+@routine
 def is_other_mode(first: Floats, sides: Floats) -> bool:
     """Whether some leg takes its other solution."""
     for k in range(sides.shape[0]):
@@ -174,7 +202,7 @@ def search_row(
             copy_now(search.best, best)
         elif distance <= (1.0 + SAME) * least and least < math.inf:
             met += 1
-        if met >= hits:
+        if met >= hits or (met == 1 and distance == least and is_global(table, aim.pose, search)):
             break
     return least
 
