@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -44,6 +44,8 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
     pivots = (table.legs["kind"] == K.PIVOT) & (table.legs["foot"] == K.CROSS)
     told = [each for each in (*table.limited, *table.driven) if not pivots[each["leg"]] or each["place"] >= K.HEAD]
 
+    on_carriers = [k for k, leg in enumerate(table.legs) if E.is_carried(leg)]
+
     def values(now: E.Now) -> np.ndarray:
         E.place(table, now, look)
         return np.array(
@@ -51,13 +53,14 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
                 *look.rows,
                 *(E.coordinate_slope(table, each, look) for each in told),
                 *(E.cone_slope(table, cone, np.inf, look) for cone in table.cones),
+                *(E.dead_point_slope(table, leg, look) for leg in on_carriers),
             ]
         )
 
-    def slopes(measure: Callable[..., float], asked: list[np.void]) -> list[np.ndarray]:
+    def slopes(measure: Callable[..., float], asked: Sequence[np.void | int]) -> list[np.ndarray]:
         found = []
         for each in asked:
-            measure(table, each, look)
+            measure(table, each, *([np.inf] if measure is E.cone_slope else []), look)
             found.append(look.slope.copy())
         return found
 
@@ -71,6 +74,7 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
         E.place(table, now, look)
         E.put_slopes(table, look)
         told_by = [*look.slopes.copy(), *slopes(E.coordinate_slope, told), *slopes(E.cone_slope, list(table.cones))]
+        told_by += slopes(E.dead_point_slope, on_carriers)
         for unknown in range(n):
             ends = [values(moved(now, unknown, sign * STEP, table.columns)) for sign in (1.0, -1.0)]
             difference = (ends[0] - ends[1]) / (2.0 * STEP)

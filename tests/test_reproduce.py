@@ -21,7 +21,7 @@ from pfabrik.reproduce.closest import nearest_distance
 from pfabrik.reproduce.efficacy import angles_between
 from pfabrik.reproduce.feasible import model_of, worst_excess
 from pfabrik.reproduce.report import BEGIN, END, put_into
-from pfabrik.reproduce.study import SETTINGS, cases
+from pfabrik.reproduce.study import cases
 
 MACHINES = ("five_bar", "stewart", "nrpm")
 SUMMARIES = ("efficacy.csv", "efficiency.csv", "robustness.csv")
@@ -125,10 +125,6 @@ def test_exact_projections_come_as_near_as_a_general_optimiser(rows: Rows, key: 
     ratios = [float(row["exact_projection"]) / float(row["nearest_by_search"]) for row in compared]
     assert np.median(ratios) <= 1.0 + 1e-6
     assert max(ratios) <= 1.01
-
-
-def test_the_papers_projection_is_asked_for_by_name() -> None:
-    assert {options.projection for options in SETTINGS.values()} == {"centroid"}
 
 
 @pytest.mark.slow

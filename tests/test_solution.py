@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines import ring
 from pfabrik import Joint, Mechanism, Options, Solution, Status
-from pfabrik.closure.configurations import Configurations
 from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels.reaching import plan as P
+from pfabrik.reaching.points import joint_points
 
 FIELDS = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
 
@@ -190,11 +190,11 @@ def test_centres_along_a_trunk_move_with_the_joints_before_them() -> None:
         np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.eye(4)[None], compiled.home_seed.nodes,
         values, np.zeros((1, compiled.n_actuators)), np.zeros((1, 5)),
     )  # fmt: skip
-    points = Solution(machine, Configurations(rows, np.zeros((1, 0))), ()).points
+    points = joint_points(compiled, rows)
     shoulder = Rotation.from_rotvec([0, 0.3, 0])
     at = np.array((100.0, 0, 0)) + shoulder.apply((90.0 - 100, 0, 40) - 12.0 * np.array((-1, 0, 3)) / np.sqrt(10))
-    np.testing.assert_allclose(points["shoulder"], (100, 0, 0), atol=1e-12)
-    np.testing.assert_allclose(points["elbow"], at, atol=1e-12)
+    np.testing.assert_allclose(points["shoulder"][0], (100, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(points["elbow"][0], at, atol=1e-12)
 
 
 @pytest.mark.parametrize("distance, named", [(0.9e-7, True), (1.1e-7, False)])

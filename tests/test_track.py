@@ -348,9 +348,10 @@ def test_cranks_that_were_stretched_out_beyond_reach_bend_back_the_way_they_did(
     way, turn = draw.normal(size=3), 0.6 * draw.normal(size=3)
     share = out_and_back(21)
     targets = np.tile(machine.home_pose, (len(share), 1, 1))
-    targets[:, :3, 3] += 1.56 * machine.characteristic_length * share * way / np.linalg.norm(way)
+    targets[:, :3, 3] += 1.2 * machine.characteristic_length * share * way / np.linalg.norm(way)
     targets[:, :3, :3] = Rotation.from_rotvec(share * turn).as_matrix()
     followed = pf.track(machine, targets)
+    assert pf.singularity(followed).serial.min() < 1e-3  # cranks are stretched out on the way
     np.testing.assert_allclose(followed.position_error, followed.position_error[::-1], rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(followed.actuators[-1], followed.actuators[0], rtol=0, atol=1e-9)
 

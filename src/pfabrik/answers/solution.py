@@ -85,8 +85,7 @@ class Solution:
         against its first, from home. What a configuration leaves open (a rod's spin about itself) is nearest to the
         start, or to home; angles count on along a path.
     joints : joint name -> its part of `q`: (...,) for R and P, (..., 2) for U and C, (..., 3) for S.
-    points : joint name -> position of its centre in the base frame, (..., 3) [length]; joints that act as one are at
-        their common centre.
+    points : joint name -> position of its centre in the base frame, (..., 3) [length].
     position_error, rotation_error : distance of the pose from the target, (...,) [length], [rad]; 0 where actuator
         values were asked for, not a pose.
     actuator_error : largest difference of an actuated coordinate from the asked value, (...,); lengths relative to L,

@@ -27,11 +27,11 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
+from ..motion.displacements import centres
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .completion import coordinates_of, positions_of
 from .locked import with_locked_actuators
-from .points import joint_points
 
 Kernel = Callable[[P.Plan, Floats, P.Seeds, P.Settings, P.Rows], int]
 
@@ -125,8 +125,8 @@ class ReachingEngine:
         return Configurations(rows, closing.coordinates)
 
     def points(self, found: Configurations) -> Mapping[str, Floats]:
-        """Joint name -> position of its centre in the base frame, (n, 3) [length]; merged joints share a centre."""
-        return joint_points(self._compiled, self._positioned(found))
+        """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
+        return centres(self.mechanism, found.coordinates)
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
@@ -189,7 +189,8 @@ class ReachingEngine:
             rows.counters[unknown] = 0
         if start is None:
             return Configurations(rows, partial(coordinates_of, self.mechanism, rows, None, chained))
-        own = start.coordinates if start.were_given else partial(coordinates_of, self.mechanism, start.rows)
+        positioned = start.rows if start.were_given else self._positioned(start)
+        own = start.coordinates if start.were_given else partial(coordinates_of, self.mechanism, positioned)
         return Configurations(rows, partial(_nearest_to, self.mechanism, rows, own, chained))
 
     def _last_answer(self, rows: P.Rows, before: int) -> Configurations | None:

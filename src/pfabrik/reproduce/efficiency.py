@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from .. import geometric
 from ..answers.solution import Solution, Status
 from ..arrays import Floats
 from ..closure.configurations import new_rows
+from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import CompiledPlan, compile_plan
 from ..description.mechanism import Mechanism
 from ..geometric.topologies import closed_form
@@ -23,8 +25,8 @@ from ..poses import pose
 from ..reaching.solve import ReachingEngine, settings_of
 from .checking import Feasibility, feasibility
 from .efficacy import rms
-from .one_by_one import closed_form_one_by_one, p_fabrik_one_by_one
-from .study import CENTROID, SETTINGS, Case, Extent, Tick
+from .one_by_one import closed_form_one_by_one, legs_one_by_one, p_fabrik_one_by_one
+from .study import SETTINGS, Case, Extent, Tick
 from .timing import median_times, one_core
 
 DRAWN_AT_ONCE = 4096
@@ -72,18 +74,18 @@ class Efficiency:
     answers : by options ("paper", "default") and start ("cold": home, "warm": the answer to the target before).
     agreement : largest difference of an actuator from the closed form's, cold, default options [length or rad]; None
         for redundant mechanisms, where both may be right.
-    times : of one target [s], by what was timed: (method, options, start, how).
+    times : of one target [s], by what was timed: ("paper", "default" or "geometric", start, "single" or "batch").
     """
 
     case: Case
     targets: Floats
     answers: dict[tuple[str, str], Answered]
     agreement: float | None
-    times: dict[tuple[str, str, str, str], float]
+    times: dict[tuple[str, str, str], float]
 
     def ratio(self, options: str, start: str, how: str) -> float:
-        """Time of P-FABRIK over that of the geometric approach, from the same start and in the same way."""
-        return self.times["P-FABRIK", options, start, how] / self.times["geometric", "", start, how]
+        """Time with these options over that of the geometric approach, from the same start and in the same way."""
+        return self.times[options, start, how] / self.times["geometric", start, how]
 
 
 def run(case: Case, extent: Extent, tick: Tick) -> Efficiency:
@@ -148,37 +150,46 @@ def in_tour(targets: Floats, mechanism: Mechanism) -> Floats:
     return targets[order]
 
 
-def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str, str, str, str], float]:
+def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str, str, str], float]:
     """Median time of one target [s], on one core, each way by turns.
 
     "single" is one kernel call a target, made by compiled code; "batch" one call of the library for all targets.
     """
-    calls: dict[tuple[str, str, str, str], Callable[[], object]] = {}
-    compiled = compile_plan(mechanism)
-    for name, options in ANY_MODE.items():
-        for start in ("cold", "warm"):
-            calls["P-FABRIK", name, start, "single"] = _single(mechanism, compiled, targets, options, start == "warm")
+    calls: dict[tuple[str, str, str], Callable[[], object]] = {}
+    table, many = leg_table(mechanism), np.tile(targets, (COPIES, 1, 1))
     for start in ("cold", "warm"):
-        calls["geometric", "", start, "single"] = _single_closed(mechanism, targets, start == "warm")
-    many = np.tile(targets, (COPIES, 1, 1))
-    calls["P-FABRIK", "default", "cold", "batch"] = lambda: solve_ik(mechanism, many, options=CENTROID)
-    calls["geometric", "", "cold", "batch"] = lambda: geometric.solve_ik(mechanism, many)
+        is_warm = start == "warm"
+        calls["paper", start, "single"] = _single(mechanism, targets, ANY_MODE["paper"], is_warm)
+        if isinstance(table, LegTable):
+            calls["default", start, "single"] = _single_legs(mechanism, table, targets, is_warm)
+        else:
+            calls["default", start, "single"] = _single(mechanism, targets, ANY_MODE["default"], is_warm)
+        calls["geometric", start, "single"] = _single_closed(mechanism, targets, is_warm)
+    for name, options in ANY_MODE.items():
+        calls[name, "cold", "batch"] = partial(solve_ik, mechanism, many, options=options)
+    calls["geometric", "cold", "batch"] = partial(geometric.solve_ik, mechanism, many)
     with one_core():
         seconds = median_times(calls, repeats)
     return {key: seconds[key] / (len(many) if key[-1] == "batch" else len(targets)) for key in calls}
 
 
-def _single(
-    mechanism: Mechanism, compiled: CompiledPlan, targets: Floats, options: Options, warm: bool
-) -> Callable[[], object]:
+def _single(mechanism: Mechanism, targets: Floats, options: Options, warm: bool) -> Callable[[], object]:
     """One kernel call of P-FABRIK a target."""
+    compiled = compile_plan(mechanism)
     settings = settings_of(mechanism, options, keep_mode=False)
     seeds = compiled.home_seed
     rows = new_rows(mechanism, len(targets), seeds.nodes.shape[1], seeds.trunks.shape[1])
     if warm:
         answers = ReachingEngine(mechanism).answer(targets, None, options, keep_mode=False)
         seeds = _answers_before(compiled, answers.rows)
-    return lambda: p_fabrik_one_by_one(compiled.plan, targets, seeds, settings, rows)
+    return partial(p_fabrik_one_by_one, compiled.plan, targets, seeds, settings, rows)
+
+
+def _single_legs(mechanism: Mechanism, table: LegTable, targets: Floats, warm: bool) -> Callable[[], object]:
+    """One kernel call of legs in closed form a target."""
+    begins = np.concatenate([mechanism.home_pose[None], targets[:-1]]) if warm else mechanism.home_pose[None]
+    records = table.legs, table.limited, table.cones, table.driven, table.task
+    return partial(legs_one_by_one, *records, targets, begins, table.home_sides, new_rows(mechanism, len(targets)))
 
 
 def _answers_before(compiled: CompiledPlan, rows: Rows) -> Seeds:
@@ -223,11 +234,10 @@ def time_rows(found: Efficiency) -> list[dict[str, Any]]:
         {
             "mechanism": found.case.key,
             "method": method,
-            "options": options,
             "start": start,
             "how": how,
             "microseconds": 1e6 * seconds,
-            "ratio_to_geometric": seconds / found.times["geometric", "", start, how],
+            "ratio_to_geometric": seconds / found.times["geometric", start, how],
         }
-        for (method, options, start, how), seconds in found.times.items()
+        for (method, start, how), seconds in found.times.items()
     ]

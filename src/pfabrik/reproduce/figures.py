@@ -81,19 +81,17 @@ def draw_efficiency(found: Sequence[Efficiency], path: Path) -> None:
     left, right = figure.subplots(1, 2)
     ratios = {
         "paper": [each.case.printed.ratio for each in found],
-        "single, cold start": [each.ratio("default", "cold", "single") for each in found],
-        "single, warm start": [each.ratio("default", "warm", "single") for each in found],
-        "batch": [each.ratio("default", "cold", "batch") for each in found],
+        "passes, single": [each.ratio("paper", "cold", "single") for each in found],
+        "default, single": [each.ratio("default", "cold", "single") for each in found],
+        "default, batch": [each.ratio("default", "cold", "batch") for each in found],
     }
     draw_bars(left, [each.case.label for each in found], ratios)
     left.axhline(1.0, color=EDGE, linewidth=1)
-    left.set(yscale="log", ylabel="time of P-FABRIK ÷ geometric approach", title="time, one core")
+    left.set(yscale="log", ylabel="time ÷ geometric approach", title="time, one core")
     passes = {
         "paper": [each.case.printed.iterations for each in found],
-        "paper's E, cold start": [each.answers["paper", "cold"].iterations for each in found],
-        "paper's E, warm start": [each.answers["paper", "warm"].iterations for each in found],
-        "default, cold start": [each.answers["default", "cold"].iterations for each in found],
-        "default, warm start": [each.answers["default", "warm"].iterations for each in found],
+        "ours, cold start": [each.answers["paper", "cold"].iterations for each in found],
+        "ours, warm start": [each.answers["paper", "warm"].iterations for each in found],
     }
     draw_bars(right, [each.case.label for each in found], passes)
     right.set(yscale="log", ylabel="passes, average over targets reached", title="iterations")

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels._jit import kernel
+from ..kernels.legs.answer import answer
+from ..kernels.legs.records import Records
 from ..kernels.reaching.plan import Floats, Plan, Rows, Seeds, Settings
 from ..kernels.reaching.solve import solve_by_iteration, solve_directly
 
@@ -37,6 +39,39 @@ def p_fabrik_one_by_one(plan: Plan, targets: Floats, seeds: Seeds, settings: Set
         )
         if solve_directly(plan, targets[i : i + 1], own_seeds, settings, own) > 0:
             left += solve_by_iteration(plan, targets[i : i + 1], own_seeds, settings, own)
+    return left
+
+
+@kernel
+def legs_one_by_one(
+    legs: Records,
+    limited: Records,
+    cones: Records,
+    driven: Records,
+    task: Records,
+    targets: Floats,
+    begins: Floats,
+    sides: Floats,
+    rows: Rows,
+) -> int:
+    """The same by legs in closed form, all on the sides they take at home; returns how many these did not reach."""
+    left = 0
+    for i in range(targets.shape[0]):
+        k = i if begins.shape[0] > 1 else 0
+        left += answer(
+            legs,
+            limited,
+            cones,
+            driven,
+            task,
+            targets[i : i + 1],
+            begins[k : k + 1],
+            sides,
+            rows.status[i : i + 1],
+            rows.poses[i : i + 1],
+            rows.actuators[i : i + 1],
+            rows.measures[i : i + 1],
+        )
     return left
 
 

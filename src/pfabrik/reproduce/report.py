@@ -53,8 +53,8 @@ def report(findings: Findings) -> str:
     parts = [
         "# The paper's experiments, run again",
         "Written by `pfabrik reproduce`. *Paper*: as printed in P-FABRIK; it does not print the dimensions of its "
-        "machines, ours have others. *Paper's E*: `Options.paper()`, E = 0.01 mm and passes alone. *Default*: "
-        "`Options(projection='centroid')`, the defaults but for the projection, which is the paper's.",
+        "machines, ours have others. *Paper's E*: `Options.paper()`, the passes of P-FABRIK alone with E = 0.01 mm. "
+        "*Default*: `Options()`, which for legs that have closed forms takes these and makes no passes.",
         f"Measured on {machine()}. {findings.extent.steps} steps a circle, {findings.extent.targets} random targets a "
         "machine.",
         "## What must hold",
@@ -195,22 +195,21 @@ def passes(found: Efficiency, name: str, start: str) -> str:
     return f"{answered.iterations:.1f} ({100 * answered.reached / len(answered.solution):.4g} %)"
 
 
+TIMED = {"paper": "P-FABRIK's passes", "default": "default", "geometric": "geometric"}
+"""What is timed, as the tables call it."""
+
+
 def times_table(found: Sequence[Efficiency]) -> str:
     ways = [("cold", "single"), ("warm", "single"), ("cold", "batch")]
     rows = []
     for each in found:
         label, printed = each.case.label, each.case.printed
-        for method, name, paper in (
-            ("P-FABRIK", "default", 1e3 * printed.time),
-            ("P-FABRIK", "paper", None),
-            ("geometric", "", 1e3 * printed.geometric_time),
-        ):
-            times = [each.times.get((method, name, *way)) for way in ways]
-            shown = [number(None if seconds is None else 1e6 * seconds) for seconds in times]
-            options = {"default": ", default", "paper": ", paper's E", "": ""}[name]
-            rows.append((f"{label}, {method}{options}", number(paper), *shown))
-        ratios = [number(each.ratio("default", *way), 2) for way in ways]
-        rows.append((f"**{label}, P-FABRIK ÷ geometric**", number(printed.ratio, 2), *ratios))
+        for name, paper in (("paper", printed.time), ("default", None), ("geometric", printed.geometric_time)):
+            times = [number(1e6 * each.times[name, *way]) for way in ways]
+            rows.append((f"{label}, {TIMED[name]}", number(paper and 1e3 * paper), *times))
+        for name, ratio in (("paper", printed.ratio), ("default", None)):
+            ratios = [number(each.ratio(name, *way), 2) for way in ways]
+            rows.append((f"**{label}, {TIMED[name]} ÷ geometric**", number(ratio, 2), *ratios))
     return markdown(("time [µs]", "paper (MATLAB)", "single, cold", "single, warm", "batch, cold"), rows)
 
 
@@ -306,16 +305,21 @@ def cost(found: Efficiency) -> Cells:
         answered = found.answers[name, "cold"]
         return f"{100 * answered.reached / len(answered.solution):.4g} %"
 
-    ratios = [number(found.ratio("default", start, "single"), 2) for start in ("cold", "warm")]
-    times = [number(1e6 * found.times["P-FABRIK", "default", start, "single"], 2) for start in ("cold", "warm")]
+    def single(name: str) -> str:
+        return " / ".join(number(1e6 * found.times[name, start, "single"], 2) for start in ("cold", "warm"))
+
+    def ratios(name: str) -> str:
+        return " / ".join(number(found.ratio(name, start, "single"), 2) for start in ("cold", "warm"))
+
     return {
         "random targets reached, paper's E": ("–", reached("paper")),
         "random targets reached, default": ("–", reached("default")),
         "passes, paper's E, cold / warm start": (number(printed.iterations), both("paper")),
-        "passes, default, cold / warm start": ("–", both("default")),
-        "time of a single answer, cold / warm start [µs]": (number(1e3 * printed.time), " / ".join(times)),
-        "the same ÷ geometric approach": (number(printed.ratio, 2), " / ".join(ratios)),
-        "batch: time ÷ geometric approach": ("–", number(found.ratio("default", "cold", "batch"), 2)),
+        "single answer by passes, cold / warm start [µs]": (number(1e3 * printed.time), single("paper")),
+        "single answer by default, cold / warm start [µs]": ("–", single("default")),
+        "passes ÷ geometric approach, single": (number(printed.ratio, 2), ratios("paper")),
+        "default ÷ geometric approach, single": ("–", ratios("default")),
+        "default ÷ geometric approach, batch": ("–", number(found.ratio("default", "cold", "batch"), 2)),
     }
 
 

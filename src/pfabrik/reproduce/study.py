@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any
@@ -20,13 +20,14 @@ from ..poses import pose
 Tick = Callable[[], None]
 
 CENTROID = Options(projection="centroid")
-"""What the library does unless told otherwise, but for the projection, which is the paper's."""
+"""The paper's projection, finished exactly."""
 
 NEAREST = Options(projection="nearest")
 """The exact projection, which the paper's is compared with."""
 
-SETTINGS = {"paper": replace(Options.paper(), projection="centroid"), "default": CENTROID}
-"""The paper's E and passes alone; and closed forms and exact steps. Both project as the paper does."""
+SETTINGS = {"paper": Options.paper(), "default": Options()}
+"""The paper's passes, with its E and its projection; and what the library does unless told otherwise: where legs have
+closed forms it takes them, and no passes at all."""
 
 
 @dataclass(frozen=True)

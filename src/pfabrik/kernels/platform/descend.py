@@ -60,6 +60,7 @@ from .equations import (
     coordinate_slope,
     count_unknowns,
     counts_turns,
+    dead_point_slope,
     new_now,
     new_view,
     place,
@@ -92,13 +93,14 @@ class Search(NamedTuple):
     balance: Floats  # (rows,): multipliers of the equations and of what is held
     best: Now
     trial: Now
+    kept: Floats  # (legs,): the sides that carriers are to stay on; 0 for either
 
 
 @allocator
 def new_search(table: Table) -> Search:
     """Scratch memory of one thread."""
     n, legs = count_unknowns(table), table.legs.shape[0]
-    rows, limits = table.task[0]["rows"] + n, 2 * table.limited.shape[0] + table.cones.shape[0]
+    rows, limits = table.task[0]["rows"] + n, 2 * table.limited.shape[0] + table.cones.shape[0] + legs
     elimination = new_elimination(n, rows)
     for j in range(n):
         elimination.used[j] = 2 if j < 6 else 1
@@ -118,6 +120,7 @@ def new_search(table: Table) -> Search:
         np.zeros(rows),
         new_now(legs),
         new_now(legs),
+        np.zeros(legs),
     )
 
 
@@ -197,8 +200,8 @@ def lay_out(held: int, search: Search) -> int:
 
 @routine
 def linearise_limits(table: Table, margin: float, search: Search, view: FreeMotions) -> None:
-    """Excess and gradient of every limit within reach."""
-    slope, values, k, excess = search.look.slope, search.look.values, 0, -math.inf
+    """Excess and gradient of every limit within reach, and of dead points that are not to be passed."""
+    slope, values, kept, k, excess = search.look.slope, search.look.values, search.kept, 0, -math.inf
     for i in range(table.limited.shape[0]):
         limited = table.limited[i]
         value = deviation(limited, values)
@@ -218,6 +221,15 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
         if over > -NEAR:
             excess = max(excess, over)
             k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.look.slope, view)
+    first = 2 * table.limited.shape[0] + table.cones.shape[0]
+    for leg in range(kept.shape[0]):
+        if kept[leg] != 0.0:
+            over = kept[leg] * dead_point_slope(table, leg, search.look)
+            if over > -NEAR:
+                excess = max(excess, over)
+                for j in range(slope.shape[0]):
+                    slope[j] *= kept[leg]
+                k = add_limit(k, over, first + leg, search.look.slope, view)
     view.linear.counts[LIMITS] = k
     view.linear.scalars[EXCESS] = excess
 
@@ -229,7 +241,7 @@ def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Sear
     put_slopes(table, search.look)
     _, held = put_objective(table, row, aim, now, search)
     force, slopes, balance, multipliers = search.force, search.look.slopes, search.balance, search.hessian.multipliers
-    m, slope, holds = slopes.shape[0], search.look.slope, search.gradient.holds
+    m, slope, holds, kept = slopes.shape[0], search.look.slope, search.gradient.holds, search.kept
     for j in range(out.shape[0]):
         out[j] = force[j]
         for r in range(m):
@@ -248,6 +260,13 @@ def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Sear
         pull = multipliers[2 * ranges + i]
         if pull != 0.0:
             cone_slope(table, table.cones[i], math.inf, search.look)
+            for j in range(out.shape[0]):
+                out[j] += pull * slope[j]
+    first = 2 * ranges + table.cones.shape[0]
+    for k in range(kept.shape[0]):
+        pull = multipliers[first + k] * kept[k]
+        if pull != 0.0:
+            dead_point_slope(table, k, search.look)
             for j in range(out.shape[0]):
                 out[j] += pull * slope[j]
 

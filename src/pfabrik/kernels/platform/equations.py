@@ -39,8 +39,8 @@ from ..legs.records import (
     Floats,
     Record,
 )
-from ..legs.rods import NOWHERE, carried, carrier_rate, mark, read_rod, rod_rows, twist_rate
-from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, turn, vec
+from ..legs.rods import NOWHERE, carried, carried_foot, carrier_rate, mark, read_rod, rod_rows, twist_rate
+from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
 from .records import Table
 
 AT_FOOT, AT_HEAD = 0, 1
@@ -302,3 +302,21 @@ def cone_slope(table: Table, cone: Record, horizon: float, view: View) -> float:
     if sine > ALIGNED:
         put_turning(table, k, main, end, scale(-1.0 / sine, axis), view)
     return angle_between(axis, u)
+
+
+@routine
+def dead_point_slope(table: Table, k: int, view: View) -> float:
+    """The rate at which a carrier shortens its rod, zero where the rod is stretched out over it; its derivative into
+    `view.slope`.
+
+    With the foot's rate f by the carrier, which goes with the carrier, and the rod's line u: f . u. Its sign tells the
+    two solutions of the leg apart.
+    """
+    slope, leg, own = view.slope, table.legs[k], view.values[k]
+    for j in range(slope.shape[0]):
+        slope[j] = 0.0
+    axis = vec(leg["carrier_axis"])
+    if leg["carrier"] == CRANK:
+        axis = cross(axis, sub(carried_foot(leg, leg, own), vec(leg["carrier_point"])))
+    put_turning(table, k, k, AT_FOOT, axis, view)
+    return dot(axis, direction(view.lines[k]))

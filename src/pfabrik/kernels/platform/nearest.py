@@ -178,7 +178,9 @@ def search_row(
     """
     least, met, target, n = math.inf, 0, aim.pose.targets[row], others.poses.shape[0]
     near = nearest_start(aim.pose, target, others, search.gradient)
-    first = row if own.poses.shape[0] > 1 else 0
+    first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
+    for k in range(kept.shape[0]):
+        kept[k] = own.sides[first, k] if stays == 1 and is_carried(table.legs[k]) else 0.0
     for start in range(n + 2):
         if start == 0 or start == n + 1:
             begin(own, first, search.best)
