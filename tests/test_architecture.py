@@ -20,7 +20,8 @@ MAY_NAME_MACHINES = {
     "__init__.py": "the first lines of a session, for who reads the package's help",
     "catalog/": "the machines themselves",
     "reproduce/paper.toml": "the machines of the paper's experiments, with what it printed of them",
-    "export/controllers.py": "the kinematics of firmwares, by their names there",
+    "export/linuxcnc.py": "the kinematics of a firmware, by their names there",
+    "export/klipper.py": "the kinematics of a firmware, by their names there",
     "cli/export.py": "the printers that a firmware knows",
     "geometric/": "closed forms, which speak of the machines that are known for theirs",
 }

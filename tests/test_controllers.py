@@ -12,8 +12,10 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from pfabrik.errors import UnsupportedMechanism
-from pfabrik.export.controllers import klipper, linuxcnc
+from pfabrik.export.klipper import klipper
+from pfabrik.export.linuxcnc import linuxcnc
 from test_export_c import COMPILERS, needs_compiler
+from test_invariance import moved
 
 STUBS = {
     "rtapi_app.h": "#define EXPORT_SYMBOL(name) struct unused_##name { int i; }\n"
@@ -73,8 +75,58 @@ def test_a_delta_printer_is_klipper_s() -> None:
     np.testing.assert_allclose(top, [joint.range[1] for joint in mechanism.joints if joint.actuated], atol=1e-6)
 
 
-def test_a_delta_whose_towers_stand_elsewhere_is_no_lineardeltakins() -> None:
-    assert "kinematicsInverse" in linuxcnc(pf.load("linear_delta"))
+def pins_of(module: str, text: str) -> dict[str, float]:
+    return {name: float(value) for name, value in re.findall(rf"setp {module}\.(\w+) (\S+)", text)}
+
+
+def turned(mechanism: pf.Mechanism, degrees: float, up: float = 0.0) -> pf.Mechanism:
+    R = Rotation.from_euler("z", degrees, degrees=True).as_matrix()
+    return moved(mechanism, R, np.array([0.0, 0.0, up]))
+
+
+def test_a_delta_of_towers_is_lineardeltakins_in_the_order_of_its_code() -> None:
+    """Carriages as its inverse has them: joint 0 at (0, R), the others counter-clockwise from there."""
+    mechanism = turned(pf.load("linear_delta"), 90.0)
+    pins = pins_of("lineardeltakins", linuxcnc(mechanism))
+    angles = np.radians([90.0, 210.0, 330.0])
+    towers = pins["R"] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    heights = 7.0 + np.sqrt(pins["L"] ** 2 - ((towers - [12.0, -20.0]) ** 2).sum(axis=1))
+    np.testing.assert_allclose(pf.solve_ik(mechanism, [12.0, -20.0, 7.0]).actuators, heights, atol=1e-6)
+
+
+def test_a_delta_that_hangs_from_its_thighs_is_rotarydeltakins() -> None:
+    """Thighs swing down from level, straight out at -90, 30 and 150 degrees; shins reach from knees to ankles."""
+    mechanism, target = pf.load("delta"), np.array([15.0, -22.0, -140.0])
+    pins = pins_of("rotarydeltakins", linuxcnc(mechanism))
+    joints = pf.solve_ik(mechanism, target).actuators
+    angles = np.radians([-90.0, 30.0, 150.0])
+    out = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
+    reach = pins["platformradius"] + pins["thighlength"] * np.cos(joints)
+    knees = reach[:, None] * out - np.outer(pins["thighlength"] * np.sin(joints), [0.0, 0.0, 1.0])
+    ankles = target + pins["footradius"] * out
+    np.testing.assert_allclose(np.linalg.norm(ankles - knees, axis=1), pins["shinlength"], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "degrees", "up"), [("linear_delta", 0.0, 0.0), ("delta", 120.1, 0.0), ("delta", 0.0, 5.0)]
+)
+def test_deltas_that_stand_elsewhere_are_modules_of_their_own(name: str, degrees: float, up: float) -> None:
+    text = linuxcnc(turned(pf.load(name), degrees, up))
+    assert "kinematicsInverse" in text
+    assert "setp" not in text
+
+
+def test_a_thigh_that_counts_from_elsewhere_is_told() -> None:
+    text = (
+        pf.files.dumps(pf.load("delta"))
+        .replace('name = "A1"', 'name = "A1"\nhome = 10')
+        .replace("range = [-40, 80]", "range = [-40, 90]")
+    )
+    assert "# joint A1 counts 10 deg more" in linuxcnc(pf.files.loads(text))
+
+
+def test_a_five_bar_is_a_module_of_its_own() -> None:
+    assert "kinematicsInverse" in linuxcnc(pf.load("five_bar"))
 
 
 @pytest.mark.parametrize("name", ["stewart", "delta", "five_bar"])
@@ -85,7 +137,7 @@ def test_what_klipper_has_no_kinematics_for_is_refused(name: str) -> None:
 
 @needs_compiler
 def test_other_machines_are_a_module_around_their_own_code(tmp_path: Path) -> None:
-    mechanism = pf.load("delta")
+    mechanism = turned(pf.load("delta"), 10.0)
     for name, text in STUBS.items():
         (tmp_path / name).write_text(text)
     height = float(mechanism.reference_point[2]) - 20.0

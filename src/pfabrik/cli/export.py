@@ -38,14 +38,14 @@ def c_float(mechanism: Mechanism) -> str:
 
 def linuxcnc(mechanism: Mechanism) -> str:
     """What LinuxCNC needs."""
-    from ..export.controllers import linuxcnc as settings
+    from ..export.linuxcnc import linuxcnc as settings
 
     return settings(mechanism)
 
 
 def klipper(mechanism: Mechanism) -> str:
     """What Klipper needs."""
-    from ..export.controllers import klipper as settings
+    from ..export.klipper import klipper as settings
 
     return settings(mechanism)
 

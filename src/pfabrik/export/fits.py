@@ -1,0 +1,135 @@
+"""What a machine is to firmwares that have kinematics of their own: struts, towers or thighs, and their dimensions."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats
+from ..tolerances import TOLERANCES
+from .legs import LegCode, RodShape
+from .machine import Coordinate, Machine
+
+
+class Tower(NamedTuple):
+    """A rail of a delta, moved inward by where its rods are on the platform.
+
+    Attributes
+    ----------
+    place : (3,) [length], of the carriage at value 0.
+    rod : its length.
+    highest : of the carriage's value; infinite without a range.
+    """
+
+    place: Floats
+    rod: float
+    highest: float
+
+
+class Thigh(NamedTuple):
+    """A crank of a delta with its pair of parallel rods.
+
+    Attributes
+    ----------
+    hip, ankle : (3,) [length]: where the crank's axis is, and the middle of the rods on the platform, against the
+        reference point.
+    length, shin : of the crank, and of the rods.
+    added : what the actuator counts more than the angle by which the crank hangs down [rad].
+    """
+
+    hip: Floats
+    ankle: Floats
+    length: float
+    shin: float
+    added: float
+
+
+def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
+    """Ends of six struts, on the base and on the platform, and what their actuators add to lengths; None for others."""
+    mechanism = machine.mechanism
+    whole = not machine.unset and not mechanism.end_effector_is_joint
+    if not whole or len(machine.codes) != 6 or [each.drive.what for each in machine.driven] != ["slide"] * 6:
+        return None
+    found = []
+    for each in machine.driven:
+        code = machine.codes[each.leg]
+        shape = code.shape
+        if not isinstance(shape, RodShape) or shape.is_reversed or shape.carrier or machine.rows:
+            return None
+        found.append((np.asarray(code.numbers["foot"]), np.asarray(code.numbers["head"]), each.home - _length(code)))
+    return found
+
+
+def _length(code: LegCode) -> float:
+    return float(np.asarray(code.numbers["length"]))
+
+
+def towers_of(machine: Machine) -> list[Tower] | None:
+    """The rails of a delta in the order of its actuators; None for other machines."""
+    mechanism, size = machine.mechanism, machine.mechanism.characteristic_length
+    if set(mechanism.task) != {"x", "y", "z"} or len(machine.driven) != 3 or len(machine.codes) != 6:
+        return None
+    towers = []
+    for each in machine.driven:
+        pair = [code for code in machine.codes if code.main == each.leg]
+        shapes = [code.shape for code in pair]
+        if len(pair) != 2 or not all(isinstance(s, RodShape) and s.carrier == "carriage" for s in shapes):
+            return None
+        axis = np.asarray(pair[0].numbers["axis"]) * each.sense
+        spans = [np.asarray(code.numbers["foot"]) - np.asarray(code.numbers["head"]) for code in pair]
+        lengths = [_length(code) for code in pair]
+        off = max(np.abs(spans[0] - spans[1]).max() / size, abs(lengths[0] - lengths[1]) / size)
+        if (
+            off > TOLERANCES.alignment
+            or np.linalg.norm(np.cross(axis, [0, 0, 1])) > TOLERANCES.alignment
+            or axis[2] < 0
+        ):
+            return None
+        towers.append(Tower(spans[0] - each.home * axis, lengths[0], each.home + each.hi))
+    return towers
+
+
+def angles_of(towers: list[Tower]) -> list[float]:
+    """Where towers stand [deg]."""
+    return [math.degrees(math.atan2(tower.place[1], tower.place[0])) % 360.0 for tower in towers]
+
+
+def thighs_of(machine: Machine) -> list[Thigh] | None:
+    """The cranks of a delta that hangs from them, in the order of its actuators; None for other machines.
+
+    Their axes are level and square to the way outward, they go down with their actuators, and their knees are outside.
+    """
+    mechanism = machine.mechanism
+    if set(mechanism.task) != {"x", "y", "z"} or len(machine.driven) != 3 or len(machine.codes) != 6:
+        return None
+    found = [_thigh(machine, each) for each in machine.driven]
+    known = [each for each in found if each is not None]
+    return known if len(known) == len(found) else None
+
+
+def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
+    size, near = machine.mechanism.characteristic_length, TOLERANCES.alignment
+    pair = [code for code in machine.codes if code.main == driven.leg]
+    if len(pair) != 2 or not all(isinstance(code.shape, RodShape) and code.shape.carrier == "crank" for code in pair):
+        return None
+    axis, spoke = (np.asarray(pair[0].numbers[name]) for name in ("axis", "spoke"))
+    knees = [np.asarray(code.numbers["foot"]) for code in pair]
+    ankles = [np.asarray(code.numbers["head"]) for code in pair]
+    aside = np.cross(axis, knees[1] - knees[0])
+    off = max(np.abs((knees[1] - knees[0]) - (ankles[1] - ankles[0])).max(), np.linalg.norm(aside)) / size
+    knee, ankle = 0.5 * (knees[0] + knees[1]), 0.5 * (ankles[0] + ankles[1])
+    hip = knee - spoke
+    outward = np.append(hip[:2], 0.0) / max(float(np.linalg.norm(hip[:2])), near * size)
+    if off > near or max(abs(axis[2]), abs(axis @ outward)) > near:
+        return None
+    down = np.array([0.0, 0.0, -1.0])
+    if np.cross(axis * driven.sense, outward) @ down < 0.0:
+        return None
+    way = ankle + np.asarray(machine.mechanism.reference_point) - hip
+    is_outside = (way @ down) * (spoke @ outward) + (spoke @ down) * -(way @ outward) > 0.0
+    if way @ down <= 0.0 or not is_outside:
+        return None
+    hangs = math.atan2(spoke @ down, spoke @ outward)
+    return Thigh(hip, ankle, float(np.linalg.norm(spoke)), _length(pair[0]), driven.home - hangs)
