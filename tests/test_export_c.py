@@ -90,9 +90,15 @@ def truth(name: str, count: int) -> Truth:
     if not (found.status == 0).any():
         targets = np.ascontiguousarray(found.pose)
         found = pf.solve_ik(free, targets, options=keep)
+    whole, closes, actuators, q = found.pose.copy(), found.status == 0, found.actuators.copy(), found.q.copy()
+    # limits may lead a search where it does not come without them
+    rows = np.flatnonzero(~closes & (np.asarray(pf.feasibility(mechanism, targets).margin) > 0.0))
+    if len(rows):
+        kept = pf.solve_ik(mechanism, targets[rows], options=keep)
+        rows, kept = rows[kept.status == 0], kept[kept.status == 0]
+        whole[rows], closes[rows], actuators[rows], q[rows] = kept.pose, True, kept.actuators, kept.q
     home = np.concatenate([np.ravel(mechanism.home_coordinate(joint.name)) for joint in mechanism.joints])
-    slack = slack_of(mechanism, found.q, home)
-    return Truth(targets, found.pose, found.status == 0, found.actuators, slack)
+    return Truth(targets, whole, closes, actuators, slack_of(mechanism, q, home))
 
 
 def slack_of(mechanism: pf.Mechanism, q: np.ndarray, home: np.ndarray) -> np.ndarray:

@@ -145,6 +145,13 @@ def test_limits_come_from_the_file_and_from_the_call() -> None:
     assert limits_of(mechanism, "speed", 5.0).tolist() == [5.0, 5.0]
     with pytest.raises(UnknownName, match="did you mean"):
         limits_of(mechanism, "speed", {"yy": 1.0})
+    post = pf.Joint(
+        "post", "cylindrical", ("base", "arm"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True, max_speed=(2.0, 30.0)
+    )
+    column = pf.Mechanism("column", [post], "arm", (1, 0, 0), task=("z", "yaw"))
+    assert limits_of(column, "speed", {"post[0]": 1.0}).tolist() == [1.0, 30.0]
+    track = pf.track(column, pf.pose([[1, 0, 0], [0, 1, 20]], rpy=[[0, 0, 0], [0, 0, np.pi / 2]]))
+    assert pf.time_path(track).duration == pytest.approx(max(np.pi / 2 / 2.0, 20.0 / 30.0), rel=1e-6)
 
 
 def test_paths_that_no_machine_follows_are_refused_with_the_step() -> None:
