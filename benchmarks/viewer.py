@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
@@ -47,11 +46,11 @@ def viewer(runs: int) -> Iterator[Row]:
 
         def solve() -> None:
             for target in targets:
-                shown._session.go_to(target)
+                shown._stage.session.go_to(target)
 
         def solve_and_send() -> None:
             for target in targets:
-                shown._answer(partial(shown._session.go_to, target))
+                shown._answer(lambda stage, target=target: stage.session.go_to(target))
 
         solving, sending = best_times(runs, solve, solve_and_send)
         shown.show(pf.solve_ik(machine, machine.home_pose))

@@ -186,7 +186,7 @@ def test_motions_of_the_mouse_reach_the_answer(shown: Callable[..., pf.Viewer]) 
     viewer = shown(machine)
     viewer._drag(pf.pose((0, 0, 300)))
     until(lambda: viewer.solution.status == pf.Status.PROJECTED)
-    until(lambda: "struts BL1, BL2" in viewer._panel._status.content)
+    until(lambda: "struts BL1, BL2" in viewer._stage.panel._status.content)
     viewer._change_target("z", 200.0)
     until(lambda: viewer.solution.status == pf.Status.REACHED)
     assert viewer.solution.pose[2, 3] == pytest.approx(200.0)
@@ -199,23 +199,23 @@ def test_motions_of_the_mouse_reach_the_answer(shown: Callable[..., pf.Viewer]) 
 
 def test_modes_are_listed_and_taken(shown: Callable[..., pf.Viewer]) -> None:
     viewer = shown("five_bar")
-    viewer._find_modes("working")
-    until(lambda: len(viewer._modes) == 4)
-    until(lambda: viewer._panel._modes.options[2] == "2: beyond min of p4; max of p5")
+    viewer._searches.find_modes("working")
+    until(lambda: len(viewer._stage.modes) == 4)
+    until(lambda: viewer._stage.panel._modes.options[2] == "2: beyond min of p4; max of p5")
     viewer._take_mode(1)
     until(lambda: viewer.solution.status == pf.Status.EXCEEDED)
-    until(lambda: "min of p4" in viewer._panel._status.content)
+    until(lambda: "min of p4" in viewer._stage.panel._status.content)
 
 
 def test_the_border_of_the_workspace_is_shown_on_request(shown: Callable[..., pf.Viewer]) -> None:
     viewer = shown("five_bar")
-    viewer._panel._workspace.value = True
-    viewer._show_workspace(True)
-    until(lambda: "mm²" in viewer._panel._note.content)
-    assert "p2 max" in viewer._panel._border.content
-    assert viewer._scene._border
-    viewer._show_workspace(False)
-    assert not viewer._scene._border
+    viewer._stage.panel._workspace.value = True
+    viewer._searches.show_workspace(True)
+    until(lambda: "mm²" in viewer._stage.panel._note.content)
+    assert "p2 max" in viewer._stage.panel._border.content
+    assert viewer._stage.scene._border
+    viewer._searches.show_workspace(False)
+    assert not viewer._stage.scene._border
 
 
 def test_a_track_is_played_step_by_step(shown: Callable[..., pf.Viewer]) -> None:
@@ -239,7 +239,7 @@ def test_a_file_is_shown_again_when_it_changes_and_its_faults_are_told(
     until(lambda: viewer.solution.pose[1, 3] == pytest.approx(10.0))
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("revolute", "revolt"), encoding="utf-8")
-    until(lambda: "did you mean" in viewer._panel._note.content)
+    until(lambda: "did you mean" in viewer._stage.panel._note.content)
     assert viewer.mechanism == pf.load("five_bar")
     pf.save(tripod_rps(), path)
     until(lambda: viewer.mechanism == tripod_rps())

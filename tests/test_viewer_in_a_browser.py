@@ -105,7 +105,7 @@ def test_a_target_dragged_beyond_a_stroke_names_the_limit_and_nothing_leaves_thi
         told = held.inner_text()
         assert names
         assert all(name in told for name in names), told
-        assert page.locator("[data-pfabrik=pose]").input_value() == viewer._session.pose_as_python
+        assert page.locator("[data-pfabrik=pose]").input_value() == viewer._stage.session.pose_as_python
         assert hosts(asked) == {"127.0.0.1"}
         page.context.close()
 
