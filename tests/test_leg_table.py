@@ -240,6 +240,7 @@ def test_feasibility_is_the_least_margin_and_tells_what_is_reached(name: str) ->
         assert named == pytest.approx(found.margin[row], abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [120, pytest.param(10_000, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("name", SERVED)
 def test_what_feasibility_says_is_what_is_reached_however_far_from_home(name: str, n: int) -> None:

@@ -147,7 +147,6 @@ def test_vertices_are_on_the_limits_they_name(name: str) -> None:
     assert sum(found.shares.values()) == pytest.approx(1.0)
 
 
-@pytest.mark.campaign
 def test_an_orthoglide_without_limits_fills_three_cylinders() -> None:
     machine = pf.load("orthoglide").without_limits()
     rod = 310.582854123025

@@ -75,6 +75,8 @@ def workspace(
         raise click.UsageError("--rpy and --any-orientation: give one of them")
     if centre is not None and largest is None:
         raise click.UsageError("--centre says nothing without --largest")
+    if tilt is not None and not 0.0 <= tilt <= 180.0:
+        raise click.UsageError(f"--tilt {tilt:g}: expected an angle from 0 to 180 degrees")
     for path in outputs:
         check_ending(path, mech)
     mechanism = load(mech)

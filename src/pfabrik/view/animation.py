@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
 from ..errors import InvalidArgument, MissingLibrary
 from ..extras import require
+from ..telling import OnProgress, telling
 from ..writing import whole_path
 from .canvas import SMALL, canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD
@@ -36,7 +36,7 @@ def animate(
     path: str | os.PathLike[str],
     *,
     seconds: float | None = None,
-    on_progress: Callable[[int, int], None] | None = None,
+    on_progress: OnProgress | None = None,
 ) -> None:
     """Write a film of a path that was followed: the machine, what was asked for, and what holds it back.
 
@@ -48,7 +48,8 @@ def animate(
     path : of the film; it ends in ".gif" or ".mp4". The latter needs the program `ffmpeg`.
     seconds : how long it runs; default: as long as the path takes where `track` was told a `sample_time`, else a
         twentieth of a second a step. There are 20 frames a second, each the step that is due.
-    on_progress : called with (frames done, frames in all).
+    on_progress : called with (frames done, frames in all); default: a bar on a terminal, if it takes more than two
+        seconds.
 
     Raises
     ------
@@ -61,12 +62,16 @@ def animate(
     require("pictures", "matplotlib", "plot")
     writer = _writer(suffix)
     film = _Film(track, [skeleton_of(track[int(step)]) for step in np.unique(steps)], np.unique(steps))
-    with whole_path(path) as part, writer.saving(film.figure, str(part), film.figure.dpi):
+    with (
+        telling(f"drawing {os.fspath(path)}", on_progress) as tell,
+        whole_path(path) as part,
+        writer.saving(film.figure, str(part), film.figure.dpi),
+    ):
         for done, step in enumerate(steps.tolist(), 1):
             film.show(step)
             writer.grab_frame()
-            if on_progress is not None:
-                on_progress(done, len(steps))
+            if tell is not None:
+                tell(done, len(steps))
 
 
 def _steps(track: Track, known: NDArray[np.intp], seconds: float | None) -> NDArray[np.intp]:

@@ -18,7 +18,8 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..description.task import task_of
 from ..errors import InvalidArgument, UnknownName
 from ..poses import SupportsMatrix
-from .blocks import Measure, OnProgress
+from ..telling import OnProgress, telling
+from .blocks import Measure
 from .lattice import Lattice
 from .orientations import tilts_up_to
 from .parts import Parts
@@ -26,7 +27,6 @@ from .refining import refined
 from .result import Workspace
 from .space import Space, space_of
 from .surface import mesh_of
-from .telling import telling
 from .verdicts import Question
 
 FINENESS, FINENESS_OF_SETS, FINENESS_ONE_BY_ONE = 1 / 100, 1 / 50, 1 / 25

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import lru_cache
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..telling import OnProgress
 from .verdicts import Question
 
 POSES_A_BLOCK = 1 << 14
@@ -20,8 +20,6 @@ SLOWER = 64
 
 LOOKS = 4
 """Looks at each cell of the border for the places where it crosses edges, about."""
-
-OnProgress = Callable[[int, int], None]
 
 
 class Measure:

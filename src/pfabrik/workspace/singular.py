@@ -16,14 +16,13 @@ from ..errors import InvalidArgument
 from ..ik import solve_ik
 from ..motion.first_order import Singularity, parallel_signs
 from ..options import Options
-from .blocks import OnProgress
+from ..telling import OnProgress, telling
 from .lattice import codes, corners
 from .numbering import Numbering
 from .parts import connected
 from .refining import Cells
 from .result import Workspace
 from .surface import crossed_edges
-from .telling import telling
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -86,6 +86,8 @@ def put_slopes(legs: Records, frames: Floats, values: Floats, lines: Floats, fol
     main = 0
     for k in range(legs.shape[0]):
         leg = legs[k]
+        if leg["bears"] == 0:
+            continue
         frame = frames[leg["reversed"]]
         if leg["kind"] == PIVOT:
             pivot_slopes(leg, frame, slopes)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeAlias
 
-from .blocks import OnProgress
+OnProgress: TypeAlias = Callable[[int, int], None]
+"""Called with what is done, and with what there is in all, about."""
 
 PATIENCE = 2.0
 """Seconds before anything is said."""
