@@ -14,6 +14,10 @@ import pfabrik as pf
 from checks import excess_of_points, gap_of_points
 from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
+from pfabrik.closure.projection import ways_of
+from pfabrik.closure.solve import ClosureEngine
+from pfabrik.engine import engine_of
+from pfabrik.platform.solve import LegsEngine
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 FEASIBLE = 1e-9
@@ -405,3 +409,21 @@ def test_a_platform_that_is_told_to_hold_its_tilt_does_not_stand_on_its_head(nam
             assert answer.held is None
             assert 0.1 < answer.rotation_error < np.radians(degrees) - 0.1
             assert answer.active_limits
+
+
+@pytest.mark.parametrize("name", ["stewart", "delta", "ankle_rss", "five_bar", "ucu"])
+def test_what_holds_a_projection_back_is_the_same_in_the_platforms_pose_and_on_all_joints(name: str) -> None:
+    machine = pf.load(name)
+    engine, rng = engine_of(machine), np.random.default_rng(5)
+    assert isinstance(engine, LegsEngine)
+    targets = np.repeat(machine.home_pose[None], 12, axis=0)
+    targets[:, :3, 3] += rng.normal(size=(12, 3)) * machine.characteristic_length
+    targets[:, :3, :3] = Rotation.from_rotvec(rng.normal(size=(12, 3))).as_matrix()
+    answers = pf.solve_ik(machine, targets, options=pf.Options(hold=None))
+    (way,) = ways_of(machine, None, None)
+    rows = np.flatnonzero(answers.status == Status.PROJECTED)
+    found = answers._found.at(rows)
+    told = engine.weighed_limits(found, targets[rows], way)
+    assert (told > 0).any(axis=1).sum() >= 4
+    on_joints = ClosureEngine(machine).weighed_limits(found, targets[rows], way)
+    np.testing.assert_allclose(told, on_joints, atol=1e-5 * on_joints.max())

@@ -91,6 +91,26 @@ def angles_and_sines(rotations: Floats) -> tuple[Floats, Floats]:
     return np.asarray(np.arctan2(np.linalg.norm(sines, axis=-1), cosine)), sines
 
 
+def to_rotvec(rotations: Floats) -> Floats:
+    """Rotation vectors (..., 3) [rad] of matrices (..., 3, 3), of at most half a turn."""
+    angles, sines = angles_and_sines(rotations)
+    short = sines / np.sinc(angles / np.pi)[..., None]
+    # near half a turn the sine vanishes: the axis is the longest column of (R + R^T) / 2 - cos I = (1 - cos) a a^T
+    cosines = np.cos(angles)[..., None, None]
+    square = 0.5 * (rotations + np.swapaxes(rotations, -1, -2)) - cosines * np.eye(3)
+    longest = np.linalg.norm(square, axis=-2).argmax(axis=-1)
+    axes = np.take_along_axis(square, longest[..., None, None], axis=-1)[..., 0]
+    size = np.linalg.norm(axes, axis=-1, keepdims=True)
+    axes = (
+        axes / np.where(size > 0.0, size, 1.0) * np.where((axes * sines).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+    )
+    return np.where((angles > LONG)[..., None], angles[..., None] * axes, short)
+
+
+LONG = 2.0
+"""Angle beyond which the axis of a rotation is read from its even part [rad]."""
+
+
 def nearest_rotations(matrices: Floats) -> Floats:
     """The orthogonal matrices (..., 3, 3) nearest to given ones: polar decomposition, by singular values."""
     U, _, Vt = np.linalg.svd(matrices)

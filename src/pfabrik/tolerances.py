@@ -40,6 +40,7 @@ class Tolerances:
         workspace it grows with the square root of a length, so that 1e-9 of L leaves 3e-5.
     same_mode : largest difference of positions [L] and rotation matrices of two solutions that count as one: where two
         solutions meet, closing the loops to 1e-13 places each to 3e-7 only.
+    meeting : gap of loops [L] up to which joints that closed forms tell need no closing: rounding leaves 1e-15 a joint.
     """
 
     position: float = 1e-9
@@ -54,6 +55,7 @@ class Tolerances:
     implied: float = 1e-12
     room: float = 1e-6
     same_mode: float = 1e-5
+    meeting: float = 1e-12
     speed: float = 1e-6
     rank: float = 1e-9
     singular: float = 1e-4

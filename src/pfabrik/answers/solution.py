@@ -12,12 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.close import closure_of
 from ..closure.configurations import Configurations
-from ..closure.descend import weighed_limits
 from ..closure.projection import ways_of
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..kernels.reaching import plan as P
@@ -109,13 +106,12 @@ class Solution:
         self._found = found
         self._wanted = wanted
 
-    def __getstate__(self) -> tuple[Mechanism, P.Rows, tuple[int, ...], Floats, Wanted | None]:
+    def __getstate__(self) -> tuple[Mechanism, Configurations, tuple[int, ...], Wanted | None]:
         """What an answer is made of; all else follows again where it is unpickled."""
-        return self.mechanism, self._rows, self.shape, self._coordinates, self._wanted
+        return self.mechanism, self._found, self.shape, self._wanted
 
-    def __setstate__(self, state: tuple[Mechanism, P.Rows, tuple[int, ...], Floats, Wanted | None]) -> None:
-        mechanism, rows, shape, coordinates, wanted = state
-        Solution.__init__(self, mechanism, Configurations(rows, coordinates), shape, wanted)
+    def __setstate__(self, state: tuple[Mechanism, Configurations, tuple[int, ...], Wanted | None]) -> None:
+        Solution.__init__(self, *state)
 
     @property
     def _rows(self) -> P.Rows:
@@ -225,16 +221,17 @@ class Solution:
     def _holding(self, wanted: Wanted, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
         """The limits that hold projected rows back from the poses that were asked for."""
         found: dict[int, tuple[ActiveLimit, ...]] = {}
-        closure, task = closure_of(self.mechanism), task_of(self.mechanism)
+        engine = engine_of(self.mechanism)
         holds, ways = (
             self._rows.counters[projected, P.HELD],
             ways_of(self.mechanism, wanted.hold, wanted.rotation_length),
         )
         for way in ways:
             rows = projected[holds == way.hold]
-            q = self._coordinates[rows]
-            weights = weighed_limits(closure, q, wanted.targets[rows], platform=way.weights, frame=task.frame)
-            found.update(zip(rows.tolist(), holding_limits(self.mechanism, q, weights), strict=True))
+            if len(rows):
+                weights = engine.weighed_limits(self._found.at(rows), wanted.targets[rows], way)
+                limits = holding_limits(self.mechanism, self._coordinates[rows], weights)
+                found.update(zip(rows.tolist(), limits, strict=True))
         return [found[row] for row in projected.tolist()]
 
     def __bool__(self) -> bool:

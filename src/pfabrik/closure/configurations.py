@@ -71,6 +71,10 @@ class Configurations:
         self.were_given = not callable(coordinates)
         self._coordinates = coordinates
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As configurations whose coordinates were given: how they would be found is not pickled."""
+        return type(self), (self.rows, self.coordinates)
+
     def __len__(self) -> int:
         return len(self.rows.status)
 

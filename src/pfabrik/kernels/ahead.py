@@ -74,7 +74,16 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_otherwise, (_TABLE, *_values("f3 f3 f2 i1 f3 f2 f2"))),
     (
         approach_by_pose,
-        (_TABLE, Aim(_POSE_OBJECTIVE, np.zeros((0, 0))), _STARTS, _STARTS, 0, 0, Found(*_values("f1 f3 f2 f2 i1"))),
+        (
+            _TABLE,
+            Aim(_POSE_OBJECTIVE, np.zeros((0, 0))),
+            _STARTS,
+            _STARTS,
+            0,
+            0,
+            Found(*_values("f1 f3 f2 f2 i1")),
+            _F2,
+        ),
     ),
     (judge, (_TABLE, *_values("f3 f2 f2 f2 f2"))),
     (read_configurations, (_TABLE, _KNOWN, *_values("f3 f2 f2 f2"))),

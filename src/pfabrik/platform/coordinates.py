@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,9 @@ from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.legs import records as K
 from ..kernels.reaching import plan as P
+from ..motion.displacements import gaps
 from ..motion.limits import within_turns
+from ..motion.meeting import meeting_joints, put_meeting_joints
 from ..tolerances import TOLERANCES
 from .table import kernel_table
 
@@ -34,10 +37,13 @@ class LegAnswers(Configurations):
     """
 
     def __init__(
-        self, rows: P.Rows, coordinates: Callable[[], Floats], sides: Floats, carriers: Floats | None = None
+        self, rows: P.Rows, coordinates: Floats | Callable[[], Floats], sides: Floats, carriers: Floats | None = None
     ) -> None:
         super().__init__(rows, coordinates)
         self.sides, self.carriers = sides, carriers
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return LegAnswers, (self.rows, self.coordinates, self.sides, self.carriers)
 
     def at(self, places: NDArray[np.intp]) -> Configurations:
         """The configurations at some places, copied."""
@@ -77,6 +83,26 @@ def settled(
         rows = np.flatnonzero(np.isfinite(carriers).all(axis=1))
         found[rows] = _read_with(mechanism, table, poses[rows], sides[rows], carriers[rows], found[rows])
     closure.put_actuators(found, actuators)
+    rest = np.flatnonzero(~_put_others(mechanism, table, poses, found))
+    if len(rest):
+        found[rest] = _closed(mechanism, poses[rest], actuators[rest], found[rest])
+    within_turns(mechanism, found)
+    return found
+
+
+def _put_others(mechanism: Mechanism, table: LegTable, poses: Floats, found: Floats) -> NDArray[np.bool_]:
+    """Write what legs do not tell, where it is where bodies meet, into joint coordinates (n, columns); which close."""
+    known = frozenset(table.known["column"].tolist()) | closure_of(mechanism, whole=False).driven
+    meeting = meeting_joints(mechanism, known)
+    if meeting is None:
+        return np.zeros(len(found), bool)
+    put_meeting_joints(mechanism, meeting, poses, found)
+    return gaps(mechanism, found) <= TOLERANCES.meeting * mechanism.characteristic_length
+
+
+def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, found: Floats) -> Floats:
+    """Joint coordinates (n, columns) closed on platforms and actuators at rest, from given ones."""
+    closure = closure_of(mechanism, whole=False)
     locked = closure.driven
     platform = (*HELD[:3], *((0.0,) * 3)) if mechanism.end_effector_is_joint else HELD
     closing = close(closure, found, poses, locked=locked, platform=platform)
@@ -90,7 +116,6 @@ def settled(
         tried = close(closure, elsewhere, poses[rest], locked=locked, platform=platform)
         better = tried.gap < closing.gap[rest]
         closing.take(rest[better], tried, better)
-    within_turns(mechanism, closing.coordinates)
     return closing.coordinates
 
 

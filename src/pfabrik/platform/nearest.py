@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.close import MARGIN
+from ..closure.descend import within_sight
 from ..closure.projection import Way
 from ..decomposition.leg_table import LegTable, Records, leg_table
+from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
@@ -95,15 +97,33 @@ def project(
 def _search(
     mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts, way: Way, corners: bool, stays: bool
 ) -> Found:
+    others = corners_of(mechanism) if corners else no_starts(table)
+    return _approach(table, _objective(mechanism, targets, way, MOST_STEPS), own, others, stays=stays)[0]
+
+
+def _objective(mechanism: Mechanism, targets: Floats, way: Way, steps: int) -> PoseObjective:
     wanted = in_lengths(targets, 1.0 / mechanism.characteristic_length)
     weights, frame = np.array(way.weights, dtype=float), task_of(mechanism).frame
     if keeps_rotation(mechanism):
         wanted[:, :3, :3] = mechanism.home_pose[:3, :3]
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:], frame = LOCKED, BASE_AXES
-    others = corners_of(mechanism) if corners else no_starts(table)
-    objective = PoseObjective(wanted, weights, frame, MARGIN, TOLERANCES.active, MOST_STEPS)
-    return _approach(table, objective, own, others, stays=stays)
+    return PoseObjective(wanted, weights, frame, MARGIN, TOLERANCES.active, steps)
+
+
+def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: Way) -> Floats:
+    """How hard every limit holds configurations back from targets (n, 4, 4) [length]: multipliers, in the order of
+    those that `closure.descend.weighed_limits` gives."""
+    objective = _objective(mechanism, within_sight(mechanism, targets), way, 0)
+    found = _approach(table, objective, present, no_starts(table))[1]
+    columns, ranges = len(column_joints(mechanism)), len(table.limited)
+    coned = [joint.name for joint in mechanism.joints if joint.cone is not None]
+    weights = np.zeros((len(targets), 2 * columns + len(coned)))
+    for bound in (0, 1):
+        weights[:, 2 * table.limited["column"] + bound] = found[:, bound : 2 * ranges : 2]
+    cones = [2 * columns + coned.index(name) for name, bound in table.limits if bound == "cone"]
+    weights[:, cones] = found[:, 2 * ranges : 2 * ranges + len(cones)]
+    return weights
 
 
 def nearest_actuators(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts, *, corners: bool) -> Found:
@@ -113,7 +133,7 @@ def nearest_actuators(mechanism: Mechanism, table: LegTable, values: Floats, own
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:] = LOCKED
     objective = PoseObjective(poses, weights, BASE_AXES, MARGIN, TOLERANCES.active, MOST_STEPS)
-    return _approach(table, objective, own, corners_of(mechanism) if corners else no_starts(table), values)
+    return _approach(table, objective, own, corners_of(mechanism) if corners else no_starts(table), values)[0]
 
 
 def _approach(
@@ -124,21 +144,24 @@ def _approach(
     values: Floats | None = None,
     *,
     stays: bool = False,
-) -> Found:
-    """The kernel over all rows, on all cores."""
+) -> tuple[Found, Floats]:
+    """The kernel over all rows, on all cores: what was found, or what holds them where they start."""
     if values is None:
         values = np.zeros((0, len(table.driven)))
     from ..kernels.platform.nearest import approach
 
     legs, found = kernel_table(table), _new_found(len(objective.targets), len(table.legs))
+    limits = 2 * len(table.limited) + len(table.cones) + len(table.legs)
+    weights = np.zeros((len(objective.targets), limits))
 
     def run(block: slice) -> None:
         first = own if len(own.poses) == 1 else Starts._make(array[block] for array in own)
         aim = Aim(objective._replace(targets=objective.targets[block]), values[block])
-        approach(legs, aim, first, others, HITS, int(stays), Found._make(array[block] for array in found))
+        into = Found._make(array[block] for array in found)
+        approach(legs, aim, first, others, HITS, int(stays), into, weights[block])
 
     in_blocks(run, len(found.distances), ROWS_A_BLOCK)
-    return found
+    return found, weights
 
 
 def _new_found(n: int, legs: int) -> Found:
@@ -235,7 +258,7 @@ def corners_of(mechanism: Mechanism) -> Starts:
         lo, hi = max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi)
         q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, DRAWS)
     objective = PoseObjective(poses, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
-    drawn = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, DRAWS, axis=0)), no_starts(table))
+    drawn = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, DRAWS, axis=0)), no_starts(table))[0]
     feasible = np.flatnonzero(np.isfinite(drawn.distances))
     every = Starts(*(np.concatenate([first, array[feasible]]) for first, array in zip(home, drawn[1:4], strict=True)))
     chosen: list[int] = []

@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 from ..closure.close import Closing
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at
 from ..closure.parasitic import has_other_assemblies
+from ..closure.projection import Way
 from ..closure.solve import STRANGE, ClosureEngine
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
+from ..kernels.platform.records import Starts
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..options import Options
 from ..poses import are_poses
 from .coordinates import LegAnswers, settled, sides_at
 from .forward import assembled
+from .nearest import in_lengths, weighed_limits
 from .one import OneAssembly, OneTarget
 from .unreached import Question, answer_unreached
 
@@ -184,6 +187,21 @@ class LegsEngine:
     def points(self, found: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         return self._inner.points(found)
+
+    def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
+        """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""
+        if not isinstance(found, LegAnswers) or found.carriers is None:
+            return self._inner.weighed_limits(found, targets, way)
+        own = np.isfinite(found.carriers).all(axis=1)
+        mine, others = np.flatnonzero(own), np.flatnonzero(~own)
+        scale = 1.0 / self.mechanism.characteristic_length
+        present = Starts(in_lengths(found.rows.poses[mine], scale), found.carriers[mine], found.sides[mine])
+        weights = weighed_limits(self.mechanism, self._table, targets[mine], present, way)
+        every = np.empty((len(targets), weights.shape[1]))
+        every[mine] = weights
+        if len(others):
+            every[others] = self._inner.weighed_limits(found.at(others), targets[others], way)
+        return every
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .._jit import kernel, routine
 from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
+from ..holding import balance
 from ..legs.answer import column, deviation, excess_of, make_exact, set_frames, turn_pose
 from ..legs.records import CARRIER, CRANK, PIVOT, SLIDE, Floats, Record, Records
 from ..legs.rods import carry
+from ..qp import new_qp
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..sqp import STEPS
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
-from .descend import Search, copy_now, descend, fix, new_search
+from .descend import Search, copy_now, descend, fix, new_search, scale_objective
 from .equations import Now, View, is_carried, new_now, new_view, place
 from .records import STRETCHED, Aim, Found, Starts, Table
 
@@ -210,8 +214,13 @@ def search_row(
 
 
 @kernel
-def approach(table: Table, aim: Aim, own: Starts, others: Starts, hits: int, stays: int, found: Found) -> None:
+def approach(
+    table: Table, aim: Aim, own: Starts, others: Starts, hits: int, stays: int, found: Found, weights: Floats
+) -> None:
     """Fill the nearest feasible configuration of every row.
+
+    With no steps to take, fill `weights` instead, (n, 2 ranges + cones + legs): how hard every limit holds each row
+    back where it starts, as of `closure.descend.approach`.
 
     Parameters
     ----------
@@ -220,7 +229,16 @@ def approach(table: Table, aim: Aim, own: Starts, others: Starts, hits: int, sta
     stays : 1 for configurations in the working mode of a row's first start alone.
     """
     search, best = new_search(table), new_now(table.legs.shape[0])
+    k, n = search.first.linear.G.shape
+    p, pulls = new_qp(k, k), np.zeros((k, n))
     for row in range(found.distances.shape[0]):
+        if aim.pose.max_iterations == 0:
+            begin(own, row, search.best)
+            fix(aim.pose, True, search)
+            scale_objective(table, row, aim, search, search.first)
+            for c in range(balance(search.first.linear, aim.pose.near, p, pulls)):
+                weights[row, search.first.linear.which[c]] = p.x[c]
+            continue
         least = search_row(table, row, aim, own, others, hits, stays, search, best)
         found.distances[row] = least
         found.steps[row] = search.control.counts[STEPS]
