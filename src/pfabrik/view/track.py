@@ -70,7 +70,7 @@ def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
     mechanism = track.mechanism
     figure.suptitle(f"{mechanism.name}: {told(track)}", fontsize=SMALL + 4.0)
     left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1, 1.2), squeeze=False))
-    axes: dict[str, Axes] = {}
+    axes = {"path": draw_path(left, track, known)}  # first: its numbers are placed by drawing all there is
     strips, below = _grid(right, len(mechanism.actuator_names), has_margins := bool(limits_of(track)))
     for index, (strip, readout) in enumerate(zip(strips, readouts(mechanism), strict=True)):
         draw_actuator(strip, readout, np.asarray(readout.display(track.actuators[:, index])), track)
@@ -79,7 +79,7 @@ def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
         draw_margins(below, track)
         axes["margins"] = below
     right.legend(handles=common_keys(), loc="outside upper center", ncols=3, frameon=False, fontsize=SMALL)
-    return {"path": draw_path(left, track, known)} | axes
+    return axes
 
 
 def checked_track(track: Track) -> NDArray[np.intp]:
