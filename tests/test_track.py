@@ -427,6 +427,19 @@ def test_an_actuator_that_is_not_named_may_be_as_fast_as_it_likes() -> None:
     assert pf.track(arm(None), turning(), sample_time=0.5, speed_limits={"j2": 1e-3}).too_fast == [()] * 9
 
 
+def test_times_may_be_given_one_by_one() -> None:
+    times = np.array([0.0, 0.5, 0.75, 1.75, 1.75, np.nan, 2.0, 2.5, 4.0])
+    followed = pf.track(arm(None), turning(), times=times, speed_limits={"j1": PACE / 0.3})
+    steps = np.array([0.5, 0.25, 1.0, np.nan, np.nan, np.nan, 0.5, 1.5])
+    np.testing.assert_allclose(followed.speeds[1:, 0], PACE / steps, atol=1e-7)
+    assert followed.too_fast == [(), (), ("j1",), *[()] * 6]
+    velocities, apart = PACE / steps, 0.5 * (steps[1:] + steps[:-1])
+    np.testing.assert_allclose(followed.accelerations[2:, 0], np.diff(velocities) / apart, atol=1e-6)
+    assert followed.sample_time is None
+    assert pf.track(arm(None), turning(), times=0.5 * np.arange(9)).sample_time == pytest.approx(0.5)
+    assert json.loads(json.dumps(followed.to_dict()))["speeds"][4] == [None, None]
+
+
 def test_without_a_sample_time_nothing_is_said_of_speeds() -> None:
     followed = pf.track(arm(None), turning())
     assert followed.speeds is None and followed.too_fast is None
@@ -473,6 +486,10 @@ def test_a_track_survives_pickling() -> None:
         ({"sample_time": "1"}, "sample_time"),
         ({"sample_time": True}, "sample_time"),
         ({"speed_limits": 1.0}, "sample_time"),
+        ({"sample_time": 0.1, "times": np.arange(9.0)}, "times"),
+        ({"times": np.arange(8.0)}, "times"),
+        ({"times": -np.arange(9.0)}, "times"),
+        ({"times": [0.0, np.inf, *range(2, 9)]}, "times"),
         ({"sample_time": 0.1, "speed_limits": 0.0}, "speed_limits"),
         ({"sample_time": 0.1, "speed_limits": [1.0, 2.0]}, "speed_limits"),
         ({"sample_time": 0.1, "speed_limits": {"j1": np.nan}}, "speed_limits\\['j1'\\]"),

@@ -29,13 +29,17 @@ LEAP = 0.5
 """Share of the whole motion that one of them makes if it is a leap."""
 
 
+EVEN = 1e-6
+"""How far steps of time may differ to count as the same, as a share: times are written with so many digits."""
+
+
 class Pace(NamedTuple):
     """When each target is to be there, and how fast actuators may be.
 
     Attributes
     ----------
     times : (n,) [s]; NaN where nothing is known.
-    sample_time : from each to the next [s]; None where times were given.
+    sample_time : from each to the next [s]; None where it differs.
     speed_limits : (n_a,) [length/s or rad/s].
     """
 
@@ -51,7 +55,7 @@ class Track(Solution):
     ----------
     targets : what was asked for, poses (n, 4, 4) [length].
     times : when each target is to be there, (n,) [s]; None where nothing was said of it.
-    sample_time : from one target to the next [s]; None where nothing was said of it, or `times` were.
+    sample_time : from one target to the next [s]; None where nothing was said of it, or it differs.
     jumps : whether an answer leaps away from the one before it, (n,): no motion leads from one to the other while
         the target moves between theirs. So it is where the nearest feasible pose itself jumps, as it can where a
         workspace is not convex.
@@ -207,6 +211,7 @@ def pace_of(
         when = sample_time * np.arange(count, dtype=np.float64)
     else:
         when = _checked_times(times, count)
+        sample_time = _even_step(when)
     limits = np.full(len(names), np.inf)
     if isinstance(speed_limits, Mapping):
         for name, limit in speed_limits.items():
@@ -228,6 +233,14 @@ def _checked_times(times: ArrayLike | None, count: int) -> Floats:
     if np.isinf(found).any() or (np.diff(found) < 0.0).any():
         raise InvalidArgument("times", "times that go back, or are infinite", expected)
     return found
+
+
+def _even_step(times: Floats) -> float | None:
+    """The step between times that are as far apart as each other; None for others."""
+    steps = np.diff(times)
+    if not len(steps) or not steps.min() > 0.0 or np.ptp(steps) > EVEN * steps[0]:
+        return None
+    return float(steps.mean())
 
 
 def _passed(steps: Floats) -> Floats:

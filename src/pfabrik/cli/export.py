@@ -94,4 +94,6 @@ def export(mech: str, force: bool, **files: Path | None) -> int:
             handle.write(text)
         if path != Path("-"):
             click.echo(f"wrote {path}", err=True)
+        if name == "linuxcnc" and text.startswith("/*"):
+            click.echo("pfabrik: note: LinuxCNC has no kinematics that are this machine's: a module for it", err=True)
     return 0

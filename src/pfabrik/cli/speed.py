@@ -11,8 +11,8 @@ import pfabrik as pf
 
 from ..answers.table import aligned, plain
 from .mech import MECH, load
+from .speeds import speed_limits
 from .target import Triple, target_of, targeted
-from .track import speed_limits
 
 
 @click.command()

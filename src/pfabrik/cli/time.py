@@ -15,7 +15,7 @@ from ..answers.table import aligned
 from .finite import FINITE
 from .mech import MECH, load
 from .progress import progress
-from .track import speed_limits
+from .speeds import speed_limits
 from .whole import whole_file
 
 if TYPE_CHECKING:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -13,18 +12,18 @@ import click
 
 import pfabrik as pf
 
-from ..errors import near_miss
 from ..extras import require
-from .finite import FINITE, is_finite
+from .finite import FINITE
 from .mech import MECH, load
 from .picture import ending_checked, picture
 from .progress import progress
-from .projecting import note_left_out, options_projecting, projecting
+from .projecting import options_projecting, projecting
+from .speeds import own_limits, speed_limits
+from .track_checks import checked
 from .whole import whole_file
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
-    from ..arrays import Floats
     from ..description.mechanism import Mechanism
     from ..options import Options
     from ..paths import path as paths
@@ -112,7 +111,7 @@ def track(
         blocks = checked(read(), mechanism, is_timed=bool(limits))
         blocks = [joined(blocks)]
         total = len(blocks[0].lines)
-    elif path.is_file():
+    elif path != STANDARD and path.is_file():  # read to its end before anything is written
         total = sum(len(block.lines) for block in checked(read(), mechanism, is_timed=bool(limits)))
         blocks = read()
     else:
@@ -144,58 +143,6 @@ def refuse_early(picture_path: Path | None, film_path: Path | None, inputs: tupl
         if path is not None:
             ending_checked(path, endings, inputs)
             require("pictures", "matplotlib", "plot")
-
-
-def checked(blocks: Iterable[paths.Path], mechanism: Mechanism, is_timed: bool) -> Iterator[paths.Path]:
-    """Blocks of a path that sets something of the task, with notes of what it sets for nothing; see `Moves`."""
-    moves = Moves(mechanism)
-    for number, block in enumerate(blocks):
-        if number == 0:
-            if is_timed and block.times is None:
-                raise click.UsageError("--speed says nothing without --sample-time, or a path with times")
-            note_misspelt(block.others)
-        moves.add(block.targets)
-        yield block
-    moves.tell()
-
-
-class Moves:
-    """What a path changes of a pose, against home."""
-
-    def __init__(self, mechanism: Mechanism) -> None:
-        self._mechanism = mechanism
-        self._found = {"x": False, "y": False, "z": False, "turned": False, "tilted": False}
-
-    def add(self, targets: Floats) -> None:
-        """Targets (n, 4, 4) as well."""
-        off = (targets != self._mechanism.home_pose).any(axis=0)
-        found = (*off[:3, 3], off[:3, :3].any(), off[:3, 2].any())
-        self._found = {name: was or bool(now) for (name, was), now in zip(self._found.items(), found, strict=True)}
-
-    def tell(self) -> None:
-        """Say so when the task leaves out columns that are not as at home; refuse a path that sets nothing else."""
-        found, task = self._found, set(self._mechanism.task)
-        columns = [axis for axis in "xyz" if found[axis] and axis not in task]
-        if found["turned"] and not task - set("xyz"):
-            columns += ["roll", "pitch", "yaw"]
-        elif "yaw" in task and found["tilted"]:
-            columns += ["roll", "pitch"]
-        sets_some = any(found[axis] for axis in task & set("xyz"))
-        if columns and not sets_some and not (found["turned"] and task - set("xyz")):
-            raise click.ClickException(
-                f"the path sets {', '.join(columns)} only, none of which the task has: {' '.join(self._mechanism.task)}"
-            )
-        note_left_out((f"column {name}" for name in columns), self._mechanism)
-
-
-def note_misspelt(others: Iterable[str]) -> None:
-    """Say so where a further column is named nearly like one of a pose."""
-    from ..paths.table import NUMERIC
-
-    for name in others:
-        hint = "" if name in NUMERIC else near_miss(name, NUMERIC)
-        if hint:
-            click.echo(f"pfabrik: note: column '{name}' goes out as it came in{hint}", err=True)
 
 
 def answered(
@@ -236,36 +183,6 @@ def as_object(followed: Track) -> dict[str, object]:
         plain[name] = None if each is None else as_plain(each.values)
         plain[f"{name}_of"] = None if each is None else each.names
     return plain
-
-
-def own_limits(mechanism: Mechanism) -> dict[str, float]:
-    """The speeds that the mechanism says, by name."""
-    from ..timing.time_path import limits_of
-
-    speeds = zip(mechanism.actuator_names, limits_of(mechanism, "speed", None).tolist(), strict=True)
-    return {name: speed for name, speed in speeds if math.isfinite(speed)}
-
-
-def speed_limits(mechanism: Mechanism, given: Sequence[str], option: str = "--speed") -> dict[str, float]:
-    """Speeds by name [rad/s or length/s], from words as of ``--speed``; what is said of one counts before all."""
-    from ..description.readouts import readouts
-
-    shown = {readout.name: readout for readout in readouts(mechanism)}
-    said: dict[str, float] = {}
-    for word in sorted(given, key=lambda word: "=" in word):
-        name, _, value = word.rpartition("=")
-        if "=" in word and name not in shown:
-            hint = near_miss(name, tuple(shown)) or f" (known: {', '.join(shown)})"
-            raise click.UsageError(f"{option} {word}: no actuator '{name}'{hint}")
-        said |= dict.fromkeys([name] if "=" in word else shown, positive(option, word, value))
-    return {name: shown[name].coordinate(value) for name, value in said.items()}
-
-
-def positive(option: str, word: str, value: str) -> float:
-    """A speed as a positive number."""
-    if not is_finite(value) or float(value) <= 0.0:
-        raise click.UsageError(f"{option} {word}: found '{value}'; expected a positive number")
-    return float(value)
 
 
 def count_statuses(solution: Track) -> dict[str, int]:
