@@ -103,6 +103,46 @@ def test_columns_in_any_order_and_either_unit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "heights"),
+    [
+        ("z\n180\n182\n", [180.0, 182.0]),
+        ("\n\ufeffz,note\n180,G1\n", [180.0]),
+        ("G21\nG1 Z181 F60\n", [220.0, 181.0]),
+        ("; begun, by hand\nG1 Z181 F60\n", [220.0, 181.0]),
+        ("%\nN10 G1 Z181 (up, a little) F60\n", [220.0, 181.0]),
+    ],
+)
+def test_a_file_without_an_ending_is_what_its_first_line_says(text: str, heights: list[float], tmp_path: Path) -> None:
+    found = read(tmp_path, text, "path", "prs", longest=1000.0)
+    assert positions(found)[:, 2].tolist() == heights
+
+
+def test_turns_and_times_by_the_names_of_machine_tools(tmp_path: Path) -> None:
+    table = read(tmp_path, "b_rad,x,y,z,a_deg\n0.1,0,0,190,3\n", "path.csv")
+    np.testing.assert_allclose(table.targets, pf.pose([[0, 0, 190]], rpy=[[np.radians(3), 0.1, 0]]), atol=1e-12)
+    assert table.angle_units == ("deg", "rad", "deg")
+    turned = read(tmp_path, "G21 G1 Z190 F600\nA30 F60\n", longest=1000.0)
+    assert turned.times is not None
+    height = pf.load("stewart").home_pose[2, 3]
+    np.testing.assert_allclose(turned.times, [0.0, abs(190 - height) / 10.0, abs(190 - height) / 10.0 + 30.0])
+
+
+def test_steps_are_divided_or_made_at_a_rate(tmp_path: Path) -> None:
+    text = "x,y,z,t,note\n0,0,180,0,a\n0,3,180,1,b\n0,3,184,3,c\n"
+    divided = read(tmp_path, text, "path.csv", longest=1.0)
+    assert np.linalg.norm(np.diff(positions(divided), axis=0), axis=1) == pytest.approx(1.0)
+    assert divided.others["note"] == [*"abbbcccc"]
+    assert divided.times is not None
+    np.testing.assert_allclose(divided.times, [0, 1 / 3, 2 / 3, 1, 1.5, 2, 2.5, 3])
+    sampled = read(tmp_path, text, "path.csv", rate=0.8)
+    assert sampled.times is not None
+    np.testing.assert_allclose(sampled.times, [0, 1.25, 2.5, 3.0])
+    np.testing.assert_allclose(positions(sampled)[:, 1:], [[0, 180], [3, 180.5], [3, 183], [3, 184]])
+    with pytest.raises(InvalidArgument, match="without a time"):
+        read(tmp_path, "x,y,z\n0,0,180\n0,0,181\n", "path.csv", rate=1.0)
+
+
+@pytest.mark.parametrize(
     ("text", "said"),
     [
         ("x,y,z\n1,2,nan\n", "line 2: column 'z': found 'nan'"),
@@ -129,7 +169,7 @@ def test_binary_and_endless_paths_end(tmp_path: Path, monkeypatch: pytest.Monkey
     for module in ("pfabrik.paths.sampling", "pfabrik.paths.read_path"):
         monkeypatch.setattr(f"{module}.MOST_STEPS", 1000)
     assert path_module.MOST_STEPS == 1_000_000
-    with pytest.raises(InvalidArgument, match="more than 1000 targets"):
+    with pytest.raises(InvalidArgument, match="line 1002: more than 1000 targets"):
         read(tmp_path, "x,y,z\n" + "1,2,180\n" * 1001, "long.csv")
     with pytest.raises(InvalidArgument, match="more than 1000 targets"):
         read(tmp_path, "G1 X1 F1\nX2\n" * 10_000)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice, repeat
 from os import PathLike
@@ -33,7 +33,8 @@ LONGEST_LINE = 100_000
 MOST_LINES = 10 * MOST_STEPS
 """Lines of a file at most, those that say nothing among them."""
 
-FIRST_WORD = re.compile(r"\s*[A-Z%/]\s*[-+.\d]*(\s|\d|$)", re.IGNORECASE)
+FIRST_WORD = re.compile(r"\s*([%/]|[A-Z]\s*[-+.\d])", re.IGNORECASE)
+"""How a line of G-code begins."""
 
 
 def read_path(
@@ -170,7 +171,7 @@ def _program(steps: Iterator[Step]) -> Iterator[Path]:
     count = 0
     while part := list(islice(steps, BLOCK)):
         count += len(part)
-        _require_few(count, part[-1].line)
+        _require_few(count, [step.line for step in part])
         if count < 2:
             break
         places = np.array([step.place for step in part])
@@ -186,11 +187,11 @@ def _counted(blocks: Iterable[Path]) -> Iterator[Path]:
     count = 0
     for block in blocks:
         count += len(block.lines)
-        _require_few(count, block.lines[-1])
+        _require_few(count, block.lines)
         yield block
 
 
-def _require_few(count: int, line: int) -> None:
+def _require_few(count: int, lines: Sequence[int]) -> None:
     if count > MOST_STEPS:
-        found = f"line {line}: more than {MOST_STEPS} targets"
+        found = f"line {lines[MOST_STEPS - count]}: more than {MOST_STEPS} targets"
         raise WrongPath(f"{found}; expected a shorter path, parts of it, or longer steps")
