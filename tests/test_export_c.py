@@ -186,15 +186,12 @@ def check(name: str, precision: str, told: Answers, known: Truth) -> float:
         assert not len(rough), off[rough].max()
     # every limit by itself, and which is exceeded most
     measured = known.closes & (told.limits < 1000)
-    assert measured.sum() >= both.sum()
+    assert measured.sum() >= (1.0 if precision == "double" else 0.999) * known.closes.sum()
     verdicts = (told.slack >= -1e-9) == (known.slack >= -1e-9)
     assert verdicts[measured][np.abs(known.slack + 1e-9)[measured] > exact].all()
     beyond = measured & (told.limits > 0)
-    worst = (
-        np.take_along_axis(known.slack, np.maximum(told.limits - 1, 0)[:, None], axis=1)[:, 0]
-        if beyond.any()
-        else least
-    )
+    places = np.where(beyond, told.limits - 1, 0)[:, None]
+    worst = np.take_along_axis(known.slack, places, axis=1)[:, 0] if beyond.any() else least
     assert (worst[beyond] <= least[beyond] + 10 * exact).all()
     # back to a pose that has these actuators: mostly the same one, else another assembly
     assert (told.fk[both] == 0).mean() > 0.98
