@@ -140,7 +140,7 @@ def _refuse_endless(lattice: Lattice, axis: int) -> NoReturn:
 
 def _cells(lattice: Lattice, code: Ints, numbers: Ints, width: int) -> Cells:
     """All cells of a box, of whose points the codes and numbers are given, (n, ...) each."""
-    sides = [(slice(None, -1), slice(1, None))[side] for side in (0, 1)]
+    sides = (slice(None, -1), slice(1, None))
     each = [numbers[tuple(sides[side] for side in corner)].ravel() for corner in corners(lattice.d).tolist()]
     at_corners = np.stack(each, axis=1)
     return Cells(code[(sides[0],) * lattice.d].ravel(), width, at_corners, lattice.margins[at_corners])

@@ -13,7 +13,7 @@ from .answer import CLOSE, KEPT, complete, deviation, lean_to, load, put_rows
 from .records import CARRIAGE, CRANK, N_VALUES, ROD, SLIDE, Floats, Record, Records
 
 PARTS = 4
-"""Parts of the way from the start in which a pose is completed where, all at once, it comes out beyond a limit."""
+"""Parts of the way from the start in which a pose is completed where, all at once, it does not close within limits."""
 
 
 @routine
