@@ -129,7 +129,31 @@ def test_a_five_bar_is_a_module_of_its_own() -> None:
     assert "kinematicsInverse" in linuxcnc(pf.load("five_bar"))
 
 
-@pytest.mark.parametrize("name", ["stewart", "delta", "five_bar"])
+def test_a_delta_that_hangs_from_its_arms_is_klipper_s_rotary_delta() -> None:
+    """Arms swing up from level, straight out at their angles; forearms reach from elbows to the nozzle."""
+    mechanism, target = turned(pf.load("delta"), 17.0, up=200.0), np.array([15.0, -22.0, 60.0])
+    text = klipper(mechanism)
+    radius, height = (float(re.findall(rf"shoulder_{name}: (\S+)", text)[0]) for name in ("radius", "height"))
+    upper, lower, angles, ends = (
+        np.array(re.findall(rf"^{name}: (\S+)", text, re.MULTILINE), float)
+        for name in ("upper_arm_length", "lower_arm_length", "angle", "position_endstop")
+    )
+
+    def elbows(arms: np.ndarray) -> np.ndarray:
+        out = radius + upper * np.cos(arms)
+        around = np.radians(angles)
+        return np.stack([out * np.cos(around), out * np.sin(around), height + upper * np.sin(arms)], axis=1)
+
+    arms = -pf.solve_ik(mechanism, target).actuators
+    np.testing.assert_allclose(np.linalg.norm(elbows(arms) - target, axis=1), lower, rtol=1e-9)
+    highest = -np.array([mechanism.joint(name).range[0] for name in mechanism.actuator_names])
+    off = elbows(highest) - np.stack([0.0 * ends, 0.0 * ends, ends], axis=1)
+    np.testing.assert_allclose(np.linalg.norm(off, axis=1), lower, rtol=1e-8)  # written with nine digits
+    with pytest.raises(UnsupportedMechanism, match="counts heights from its bed"):
+        klipper(pf.load("delta"))
+
+
+@pytest.mark.parametrize("name", ["stewart", "five_bar"])
 def test_what_klipper_has_no_kinematics_for_is_refused(name: str) -> None:
     with pytest.raises(UnsupportedMechanism, match=r"cannot be exported: Klipper's delta has three upright rails"):
         klipper(pf.load(name))

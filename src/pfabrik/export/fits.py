@@ -37,6 +37,7 @@ class Thigh(NamedTuple):
         reference point.
     length, shin : of the crank, and of the rods.
     added : what the actuator counts more than the angle by which the crank hangs down [rad].
+    least : of that angle; infinite without a range.
     """
 
     hip: Floats
@@ -44,6 +45,7 @@ class Thigh(NamedTuple):
     length: float
     shin: float
     added: float
+    least: float
 
 
 def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
@@ -132,4 +134,5 @@ def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
     if way @ down <= 0.0 or not is_outside:
         return None
     hangs = math.atan2(spoke @ down, spoke @ outward)
-    return Thigh(hip, ankle, float(np.linalg.norm(spoke)), _length(pair[0]), driven.home - hangs)
+    shin = _length(pair[0])
+    return Thigh(hip, ankle, float(np.linalg.norm(spoke)), shin, driven.home - hangs, hangs + driven.lo)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..tolerances import TOLERANCES
-from .fits import Tower, angles_of, towers_of
+from .fits import Thigh, Tower, angles_of, thighs_of, towers_of
 from .machine import Machine
 from .wording import comment
 
@@ -19,37 +20,73 @@ LETTERS = "abc"
 def klipper(mechanism: Mechanism) -> str:
     """`[printer]` and `[stepper_*]` of a delta for Klipper, with what it cannot know of this machine listed.
 
+    Deltas with upright rails are its delta, those that hang from cranks its rotary_delta.
+
     Raises
     ------
     UnsupportedMechanism : a machine that Klipper has no kinematics for.
     """
     machine = Machine(mechanism)
-    towers = towers_of(machine)
-    if towers is None:
-        reason = (
-            "Klipper's delta has three upright rails, each with one pair of parallel rods, and this machine has not"
-        )
-        raise UnsupportedMechanism(mechanism.name, [reason], "exported")
-    return _delta(mechanism, towers)
+    towers, thighs = towers_of(machine), thighs_of(machine)
+    if towers is not None:
+        return _delta(mechanism, towers)
+    if thighs is not None:
+        return _rotary_delta(mechanism, thighs)
+    reason = (
+        "Klipper's delta has three upright rails, each with one pair of parallel rods, its rotary_delta hangs from "
+        "three cranks outward, and this machine does neither"
+    )
+    raise UnsupportedMechanism(mechanism.name, [reason], "exported")
 
 
-def _delta(mechanism: Mechanism, towers: list[Tower]) -> str:
-    radii = [math.hypot(*tower.place[:2]) for tower in towers]
-    unknown = ["pins, steps and currents of the steppers", "limits of the rods' joints"]
-    if np.ptp(radii) > TOLERANCES.alignment * mechanism.characteristic_length:
-        places = ", ".join(f"{radius:.6g}" for radius in radii)
-        reason = f"Klipper's delta has one radius for its three towers, and these have {places}"
+def _rotary_delta(mechanism: Mechanism, thighs: list[Thigh]) -> str:
+    size, near = mechanism.characteristic_length, TOLERANCES.alignment
+    outward = [thigh.hip[:2] / math.hypot(*thigh.hip[:2]) for thigh in thighs]
+    radii = [float(out @ (thigh.hip - thigh.ankle)[:2]) for out, thigh in zip(outward, thighs, strict=True)]
+    aside = [(thigh.hip - thigh.ankle)[:2] - out * r for out, r, thigh in zip(outward, radii, thighs, strict=True)]
+    heights = [float((thigh.hip - thigh.ankle)[2]) for thigh in thighs]
+    if max(np.ptp(radii), np.ptp(heights), np.abs(aside).max()) > near * size:
+        reason = "Klipper's rotary_delta has one radius and one height for its three shoulders, and these differ"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
+    if heights[0] <= near * size:
+        reason = f"Klipper counts heights from its bed, below the shoulders, and these are at z = {heights[0]:.6g}"
+        raise UnsupportedMechanism(mechanism.name, [reason], "exported")
+    lines = _begun(mechanism, "rotary_delta", ["which way steppers turn: it counts arms upward"])
+    lines += [f"shoulder_radius: {radii[0]:.9g}", f"shoulder_height: {heights[0]:.9g}"]
+    for letter, thigh in zip(LETTERS, thighs, strict=True):
+        angle = math.degrees(math.atan2(thigh.hip[1], thigh.hip[0])) % 360.0
+        lines += ["", f"[stepper_{letter}]", f"angle: {angle:.9g}"]
+        lines += [f"upper_arm_length: {thigh.length:.9g}", f"lower_arm_length: {thigh.shin:.9g}"]
+        reach = radii[0] + thigh.length * math.cos(thigh.least) if math.isfinite(thigh.least) else math.inf
+        if reach < thigh.shin:
+            elbow = heights[0] - thigh.length * math.sin(thigh.least)
+            lines.append(f"position_endstop: {elbow - math.sqrt(thigh.shin**2 - reach**2):.9g}")
+        else:
+            lines.append("# position_endstop: the arm has no upper end of its range with the nozzle in the middle")
+    return "\n".join([*lines, ""])
+
+
+def _begun(mechanism: Mechanism, kind: str, more: Sequence[str] = ()) -> list[str]:
+    """What Klipper cannot know, and the kind of printer."""
+    unknown = ["pins, steps and currents of the steppers", "limits of the rods' joints", *more]
     if mechanism.length_unit != "mm":
         unknown.append(f"lengths in {mechanism.length_unit}: it counts in mm")
-    lines = [
+    return [
         f"# '{comment(mechanism.name)}' for Klipper, written by pfabrik.",
         "# What it cannot know of this machine, or pfabrik of the printer:",
         *(f"# - {each}" for each in unknown),
         "[printer]",
-        "kinematics: delta",
-        f"delta_radius: {radii[0]:.9g}",
+        f"kinematics: {kind}",
     ]
+
+
+def _delta(mechanism: Mechanism, towers: list[Tower]) -> str:
+    radii = [math.hypot(*tower.place[:2]) for tower in towers]
+    if np.ptp(radii) > TOLERANCES.alignment * mechanism.characteristic_length:
+        places = ", ".join(f"{radius:.6g}" for radius in radii)
+        reason = f"Klipper's delta has one radius for its three towers, and these have {places}"
+        raise UnsupportedMechanism(mechanism.name, [reason], "exported")
+    lines = [*_begun(mechanism, "delta"), f"delta_radius: {radii[0]:.9g}"]
     speeds = [mechanism.joint(name).max_speed for name in mechanism.actuator_names]
     known = [speed for speed in speeds if speed is not None]
     lines.append(
