@@ -30,8 +30,9 @@ from .table import kernel_table
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
-CORNERS, HITS = 16, 4
-"""How many configurations searches start from at most, and how many of them must end at the nearest one."""
+CORNERS, HITS, HITS_OF_STRUTS = 16, 4, 3
+"""How many configurations searches start from at most, and how many of them must end at the nearest one: fewer where
+struts leave the platform all its freedoms, and have no two ways to bend."""
 
 DRAWS, DRAWN_STEPS = 240, 30
 """How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
@@ -153,12 +154,13 @@ def _approach(
     legs, found = kernel_table(table), _new_found(len(objective.targets), len(table.legs))
     limits = 2 * len(table.limited) + len(table.cones) + len(table.legs)
     weights = np.zeros((len(objective.targets), limits))
+    hits = HITS if table.task[0]["rows"] > 0 or len(_carriers(table)) else HITS_OF_STRUTS
 
     def run(block: slice) -> None:
         first = own if len(own.poses) == 1 else Starts._make(array[block] for array in own)
         aim = Aim(objective._replace(targets=objective.targets[block]), values[block])
         into = Found._make(array[block] for array in found)
-        approach(legs, aim, first, others, HITS, int(stays), into, weights[block])
+        approach(legs, aim, first, others, hits, int(stays), into, weights[block])
 
     in_blocks(run, len(found.distances), ROWS_A_BLOCK)
     return found, weights

@@ -71,6 +71,9 @@ from .records import Aim, Table
 HOPELESS = 20.0
 """A search that is farther than the nearest yet by so many times what its last step promised is given up."""
 
+BY = 0.03
+"""A search that comes so near to the nearest configuration met yet [rad or L] would end there."""
+
 NEAR = 0.3
 """Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
 
@@ -357,10 +360,25 @@ def scale_objective(table: Table, row: int, aim: Aim, search: Search, view: Free
 
 
 @routine
-def descend(table: Table, row: int, aim: Aim, least: float, search: Search) -> float:
+def is_by(now: Now, met: Now) -> bool:
+    """Whether a configuration is so near to another that a descent would end there."""
+    pose, other, q = now.pose, met.pose, now.q
+    for i in range(3):
+        for j in range(4):
+            if abs(pose[i, j] - other[i, j]) > BY:
+                return False
+    for k in range(q.shape[0]):
+        if abs(wrap(q[k] - met.q[k], 0.0)) > BY:
+            return False
+    return True
+
+
+@routine
+def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Search) -> float:
     """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible.
 
-    And infinite where what steps promise says that it will not come as near as `least`.
+    And infinite where what steps promise says that it will not come as near as `least`; where it comes by the
+    configuration that is so near, that is where it ends.
     """
     view, other, hessian, control = search.first, search.second, search.hessian, search.control
     unit = search.gradient.unit
@@ -381,6 +399,8 @@ def descend(table: Table, row: int, aim: Aim, least: float, search: Search) -> f
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view
+                    if least < math.inf and is_by(search.best, met):
+                        return least
                     if HOPELESS * control.scalars[PROMISE] < view.linear.scalars[VALUE] - 0.5 * unit[0] * least * least:
                         return math.inf
     return math.sqrt(2.0 * view.linear.scalars[VALUE] / unit[0])

@@ -198,7 +198,7 @@ def search_row(
         fix(aim.pose, in_place, search)
         if in_place:
             put_held(table, aim.pose, target, search.look, search.best)
-        distance = descend(table, row, aim, least, search)
+        distance = descend(table, row, aim, least, best, search)
         if distance < math.inf:
             put_sides(table, search.best, search.look)
             if stays == 1 and is_other_mode(own.sides[first], search.best.sides):
