@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from ..decomposition.leg_table import LegTable
@@ -9,6 +11,7 @@ from ..kernels.legs import records as K
 from ..kernels.platform.records import Table
 
 
+@lru_cache(maxsize=64)
 def kernel_table(table: LegTable) -> Table:
     """The same records, with the unknown that each carrier's coordinate is."""
     columns = np.full(len(table.legs), -1)

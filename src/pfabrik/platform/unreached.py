@@ -27,7 +27,7 @@ from .table import kernel_table
 ROWS_A_BLOCK = 64
 
 NEARLY = 1e-4
-"""Distance at which a projection is taken for a start from which the target may be reached [L]."""
+"""Distance at which a projection is as good as reached, and is to be so exactly [L]."""
 
 
 class Question(NamedTuple):
@@ -72,10 +72,13 @@ def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, 
     found, rest, wanted = Found._make(array[placed] for array in found), rest[placed], wanted[placed]
     sides[rest], carriers[rest] = found.sides, found.q
     _put_projected(question, rest, wanted, found, holds[placed], rows)
-    near = rest[found.distances <= NEARLY]
-    if len(near):
-        _reach_again(question, near, sides, rows)
-        carriers[near] = np.nan
+    is_near = found.distances <= NEARLY
+    again = np.flatnonzero(is_near | (table.task[0]["unset"] > 0))
+    if len(again):
+        left = _reach_again(question, rest[again], sides, rows)
+        carriers[rest[again[~left]]] = np.nan
+        lost = rest[again[left & is_near[again]]]
+        rows.status[lost], carriers[lost] = P.PENDING, np.nan
     return carriers
 
 
@@ -106,28 +109,30 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
     return np.asarray(rest[~reached])
 
 
-def _reach_again(question: Question, near: NDArray[np.intp], sides: Floats, rows: P.Rows) -> None:
-    """Answer rows whose projections came as near as that exactly, from where these ended; else they are PENDING."""
+def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: P.Rows) -> NDArray[np.bool_]:
+    """Answer rows exactly from where their projections ended; which stay as they are."""
     from ..kernels.legs.answer import answer
 
-    table, own = question.table, rows_at(rows, near)
+    table, own = question.table, rows_at(rows, again)
     begins = own.poses.copy()
     answer(
         table.legs,
         table.limited,
         table.cones,
         table.driven,
-        table.task_within(STRANGE),
-        question.targets[near],
+        table.task_within(STRANGE) if question.nearby else table.task,
+        question.targets[again],
         begins,
-        sides[near],
+        sides[again],
         own.status,
         own.poses,
         own.actuators,
         own.measures,
     )
     own.measures[:, [P.POSITION_ERROR, P.ROTATION_ERROR]] = 0.0
-    put_rows(rows, near, own)
+    left = own.status != P.REACHED
+    put_rows(rows, again[~left], rows_at(own, ~left))
+    return np.asarray(left)
 
 
 def _put_projected(
