@@ -105,9 +105,8 @@ def _search(
 def _objective(mechanism: Mechanism, targets: Floats, way: Way, steps: int) -> PoseObjective:
     wanted = in_lengths(targets, 1.0 / mechanism.characteristic_length)
     weights, frame = np.array(way.weights, dtype=float), task_of(mechanism).frame
-    if keeps_rotation(mechanism):
-        wanted[:, :3, :3] = mechanism.home_pose[:3, :3]
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
+        wanted[:, :3, :3] = mechanism.home_pose[:3, :3]
         weights[3:], frame = LOCKED, BASE_AXES
     return PoseObjective(wanted, weights, frame, MARGIN, TOLERANCES.active, steps)
 
