@@ -46,9 +46,9 @@ NOTE = """Times are the shortest of several runs, subject and baseline by turns;
 baseline. The closed forms (benchmarks/closed_forms.py) know their machine, use one core and blocks of 4096 poses, and
 return numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres only
 when `points` is read. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM: 0.4), those out of reach within 1 L
-and 0.5 rad; these are projected exactly where a row does not say "centroid"; the closure engine, which answers the
-delta's partial task, has no other way. Newton's method in NumPy (benchmarks/newton.py) knows the hexapod, solves six
-equations in the pose for whole batches at a time, and looks at no passive joint and no limit; forward kinematics here
+and 0.5 rad; these are projected exactly where a row does not say "centroid", which is the paper's method on joint
+positions; a delta has no other way than exactly. Newton's method in NumPy (benchmarks/newton.py) knows the hexapod,
+solves six equations in the pose for whole batches at a time, and looks at no passive joint and no limit; forward kinematics here
 closes all loops in all joint coordinates, and measures limits. Starts are answers up to 0.01 L and 0.01 rad away. The
 platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes are for all of
 it, not for a pose. The viewer's motions are timed in a page of headless Chromium, which draws without a graphics card,

@@ -118,6 +118,25 @@ def centres(mechanism: Structure, q: Floats) -> dict[str, Floats]:
     return {joint.name: present[:, j] for j, joint in enumerate(mechanism.joints) if joint.at is not None}
 
 
+def centres_at(mechanism: Structure, poses: Floats) -> dict[str, Floats] | None:
+    """The same where poses of the end effector (n, 4, 4) tell it alone; None where some joint is on neither of the base
+    and the end effector's body."""
+    found: dict[str, Floats] = {}
+    if mechanism.end_effector_is_joint:
+        return None
+    displaced = poses @ np.linalg.inv(mechanism.home_pose)
+    for joint in mechanism.joints:
+        if joint.at is None:
+            continue
+        if mechanism.base in joint.connects:
+            found[joint.name] = np.repeat(np.array(joint.at, dtype=float)[None], len(poses), axis=0)
+        elif mechanism.end_effector_body in joint.connects:
+            found[joint.name] = _moved(displaced, np.array(joint.at, dtype=float))
+        else:
+            return None
+    return found
+
+
 def placed(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:
     """Displacements (n, bodies, 4, 4) of `mechanism.bodies`, and joint centres (n, joints, 3) as of `centres`."""
     geometry = _geometry(mechanism)

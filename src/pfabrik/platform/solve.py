@@ -18,6 +18,7 @@ from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Starts
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
+from ..motion.displacements import centres_at
 from ..options import Options
 from ..poses import are_poses
 from .coordinates import LegAnswers, settled, sides_at
@@ -186,7 +187,10 @@ class LegsEngine:
 
     def points(self, found: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
-        return self._inner.points(found)
+        if not isinstance(found, LegAnswers):
+            return self._inner.points(found)
+        placed = centres_at(self.mechanism, found.rows.poses)
+        return placed if placed is not None else self._inner.points(found)
 
     def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
         """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""

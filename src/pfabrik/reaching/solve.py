@@ -27,11 +27,11 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
-from ..motion.displacements import centres
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .completion import coordinates_of, positions_of
 from .locked import with_locked_actuators
+from .points import joint_points
 
 Kernel = Callable[[P.Plan, Floats, P.Seeds, P.Settings, P.Rows], int]
 
@@ -125,8 +125,8 @@ class ReachingEngine:
         return Configurations(rows, closing.coordinates)
 
     def points(self, found: Configurations) -> Mapping[str, Floats]:
-        """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
-        return centres(self.mechanism, found.coordinates)
+        """Joint name -> position of its centre in the base frame, (n, 3) [length]; merged joints share a centre."""
+        return joint_points(self._compiled, self._positioned(found))
 
     def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
         """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""
