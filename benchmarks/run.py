@@ -44,15 +44,16 @@ IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.p
 
 NOTE = """Times are the shortest of several runs, subject and baseline by turns; a ratio below 1 is faster than the
 baseline. The closed forms (benchmarks/closed_forms.py) know their machine, use one core and blocks of 4096 poses, and
-return numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres only
-when `points` is read. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM: 0.4), those out of reach within 1 L
-and 0.5 rad; these are projected exactly where a row does not say "centroid", which is the paper's method on joint
-positions; a delta has no other way than exactly. Newton's method in NumPy (benchmarks/newton.py) knows the hexapod,
-solves six equations in the pose for whole batches at a time, and looks at no passive joint and no limit; forward kinematics here
-closes all loops in all joint coordinates, and measures limits. Starts are answers up to 0.01 L and 0.01 rad away. The
-platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes are for all of
-it, not for a pose. The viewer's motions are timed in a page of headless Chromium, which draws without a graphics card,
-from the motion of the mouse until the answer has been drawn; these rows are left out where it is not installed."""
+return numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres
+only when `points` is read. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM: 0.4), those out of reach
+within 1 L and 0.5 rad; these are projected exactly where a row does not say "centroid", which is the paper's method on
+joint positions; a delta has no other way than exactly. Newton's method in NumPy (benchmarks/newton.py) knows the
+hexapod, solves six equations in the pose for whole batches at a time, and looks at no passive joint and no limit;
+forward kinematics here closes all loops in all joint coordinates, and measures limits. Starts are answers up to 0.01 L
+and 0.01 rad away. The platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new
+processes are for all of it, not for a pose. The viewer's motions are timed in a page of headless Chromium, which draws
+without a graphics card, from the motion of the mouse until the answer has been drawn; these rows are left out where it
+is not installed."""
 
 
 def agree(solution: pf.Solution, values: Array) -> None:
