@@ -80,7 +80,7 @@ class LegsEngine:
         left = self._reach(targets, start, sides, keep_mode, rows)
         carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
         if left and self._searches:
-            sides = np.array(np.broadcast_to(sides, (len(targets), sides.shape[1])))
+            sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
             poses = self._one.home if start is None else start.rows.poses
             question = Question(self.mechanism, self._table, targets, poses, options, keep_mode, nearby)
             carriers = answer_unreached(question, rest, sides, rows)
