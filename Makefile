@@ -47,14 +47,14 @@ $(READY): pyproject.toml
 	@command -v $(PYTHON) > /dev/null || { echo "'$(PYTHON)' not found; try: make PYTHON=/path/to/python3" >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(v < (3, 11) and "Python >= 3.11 is needed; %s is %d.%d. Try: make PYTHON=python3.12" % (sys.executable, v[0], v[1]))'
 	@printf 'installing pfabrik into .venv ' >&2
-	@(while sleep 2; do printf . >&2; done) & dots=$$!; trap 'kill $$dots' EXIT; \
+	@(while sleep 2 && kill -0 $$$$ 2>/dev/null; do printf . >&2; done) & dots=$$!; trap 'kill $$dots' EXIT; \
 		$(PYTHON) -m venv .venv && \
 		$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[plot]' && echo >&2
 	@touch $@
 
 $(STAMP): $(READY)
 	@printf 'installing what tests and checks need ' >&2
-	@(while sleep 2; do printf . >&2; done) & dots=$$!; trap 'kill $$dots' EXIT; \
+	@(while sleep 2 && kill -0 $$$$ 2>/dev/null; do printf . >&2; done) & dots=$$!; trap 'kill $$dots' EXIT; \
 		$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[plot,view,dev]' && echo >&2
 	@# the model of a robot, which tests read from its maker's wheel: without what its programs need, and skipped without it
 	@-$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps reachy-mini reachy-mini-rust-kinematics
