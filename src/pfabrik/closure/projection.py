@@ -14,8 +14,8 @@ from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
 from ..kernels.reaching import plan as P
 from ..motion.displacements import displacements
-from .close import Closing, Closure, close
-from .descend import approached
+from .close import Closing, Closure, close, closure_of
+from .descend import approached, weighed_limits
 from .known import corners_of
 from .nearest import nearest
 from .parasitic import strays
@@ -62,6 +62,12 @@ def ways_of(mechanism: Mechanism, hold: str | None, rotation_length: float | Non
     if hold == "orientation":
         return [Way(task.weights(1.0, LOCKED), P.HOLD_ORIENTATION), free]
     return [Way(task.weights(LOCKED, turning), P.HOLD_POSITION), free]
+
+
+def held_back(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: Way) -> Floats:
+    """How hard every limit holds projected configurations (n, columns) back from targets: see `weighed_limits`."""
+    closure, frame = closure_of(mechanism), task_of(mechanism).frame
+    return weighed_limits(closure, coordinates, targets, platform=way.weights, frame=frame)
 
 
 def kept(mechanism: Mechanism, holds: NDArray[np.int64], poses: Floats, targets: Floats) -> NDArray[np.int64]:

@@ -21,10 +21,10 @@ from ..tolerances import TOLERANCES
 from .assemble import assemble, judged
 from .close import HELD, MARGIN, Closing, Closure, close, closure_of, measured, platform_poses
 from .configurations import Configurations, coordinates_for, joint_coordinates, new_rows, put_rows, write_closing
-from .descend import weighed_limits, within_sight
+from .descend import within_sight
 from .known import chanced_upon
 from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
-from .projection import Way, kept, project, ways_of
+from .projection import Way, held_back, kept, project, ways_of
 from .starts import random_coordinates
 from .stretched import Bends
 
@@ -128,8 +128,7 @@ class ClosureEngine:
 
     def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
         """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""
-        frame = task_of(self.mechanism).frame
-        return weighed_limits(closure_of(self.mechanism), found.coordinates, targets, platform=way.weights, frame=frame)
+        return held_back(self.mechanism, found.coordinates, targets, way)
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""

@@ -19,8 +19,8 @@ from ..closure.configurations import (
     rows_at,
     write_closing,
 )
-from ..closure.descend import weighed_limits, within_sight
-from ..closure.projection import SAME, Way, kept, project, ways_of
+from ..closure.descend import within_sight
+from ..closure.projection import SAME, Way, held_back, kept, project, ways_of
 from ..closure.stretched import Bends
 from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
@@ -130,8 +130,7 @@ class ReachingEngine:
 
     def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
         """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""
-        frame = task_of(self.mechanism).frame
-        return weighed_limits(closure_of(self.mechanism), found.coordinates, targets, platform=way.weights, frame=frame)
+        return held_back(self.mechanism, found.coordinates, targets, way)
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
