@@ -41,7 +41,7 @@ _HOMES = {
     "pose": "poses",
     "Options": "options",
     "Solution": "answers.solution",
-    "Status": "answers.solution",
+    "Status": "answers.status",
     "ActiveLimit": "answers.limits",
     "SubChain": "decomposition.decompose",
     "decompose": "decomposition.decompose",
@@ -158,7 +158,8 @@ if TYPE_CHECKING:
     from .answers.limits import ActiveLimit
     from .answers.margins import margins
     from .answers.residual import closure_residual
-    from .answers.solution import Solution, Status
+    from .answers.solution import Solution
+    from .answers.status import Status
     from .answers.tracked import Track
     from .catalog import catalog
     from .configuration import configuration

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .answers.solution import Solution, Status
+from .answers.solution import Solution
 from .answers.starts import joint_vectors
+from .answers.status import Status
 from .closure.close import CLOSED, measured
 from .description.mechanism import Mechanism
 from .engine import engine_of

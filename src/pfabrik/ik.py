@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .answers.solution import Solution, Wanted
+from .answers.answer import Wanted
+from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .description.mechanism import Mechanism
 from .engine import engine_of

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from .answers.differential import forward_jacobian
-from .answers.solution import Solution, Status
+from .answers.solution import Solution
 from .answers.starts import Start, start_of
+from .answers.status import Status
 from .arrays import Floats
 from .closure.configurations import new_rows
 from .description.mechanism import Mechanism, checked_mechanism

@@ -8,8 +8,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .answers.solution import Solution, Status, Wanted
+from .answers.answer import Wanted
+from .answers.solution import Solution
 from .answers.starts import Start, start_of
+from .answers.status import Status
 from .answers.tracked import Track, pace_of
 from .description.mechanism import Mechanism
 from .engine import engine_of

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .answers.limits import ActiveLimit, active_limits
-from .answers.solution import Solution, Status, checked_solution
+from .answers.solution import Solution, checked_solution
+from .answers.status import Status
 from .answers.table import aligned, plain
 from .answers.words import short_names
 from .arrays import Floats

@@ -15,7 +15,8 @@ from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..motion.displacements import home_coordinates
 from ..poses import as_floats
-from .solution import Solution, Status
+from .solution import Solution
+from .status import Status
 
 Start: TypeAlias = Solution | ArrayLike
 """A Solution, or joint coordinates q (..., nq) in the order of `mechanism.coordinate_names` [rad or length]."""

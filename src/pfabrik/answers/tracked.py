@@ -16,8 +16,10 @@ from ..description.task import task_of
 from ..errors import InvalidArgument, UnknownName
 from ..poses import as_floats, between
 from ..tolerances import TOLERANCES
+from .answer import Integers, Wanted
 from .limits import ActiveLimit
-from .solution import Integers, Solution, Status, Wanted, as_plain
+from .solution import Solution, as_plain
+from .status import Status
 
 SUSPICIOUS, LEAST = 4.0, 1e-6
 """An answer that moves so many times as far as its target, and farther than the least [L or rad], may have leapt."""

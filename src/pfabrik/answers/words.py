@@ -1,4 +1,4 @@
-"""A Solution in words and in the units that people read: degrees, and the mechanism's own length."""
+"""An answer in words and in the units that people read: degrees, and the mechanism's own length."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
+    from .answer import Answer
     from .limits import ActiveLimit
-    from .solution import Solution
 
 
-def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
+def as_sentence(answer: Answer, asked: Floats | None = None) -> str:
     """What became of one target, or of the actuator values asked for, in one sentence.
 
     For instance ``projected: 12.3 mm from the target; strut B3 at its maximum 250 mm; joint C1's cone at 45 deg``: how
@@ -30,100 +30,100 @@ def as_sentence(solution: Solution, asked: Floats | None = None) -> str:
     ----------
     asked : actuator values (n_a,) [length or rad], where these were asked for and not a pose.
     """
-    status = str(solution.status).lower()
+    status = str(answer.status).lower()
     if status == "reached":
         return "reached"
     if status == "projected" and asked is not None:
-        why = reasons(solution) or ["no limit is active: no configuration with these values was found"]
-        return "; ".join([f"projected: {actuator_distance(solution, asked)} from the values asked for", *why])
+        why = reasons(answer) or ["no limit is active: no configuration with these values was found"]
+        return "; ".join([f"projected: {actuator_distance(answer, asked)} from the values asked for", *why])
     if status == "projected":
-        why = reasons(solution) or [f"no limit is active: {why_without_limits(solution)}"]
-        return "; ".join([f"projected: {distance(solution)} from the target", *given_up(solution), *why])
+        why = reasons(answer) or [f"no limit is active: {why_without_limits(answer)}"]
+        return "; ".join([f"projected: {distance(answer)} from the target", *given_up(answer), *why])
     if status == "exceeded":
-        return f"exceeded: assembled, but beyond limits: {by_bound(exceeded(solution))}"
-    return f"{status}: no feasible configuration found; {what_is_wrong(solution)}"
+        return f"exceeded: assembled, but beyond limits: {by_bound(exceeded(answer))}"
+    return f"{status}: no feasible configuration found; {what_is_wrong(answer)}"
 
 
-def given_up(solution: Solution) -> list[str]:
+def given_up(answer: Answer) -> list[str]:
     """What a projected answer was to hold of its target and does not: one phrase, or none."""
     from ..closure.projection import ways_of
     from ..kernels.reaching.plan import HOLD_NOTHING
 
-    wanted = solution._wanted
-    if wanted is None or solution.held is not None:
+    wanted = answer._wanted
+    if wanted is None or answer.held is not None:
         return []
-    first, *_ = ways_of(solution.mechanism, wanted.hold, wanted.rotation_length)
+    first, *_ = ways_of(answer.mechanism, wanted.hold, wanted.rotation_length)
     if first.hold == HOLD_NOTHING:
         return []
     other = "position" if wanted.hold == "orientation" else "orientation"
     return [f"no {other} was found that suits the {wanted.hold}: both give way"]
 
 
-def why_without_limits(solution: Solution) -> str:
+def why_without_limits(answer: Answer) -> str:
     """What keeps an answer that no limit holds back from its target, as far as first order tells."""
-    inside, outside = missed(solution)
+    inside, outside = missed(answer)
     found = []
-    if inside and are_stretched(solution.mechanism, solution._coordinates).any():
+    if inside and are_stretched(answer.mechanism, answer._coordinates).any():
         found.append("the links are stretched out or folded")
     if outside:
         found.append("the mechanism has no freedom that way")
     return ", and ".join(found) or "nothing nearer was found"
 
 
-def missed(solution: Solution) -> tuple[bool, bool]:
+def missed(answer: Answer) -> tuple[bool, bool]:
     """Whether what is missed lies along motions of the end effector (at home and here), and whether across them.
 
     Of a rotation that is missed, only the first is said.
     """
-    mechanism, wanted = solution.mechanism, solution._wanted
-    if wanted is None or solution.rotation_error > TOLERANCES.rotation:
+    mechanism, wanted = answer.mechanism, answer._wanted
+    if wanted is None or answer.rotation_error > TOLERANCES.rotation:
         return True, False
     axes = [axis in mechanism.task for axis in "xyz"]
-    offset = (wanted.targets[0] - solution.pose)[:3, 3][axes]
-    here = solution._coordinates
+    offset = (wanted.targets[0] - answer.pose)[:3, 3][axes]
+    here = answer._coordinates
     motions = np.hstack(list(forward_map(mechanism, np.concatenate([0.0 * here, here]))[:, :3][:, axes]))
     along = motions @ np.linalg.lstsq(motions, offset, rcond=TOLERANCES.alignment)[0]
     least = TOLERANCES.alignment * float(np.linalg.norm(offset))
     return bool(np.linalg.norm(along) > least), bool(np.linalg.norm(offset - along) > least)
 
 
-def what_is_wrong(solution: Solution) -> str:
+def what_is_wrong(answer: Answer) -> str:
     """Open loops or, where they are closed, the limits that are exceeded."""
-    if solution.residual <= TOLERANCES.position * solution.mechanism.characteristic_length:
-        return f"limits exceeded: {by_bound(exceeded(solution))}"
-    return f"loops open by {loop_gap(solution)}"
+    if answer.residual <= TOLERANCES.position * answer.mechanism.characteristic_length:
+        return f"limits exceeded: {by_bound(exceeded(answer))}"
+    return f"loops open by {loop_gap(answer)}"
 
 
-def distance(solution: Solution) -> str:
+def distance(answer: Answer) -> str:
     """Position error, rotation error, or both, where they exceed the tolerance."""
-    mechanism = solution.mechanism
+    mechanism = answer.mechanism
     parts = []
-    if solution.position_error > TOLERANCES.position * mechanism.characteristic_length:
-        parts.append(f"{float(solution.position_error):.3g} {mechanism.length_unit}")
-    if solution.rotation_error > TOLERANCES.rotation:
-        parts.append(f"{math.degrees(float(solution.rotation_error)):.3g} deg")
+    if answer.position_error > TOLERANCES.position * mechanism.characteristic_length:
+        parts.append(f"{float(answer.position_error):.3g} {mechanism.length_unit}")
+    if answer.rotation_error > TOLERANCES.rotation:
+        parts.append(f"{math.degrees(float(answer.rotation_error)):.3g} deg")
     return " and ".join(parts) or "a hair"
 
 
-def actuator_distance(solution: Solution, asked: Floats) -> str:
+def actuator_distance(answer: Answer, asked: Floats) -> str:
     """The largest differences between actuator coordinates and the values asked for: ``up to 12.3 mm and 4 deg``."""
     worst: dict[str, float] = {}
-    for readout, off in zip(readouts(solution.mechanism), np.abs(solution.actuators - asked), strict=True):
+    for readout, off in zip(readouts(answer.mechanism), np.abs(answer.actuators - asked), strict=True):
         worst[readout.unit] = max(float(readout.display(off)), worst.get(readout.unit, 0.0))
     return "actuators up to " + " and ".join(f"{off:.3g} {unit}" for unit, off in worst.items() if off > 0.0)
 
 
-def loop_gap(solution: Solution) -> str:
+def loop_gap(answer: Answer) -> str:
     """The largest loop gap with its unit."""
-    return f"{float(solution.residual):.1g} {solution.mechanism.length_unit}"
+    return f"{float(answer.residual):.1g} {answer.mechanism.length_unit}"
 
 
-def reasons(solution: Solution) -> list[str]:
+def reasons(answer: Answer) -> list[str]:
     """What holds a projected answer back, the hardest first, one phrase for those of a kind and value."""
     names: dict[tuple[str, str], list[str]] = {}
-    for limit in solution._limits[0]:
-        is_plain = solution.mechanism.joint(limit.joint).type != "universal"  # length or angle: the bound's unit tells
-        names.setdefault(in_words(limit, solution.mechanism), []).append(limit.joint if is_plain else name_of(limit))
+    for limit in answer._limits[0]:
+        is_plain = answer.mechanism.joint(limit.joint).type != "universal"  # length or angle: the bound's unit tells
+        names.setdefault(in_words(limit, answer.mechanism), []).append(limit.joint if is_plain else name_of(limit))
     return [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
 
 
@@ -164,9 +164,9 @@ def short_names(limits: Iterable[ActiveLimit]) -> str:
     return "; ".join(f"{name_of(limit)} {limit.bound}" for limit in limits)
 
 
-def exceeded(solution: Solution) -> list[ActiveLimit]:
+def exceeded(answer: Answer) -> list[ActiveLimit]:
     """The limits that a failed answer exceeds, not those that it only lies on."""
-    return [limit for limit in solution._limits[0] if is_exceeded(limit, solution.mechanism)]
+    return [limit for limit in answer._limits[0] if is_exceeded(limit, answer.mechanism)]
 
 
 def is_exceeded(limit: ActiveLimit, mechanism: Mechanism) -> bool:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..arrays import Floats
 from ..description.home_mobility import end_effector_freedom
 from ..description.mechanism import Mechanism, checked_mechanism

@@ -7,7 +7,8 @@ from math import prod
 
 import numpy as np
 
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..arrays import Floats
 from ..closure.close import close, closure_of
 from ..description.mechanism import Mechanism

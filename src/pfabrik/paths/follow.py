@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Ints
 from ..description.mechanism import Mechanism

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..answers.residual import closure_residual
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..tolerances import TOLERANCES
 from .feasible import worst_excess
 

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats
 from ..tolerances import TOLERANCES

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..arrays import Floats
 from ..fk import solve_fk
 from ..options import Options

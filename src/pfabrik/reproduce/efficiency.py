@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import geometric
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..arrays import Floats
 from ..closure.configurations import new_rows
 from ..decomposition.leg_table import LegTable, leg_table

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..answers.solution import Status
+from ..answers.status import Status
 from ..description.readouts import Readout, readout
 from ..view.looks import ACHIEVED, ASKED, HELD, SHADE
 from ..view.track import common_keys, draw_limits, line_style, shade_steps

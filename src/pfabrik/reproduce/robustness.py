@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import geometric
-from ..answers.solution import Status
+from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import short_names
 from ..arrays import Floats

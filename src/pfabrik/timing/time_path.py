@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..answers.solution import Status
+from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats
 from ..description.mechanism import Mechanism

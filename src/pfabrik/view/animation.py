@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
 from ..errors import InvalidArgument, MissingLibrary

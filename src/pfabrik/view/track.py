@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.margins import margins
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats
 from ..description.readouts import Readout, readouts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
@@ -20,23 +19,11 @@ from ..errors import InvalidArgument, UnknownName
 from ..poses import SupportsMatrix
 from ..telling import OnProgress, telling
 from .blocks import Measure
-from .lattice import Lattice
 from .orientations import tilts_up_to
-from .parts import Parts
-from .refining import refined
 from .result import Workspace
+from .search import searched, step_of
 from .space import Space, space_of
-from .surface import mesh_of
 from .verdicts import Question
-
-FINENESS, FINENESS_OF_SETS, FINENESS_ONE_BY_ONE = 1 / 100, 1 / 50, 1 / 25
-"""Resolutions [L or rad]: where closed forms tell margins; where they do for each of many tilts; elsewhere."""
-
-FIRST_CELLS = {(2, True): 1 / 48, (3, True): 1 / 12, (2, False): 1 / 12, (3, False): 1 / 5}
-"""How wide the first cells are [L or rad], by coordinates, and whether closed forms tell margins."""
-
-FIRST_REACH = {True: 2.5, False: 1.5}
-"""How far the first look goes to each side [L or rad], likewise."""
 
 FEWEST_CELLS = 24
 """Cells across the shortest side of a workspace; where the default resolution gives fewer, it is halved."""
@@ -100,27 +87,22 @@ def workspace(
             raise InvalidArgument("tilt", "an angle", "None with orientation='any'")
     hold: Literal["orientation", "position"] = "position" if is_any else "orientation"
     question = Question(space, begin, _turns(space, tilt), hold, *_ends(space, within))
-    step = _step(question, resolution)
     with telling("workspace", on_progress) as tell:
-        for _ in range(MOST_HALVINGS):
-            found = _found(question, step, Measure(question, executor, tell))
-            size = (found.bounds[1] - found.bounds[0]) / step if len(found.faces) else np.inf
-            if resolution is not None or np.min(size) >= FEWEST_CELLS:
-                break
-            step = 0.5 * step
+        return _found(question, resolution, executor, tell)
+
+
+def _found(
+    question: Question, resolution: float | None, executor: Executor | None, tell: OnProgress | None
+) -> Workspace:
+    """At the resolution asked for; else at the default one, or finer, until enough cells go across."""
+    step = step_of(question, resolution)
+    for _ in range(MOST_HALVINGS):
+        found = Workspace(question, step, *searched(question, step, Measure(question, executor, tell)))
+        cells = np.ptp(found.bounds, axis=0) / step if len(found.faces) else np.inf
+        if resolution is not None or np.min(cells) >= FEWEST_CELLS:
+            break
+        step = 0.5 * step
     return found
-
-
-def _found(question: Question, step: Floats, measure: Measure) -> Workspace:
-    space, exact = question.space, question.has_margins
-    lattice = Lattice(space.start, step, measure)
-    unit = np.where(space.is_angle, 1.0, question.mechanism.characteristic_length)
-    widest = float((step / unit).max())
-    levels = max(1, round(math.log2(FIRST_CELLS[len(step), exact] / widest)))
-    reach = math.ceil(FIRST_REACH[exact] / (widest * 2**levels))
-    cells = refined(lattice, levels, max(reach, 2))
-    mesh, coarser = mesh_of(lattice, cells.border), mesh_of(lattice, cells.coarser)
-    return Workspace(question, step, mesh, coarser, Parts(lattice, cells))
 
 
 def _start(mechanism: Mechanism, start: Start | None) -> Solution | None:
@@ -172,31 +154,3 @@ def _pair(name: str, ends: Any) -> tuple[float, float]:
     if not low < high:
         raise InvalidArgument(name, repr(ends), expected)
     return low, high
-
-
-def _step(question: Question, resolution: float | None) -> Floats:
-    """The size of the smallest cells, (d,) [length or rad]."""
-    space, length = question.space, question.mechanism.characteristic_length
-    unit = np.where(space.is_angle, 1.0, length)
-    if resolution is None:
-        many = len(question.turns) > 1
-        return unit * (FINENESS_ONE_BY_ONE if not question.has_margins else FINENESS_OF_SETS if many else FINENESS)
-    if isinstance(resolution, bool) or not isinstance(resolution, int | float | np.number):
-        raise InvalidArgument("resolution", repr(resolution), "a positive number")
-    if not 0.0 < resolution < np.inf:
-        raise InvalidArgument("resolution", repr(resolution), "a positive number")
-    relative = resolution if all(space.is_angle) else resolution / length
-    if not 1e-4 <= relative <= 0.5:
-        expected = "between 1e-4 and 0.5 of the characteristic length, or rad"
-        raise InvalidArgument("resolution", repr(resolution), expected)
-    return unit * relative
-
-
-def sliced(question: Question, fixed: Mapping[str, float], resolution: Floats | float) -> Workspace:
-    """The workspace of a question with further coordinates fixed."""
-    space = question.space.with_fixed(fixed)
-    kept = [question.space.names.index(name) for name in space.names]
-    asked = dataclasses.replace(question, space=space, lowest=question.lowest[kept], highest=question.highest[kept])
-    step = resolution[kept] if isinstance(resolution, np.ndarray) else _step(asked, resolution)
-    with telling("slice", None) as tell:
-        return _found(asked, step, Measure(asked, None, tell))

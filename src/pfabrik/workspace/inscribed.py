@@ -14,7 +14,7 @@ from ..errors import InvalidArgument, UnknownName
 from ..poses import as_floats
 
 if TYPE_CHECKING:
-    from .result import Workspace
+    from .region import Region
 
 Kind = Literal["sphere", "box", "cylinder"]
 
@@ -55,7 +55,7 @@ class Inscribed:
         return float(share[self.kind] * np.prod(self.extents))
 
 
-def inscribed(found: Workspace, kind: Kind, centre: ArrayLike | None, proportions: ArrayLike | None) -> Inscribed:
+def inscribed(found: Region, kind: Kind, centre: ArrayLike | None, proportions: ArrayLike | None) -> Inscribed:
     """The largest shape of a kind about a centre, or anywhere."""
     extents = _extents(found, kind, proportions)
     vertices = found.vertices[np.unique(found.faces)]
@@ -73,7 +73,7 @@ def inscribed(found: Workspace, kind: Kind, centre: ArrayLike | None, proportion
     )
 
 
-def _extents(found: Workspace, kind: Kind, proportions: ArrayLike | None) -> Floats:
+def _extents(found: Region, kind: Kind, proportions: ArrayLike | None) -> Floats:
     """The shape of size one: how long it is along each coordinate, (d,)."""
     d = len(found.names)
     if kind not in get_args(Kind):
@@ -95,7 +95,7 @@ def _extents(found: Workspace, kind: Kind, proportions: ArrayLike | None) -> Flo
     return given[[0, 0, 1]] if kind == "cylinder" else given
 
 
-def _checked_centre(found: Workspace, centre: ArrayLike) -> Floats:
+def _checked_centre(found: Region, centre: ArrayLike) -> Floats:
     expected = f"a point of shape ({len(found.names)},) within reach: {', '.join(found.names)}"
     point = as_floats("centre", centre, expected)
     if point.shape != (len(found.names),) or not np.isfinite(point).all() or not found.contains(point):
@@ -113,7 +113,7 @@ def _scales(kind: Kind, extents: Floats, away: Floats) -> Floats:
     return np.maximum(np.hypot(shares[..., 0], shares[..., 1]), shares[..., 2])
 
 
-def _distance_to_faces(found: Workspace, kind: Kind, extents: Floats, centre: Floats) -> float:
+def _distance_to_faces(found: Region, kind: Kind, extents: Floats, centre: Floats) -> float:
     """The size at which the shape meets the mesh: its nearest faces are looked at closely."""
     corners = found.vertices[found.faces]
     nearest = _scales(kind, extents, corners - centre).min(axis=1)
@@ -145,7 +145,7 @@ def _shell(kind: Kind, extents: Floats) -> Floats:
     return directions / _scales(kind, extents, directions)[:, None]
 
 
-def _best_centre(found: Workspace, kind: Kind, extents: Floats, vertices: Floats) -> Floats:
+def _best_centre(found: Region, kind: Kind, extents: Floats, vertices: Floats) -> Floats:
     """Where the shape can be largest, as far as a search from the best points of a grid finds."""
     vertices = vertices[:: max(1, len(vertices) // MOST_VERTICES)]
     low, high = found.bounds
@@ -161,7 +161,7 @@ def _best_centre(found: Workspace, kind: Kind, extents: Floats, vertices: Floats
     return max((_climbed(size, found, centre, (high - low) / FIRST_GRID) for centre in best), key=size)
 
 
-def _climbed(size: Any, found: Workspace, centre: Floats, steps: Floats) -> Floats:
+def _climbed(size: Any, found: Region, centre: Floats, steps: Floats) -> Floats:
     """From a centre to better ones, a step along a coordinate at a time; steps halve where none is better."""
     best = size(centre)
     for _ in range(MOST_STEPS):

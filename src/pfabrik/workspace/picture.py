@@ -14,7 +14,7 @@ from .words import in_words
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .result import Workspace
+    from .region import Region
 
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#f0e442")
 """Colours that colour-blind people can tell apart, after Okabe and Ito; of the limits that form most of the border."""
@@ -38,7 +38,7 @@ Group: TypeAlias = tuple[str, str, list[int]]
 Strings: TypeAlias = NDArray[np.str_]
 
 
-def plot(found: Workspace, ax: Axes | None = None) -> Axes:
+def plot(found: Region, ax: Axes | None = None) -> Axes:
     """Draw a workspace on matplotlib axes, or on those of a new figure, which is `ax.figure`."""
     d = len(found.names)
     axes = axes_for(ax, d)
@@ -62,7 +62,7 @@ def plot(found: Workspace, ax: Axes | None = None) -> Axes:
     return axes
 
 
-def _groups(found: Workspace) -> list[Group]:
+def _groups(found: Region) -> list[Group]:
     """Limits that share a colour: each its own where there are colours enough; else those of joints that are copies."""
     shares = {limit: [limit] for limit in found.shares}
     if len(shares) > len(COLOURS):
@@ -79,14 +79,14 @@ def _groups(found: Workspace) -> list[Group]:
     return [*groups, (f"{len(rest)} other limits", REST, rest)] if rest else groups
 
 
-def _face_colours(found: Workspace, groups: list[Group]) -> Strings:
+def _face_colours(found: Region, groups: list[Group]) -> Strings:
     colours = np.full(len(found.limits), REST)
     for _, colour, limits in groups:
         colours[limits] = colour
     return colours
 
 
-def _draw_plane(axes: Any, found: Workspace, groups: list[Group]) -> None:
+def _draw_plane(axes: Any, found: Region, groups: list[Group]) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
@@ -113,7 +113,7 @@ def _draw_plane(axes: Any, found: Workspace, groups: list[Group]) -> None:
         axes.set_aspect("equal")
 
 
-def _draw_solid(axes: Any, found: Workspace, groups: list[Group]) -> None:
+def _draw_solid(axes: Any, found: Region, groups: list[Group]) -> None:
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
@@ -135,16 +135,16 @@ def _draw_solid(axes: Any, found: Workspace, groups: list[Group]) -> None:
     axes.locator_params(nbins=5)
 
 
-def shown(found: Workspace, points: Floats) -> Floats:
+def shown(found: Region, points: Floats) -> Floats:
     """Coordinates as people read them: angles in degrees."""
     return points * np.where([unit == "rad" for unit in found.units], 180.0 / np.pi, 1.0)
 
 
-def labels(found: Workspace) -> list[str]:
+def labels(found: Region) -> list[str]:
     return [f"{name} [{'deg' if unit == 'rad' else unit}]" for name, unit in zip(found.names, found.units, strict=True)]
 
 
-def _title(found: Workspace) -> str:
+def _title(found: Region) -> str:
     return f"{found.mechanism.name}: {in_words(found)}"
 
 

@@ -16,10 +16,10 @@ from ..errors import InvalidArgument
 from ..writing import whole_path
 
 if TYPE_CHECKING:
-    from .result import Workspace
+    from .region import Region
 
 
-def save(found: Workspace, path: str | PathLike[str]) -> None:
+def save(found: Region, path: str | PathLike[str]) -> None:
     """Write a workspace in the format that the ending says; the file is there whole, or not at all."""
     write = _FORMATS.get(Path(path).suffix.lower())
     if write is None:
@@ -29,7 +29,7 @@ def save(found: Workspace, path: str | PathLike[str]) -> None:
         part.write_bytes(content)
 
 
-def _as_npz(found: Workspace) -> bytes:
+def _as_npz(found: Region) -> bytes:
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
@@ -46,7 +46,7 @@ def _as_npz(found: Workspace) -> bytes:
     return buffer.getvalue()
 
 
-def _as_stl(found: Workspace) -> bytes:
+def _as_stl(found: Region) -> bytes:
     """Binary STL: triangles with their normals, in the mechanism's unit."""
     corners = found.vertices[_triangles(found)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -58,7 +58,7 @@ def _as_stl(found: Workspace) -> bytes:
     return header + len(rows).to_bytes(4, "little") + rows.tobytes()
 
 
-def _as_ply(found: Workspace) -> bytes:
+def _as_ply(found: Region) -> bytes:
     """Binary PLY: vertices, and triangles with the number of the limit that forms each; comments name it."""
     faces = _triangles(found)
     vertices = np.asarray(found.vertices, "<f8")
@@ -79,13 +79,13 @@ def _as_ply(found: Workspace) -> bytes:
     return "\n".join([*header, ""]).encode("utf-8") + vertices.tobytes() + rows.tobytes()
 
 
-def _triangles(found: Workspace) -> Ints:
+def _triangles(found: Region) -> Ints:
     if len(found.names) != 3:
         raise InvalidArgument("path", "a format for triangles", ".npz or .csv: a workspace in a plane has none")
     return found.faces
 
 
-def _as_csv(found: Workspace) -> bytes:
+def _as_csv(found: Region) -> bytes:
     """Points of the border, one a row, with the limit that forms it there; angles in radians, named so."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -96,6 +96,6 @@ def _as_csv(found: Workspace) -> bytes:
     return text.getvalue().encode("utf-8")
 
 
-_FORMATS: dict[str, Callable[[Workspace], bytes]] = {".npz": _as_npz, ".stl": _as_stl, ".ply": _as_ply, ".csv": _as_csv}
+_FORMATS: dict[str, Callable[[Region], bytes]] = {".npz": _as_npz, ".stl": _as_stl, ".ply": _as_ply, ".csv": _as_csv}
 
 ENDINGS = tuple(_FORMATS)

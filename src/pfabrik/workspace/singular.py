@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 
 from ..answers.differential import singularity
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats, Ints
 from ..description.mechanism import Mechanism, checked_mechanism
@@ -22,6 +23,7 @@ from .numbering import Numbering
 from .parts import connected
 from .refining import Cells
 from .result import Workspace
+from .singular_picture import plot_map, plot_track
 from .surface import crossed_edges
 
 if TYPE_CHECKING:
@@ -70,9 +72,7 @@ class SingularityMap:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the parallel measure and the locus of parallel singularities. Needs the extra `plot`."""
-        from .singular_picture import plot_map
-
-        return plot_map(self, ax)
+        return plot_map(self.workspace, self.points, self.measures, self.locus_vertices, self.locus_faces, ax)
 
     def __repr__(self) -> str:
         least = float(np.min(self.measures.parallel, initial=np.inf))
@@ -98,9 +98,7 @@ class SingularityTrack:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the measures along the path, crossings marked. Needs the extra `plot`."""
-        from .singular_picture import plot_track
-
-        return plot_track(self, ax)
+        return plot_track(self.measures, self.crossings, ax)
 
 
 @overload

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import Floats, Ints
+from ..motion.first_order import Singularity
 from .drawing import SMALL, axes_for
 from .picture import labels, shown
+from .region import Region
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from .singular import SingularityMap, SingularityTrack
 
 LOCUS = "#d55e00"
 MARK, FINE, FAINT = 9.0, 6.0, 0.5
@@ -24,21 +25,21 @@ LINES = {
 }
 
 
-def plot_map(found: SingularityMap, ax: Axes | None = None) -> Axes:
-    """Draw the parallel measure of a plane, or of space, and the locus in it."""
-    space = found.workspace
+def plot_map(
+    space: Region, points: Floats, measures: Singularity, vertices: Floats, faces: Ints, ax: Axes | None = None
+) -> Axes:
+    """Draw the parallel measure at points (n, d) of a plane, or of space, and the locus: vertices (v, d), faces."""
     d = len(space.names)
     axes = axes_for(ax, d)
     from matplotlib.collections import LineCollection
 
-    points, locus = shown(space, found.points), shown(space, found.locus_vertices)
-    parallel = np.asarray(found.measures.parallel)
-    faces = list(locus[found.locus_faces])
+    points, parallel = shown(space, points), np.asarray(measures.parallel)
+    locus = list(shown(space, vertices)[faces])
     if d == 2:
         drawn = axes.scatter(
             points[:, 0], points[:, 1], c=parallel, s=MARK, marker="s", linewidths=0, cmap="cividis", vmin=0.0
         )
-        axes.add_collection(LineCollection(faces, colors=LOCUS, linewidths=2.0))
+        axes.add_collection(LineCollection(locus, colors=LOCUS, linewidths=2.0))
         if len(set(space.units)) == 1:
             axes.set_aspect("equal")
     else:
@@ -46,26 +47,22 @@ def plot_map(found: SingularityMap, ax: Axes | None = None) -> Axes:
 
         solid: Any = axes
         drawn = solid.scatter(*points.T, c=parallel, s=FINE, linewidths=0, cmap="cividis", vmin=0.0, alpha=FAINT)
-        solid.add_collection3d(Poly3DCollection(faces, facecolors=LOCUS, edgecolors="none", alpha=0.8))
+        solid.add_collection3d(Poly3DCollection(locus, facecolors=LOCUS, edgecolors="none", alpha=0.8))
     axes.figure.colorbar(drawn, ax=axes, label="parallel measure", shrink=0.8, pad=0.12 if d == 3 else 0.03)
     axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(space), strict=False)))
-    axes.set_title(_title(found), fontsize=SMALL + 1)
+    what = "parallel singularities" if locus else "no parallel singularity"
+    axes.set_title(f"{space.mechanism.name}: {what}", fontsize=SMALL + 1)
     return axes
 
 
-def _title(found: SingularityMap) -> str:
-    what = "parallel singularities" if len(found.locus_faces) else "no parallel singularity"
-    return f"{found.workspace.mechanism.name}: {what}"
-
-
-def plot_track(found: SingularityTrack, ax: Axes | None = None) -> Axes:
+def plot_track(measures: Singularity, crossings: Ints, ax: Axes | None = None) -> Axes:
     """Draw the measures along a path, one line each, and where it leads through parallel singularities."""
     axes = axes_for(ax, 2)
     for name, (colour, dashes) in LINES.items():
-        values = np.asarray(getattr(found.measures, name))
+        values = np.asarray(getattr(measures, name))
         if np.isfinite(values).any():
             axes.plot(np.arange(1, len(values) + 1), values, color=colour, linestyle=dashes, label=name)
-    for count, row in enumerate(found.crossings.tolist()):
+    for count, row in enumerate(crossings.tolist()):
         label = "" if count else "parallel singularity"
         axes.axvline(row + 0.5, color=LOCUS, linewidth=1.2, label=label)
     axes.set(xlabel="target", ylabel="measure of singularity", ylim=(0.0, None))

@@ -8,7 +8,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ..answers.limits import active_limits
-from ..answers.solution import Solution, Status
+from ..answers.solution import Solution
+from ..answers.status import Status
 from ..arrays import Floats, Ints, Mask
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism

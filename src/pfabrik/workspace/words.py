@@ -6,10 +6,10 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .result import Workspace
+    from .region import Region
 
 
-def in_words(found: Workspace) -> str:
+def in_words(found: Region) -> str:
     """The size of a workspace, to the digit that is uncertain: "4,970,000 ± 2,000 mm³"."""
     return (
         f"{rounded(found.size, found.uncertainty)} ± {rounded(found.uncertainty, found.uncertainty)} {found.size_unit}"

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...answers.solution import Solution, Status
+from ...answers.solution import Solution
+from ...answers.status import Status
 from ...description.mechanism import Mechanism
 from ...description.readouts import Readout, readouts
 from ...description.task import task_of

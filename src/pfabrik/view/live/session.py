@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 
 from ...answers.margins import margins
-from ...answers.solution import Solution, Status
+from ...answers.solution import Solution
+from ...answers.status import Status
 from ...answers.words import as_sentence
 from ...arrays import Floats
 from ...configuration import configuration

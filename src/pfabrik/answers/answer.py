@@ -1,0 +1,175 @@
+"""The fields of an answer: a status, a configuration that is feasible, and what was measured of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..closure.configurations import Configurations
+from ..closure.projection import ways_of
+from ..description.mechanism import Mechanism
+from ..engine import engine_of
+from ..kernels.reaching import plan as P
+from ..motion.displacements import columns, home_coordinates
+from .limits import ActiveLimit, active_limits, binding_limits, holding_limits
+from .status import Status
+
+Integers = NDArray[np.int64]
+
+Held: TypeAlias = Literal["orientation", "position"] | None
+"""What of its target a projected answer has."""
+
+
+class Wanted(NamedTuple):
+    """Poses that were asked for, (n, 4, 4), and how the distance from them counts; see `Options`."""
+
+    targets: Floats
+    hold: str | None
+    rotation_length: float | None
+
+
+class Answer:
+    """The fields of a `Solution`, which says what they are; what puts them into words or pictures reads these."""
+
+    def __init__(
+        self, mechanism: Mechanism, found: Configurations, shape: tuple[int, ...], wanted: Wanted | None = None
+    ) -> None:
+        """Wrap configurations, as many as the batch shape has; `wanted` are the poses asked for, if any were."""
+        self.mechanism = mechanism
+        self.shape = shape
+        self._found = found
+        self._wanted = wanted
+
+    def __getstate__(self) -> tuple[Mechanism, Configurations, tuple[int, ...], Wanted | None]:
+        """What an answer is made of; all else follows again where it is unpickled."""
+        return self.mechanism, self._found, self.shape, self._wanted
+
+    def __setstate__(self, state: tuple[Mechanism, Configurations, tuple[int, ...], Wanted | None]) -> None:
+        Answer.__init__(self, *state)
+
+    @property
+    def _rows(self) -> P.Rows:
+        return self._found.rows
+
+    @property
+    def _coordinates(self) -> Floats:
+        """All joint coordinates as deviations from home, row by row, (n, columns) [length or rad]."""
+        return self._found.coordinates
+
+    def _shaped(self, array: NDArray[Any]) -> Any:
+        shaped = array.reshape(self.shape + array.shape[1:])
+        return shaped if shaped.ndim else shaped.item()
+
+    @property
+    def status(self) -> Status | Integers:
+        return Status(int(self._rows.status[0])) if self.shape == () else self._rows.status.reshape(self.shape)
+
+    @property
+    def pose(self) -> Floats:
+        return cast(Floats, self._shaped(self._rows.poses))
+
+    @property
+    def actuators(self) -> Floats:
+        return cast(Floats, self._shaped(self._rows.actuators))
+
+    @property
+    def position_error(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.POSITION_ERROR]))
+
+    @property
+    def rotation_error(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.ROTATION_ERROR]))
+
+    @property
+    def residual(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.RESIDUAL]))
+
+    @property
+    def limit_excess(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.LIMIT_EXCESS]))
+
+    @property
+    def iterations(self) -> int | Integers:
+        return cast(int | Integers, self._shaped(self._rows.counters[:, P.ITERATIONS]))
+
+    @property
+    def rounds(self) -> int | Integers:
+        return cast(int | Integers, self._shaped(self._rows.counters[:, P.ROUNDS]))
+
+    @property
+    def held(self) -> Held | NDArray[np.object_]:
+        names = np.array([None, "orientation", "position"], dtype=object)
+        held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, P.HELD], P.HOLD_NOTHING)]
+        return held[0] if self.shape == () else held.reshape(self.shape)
+
+    @property
+    def actuator_error(self) -> float | Floats:
+        return cast(float | Floats, self._shaped(self._rows.measures[:, P.ACTUATOR_ERROR]))
+
+    @cached_property
+    def q(self) -> Floats:
+        return cast(Floats, self._shaped(self._coordinates + home_coordinates(self.mechanism)))
+
+    @cached_property
+    def joints(self) -> Mapping[str, Floats]:
+        spans = ((name, span) for name, span in columns(self.mechanism).items() if span.stop > span.start)
+        single = {name: span.start if span.stop - span.start == 1 else span for name, span in spans}
+        return MappingProxyType({name: self.q[..., place][()] for name, place in single.items()})
+
+    @cached_property
+    def points(self) -> Mapping[str, Floats]:
+        found = engine_of(self.mechanism).points(self._found)
+        order = [joint.name for joint in self.mechanism.joints if joint.name in found]
+        unknown = (self._rows.status == Status.INVALID)[:, None]
+        return MappingProxyType({name: self._shaped(np.where(unknown, np.nan, found[name])) for name in order})
+
+    @cached_property
+    def active_limits(self) -> tuple[ActiveLimit, ...] | list[tuple[ActiveLimit, ...]]:
+        listed = self._limits
+        return listed[0] if self.shape == () else listed
+
+    @cached_property
+    def _limits(self) -> list[tuple[ActiveLimit, ...]]:
+        """The same as a list of rows, also of a single answer."""
+        rows = self._rows
+        held: list[tuple[ActiveLimit, ...]] = [()] * len(rows.status)
+        away = np.flatnonzero((rows.status != Status.REACHED) & (rows.status != Status.INVALID))
+        named = active_limits(self.mechanism, self._coordinates[away])
+        for row, found in zip(away, named, strict=True):
+            held[row] = found
+        projected = np.flatnonzero(rows.status == Status.PROJECTED)
+        if self._wanted is not None and len(projected):
+            for row, found in zip(projected, self._holding(self._wanted, projected), strict=True):
+                held[row] = found
+        return held
+
+    @cached_property
+    def binding(self) -> NDArray[np.void]:
+        """The first of `active_limits` of every row as one array, (...,): empty names where there is none.
+
+        Fields: joint, bound (text), coordinate (int), value, limit [length or rad], multiplier (NaN where none is
+        known).
+        """
+        return binding_limits(self._limits).reshape(self.shape)
+
+    def _holding(self, wanted: Wanted, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
+        """The limits that hold projected rows back from the poses that were asked for."""
+        found: dict[int, tuple[ActiveLimit, ...]] = {}
+        engine = engine_of(self.mechanism)
+        holds, ways = (
+            self._rows.counters[projected, P.HELD],
+            ways_of(self.mechanism, wanted.hold, wanted.rotation_length),
+        )
+        for way in ways:
+            rows = projected[holds == way.hold]
+            if len(rows):
+                weights = engine.weighed_limits(self._found.at(rows), wanted.targets[rows], way)
+                limits = holding_limits(self.mechanism, self._coordinates[rows], weights)
+                found.update(zip(rows.tolist(), limits, strict=True))
+        return [found[row] for row in projected.tolist()]

@@ -1,0 +1,134 @@
+"""What is within reach: a border, what forms it, and the parts that it encloses."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats, Ints, Mask
+from ..description.mechanism import Mechanism
+from ..errors import InvalidArgument
+from ..poses import as_floats
+from .parts import Parts
+from .surface import Mesh
+from .verdicts import Limits, Question
+
+EXPONENTS = {1: "", 2: "²", 3: "³"}
+
+
+class Region:
+    """The fields of a `Workspace`, which says what they are; what draws, writes or fills one reads these."""
+
+    def __init__(
+        self, question: Question, resolution: Floats, mesh: Mesh, coarser: Mesh, parts: Parts, part: int | None = None
+    ) -> None:
+        self._question, self._mesh, self._coarser, self._parts, self._part = question, mesh, coarser, parts, part
+        self.resolution = resolution
+        self.limits: Limits = question.limits
+        for array in (*mesh, resolution):
+            array.setflags(write=False)
+
+    @property
+    def mechanism(self) -> Mechanism:
+        return self._question.mechanism
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self._question.space.names
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return self._question.space.units
+
+    @property
+    def vertices(self) -> Floats:
+        return self._mesh.vertices
+
+    @property
+    def faces(self) -> Ints:
+        return self._mesh.faces
+
+    @cached_property
+    def face_limit(self) -> Ints:
+        """The limit of most of its vertices."""
+        own = self._mesh.limits[self.faces]
+        found = np.where((own[:, 1:2] == own[:, 2:]).any(axis=1), own[:, 1], own[:, 0])
+        found.setflags(write=False)
+        return found
+
+    @property
+    def vertex_limit(self) -> Ints:
+        """Which of `limits` forms the border at each vertex, (v,)."""
+        return self._mesh.limits
+
+    @property
+    def size(self) -> float:
+        """Area or volume [`size_unit`]; of a tilt and a length, say, their product."""
+        return self._mesh.size
+
+    @property
+    def uncertainty(self) -> float:
+        """By how much `size` differs from that at twice the resolution [`size_unit`]."""
+        return abs(self._mesh.size - self._coarser.size)
+
+    @property
+    def size_unit(self) -> str:
+        """Such as "mm³", or "rad² mm"."""
+        counts = {unit: self.units.count(unit) for unit in sorted(set(self.units), reverse=True)}
+        return " ".join(unit + EXPONENTS[count] for unit, count in counts.items())
+
+    @property
+    def volume(self) -> float:
+        """Of three coordinates [`size_unit`]."""
+        return self._size_of(3, "volume")
+
+    @property
+    def area(self) -> float:
+        """Of two coordinates [`size_unit`]."""
+        return self._size_of(2, "area")
+
+    def _size_of(self, d: int, what: str) -> float:
+        if len(self.names) != d:
+            raise InvalidArgument(what, f"a workspace over {', '.join(self.names)}", f"{d} coordinates; or `size`")
+        return self.size
+
+    @property
+    def bounds(self) -> Floats:
+        """Least and greatest value of each coordinate, (2, d) [length or rad]; NaN where nothing is within reach."""
+        if not len(self.vertices):
+            return np.full((2, len(self.names)), np.nan)
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @cached_property
+    def shares(self) -> dict[tuple[str, str], float]:
+        """(joint, bound) -> share of the border that this limit forms, the greatest first."""
+        sizes = self._mesh.face_sizes
+        total = np.bincount(self.face_limit, sizes, minlength=len(self.limits))
+        order = [index for index in np.argsort(-total, kind="stable").tolist() if total[index] > 0.0]
+        return {self.limits[index]: float(total[index] / sizes.sum()) for index in order}
+
+    def contains(self, points: ArrayLike) -> bool | Mask:
+        """Whether points (..., d) are within reach [length or rad]: asked anew, not read off the mesh; bools (...).
+
+        Of one of several `components`, whether they are within it.
+        """
+        array = self._points("points", points)
+        rows = array.reshape(-1, array.shape[-1])
+        inside: Mask = self._question.measure(rows)[0] >= 0.0
+        if self._part is not None:
+            inside[inside] = self._parts.of(rows[inside]) == self._part
+        return inside.reshape(array.shape[:-1]) if array.ndim > 1 else bool(inside[0])
+
+    def poses(self, points: ArrayLike) -> Floats:
+        """The targets (..., 4, 4) in the base frame that points (..., d) stand for."""
+        array = self._points("points", points)
+        return self._question.space.poses(array.reshape(-1, array.shape[-1])).reshape(*array.shape[:-1], 4, 4)
+
+    def _points(self, name: str, points: ArrayLike) -> Floats:
+        expected = f"finite numbers of shape (..., {len(self.names)}): {', '.join(self.names)}"
+        array = as_floats(name, points, expected)
+        if array.shape[-1:] != (len(self.names),) or not np.isfinite(array).all():
+            raise InvalidArgument(name, f"shape {array.shape}", expected)
+        return array

@@ -1,0 +1,70 @@
+"""The search for a workspace's border: coarse cells first, halved where the border passes."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import InvalidArgument
+from ..telling import telling
+from .blocks import Measure
+from .lattice import Lattice
+from .parts import Parts
+from .refining import refined
+from .surface import Mesh, mesh_of
+from .verdicts import Question
+
+FINENESS, FINENESS_OF_SETS, FINENESS_ONE_BY_ONE = 1 / 100, 1 / 50, 1 / 25
+"""Resolutions [L or rad]: where closed forms tell margins; where they do for each of many tilts; elsewhere."""
+
+FIRST_CELLS = {(2, True): 1 / 48, (3, True): 1 / 12, (2, False): 1 / 12, (3, False): 1 / 5}
+"""How wide the first cells are [L or rad], by coordinates, and whether closed forms tell margins."""
+
+FIRST_REACH = {True: 2.5, False: 1.5}
+"""How far the first look goes to each side [L or rad], likewise."""
+
+
+def searched(question: Question, step: Floats, measure: Measure) -> tuple[Mesh, Mesh, Parts]:
+    """The border at cells of size `step`, (d,), the same at cells twice as large, and the parts that hang together."""
+    space, exact = question.space, question.has_margins
+    lattice = Lattice(space.start, step, measure)
+    unit = np.where(space.is_angle, 1.0, question.mechanism.characteristic_length)
+    widest = float((step / unit).max())
+    levels = max(1, round(math.log2(FIRST_CELLS[len(step), exact] / widest)))
+    reach = math.ceil(FIRST_REACH[exact] / (widest * 2**levels))
+    cells = refined(lattice, levels, max(reach, 2))
+    return mesh_of(lattice, cells.border), mesh_of(lattice, cells.coarser), Parts(lattice, cells)
+
+
+def step_of(question: Question, resolution: float | None) -> Floats:
+    """The size of the smallest cells, (d,) [length or rad]."""
+    space, length = question.space, question.mechanism.characteristic_length
+    unit = np.where(space.is_angle, 1.0, length)
+    if resolution is None:
+        many = len(question.turns) > 1
+        return unit * (FINENESS_ONE_BY_ONE if not question.has_margins else FINENESS_OF_SETS if many else FINENESS)
+    if isinstance(resolution, bool) or not isinstance(resolution, int | float | np.number):
+        raise InvalidArgument("resolution", repr(resolution), "a positive number")
+    if not 0.0 < resolution < np.inf:
+        raise InvalidArgument("resolution", repr(resolution), "a positive number")
+    relative = resolution if all(space.is_angle) else resolution / length
+    if not 1e-4 <= relative <= 0.5:
+        expected = "between 1e-4 and 0.5 of the characteristic length, or rad"
+        raise InvalidArgument("resolution", repr(resolution), expected)
+    return unit * relative
+
+
+def sliced(
+    question: Question, fixed: Mapping[str, float], resolution: Floats | float
+) -> tuple[Question, Floats, Mesh, Mesh, Parts]:
+    """A question with further coordinates fixed, the size of the smallest cells, and what was found."""
+    space = question.space.with_fixed(fixed)
+    kept = [question.space.names.index(name) for name in space.names]
+    asked = dataclasses.replace(question, space=space, lowest=question.lowest[kept], highest=question.highest[kept])
+    step = resolution[kept] if isinstance(resolution, np.ndarray) else step_of(asked, resolution)
+    with telling("slice", None) as tell:
+        return asked, step, *searched(asked, step, Measure(asked, None, tell))
