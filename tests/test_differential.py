@@ -22,7 +22,8 @@ from pfabrik.description.graph import tree_of
 from pfabrik.description.home_mobility import column_joints
 from pfabrik.errors import InvalidArgument
 from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units, screws
-from pfabrik.motion.first_order import KINDS, generic_of, measures
+from pfabrik.motion.mobility import generic_of
+from pfabrik.motion.singularities import KINDS, measures
 from pfabrik.tolerances import TOLERANCES
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

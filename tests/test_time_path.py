@@ -10,7 +10,7 @@ import pytest
 
 import pfabrik as pf
 from pfabrik.errors import InvalidArgument, UnknownName
-from pfabrik.motion.first_order import generic_of
+from pfabrik.motion.mobility import generic_of
 from pfabrik.timing.curve import curve_of
 from pfabrik.timing.time_path import limits_of
 

@@ -18,6 +18,8 @@ class Tolerances:
         home on a bound must not be refused for its last digit.
     active : distance from a bound below which a limit is reported as active [L or rad]; above the inward margin that
         projected answers keep, below anything a machine could resolve.
+    held : most that a projected answer may miss of the part of its target that it says it has [L or rad]: ends of
+        searches for the nearest are that exact.
     holding : multiplier above which a limit holds an answer back: by how much of the distance it gives way the answer
         comes nearer, cosines of angles; below it there is the rounding of answers that touch a limit by chance.
     rotation_matrix : largest deviation of R^T R from I accepted in a target: matrices typed with 7 digits pass,
@@ -38,6 +40,11 @@ class Tolerances:
         loops are closed to 1e-9, so that below there is nothing but their error.
     singular : measure of singularity [L and rad] below which a configuration counts as singular: at the border of a
         workspace it grows with the square root of a length, so that 1e-9 of L leaves 3e-5.
+    stretched : measure of singularity [L and rad] below which links count as stretched out or folded: it goes with the
+        square root of a length, and what a search for the nearest pose leaves of a length is up to a millionth.
+    file_gap : gap [L or rad] that the digits of another program's file may leave in loops that it says are closed: more
+        is a machine that cannot be closed.
+    file_angle : angle [rad] up to which axes in such a file may have been meant to be parallel: `1.57` is off by 8e-4.
     same_mode : largest difference of positions [L] and rotation matrices of two solutions that count as one: where two
         solutions meet, closing the loops to 1e-13 places each to 3e-7 only.
     meeting : gap of loops [L] up to which joints that closed forms tell need no closing: rounding leaves 1e-15 a joint.
@@ -48,6 +55,7 @@ class Tolerances:
     limit: float = 1e-9
     home_slack: float = 1e-9
     active: float = 1e-7
+    held: float = 1e-6
     holding: float = 1e-6
     rotation_matrix: float = 1e-6
     alignment: float = 1e-6
@@ -59,6 +67,9 @@ class Tolerances:
     speed: float = 1e-6
     rank: float = 1e-9
     singular: float = 1e-4
+    stretched: float = 1e-3
+    file_gap: float = 1e-4
+    file_angle: float = 1e-3
 
 
 TOLERANCES = Tolerances()

@@ -104,7 +104,7 @@ class Travel(Sequence[Reach]):
             return "unlimited", unit
         if reach.kind == "about":
             return plain(float(np.degrees(reach.distance)), 1e-6), unit
-        return plain(reach.distance, 2e-9 * mechanism.characteristic_length), unit
+        return plain(reach.distance, 2.0 * TOLERANCES.position * mechanism.characteristic_length), unit
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, lists and dicts, ready for JSON; an endless distance becomes None."""

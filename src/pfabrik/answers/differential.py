@@ -9,7 +9,8 @@ import numpy as np
 from ..arrays import Floats
 from ..closure.first_order import forward_map, inverse_map, singularities
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..motion.first_order import Mobility, Singularity, generic_of
+from ..motion.mobility import Mobility, generic_of
+from ..motion.singularities import Singularity
 from .solution import Solution, checked_solution
 
 __all__ = ["Mobility", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]

@@ -43,7 +43,7 @@ def describe(solution: Solution, asked: Floats | None = None) -> str:
 
 def pose_texts(solution: Solution) -> tuple[list[str], list[str]]:
     """Position [length], and roll, pitch, yaw [deg]."""
-    smallest = 1e-9 * solution.mechanism.characteristic_length
+    smallest = TOLERANCES.position * solution.mechanism.characteristic_length
     position = [plain(value, smallest) for value in solution.pose[:3, 3]]
     return position, [plain(math.degrees(angle), 1e-7) for angle in to_rpy(solution.pose[:3, :3])]
 

@@ -17,7 +17,7 @@ from ..description.graph_faults import leaves
 from ..description.joint_types import TASK_TURNS
 from ..description.task import task_of
 from ..errors import InvalidMechanism
-from ..motion.first_order import generic_of
+from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .mech import MECH, load
 

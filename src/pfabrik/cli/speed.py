@@ -11,20 +11,14 @@ import pfabrik as pf
 
 from ..answers.table import aligned, plain
 from .mech import MECH, load
-from .speeds import speed_limits
+from .speeds import speed_limits, speed_option
 from .target import Triple, target_of, targeted
 
 
 @click.command()
 @click.argument("mech", type=MECH)
 @targeted
-@click.option(
-    "--speed",
-    "speeds",
-    multiple=True,
-    metavar="[NAME=]VALUE",
-    help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated. Default: the file's max_speed.",
-)
+@speed_option
 @click.option("--json", "as_json", is_flag=True, help="One JSON array on stdout; angles in radians.")
 def speed(
     mech: str,

@@ -1,4 +1,4 @@
-"""Highest speeds of actuators: of the file, and from words as of ``--speed``."""
+"""Highest speeds of actuators: of the file, and by ``--speed``, which the commands about time share."""
 
 from __future__ import annotations
 
@@ -13,6 +13,14 @@ from .finite import is_finite
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
+
+speed_option = click.option(
+    "--speed",
+    "speeds",
+    multiple=True,
+    metavar="[NAME=]VALUE",
+    help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated. Default: the file's max_speed.",
+)
 
 
 def own_limits(mechanism: Mechanism) -> dict[str, float]:

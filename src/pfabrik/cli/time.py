@@ -15,7 +15,7 @@ from ..answers.table import aligned
 from .finite import FINITE
 from .mech import MECH, load
 from .progress import progress
-from .speeds import speed_limits
+from .speeds import speed_limits, speed_option
 from .whole import whole_file
 
 if TYPE_CHECKING:
@@ -28,13 +28,7 @@ if TYPE_CHECKING:
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path, allow_dash=True), help="CSV file to write; - prints it."
 )
-@click.option(
-    "--speed",
-    "speeds",
-    multiple=True,
-    metavar="[NAME=]VALUE",
-    help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated. Default: the file's max_speed.",
-)
+@speed_option
 @click.option(
     "--acceleration",
     "accelerations",

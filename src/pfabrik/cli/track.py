@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -18,7 +19,7 @@ from .mech import MECH, load
 from .picture import ending_checked, picture
 from .progress import progress
 from .projecting import options_projecting, projecting
-from .speeds import own_limits, speed_limits
+from .speeds import own_limits, speed_limits, speed_option
 from .track_checks import checked
 from .whole import whole_file
 
@@ -45,13 +46,7 @@ STANDARD = Path("-")
 @click.option("--rate", type=FINITE, metavar="HZ", help="Resample the path: targets per second.")
 @click.option("--longest", type=FINITE, metavar="D", help="Resample the path: longest step [length].")
 @click.option("--tolerance", type=FINITE, metavar="D", help="How far steps may be off an arc [length].")
-@click.option(
-    "--speed",
-    "speeds",
-    multiple=True,
-    metavar="[NAME=]VALUE",
-    help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated. Default: the file's max_speed.",
-)
+@speed_option
 @click.option(
     "--plot", "picture_path", type=click.Path(path_type=Path), metavar="FILE", help="Picture: PNG, SVG or PDF."
 )
@@ -87,7 +82,8 @@ def track(
 
     The exit code is 1 also where an actuator would have to be faster than it may.
     """
-    if output is None and not as_json and picture_path is None and film_path is None:
+    drawn = picture_path is not None or film_path is not None
+    if output is None and not as_json and not drawn:
         raise click.UsageError("no place for the answers: give -o FILE, -o -, --json, --plot or --animate")
     if as_json and output == STANDARD:
         raise click.UsageError("-o - and --json both print on stdout: give one of them")
@@ -97,36 +93,18 @@ def track(
     refuse_early(picture_path, film_path, inputs)
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
-    from ..paths.path import joined
     from ..paths.read_path import path_blocks
     from .track_summary import Summary
 
-    def read() -> Iterator[paths.Path]:
-        options = {"longest": longest, "rate": rate, "rapid": rapid, "sample_time": sample_time}
-        return path_blocks(path, mechanism, tolerance=tolerance, **options)
-
-    blocks: Iterable[paths.Path]
-    total = None
-    if as_json or picture_path is not None or film_path is not None:
-        blocks = checked(read(), mechanism, is_timed=bool(limits))
-        blocks = [joined(blocks)]
-        total = len(blocks[0].lines)
-    elif path != STANDARD and path.is_file():  # read to its end before anything is written
-        total = sum(len(block.lines) for block in checked(read(), mechanism, is_timed=bool(limits)))
-        blocks = read()
-    else:
-        blocks = checked(read(), mechanism, is_timed=bool(limits))
+    timing = {"rate": rate, "rapid": rapid, "sample_time": sample_time}
+    read = partial(path_blocks, path, mechanism, tolerance=tolerance, longest=longest, **timing)
+    check = partial(checked, mechanism=mechanism, is_timed=bool(limits))
+    blocks, total = blocks_of(path, read, check, whole=as_json or drawn)
     told = Summary(mechanism)
     options = options_projecting(hold, projection)
     with nullcontext() if output is None else whole_file(output, inputs) as handle:
         followed = answered(mechanism, blocks, options, own_limits(mechanism) | limits, handle, told, total)
-    if picture_path is not None:
-        with picture(picture_path):
-            pf.plot_track(followed)
-    if film_path is not None:
-        with progress(f"drawing {film_path}") as on_progress:
-            pf.animate(followed, film_path, on_progress=on_progress)
-        click.echo(f"wrote {film_path}", err=True)
+    draw(followed, picture_path, film_path)
     if as_json:
         click.echo(json.dumps(as_object(followed), allow_nan=False))
     click.echo(told.line(), err=as_json or output == STANDARD)
@@ -143,6 +121,38 @@ def refuse_early(picture_path: Path | None, film_path: Path | None, inputs: tupl
         if path is not None:
             ending_checked(path, endings, inputs)
             require("pictures", "matplotlib", "plot")
+
+
+def blocks_of(
+    path: Path,
+    read: Callable[[], Iterator[paths.Path]],
+    check: Callable[[Iterator[paths.Path]], Iterator[paths.Path]],
+    *,
+    whole: bool,
+) -> tuple[Iterable[paths.Path], int | None]:
+    """The parts of a path, all in one if it is wanted whole, and how many targets there are, where that is known.
+
+    What can be read twice is checked to its end before anything is answered; the rest part by part.
+    """
+    from ..paths.path import joined
+
+    if whole:
+        block = joined(check(read()))
+        return [block], len(block.lines)
+    if path != STANDARD and path.is_file():
+        return read(), sum(len(block.lines) for block in check(read()))
+    return check(read()), None
+
+
+def draw(followed: Track, picture_path: Path | None, film_path: Path | None) -> None:
+    """Write the picture and the film that were asked for."""
+    if picture_path is not None:
+        with picture(picture_path):
+            pf.plot_track(followed)
+    if film_path is not None:
+        with progress(f"drawing {film_path}") as on_progress:
+            pf.animate(followed, film_path, on_progress=on_progress)
+        click.echo(f"wrote {film_path}", err=True)
 
 
 def answered(

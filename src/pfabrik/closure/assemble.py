@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..kernels.reaching import plan as P
-from ..motion.first_order import generic_of
+from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of, platform_poses
 from .configurations import Configurations

@@ -11,7 +11,9 @@ from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import FirstOrder, FirstOrderPlan
 from ..kernels.threads import in_blocks
 from ..motion.displacements import rate_units
-from ..motion.first_order import Singularity, actuated_columns, generic_of, graph_of, measures, singularity_of
+from ..motion.first_order import actuated_columns, graph_of
+from ..motion.mobility import generic_of
+from ..motion.singularities import Singularity, measures, singularity_of
 from ..tolerances import TOLERANCES
 from .close import closure_of
 
@@ -47,13 +49,7 @@ def singularities(mechanism: Mechanism, q: Floats) -> Singularity:
 def are_stretched(mechanism: Mechanism, q: Floats) -> Mask:
     """Whether links are stretched out or folded at coordinates q (n, c), so that they may bend either way, (n,)."""
     found = singularities(mechanism, q)
-    return np.asarray(np.minimum(found.serial, found.passive) < STRETCHED)
-
-
-STRETCHED = 1e-3
-"""Measure of singularity [L and rad] below which links count as stretched out or folded: it goes with the square root
-of a length, and what a search for the nearest pose leaves of a length is up to a millionth.
-"""
+    return np.asarray(np.minimum(found.serial, found.passive) < TOLERANCES.stretched)
 
 
 def _first_order(mechanism: Mechanism, q: Floats, *, whole: bool) -> FirstOrder:

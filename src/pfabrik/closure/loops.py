@@ -17,6 +17,7 @@ from ..description.mechanism import Joint, Mechanism
 from ..description.paths import Path, independent_paths
 from ..kernels.closure import loops as K
 from ..motion.displacements import columns
+from ..tolerances import TOLERANCES
 
 
 def loops_of(mechanism: Mechanism, *, whole: bool = True) -> K.Loops:
@@ -168,7 +169,9 @@ def _slides(
         body = passed.connects[1 if forward else 0]
         if passed.type == "prismatic":
             axis = np.array(mechanism.home_axis(passed.name)) * (1.0 if forward else -1.0)
-            if passed.along is None or np.linalg.norm(np.cross(axis, line)) > 1e-9 * np.linalg.norm(line):
+            if passed.along is None or np.linalg.norm(np.cross(axis, line)) > TOLERANCES.position * np.linalg.norm(
+                line
+            ):
                 found.append((places[passed.name].start, axis))
     return found
 

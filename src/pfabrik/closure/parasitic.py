@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..motion.first_order import around_home, generic_of
+from ..motion.mobility import generic_of
+from ..motion.walks import around_home
 from ..tolerances import TOLERANCES
 from .close import Closure, closure_of, platform_poses
 

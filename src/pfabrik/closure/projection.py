@@ -14,6 +14,7 @@ from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
 from ..kernels.reaching import plan as P
 from ..motion.displacements import displacements
+from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of
 from .descend import approached, weighed_limits
 from .known import corners_of
@@ -25,10 +26,6 @@ SAME = 1e-7
 
 HITS = 7
 """How many searches must end at the nearest configuration found before no other is looked for."""
-
-
-MISSED = 1e-6
-"""Most that an answer may miss of what it says it holds [L or rad]."""
 
 
 class Way(NamedTuple):
@@ -73,8 +70,8 @@ def held_back(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: W
 def kept(mechanism: Mechanism, holds: NDArray[np.int64], poses: Floats, targets: Floats) -> NDArray[np.int64]:
     """What poses (n, 4, 4) have of their targets, of what they were to hold: targets out of sight were not sought."""
     position, rotation = task_of(mechanism).errors(poses, targets)
-    turned = (holds == P.HOLD_ORIENTATION) & (rotation > MISSED)
-    moved = (holds == P.HOLD_POSITION) & (position > MISSED * mechanism.characteristic_length)
+    turned = (holds == P.HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
+    moved = (holds == P.HOLD_POSITION) & (position > TOLERANCES.held * mechanism.characteristic_length)
     return np.where(turned | moved, P.HOLD_NOTHING, holds)
 
 

@@ -9,6 +9,7 @@ from html import escape
 import numpy as np
 
 from ..arrays import Floats
+from ..tolerances import TOLERANCES
 from .joints import Joint
 from .places import Places, joint_places, joints_on
 from .structure import Structure
@@ -18,9 +19,6 @@ WIDTH, HEIGHT, MARGIN = 260.0, 200.0, 14.0
 
 RADIUS, HALF_SIDE = 3.5, 5.0
 """Sizes of a joint's circle, and of a slide's square, which is to be seen behind a joint in the same place [pixels]."""
-
-FLAT = 1e-6
-"""Joints that leave a plane by no more than this share of their spread lie in it."""
 
 VIEWER = np.array([1.0, -1.0, 1.0]) / math.sqrt(3.0)
 """Where a machine in space is seen from: x to the right, y to the back, z up, all at one scale."""
@@ -64,9 +62,9 @@ def sketch(mechanism: Structure, points: Mapping[str, Floats] | None = None, ref
 def _plane_of_view(places: Floats) -> Floats:
     """The directions that are drawn to the right and up, unit vectors as rows (2, 3)."""
     spreads, axes = np.linalg.svd(places - places.mean(axis=0))[1:]
-    is_planar = len(places) >= 3 and spreads[2] <= FLAT * spreads[0] < spreads[1]
+    is_planar = len(places) >= 3 and spreads[2] <= TOLERANCES.alignment * spreads[0] < spreads[1]
     normal = axes[2] * np.copysign(1.0, axes[2] @ VIEWER) if is_planar else VIEWER
-    upward = next(each for each in np.eye(3)[[2, 1]] if np.linalg.norm(np.cross(each, normal)) > FLAT)
+    upward = next(each for each in np.eye(3)[[2, 1]] if np.linalg.norm(np.cross(each, normal)) > TOLERANCES.alignment)
     right = np.cross(upward, normal)
     right /= np.linalg.norm(right)
     return np.array([right, np.cross(normal, right)])

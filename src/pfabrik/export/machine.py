@@ -13,7 +13,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import Task, task_of
 from ..errors import UnsupportedMechanism
 from ..kernels.legs import records as K
-from ..motion.first_order import generic_of
+from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .equations import Drive, Unit, drive_unit, units
 from .legs import LegCode, PivotShape, RodShape, leg_codes

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..kernels._jit import inlined, routine
+from ..tolerances import TOLERANCES
 
 Records: TypeAlias = NDArray[np.void]
 Statuses: TypeAlias = NDArray[np.int8]
@@ -21,9 +22,9 @@ BLOCK = 64
 # Rows of the table: twelve entries of the poses, how far their last rows are off, whether anything is exceeded (0 if
 # not), and behind these what the closed form needs.
 LAST_ROW, OVER, FREE = 12, 13, 14
-# Largest deviation of R^T R from I in a target (`Tolerances.rotation_matrix`), and below which it is left as it is: it
-# moves no point by more than a thousandth of what limits allow.
-NOT_A_ROTATION, ROUNDED = 1e-6, 1e-12
+# Largest deviation of R^T R from I in a target, and below which it is left as it is: it moves no point by more than a
+# thousandth of what limits allow.
+NOT_A_ROTATION, ROUNDED = TOLERANCES.rotation_matrix, 1e-12
 
 
 @routine

@@ -17,7 +17,7 @@ from ..description.mechanism import Mechanism
 from ..errors import Fault, InvalidMechanism, MobilityWarning
 from ..motion.displacements import centres, columns, displacements, screws
 from ..tolerances import TOLERANCES
-from .closing import CLOSED, DIGITS, Closer, Placed, bounds, closed
+from .closing import CLOSED, Closer, Placed, bounds, closed
 from .opened import ROWS, Loop, Note, OpenMechanism
 from .simplify import simplified
 from .straighten import straightened
@@ -85,10 +85,10 @@ def _placed(opened: OpenMechanism, closer: Closer, told: list[Note]) -> tuple[Pl
     tried = [closed(closer, free | (low > 0.0) | (high < 0.0), low, high) for free in (~driven,)]
     if tried[-1].gap > CLOSED:
         tried.append(closed(closer, everything, low, high))
-    if min(each.gap for each in tried) > DIGITS:
+    if min(each.gap for each in tried) > TOLERANCES.file_gap:
         tried.append(closed(closer, everything, np.full_like(low, -np.inf), np.full_like(high, np.inf)))
     best = next((each for each in tried if each.gap <= CLOSED), min(tried, key=lambda each: each.gap))
-    if best.gap > DIGITS:
+    if best.gap > TOLERANCES.file_gap:
         raise InvalidMechanism(_faults(opened, closer, best))
     beyond = {joint.name for joint, at in _outside(opened, best.q) if at}
     if beyond:
@@ -110,7 +110,7 @@ def _faults(opened: OpenMechanism, closer: Closer, best: Placed) -> list[Fault]:
     found = []
     for loop, before, after in zip(opened.loops, begin, closer.openings(best.q), strict=True):
         (far, turn), (was, _) = (tuple(float(np.linalg.norm(part)) for part in each) for each in (after, before))
-        if max(far, turn) > DIGITS:
+        if max(far, turn) > TOLERANCES.file_gap:
             by = f"{far * closer.length:.3g} {opened.length_unit} and {np.degrees(turn):.3g} deg"
             found.append(
                 (far + turn, f"open by {by} at best, from {was * closer.length:.3g} {opened.length_unit}", loop)

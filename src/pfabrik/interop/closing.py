@@ -13,6 +13,7 @@ from ..description.home_mobility import body_twist, column_joints
 from ..description.structure import Structure
 from ..motion.displacements import columns, displacements, rate_units, screws, stepped
 from ..rotations import angles_and_sines
+from ..tolerances import TOLERANCES
 from .opened import Loop, OpenMechanism
 
 STEPS = 200
@@ -20,9 +21,6 @@ STEPS = 200
 
 CLOSED = 1e-13
 """Gap that counts as none [L and rad]: rounding."""
-
-DIGITS = 1e-4
-"""Gap that the digits of a file may leave [L or rad]: more is a machine that cannot be closed."""
 
 STALLED = 1.0 - 1e-9
 """Share of the sum of squares that a step leaves where there is nothing left to gain."""
@@ -149,7 +147,7 @@ def closed(closer: Closer, free: NDArray[np.bool_], low: Floats, high: Floats) -
     home = np.where(free, np.clip(0.0, low, high), 0.0)
     best = _descended(closer, home, free, low, high)
     for _ in range(STARTS):
-        if best.gap <= DIGITS:
+        if best.gap <= TOLERANCES.file_gap:
             break
         astray = np.where(free, np.clip(home + rng.uniform(-STRAY, STRAY, len(home)) * units, low, high), home)
         tried = _descended(closer, astray, free, low, high)

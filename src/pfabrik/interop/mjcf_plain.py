@@ -24,7 +24,6 @@ KEPT: dict[str, tuple[str, ...]] = {
 }
 """Elements that say something of the kinematics, and those of their attributes that do."""
 
-SECTIONS = ("compiler", "default", "worldbody", "equality", "actuator", "keyframe")
 IN_DEFAULTS = ("default", "joint", "site")
 REFUSED = {
     "attach": "a model that attaches others",

@@ -18,7 +18,7 @@ from ..extras import require
 from ..fk import solve_fk
 from ..ik import solve_ik
 from ..motion.displacements import columns
-from ..motion.first_order import generic_of
+from ..motion.mobility import generic_of
 from ..poses import pose
 from ..rotations import to_quaternion
 from ..tolerances import TOLERANCES

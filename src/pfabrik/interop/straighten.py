@@ -15,10 +15,8 @@ from ..arrays import Floats
 from ..description.home_mobility import inexactness
 from ..description.joints import Joint
 from ..description.structure import Structure
+from ..tolerances import TOLERANCES
 from .opened import Note, OpenMechanism
-
-ROUNDED = 1e-3
-"""Angle up to which axes may have been meant to be parallel [rad]: `1.57` is off by 8e-4."""
 
 PARALLEL = 1e-15
 """Sine up to which they are."""
@@ -54,11 +52,11 @@ def _straight(joints: Sequence[Joint]) -> list[Joint]:
     for joint in joints:
         if joint.axis is not None:
             axis = np.array(joint.axis)
-            near = [mean for mean in means if _sine(mean, axis) < ROUNDED]
+            near = [mean for mean in means if _sine(mean, axis) < TOLERANCES.file_angle]
             if not near:
                 means.append(_mean([np.array(each.axis) for each in joints if each.axis is not None], axis))
     for place, mean in enumerate(means):
-        square = [other for other in means[:place] if abs(other @ mean) < ROUNDED]
+        square = [other for other in means[:place] if abs(other @ mean) < TOLERANCES.file_angle]
         if square:
             across = np.linalg.qr(np.array(square).T)[0]
             means[place] = mean - across @ (across.T @ mean)
@@ -68,13 +66,13 @@ def _straight(joints: Sequence[Joint]) -> list[Joint]:
 
 def _mean(axes: Sequence[Floats], axis: Floats) -> Floats:
     """The mean direction of the axes nearly parallel to one, to its side."""
-    total = np.sum([np.sign(each @ axis) * each for each in axes if _sine(each, axis) < ROUNDED], axis=0)
+    total = np.sum([np.sign(each @ axis) * each for each in axes if _sine(each, axis) < TOLERANCES.file_angle], axis=0)
     return np.asarray(total / np.linalg.norm(total))
 
 
 def _turned(joint: Joint, means: Sequence[Floats]) -> Joint:
     axis = np.array(joint.axis)
-    mean = next((each for each in means if _sine(each, axis) < 2.0 * ROUNDED), axis)
+    mean = next((each for each in means if _sine(each, axis) < 2.0 * TOLERANCES.file_angle), axis)
     return dataclasses.replace(joint, axis=np.sign(mean @ axis) * mean)
 
 

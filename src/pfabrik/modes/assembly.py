@@ -12,7 +12,7 @@ from ..closure.starts import random_starts
 from ..description.mechanism import Mechanism
 from ..errors import ContinuumOfSolutions, InvalidArgument
 from ..fk import Actuators, as_values, assembled
-from ..motion.first_order import stepped_freely
+from ..motion.walks import stepped_freely
 from ..tolerances import TOLERANCES
 from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes, as_count
 

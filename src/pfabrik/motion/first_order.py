@@ -1,11 +1,4 @@
-"""How a mechanism moves to first order: mobility, Jacobians, and how near it is to a singularity.
-
-All motions that the loops allow are combinations of orthonormal joint rates: the null space of the loop conditions C.
-On them, T gives the twist of the end effector and A the actuators' rates. The left singular vectors of [T; A], split
-into Q_T and Q_A, are the pairs (twist, actuator rates) that the mechanism can do, freed of passive rates and of any
-choice of joint coordinates. In suitable bases both are diagonal, cosines c and sines s with c² + s² = 1 (the CS
-decomposition): the forward Jacobian has the gains c / s and the inverse Jacobian s / c, which grow without bound as a
-sine (type 2) or a cosine (type 1) vanishes.
+"""How a mechanism moves to first order: what joint rates do to its loops and to its end effector.
 
 Here lengths are in units of L and twists are [velocity of the reference point; angular velocity], in the base frame, so
 nothing depends on the mechanism's unit, on where it stands, or on the order of its joints.
@@ -15,255 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..description.graph import tree_of
-from ..description.home_mobility import (
-    body_twist,
-    column_joints,
-    loop_conditions,
-    orthonormal_rates,
-)
+from ..description.home_mobility import body_twist, column_joints, loop_conditions, orthonormal_rates
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
-from ..tolerances import TOLERANCES
-from .displacements import end_effector_pose, gaps, loop_errors, screws, stepped
-
-KINDS = ("serial", "parallel", "constraint", "passive")
-SAMPLES, STEPS, STEP = 8, 3, 0.1
-"""Walks from home to generic configurations: how many, of how many steps, of which largest joint motion [rad or L]."""
-NEWTON_STEPS = 20
-"""Most steps to close the loops after one of them; a walk that takes more is left out."""
-
-
-@dataclass(frozen=True)
-class Mobility:
-    """How many independent motions a mechanism has in general; home may be special and is not taken for it.
-
-    Attributes
-    ----------
-    mobility : motions of the whole mechanism: platform + internal + idle.
-    platform : freedoms of the end effector.
-    internal : motions that move actuators while the end effector rests (kinematic redundancy).
-    idle : motions in which neither the end effector nor an actuator moves (the spin of a rod between ball joints).
-    actuators : number of actuated joints.
-    uncontrolled : freedoms that the end effector keeps with all actuators locked.
-    over_constraints : loop conditions that follow from the others.
-    """
-
-    mobility: int
-    platform: int
-    internal: int
-    idle: int
-    actuators: int
-    uncontrolled: int
-    over_constraints: int
-
-    @property
-    def redundancy(self) -> int:
-        """Actuators beyond the freedoms of the end effector; negative where there are too few."""
-        return self.actuators - self.platform
-
-
-@dataclass(frozen=True, eq=False)
-class Singularity:
-    """How near a configuration is to each kind of singularity: four measures that are 0 there, and grow with distance.
-
-    Measures are scale free (lengths in units of L, angles in rad), (...,) each; inf where nothing can be lost
-    or gained. Where `constraint` or `passive` is 0, the motions are not determined to first order, and the other
-    measures hold for one choice of several that are possible.
-
-    Attributes
-    ----------
-    serial : platform speed per actuator speed in the most expensive direction, 1 / |inverse Jacobian|. 0 is a type 1
-        singularity: actuators move, and the end effector has lost a freedom.
-    parallel : actuator speed per platform speed in the softest direction, 1 / |forward Jacobian|. 0 is a type 2
-        singularity: the end effector moves although all actuators are locked; always so where actuators are missing.
-    constraint : the smallest singular value of the loop conditions that is not zero in general. 0 is a constraint
-        singularity: the mechanism as a whole gains a motion.
-    passive : speed of end effector and actuators per speed of all joints in the motion that shows least of it. 0 is a
-        singularity of passive joints: they move while end effector and actuators, which have lost a freedom, rest.
-    lost, gained : unit twists [velocity of the reference point in L/s; angular velocity in rad/s] nearest to being lost
-        or gained, in the base frame, (..., 6); of a joint end effector, the unit velocity of its centre, (..., 3). They
-        belong to `serial` and `parallel`, or to `passive` and `constraint` where these are singular, and the smaller.
-    kinds : the kinds whose measure is below `TOLERANCES.singular`; for a batch, one tuple a row, in row order.
-    """
-
-    serial: float | Floats
-    parallel: float | Floats
-    constraint: float | Floats
-    passive: float | Floats
-    lost: Floats
-    gained: Floats
-    kinds: tuple[str, ...] | list[tuple[str, ...]]
-
-
-def measures(mechanism: Mechanism, q: Floats) -> Singularity:
-    """`singularity` at coordinates q, (n, c): arrays (n,) and (n, 6) or (n, 3), and a list of n tuples."""
-    invalid, q = _set_aside(q)
-    motion = _motion(mechanism, q)
-    serial, lost = _nearest_lost(generic_of(mechanism), motion)
-    parallel, gained = _nearest_gained(motion)
-    found = np.stack([serial, parallel, motion.constraint, motion.passive])
-    for array in (found.T, lost, gained):
-        array[invalid] = np.nan
-    return singularity_of(found.T, lost, gained)
-
-
-def singularity_of(found: Floats, lost: Floats, gained: Floats) -> Singularity:
-    """A `Singularity` of measures (n, 4), in the order of `KINDS`, and twists (n, r) of any length."""
-    near = TOLERANCES.singular > found
-    return Singularity(
-        serial=found[:, 0],
-        parallel=found[:, 1],
-        constraint=found[:, 2],
-        passive=found[:, 3],
-        lost=_unit(lost),
-        gained=_unit(gained),
-        kinds=[tuple(kind for kind, is_near in zip(KINDS, row, strict=True) if is_near) for row in near],
-    )
-
-
-def parallel_signs(mechanism: Mechanism, q: Floats) -> Floats:
-    """On which side of the parallel singularities coordinates q (n, c) are, (n,): 1 or -1; 0 on one; NaN if untold.
-
-    It is the sign of det Q_A det D'Q_T, the same for any basis of the motions, with D the directions of the end
-    effector's freedoms. It changes where the actuators lose hold, or the end effector a freedom. It is told where there
-    are as many actuators as freedoms, which are the same everywhere or those of the task.
-    """
-    invalid, q = _set_aside(q)
-    generic, freedoms = generic_of(mechanism), generic_of(mechanism).mobility.platform
-    axes, turns = task_of(mechanism).axes, task_of(mechanism).rotations
-    directions = generic.directions
-    if directions.shape[1] != freedoms:
-        turned = {0: (), 1: (5,), 2: (3, 4), 3: (3, 4, 5)}[turns]
-        directions = np.eye(6)[:, [*np.flatnonzero(axes).tolist(), *turned]]
-    if not len(mechanism.actuator_names) == directions.shape[1] == freedoms:
-        return np.full(len(q), np.nan)
-    motion = _motion(mechanism, q)
-    signs = np.sign(np.linalg.det(motion.actuators)) * np.sign(np.linalg.det(directions.T @ motion.twists))
-    return np.asarray(np.where(invalid, np.nan, signs))
-
-
-def _set_aside(q: Floats) -> tuple[NDArray[np.bool_], Floats]:
-    """Which rows are NaN, and q with home in their place."""
-    invalid = np.asarray(np.isnan(q).any(axis=1))
-    return invalid, np.where(invalid[:, None], 0.0, q)
-
-
-@dataclass(frozen=True)
-class _Motion:
-    """First-order motions at n configurations; r rows of a twist, d motions that show at platform or actuators.
-
-    Attributes
-    ----------
-    twists, actuators : Q_T (n, r, d) and Q_A (n, n_a, d): orthonormal together; a column is zero where it is lost.
-    all_twists : T on orthonormal joint rates, (n, r, motions).
-    passive, constraint : the measures of these names, (n,).
-    extra_twist, extra_rates : twist (n, r) and actuator rates (n, n_a) of the motion that the loops hold back least.
-    """
-
-    twists: Floats
-    actuators: Floats
-    all_twists: Floats
-    passive: Floats
-    constraint: Floats
-    extra_twist: Floats
-    extra_rates: Floats
-
-
-def _motion(mechanism: Mechanism, q: Floats) -> _Motion:
-    generic = generic_of(mechanism)
-    closure, twist = _first_order(mechanism, q)
-    actuated = actuated_columns(mechanism)
-    rank, shown = closure.shape[-1] - generic.mobility.mobility, generic.mobility.platform + generic.mobility.internal
-    values, right = _right_singular(closure)
-    motions = np.swapaxes(right[:, rank:], -1, -2)
-    left, sizes, _ = np.linalg.svd(np.concatenate([twist @ motions, motions[:, actuated]], axis=1), full_matrices=False)
-    pairs = left[..., :shown] * (sizes[:, None, :shown] > TOLERANCES.rank)
-    extra = right[:, rank - 1] if rank else np.zeros(q.shape)
-    return _Motion(
-        twists=pairs[:, : twist.shape[1]],
-        actuators=pairs[:, twist.shape[1] :],
-        all_twists=twist @ motions,
-        passive=sizes[:, shown - 1] if shown else np.full(len(q), np.inf),
-        constraint=values[:, rank - 1] if rank else np.full(len(q), np.inf),
-        extra_twist=np.einsum("nrc,nc->nr", twist, extra),
-        extra_rates=extra[:, actuated],
-    )
-
-
-def _nearest_lost(generic: Generic, motion: _Motion) -> tuple[Floats, Floats]:
-    """The serial measure (n,), and the direction (n, r) in which the platform is nearest to losing a freedom."""
-    freedoms = generic.mobility.platform
-    if freedoms == 0:
-        return np.full(len(motion.twists), np.inf), np.full(motion.twists.shape[:2], np.nan)
-    left, cosines, right = np.linalg.svd(generic.directions.T @ motion.twists)
-    sines = np.linalg.norm(motion.actuators @ np.swapaxes(right, -1, -2), axis=1)
-    ratios = _ratios(cosines[:, :freedoms], sines[:, :freedoms])
-    serial, lost = _least(ratios, left[..., :freedoms])
-    stuck = np.linalg.svd(generic.directions.T @ motion.all_twists)[0][..., freedoms - 1]
-    lost = np.where(_rules(motion.passive, serial)[:, None], stuck, lost)
-    return serial, lost @ generic.directions.T
-
-
-def _nearest_gained(motion: _Motion) -> tuple[Floats, Floats]:
-    """The parallel measure (n,), and the twist (n, r) that locked actuators and loops resist least."""
-    _, right = _right_singular(motion.actuators)
-    axes = np.swapaxes(right, -1, -2)
-    sines, twists = np.linalg.norm(motion.actuators @ axes, axis=1), motion.twists @ axes
-    parallel, gained = _least(_ratios(sines, np.linalg.norm(twists, axis=1)), twists)
-    held = np.einsum("nra,na->nr", motion.twists @ _pseudo_inverse(motion.actuators), motion.extra_rates)
-    freed = motion.extra_twist - held
-    moves = _rules(motion.constraint, parallel) & (np.linalg.norm(freed, axis=1) > TOLERANCES.alignment)
-    return parallel, np.where(moves[:, None], freed, gained)
-
-
-def _rules(measure: Floats, other: Floats) -> NDArray[np.bool_]:
-    """Whether the first kind of singularity has been met, and the other is not nearer still."""
-    return np.asarray(measure < np.minimum(other, TOLERANCES.singular))
-
-
-def _ratios(small: Floats, large: Floats) -> Floats:
-    """small / large; inf where the large vanishes: the pair is no motion, or one that costs nothing."""
-    return np.asarray(np.divide(small, large, out=np.full(small.shape, np.inf), where=large > TOLERANCES.rank))
-
-
-def _least(ratios: Floats, vectors: Floats) -> tuple[Floats, Floats]:
-    """The least of the ratios (n, k), and its column of the vectors (n, r, k); inf and NaN where there is none."""
-    ratios = np.concatenate([ratios, np.full((len(ratios), 1), np.inf)], axis=1)
-    vectors = np.concatenate([vectors, np.full((*vectors.shape[:2], 1), np.nan)], axis=2)
-    least = np.argmin(ratios, axis=1)
-    return np.min(ratios, axis=1), np.take_along_axis(vectors, least[:, None, None], axis=2)[..., 0]
-
-
-def _unit(vectors: Floats) -> Floats:
-    """Unit vectors (n, r), signed so that the largest component is positive; NaN for zero."""
-    largest = np.take_along_axis(vectors, np.argmax(np.abs(vectors), axis=1)[:, None], axis=1)
-    norms = np.linalg.norm(vectors, axis=1, keepdims=True) * np.where(largest < 0.0, -1.0, 1.0)
-    return vectors / np.where(norms == 0.0, np.nan, norms)
-
-
-def _pseudo_inverse(matrices: Floats, most: int | None = None) -> Floats:
-    """Pseudo-inverses of (n, a, b) at no more than the rank `most`, without singular values that are lost."""
-    left, values, right = np.linalg.svd(matrices, full_matrices=False)
-    kept = values > TOLERANCES.rank
-    kept[:, most:] = False if most is not None else kept[:, most:]
-    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
-    return np.asarray(np.swapaxes(right, -1, -2) @ (inverse[..., None] * np.swapaxes(left, -1, -2)))
-
-
-def _right_singular(matrices: Floats) -> tuple[Floats, Floats]:
-    """Singular values, and all right singular vectors as rows, of (n, a, b): (n, min(a, b)) and (n, b, b)."""
-    if 0 in matrices.shape[1:]:
-        n, _, b = matrices.shape
-        return np.zeros((n, 0)), np.broadcast_to(np.eye(b), (n, b, b))
-    _, values, right = np.linalg.svd(matrices)
-    return values, right
+from .displacements import end_effector_pose, screws, stepped
 
 
 def actuated_columns(mechanism: Mechanism) -> list[int]:
@@ -296,17 +48,17 @@ def graph_of(mechanism: Mechanism) -> Graph:
     return Graph(path, tree.loops[:, owners], orthonormal[:, owners], orthonormal_rates(mechanism))
 
 
-def _first_order(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats]:
+def first_order(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats]:
     """Loop conditions (n, 6 loops, c) and twist of the end effector (n, r, c), per orthonormal joint rate."""
     graph = graph_of(mechanism)
-    present = graph.rates @ _at_reference(mechanism, q, screws(mechanism, q))
+    present = graph.rates @ at_reference(mechanism, q, screws(mechanism, q))
     twist = body_twist(graph.path, present)
     velocity, angular = twist[:, 3:], twist[:, :3]
     rows = [velocity] if mechanism.end_effector_is_joint else [velocity, angular]
     return loop_conditions(graph.orthonormal, present), np.concatenate(rows, axis=1)
 
 
-def _at_reference(mechanism: Mechanism, q: Floats, origin_screws: Floats) -> Floats:
+def at_reference(mechanism: Mechanism, q: Floats, origin_screws: Floats) -> Floats:
     """Screws (n, k, 6) with the velocity of the present reference point in place of that at the base origin."""
     points = end_effector_pose(mechanism, q)[:, None, :3, 3] / mechanism.characteristic_length
     moved = origin_screws.copy()
@@ -314,95 +66,14 @@ def _at_reference(mechanism: Mechanism, q: Floats, origin_screws: Floats) -> Flo
     return moved
 
 
-@dataclass(frozen=True)
-class Generic:
-    """What holds in general: the counts, and an orthonormal basis (r, k) of all twists that the platform ever has."""
-
-    mobility: Mobility
-    directions: Floats
-
-
-@lru_cache(maxsize=64)
-def generic_of(mechanism: Mechanism) -> Generic:
-    closure, twist = _first_order(mechanism, around_home(mechanism))
-    values, right = _right_singular(closure)
-    ranks = _rank(values)
-    rank = int(ranks.max())
-    motions = np.swapaxes(right[ranks == rank, rank:], -1, -2)
-    twists, actuators = twist[ranks == rank] @ motions, motions[:, actuated_columns(mechanism)]
-    shown, platform, driven = (
-        int(_rank(np.linalg.svd(each, compute_uv=False)).max())
-        for each in (np.concatenate([twists, actuators], axis=1), twists, actuators)
-    )
-    counts = Mobility(
-        mobility=motions.shape[-1],
-        platform=platform,
-        internal=shown - platform,
-        idle=motions.shape[-1] - shown,
-        actuators=len(mechanism.actuator_names),
-        uncontrolled=shown - driven,
-        over_constraints=closure.shape[1] - rank,
-    )
-    left, sizes, _ = np.linalg.svd(np.hstack(list(twists)))
-    return Generic(counts, left[:, : int(_rank(sizes))])
-
-
-def _rank(values: NDArray[Any]) -> Any:
-    return np.count_nonzero(values > TOLERANCES.alignment, axis=-1)
-
-
-@lru_cache(maxsize=64)
-def around_home(mechanism: Mechanism) -> Floats:
-    """Home, and closed configurations some steps from it, (n, c): the same in every call."""
-    random = np.random.default_rng(0)
-    q = np.zeros((SAMPLES, len(column_joints(mechanism))))
-    for _ in range(STEPS):
-        conditions, _ = _first_order(mechanism, q)
-        step = random.standard_normal(q.shape)
-        step -= np.einsum("nij,nj->ni", np.linalg.pinv(conditions, TOLERANCES.alignment) @ conditions, step)
-        largest = np.abs(step).max(axis=1, keepdims=True)
-        q = _closed(mechanism, _moved(mechanism, q, STEP * step / np.maximum(largest, TOLERANCES.alignment)))
-    closed = gaps(mechanism, q) <= TOLERANCES.position * mechanism.characteristic_length
-    return np.concatenate([np.zeros((1, q.shape[1])), q[closed]])
-
-
-def _moved(mechanism: Mechanism, q: Floats, rates: Floats) -> Floats:
+def moved(mechanism: Mechanism, q: Floats, rates: Floats) -> Floats:
     return stepped(mechanism, q, rates @ graph_of(mechanism).rates)
 
 
-def _closed(mechanism: Mechanism, q: Floats) -> Floats:
-    """The loops closed by Gauss-Newton steps of the smallest joint motions; one more once they count as closed.
-
-    Directions in which the loops hardly resist are left alone, so that a walk may start in a singularity.
-    """
-    graph = graph_of(mechanism)
-    for _ in range(NEWTON_STEPS):
-        open_by = gaps(mechanism, q) / mechanism.characteristic_length
-        conditions = loop_conditions(graph.fundamental, graph.rates @ _at_reference(mechanism, q, screws(mechanism, q)))
-        errors = _at_reference(mechanism, q, loop_errors(mechanism, q)).reshape(len(q), -1)
-        step = np.einsum("nij,nj->ni", np.linalg.pinv(conditions, TOLERANCES.alignment), -errors)
-        q = _moved(mechanism, q, step)
-        if (open_by <= TOLERANCES.position).all():
-            break
-    return q
-
-
-def stepped_freely(mechanism: Mechanism, q: Floats, step: float) -> Floats:
-    """Coordinates (k, c), moved from one configuration q (c,) by a step along each motion that nothing hinders.
-
-    Those are the motions of the end effector with locked actuators to which the loops object, to first order, by less
-    than `TOLERANCES.singular`; whether they go on is for the caller to see.
-
-    Parameters
-    ----------
-    step : of the end effector [L or rad].
-    """
-    closure, twist = _first_order(mechanism, q[None])
-    free = np.setdiff1d(np.arange(q.size), actuated_columns(mechanism))
-    values, right = _right_singular(closure[..., free])
-    motions = right[0, np.count_nonzero(values > TOLERANCES.singular) :].T
-    _, sizes, axes = np.linalg.svd(twist[0][:, free] @ motions, full_matrices=False)
-    shown = sizes > TOLERANCES.singular
-    rates = np.zeros((int(shown.sum()), q.size))
-    rates[:, free] = axes[shown] @ motions.T / sizes[shown, None]
-    return _moved(mechanism, np.repeat(q[None], len(rates), axis=0), step * rates)
+def right_singular(matrices: Floats) -> tuple[Floats, Floats]:
+    """Singular values, and all right singular vectors as rows, of (n, a, b): (n, min(a, b)) and (n, b, b)."""
+    if 0 in matrices.shape[1:]:
+        n, _, b = matrices.shape
+        return np.zeros((n, 0)), np.broadcast_to(np.eye(b), (n, b, b))
+    _, values, right = np.linalg.svd(matrices)
+    return values, right

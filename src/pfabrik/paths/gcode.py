@@ -28,6 +28,16 @@ MESSAGES = ("M117", "M118")
 FARTHEST = 1e9
 """Numbers beyond are no places of a machine."""
 
+ROUNDING = 1e-12
+"""Share by which a length may be longer than so many steps: what dividing it leaves."""
+
+OFF_ROUND, DIGITS = 1e-3, 1e-6
+"""Shares of an arc's radius by which its ends may differ in theirs, as other readers have it, and by which a radius
+may be too short for them: programs are written with some six digits."""
+
+FULL_TURN = 1e-9
+"""Angle of an arc whose ends are one place, which goes all the way round, up to rounding [rad]."""
+
 
 class Step(NamedTuple):
     """A place on the way: x, y, z, and a, b, c [deg]; the feed toward it, as of a `Path`; the line."""
@@ -147,7 +157,7 @@ def _move(state: State, words: dict[str, list[float]], number: int, tolerance: f
 def _parts(length: float, longest: float, number: int) -> int:
     if length / longest > FARTHEST:
         raise WrongPath(f"line {number}: a move of {length:g}, in steps of {longest:g}: too many")
-    return max(1, math.ceil(length / longest * (1.0 - 1e-12)))
+    return max(1, math.ceil(length / longest * (1.0 - ROUNDING)))
 
 
 def _arc(
@@ -163,11 +173,11 @@ def _arc(
         offsets = [words.get(OFFSETS[axis], [0.0])[-1] * state.unit for axis in plane[:2]]
         centre = np.array(offsets)
     radius, off = float(np.hypot(*centre)), float(np.hypot(*(chord - centre)))
-    if not radius > 0.0 or abs(radius - off) > max(1e-3 * radius, 2.0 * tolerance):
+    if not radius > 0.0 or abs(radius - off) > max(OFF_ROUND * radius, 2.0 * tolerance):
         raise WrongPath(f"line {number}: an arc from radius {radius:g} to {off:g}; expected the same")
     start, stop = math.atan2(-centre[1], -centre[0]), math.atan2(*(chord - centre)[::-1])
     turn = (sense * (stop - start)) % (2.0 * math.pi)
-    turn = 2.0 * math.pi if turn < 1e-9 else turn
+    turn = 2.0 * math.pi if turn < FULL_TURN else turn
     flat = 2.0 * math.acos(max(1.0 - tolerance / radius, 0.0)) if tolerance < radius else math.pi / 2.0
     count = max(_parts(radius * turn, longest, number), math.ceil(turn / flat))
     for part in range(1, count):
@@ -183,7 +193,7 @@ def _arc(
 def _centre_of(chord: Floats, radius: float, sense: float, number: int) -> Floats:
     """The centre of an arc given by its radius; a negative one is that of the longer arc."""
     half = float(np.hypot(*chord)) / 2.0
-    if half == 0.0 or half > abs(radius) * (1.0 + 1e-6):
+    if half == 0.0 or half > abs(radius) * (1.0 + DIGITS):
         raise WrongPath(f"line {number}: found R{radius:g} for ends {2.0 * half:g} apart; expected at least half of it")
     height = math.sqrt(max(radius * radius - half * half, 0.0)) * math.copysign(1.0, radius) * sense
     return chord / 2.0 + height * np.array([-chord[1], chord[0]]) / (2.0 * half)

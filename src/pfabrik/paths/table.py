@@ -13,7 +13,7 @@ from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..errors import near_miss
-from ..motion.first_order import generic_of
+from ..motion.mobility import generic_of
 from ..poses import pose
 from ..tolerances import TOLERANCES
 from .numbers import is_finite

@@ -15,6 +15,7 @@ from ..answers.words import short_names
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..ik import solve_ik
+from ..tolerances import TOLERANCES
 from ..track import track
 from .checking import Feasibility, feasibility
 from .closest import Comparison, compare
@@ -174,7 +175,7 @@ def summary(found: Robustness) -> dict[str, Any]:
         "projected": int(found.projected.sum()),
         **found.feasibility._asdict(),
         "largest_distance": float(found.solution.position_error.max()),
-        "orientation_given_up": int((found.solution.rotation_error > 1e-9).sum()),
+        "orientation_given_up": int((found.solution.rotation_error > TOLERANCES.rotation).sum()),
         "compared": len(found.compared),
         **ratio_cells("ratio", found.ratios),
         **ratio_cells("exact_ratio", found.exact_ratios),

@@ -11,10 +11,8 @@ from ..answers.differential import forward_jacobian, inverse_jacobian
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
 from ..errors import InvalidArgument
+from ..tolerances import TOLERANCES
 from .time_path import limits_of
-
-MISSED = 1e-6
-"""How far a twist may be from one that the machine makes, as a share of it, to count as one."""
 
 
 class PlatformSpeed(NamedTuple):
@@ -85,14 +83,14 @@ def _fastest(
 
 
 def _is_made(wanted: Floats, made: Floats, sizes: Floats) -> bool:
-    return bool(np.linalg.norm((made - wanted) / sizes) <= MISSED * np.linalg.norm(wanted / sizes))
+    return bool(np.linalg.norm((made - wanted) / sizes) <= TOLERANCES.alignment * np.linalg.norm(wanted / sizes))
 
 
 def _slowest(inverse: Floats, forward: Floats, sizes: Floats, limits: Floats) -> Floats | None:
     """The translation at which some actuator meets its limit first, among those that the machine makes."""
     keeps = (forward @ inverse - np.eye(len(sizes)))[:, :3] / sizes[:, None] * sizes[0]
     _, values, right = np.linalg.svd(keeps)
-    free = right[values <= MISSED]
+    free = right[values <= TOLERANCES.alignment]
     if not len(free):
         return None
     rows = inverse[:, :3] @ free.T / limits[:, None]

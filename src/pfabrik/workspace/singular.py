@@ -15,7 +15,7 @@ from ..arrays import Floats, Ints
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..ik import solve_ik
-from ..motion.first_order import Singularity, parallel_signs
+from ..motion.singularities import Singularity, parallel_signs
 from ..options import Options
 from ..telling import OnProgress, telling
 from .lattice import codes, corners

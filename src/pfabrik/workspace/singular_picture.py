@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..motion.first_order import Singularity
+from ..motion.singularities import Singularity
 from .drawing import SMALL, axes_for
 from .picture import labels, shown
 from .region import Region

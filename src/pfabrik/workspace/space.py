@@ -13,7 +13,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..errors import InvalidArgument, UnknownName
 from ..motion.displacements import columns, home_coordinates
-from ..motion.first_order import generic_of
+from ..motion.mobility import generic_of
 from ..poses import SupportsMatrix, is_rotation
 from ..rotations import from_rotvec
 from ..targets import as_targets
@@ -56,11 +56,6 @@ class Space:
     def units(self) -> tuple[str, ...]:
         """The unit of each coordinate: that of lengths, or "rad"."""
         return tuple("rad" if turns else self.mechanism.length_unit for turns in self.is_angle)
-
-    @property
-    def period(self) -> Floats:
-        """Beyond half of what a coordinate repeats itself, (d,) [rad]; inf for lengths."""
-        return np.where(self.is_angle, 2.0 * np.pi, np.inf)
 
     def with_fixed(self, fixed: Mapping[str, float]) -> Space:
         """With coordinates fixed that vary here."""

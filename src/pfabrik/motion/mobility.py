@@ -1,0 +1,82 @@
+"""How many independent motions a mechanism has in general, counted at configurations around home."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..description.mechanism import Mechanism
+from ..tolerances import TOLERANCES
+from .first_order import actuated_columns, first_order, right_singular
+from .walks import around_home
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """How many independent motions a mechanism has in general; home may be special and is not taken for it.
+
+    Attributes
+    ----------
+    mobility : motions of the whole mechanism: platform + internal + idle.
+    platform : freedoms of the end effector.
+    internal : motions that move actuators while the end effector rests (kinematic redundancy).
+    idle : motions in which neither the end effector nor an actuator moves (the spin of a rod between ball joints).
+    actuators : number of actuated joints.
+    uncontrolled : freedoms that the end effector keeps with all actuators locked.
+    over_constraints : loop conditions that follow from the others.
+    """
+
+    mobility: int
+    platform: int
+    internal: int
+    idle: int
+    actuators: int
+    uncontrolled: int
+    over_constraints: int
+
+    @property
+    def redundancy(self) -> int:
+        """Actuators beyond the freedoms of the end effector; negative where there are too few."""
+        return self.actuators - self.platform
+
+
+@dataclass(frozen=True)
+class Generic:
+    """What holds in general: the counts, and an orthonormal basis (r, k) of all twists that the platform ever has."""
+
+    mobility: Mobility
+    directions: Floats
+
+
+@lru_cache(maxsize=64)
+def generic_of(mechanism: Mechanism) -> Generic:
+    closure, twist = first_order(mechanism, around_home(mechanism))
+    values, right = right_singular(closure)
+    ranks = _rank(values)
+    rank = int(ranks.max())
+    motions = np.swapaxes(right[ranks == rank, rank:], -1, -2)
+    twists, actuators = twist[ranks == rank] @ motions, motions[:, actuated_columns(mechanism)]
+    shown, platform, driven = (
+        int(_rank(np.linalg.svd(each, compute_uv=False)).max())
+        for each in (np.concatenate([twists, actuators], axis=1), twists, actuators)
+    )
+    counts = Mobility(
+        mobility=motions.shape[-1],
+        platform=platform,
+        internal=shown - platform,
+        idle=motions.shape[-1] - shown,
+        actuators=len(mechanism.actuator_names),
+        uncontrolled=shown - driven,
+        over_constraints=closure.shape[1] - rank,
+    )
+    left, sizes, _ = np.linalg.svd(np.hstack(list(twists)))
+    return Generic(counts, left[:, : int(_rank(sizes))])
+
+
+def _rank(values: NDArray[Any]) -> Any:
+    return np.count_nonzero(values > TOLERANCES.alignment, axis=-1)

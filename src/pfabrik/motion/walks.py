@@ -1,0 +1,72 @@
+"""Walks from a configuration along motions that the loops allow, or hardly hinder."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.home_mobility import column_joints, loop_conditions
+from ..description.mechanism import Mechanism
+from ..tolerances import TOLERANCES
+from .displacements import gaps, loop_errors, screws
+from .first_order import actuated_columns, at_reference, first_order, graph_of, moved, right_singular
+
+SAMPLES, STEPS, STEP = 8, 3, 0.1
+"""Walks from home to generic configurations: how many, of how many steps, of which largest joint motion [rad or L]."""
+NEWTON_STEPS = 20
+"""Most steps to close the loops after one of them; a walk that takes more is left out."""
+
+
+@lru_cache(maxsize=64)
+def around_home(mechanism: Mechanism) -> Floats:
+    """Home, and closed configurations some steps from it, (n, c): the same in every call."""
+    random = np.random.default_rng(0)
+    q = np.zeros((SAMPLES, len(column_joints(mechanism))))
+    for _ in range(STEPS):
+        conditions, _ = first_order(mechanism, q)
+        step = random.standard_normal(q.shape)
+        step -= np.einsum("nij,nj->ni", np.linalg.pinv(conditions, TOLERANCES.alignment) @ conditions, step)
+        largest = np.abs(step).max(axis=1, keepdims=True)
+        q = _closed(mechanism, moved(mechanism, q, STEP * step / np.maximum(largest, TOLERANCES.alignment)))
+    closed = gaps(mechanism, q) <= TOLERANCES.position * mechanism.characteristic_length
+    return np.concatenate([np.zeros((1, q.shape[1])), q[closed]])
+
+
+def _closed(mechanism: Mechanism, q: Floats) -> Floats:
+    """The loops closed by Gauss-Newton steps of the smallest joint motions; one more once they count as closed.
+
+    Directions in which the loops hardly resist are left alone, so that a walk may start in a singularity.
+    """
+    graph = graph_of(mechanism)
+    for _ in range(NEWTON_STEPS):
+        open_by = gaps(mechanism, q) / mechanism.characteristic_length
+        conditions = loop_conditions(graph.fundamental, graph.rates @ at_reference(mechanism, q, screws(mechanism, q)))
+        errors = at_reference(mechanism, q, loop_errors(mechanism, q)).reshape(len(q), -1)
+        step = np.einsum("nij,nj->ni", np.linalg.pinv(conditions, TOLERANCES.alignment), -errors)
+        q = moved(mechanism, q, step)
+        if (open_by <= TOLERANCES.position).all():
+            break
+    return q
+
+
+def stepped_freely(mechanism: Mechanism, q: Floats, step: float) -> Floats:
+    """Coordinates (k, c), moved from one configuration q (c,) by a step along each motion that nothing hinders.
+
+    Those are the motions of the end effector with locked actuators to which the loops object, to first order, by less
+    than `TOLERANCES.singular`; whether they go on is for the caller to see.
+
+    Parameters
+    ----------
+    step : of the end effector [L or rad].
+    """
+    closure, twist = first_order(mechanism, q[None])
+    free = np.setdiff1d(np.arange(q.size), actuated_columns(mechanism))
+    values, right = right_singular(closure[..., free])
+    motions = right[0, np.count_nonzero(values > TOLERANCES.singular) :].T
+    _, sizes, axes = np.linalg.svd(twist[0][:, free] @ motions, full_matrices=False)
+    shown = sizes > TOLERANCES.singular
+    rates = np.zeros((int(shown.sum()), q.size))
+    rates[:, free] = axes[shown] @ motions.T / sizes[shown, None]
+    return moved(mechanism, np.repeat(q[None], len(rates), axis=0), step * rates)
