@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import re
+import runpy
 import shlex
 import shutil
-import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner, Result
 
 import pfabrik as pf
+from pfabrik.cli import main
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *ROOT.glob("docs/**/*.md")])
@@ -39,11 +41,20 @@ def files_named(page: Path) -> list[str]:
     return re.findall(r"`((?:\w+/)*(?:\w+\.py|\w+/))`", page.read_text(encoding="utf-8"))
 
 
-def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Python in a folder of its own, with this package, warnings being errors."""
-    environment = os.environ | {"PYTHONPATH": str(Path(pf.__file__).parents[1])}
-    command = [sys.executable, "-W", "error", *arguments]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder of one's own to work in, and no figure left open behind."""
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
+
+
+def pfabrik(line: str) -> Result:
+    """A command line, words after #, its errors and warnings among what fails."""
+    result = CliRunner().invoke(main, shlex.split(line, comments=True)[1:])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
 
 
 def test_there_is_something_to_check() -> None:
@@ -85,17 +96,17 @@ def test_every_page_is_on_the_map(page: Path) -> None:
         for number, code in enumerate(blocks(page, "python"), 1)
     ],
 )
-def test_python_blocks_run_as_they_are_written(code: str, tmp_path: Path) -> None:
-    done = python(tmp_path, "-c", code)
-    assert done.returncode == 0, done.stderr
+@pytest.mark.usefixtures("folder")
+def test_python_blocks_run_as_they_are_written(code: str) -> None:
+    exec(compile(code, "<block>", "exec"), {"__name__": "__main__"})
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
-def test_examples_run(example: Path, tmp_path: Path) -> None:
-    done = python(tmp_path, str(example))
-    assert done.returncode == 0, done.stderr
-    assert done.stdout
+@pytest.mark.usefixtures("folder")
+def test_examples_run(example: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    runpy.run_path(str(example), run_name="__main__")
+    assert capsys.readouterr().out
 
 
 def test_the_worked_example_is_a_mechanism_that_can_be_solved(tmp_path: Path) -> None:
@@ -106,15 +117,15 @@ def test_the_worked_example_is_a_mechanism_that_can_be_solved(tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_the_worked_example_prints_what_the_page_shows(tmp_path: Path) -> None:
+def test_the_worked_example_prints_what_the_page_shows(folder: Path) -> None:
     (text,) = blocks(FORMAT, "toml")
     shown = [block.partition("\n") for block in blocks(FORMAT, "") if block.startswith("$ pfabrik ")]
     assert len(shown) == 4
     for line, _, expected in shown:
         faulty = " found " in expected
         written = misspelt(text) if faulty else text
-        (tmp_path / "hexapod.toml").write_text(written, encoding="utf-8")
-        done = python(tmp_path, "-m", "pfabrik", *shlex.split(line)[2:])
+        (folder / "hexapod.toml").write_text(written, encoding="utf-8")
+        done = pfabrik(line.removeprefix("$ "))
         found = done.stderr if faulty else done.stdout
         assert without_noise(found) == without_noise(expected), line
 
@@ -128,18 +139,18 @@ def without_noise(text: str) -> list[str]:
     return [line.rstrip() for line in text.splitlines() if not line.startswith(NOISE)]
 
 
+LINES = [line for block in blocks(ROOT / "README.md", "") for line in block.splitlines() if line.startswith("pfabrik ")]
+ELSEWHERE = ("pfabrik demo --quick", "pfabrik reproduce --quick")
+"""Commands that take long, and that tests of their own run just so."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "line",
-    [line for block in blocks(ROOT / "README.md", "") for line in block.splitlines() if line.startswith("pfabrik ")],
-)
-def test_commands_of_the_readme_answer(line: str, tmp_path: Path) -> None:
-    pf.save(pf.load("five_bar"), tmp_path / "my_machine.toml")
-    (tmp_path / "path.csv").write_text("x,y,z\n0,0,190\n0,0,300\n", encoding="utf-8")
-    if "demo" in line:
-        pytest.importorskip("matplotlib")
-    done = python(tmp_path, "-m", "pfabrik", *shlex.split(line, comments=True)[1:])
-    assert done.returncode in (0, 1), done.stderr
+@pytest.mark.parametrize("line", [line for line in LINES if not line.startswith(ELSEWHERE)])
+def test_commands_of_the_readme_answer(line: str, folder: Path) -> None:
+    pf.save(pf.load("five_bar"), folder / "my_machine.toml")
+    (folder / "path.csv").write_text("x,y,z\n0,0,190\n0,0,300\n", encoding="utf-8")
+    done = pfabrik(line)
+    assert done.exit_code in (0, 1), done.stderr
     assert done.stdout
 
 
@@ -151,12 +162,12 @@ DRAWN = re.compile(r"pfabrik .*figures/[\w.]+\.(?:png|gif)")
 @pytest.mark.parametrize(
     "line", [line for block in blocks(SEEING, "") for line in block.splitlines() if DRAWN.fullmatch(line)]
 )
-def test_pictures_are_made_by_the_commands_shown_beside_them(line: str, tmp_path: Path) -> None:
+def test_pictures_are_made_by_the_commands_shown_beside_them(line: str, folder: Path) -> None:
     pytest.importorskip("matplotlib")
     (made,) = re.findall(r"figures/[\w.]+$", line)
     assert f"]({made})" in SEEING.read_text(encoding="utf-8")
     shown = (ROOT / "docs" / made).stat().st_size
-    shutil.copytree(ROOT / "docs" / "figures", tmp_path / "figures", ignore=shutil.ignore_patterns(Path(made).name))
-    done = python(tmp_path, "-m", "pfabrik", *shlex.split(line)[1:])
-    assert done.returncode in (0, 1), done.stderr
-    assert (tmp_path / made).stat().st_size == pytest.approx(shown, rel=0.2), "run the command again, in docs/"
+    shutil.copytree(ROOT / "docs" / "figures", folder / "figures", ignore=shutil.ignore_patterns(Path(made).name))
+    done = pfabrik(line)
+    assert done.exit_code in (0, 1), done.stderr
+    assert (folder / made).stat().st_size == pytest.approx(shown, rel=0.2), "run the command again, in docs/"

@@ -17,11 +17,13 @@ from click.testing import CliRunner
 import oracles
 import pfabrik as pf
 from pfabrik.cli import main
+from pfabrik.reproduce import efficacy, robustness
 from pfabrik.reproduce.closest import nearest_distance
 from pfabrik.reproduce.efficacy import angles_between
 from pfabrik.reproduce.feasible import model_of, worst_excess
 from pfabrik.reproduce.report import BEGIN, END, put_into
-from pfabrik.reproduce.study import cases
+from pfabrik.reproduce.study import QUICK, cases
+from pfabrik.reproduce.tables import write_csv
 
 MACHINES = ("five_bar", "stewart", "nrpm")
 SUMMARIES = ("efficacy.csv", "efficiency.csv", "robustness.csv")
@@ -146,6 +148,18 @@ def test_the_readme_changes_between_its_marks_only(folder: Path) -> None:
 
 
 @pytest.mark.slow
+def test_the_same_numbers_come_out_of_another_process(folder: Path, tmp_path: Path) -> None:
+    case = cases()[0]
+    found = {
+        f"efficacy_{case.key}.csv": efficacy.steps(efficacy.run(case, QUICK, lambda: None)),
+        f"robustness_{case.key}.csv": robustness.steps(robustness.run(case, QUICK, lambda: None)),
+    }
+    for name, numbers in found.items():
+        write_csv(tmp_path / name, numbers)
+        assert (tmp_path / name).read_bytes() == (folder / "out" / name).read_bytes(), name
+
+
+@pytest.mark.campaign
 def test_the_same_numbers_come_out_of_every_run(folder: Path, tmp_path: Path) -> None:
     assert reproduce(tmp_path).returncode == 0
     first = {path.name: path.read_bytes() for path in (folder / "out").glob("*.csv")}
