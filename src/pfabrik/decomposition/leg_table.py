@@ -20,7 +20,7 @@ from ..description.task import task_of
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
 from .decompose import decompose
-from .legs import Item, KeptAxis, LegForm, NoLeg, Pivot, Rod, holds_spin, legs_of_chain
+from .legs import Arm, Item, KeptAxis, LegForm, NoLeg, Pivot, Rod, holds_spin, keeps_from_spinning, legs_of_chain
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -63,8 +63,15 @@ class LegTable:
 
     @property
     def home_sides(self) -> Floats:
-        """Which of two solutions each leg takes at home, (1, legs)."""
+        """Which of two solutions each leg takes at home, and where arms are, (1, legs)."""
         return np.array(self.legs["side"], dtype=float)[None]
+
+    @cached_property
+    def arms(self) -> Records:
+        """The coordinates of arms, which poses leave open; their columns count them."""
+        arms = self.known[self.legs["kind"][self.known["leg"]] == K.ARM]
+        arms["column"] = np.arange(len(arms))
+        return arms
 
     @cached_property
     def is_for_blocks(self) -> bool:
@@ -89,6 +96,15 @@ def leg_table(mechanism: Mechanism) -> LegTable | str:
         return _table(mechanism)
     except NoLeg as reason:
         return str(reason)
+
+
+def table_without_arms(mechanism: Mechanism) -> LegTable | str:
+    """A mechanism's table of legs if a pose leaves none of their limits open, or the reason why it has none."""
+    table = leg_table(mechanism)
+    if isinstance(table, str) or not len(table.arms):
+        return table
+    names = dict.fromkeys(item.joint.name for form in table.forms if isinstance(form, Arm) for item in form.items)
+    return f"poses leave joints {', '.join(names)} open"
 
 
 def legs_answer(mechanism: Mechanism) -> bool:
@@ -172,6 +188,9 @@ def _places(form: LegForm) -> Iterator[tuple[Item, int]]:
     """Items whose coordinates a leg tells, each with its place in the leg's values."""
     if isinstance(form, KeptAxis):
         return
+    if isinstance(form, Arm):
+        yield form.item, K.CARRIER
+        return
     if isinstance(form, Pivot):
         yield from ((item, K.HEAD + place) for place, item in enumerate(form.slides))
         if form.ending.kind != "ball":
@@ -217,6 +236,8 @@ def _coordinate(mechanism: Mechanism, leg: int, item: Item, place: int) -> tuple
 def _record(mechanism: Mechanism, form: LegForm) -> Records:
     if isinstance(form, Rod):
         return _rod_record(mechanism, form)
+    if isinstance(form, Arm):
+        return _arm_record(form)
     return _pivot_record(mechanism, form) if isinstance(form, Pivot) else _kept_axis_record(form)
 
 
@@ -262,6 +283,14 @@ def _kept_axis_record(form: KeptAxis) -> Records:
     return record
 
 
+def _arm_record(arm: Arm) -> Records:
+    record = np.zeros((), K.LEG)
+    record["kind"], record["reversed"], record["on_arm"] = K.ARM, arm.is_reversed, arm.is_on_arm
+    record["carrier"] = _CARRIERS[arm.item.kind]
+    record["carrier_axis"], record["carrier_point"] = arm.item.axis, arm.item.point
+    return record
+
+
 def _put_axis_rows(record: Records, kind: str, axes: Floats) -> None:
     pairs = _axis_pairs(kind, axes)
     record["axis_rows"], record["upright"] = len(pairs), {"hinge": 1, "weld": 3}.get(kind, 0)
@@ -297,8 +326,7 @@ def _rod_record(mechanism: Mechanism, rod: Rod) -> Records:
         axes = _axes(ending.items[::order])
         record[end], record[f"{end}_axes"] = _ENDINGS[ending.kind], axes
         record[f"{end}_side"] = _home_side(axes, line) if ending.kind == "cross" else 0.0
-    ends = (rod.foot_ending, rod.head_ending)
-    record["twists"] = all(map(holds_spin, ends)) and rod.twist is None and not rod.beside
+    record["twists"] = keeps_from_spinning(rod)
     foot_mark, head_mark = rod.foot_ending.items[-1].axis, rod.head_ending.items[0].axis
     flat = foot_mark @ head_mark - (line @ foot_mark) * (line @ head_mark)
     record["twist"] = math.atan2(line @ np.cross(foot_mark, head_mark), flat)
@@ -371,6 +399,9 @@ def _row_counts(legs: Records) -> list[int]:
     for leg in legs:
         if leg["kind"] == K.PIVOT:
             counts.append(int(3 - leg["slides"] + leg["axis_rows"]))
+            continue
+        if leg["kind"] == K.ARM:
+            counts.append(0)
             continue
         is_rigid = not leg["slides"] and leg["carrier"] in (K.NO_CARRIER, K.SHARED)
         hinges = int(leg["foot"] == K.HINGE) + int(leg["head"] == K.HINGE)

@@ -4,11 +4,12 @@ With every joint as hinges (R), slides (P) and balls (S) in series, a chain is
 
 - a rod: at most one carrier (R or P), a foot ending, a rigid or sliding rod, a head ending; the carrier of a rigid
   rod is turned until the rod reaches;
-- a pivot: slides, then one ending of no length.
+- a pivot: slides, then one ending of no length;
+- arms: hinges and slides that carry sliding rods, which reach wherever arms are: their coordinates are free.
 
 Endings are a hinge, two that cross, three through one point, or a ball. Where a chain branches, its first branch places
-the carrier and the others are rods on it. A pinned parallelogram between two parallel hinges is a rod between pairs of
-crossed hinges, and an axis that the platform keeps.
+the carrier and the others are rods on it, or all are rods on its arms. A pinned parallelogram between two parallel
+hinges is a rod between pairs of crossed hinges, and an axis that the platform keeps.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ Kind = Literal["R", "P", "S"]
 EndingKind = Literal["weld", "hinge", "cross", "triple", "ball"]
 
 NO_AXIS = np.zeros(3)
-MOST_HINGES = 3
-"""Hinges of the largest ending."""
+MOST_HINGES, MOST_ARMS = 3, 3
+"""Hinges of the largest ending, and arms of a chain."""
 
 
 class NoLeg(Exception):
@@ -132,7 +133,20 @@ class KeptAxis:
         return self.ending.items
 
 
-LegForm = Rod | Pivot | KeptAxis
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A hinge or slide that carries sliding rods; see above."""
+
+    item: Item
+    is_on_arm: bool
+    is_reversed: bool
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        return (self.item,)
+
+
+LegForm = Rod | Pivot | KeptAxis | Arm
 
 
 def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
@@ -151,18 +165,33 @@ def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
         return _with_parallelogram(mechanism, chain, loops[0])
     if loops:
         raise NoLeg("has a loop of its own")
-    return (_leg(_items(mechanism, chain.steps), most_carriers=1),)
+    return _leg(_items(mechanism, chain.steps), most_carriers=1)
 
 
 def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
-    """Rods on one carrier."""
+    """Rods on one carrier, or on arms."""
     trunk = _items(mechanism, chain.trunk)
     first, *others = (_items(mechanism, branch) for branch in chain.branches)
+    if any(item.kind == "P" for item in first):
+        return _on_arms(trunk, (first, *others), is_reversed=False)
     if len(trunk) != 1:
         raise NoLeg("several joints carry its branches")
     main = _rod(trunk[0], first, is_reversed=False)
     rods = [_rod(None, other, is_reversed=False) for other in others]
     return (main, *(replace(rod, is_shared=True) for rod in rods))
+
+
+def _on_arms(trunk: Sequence[Item], branches: Sequence[list[Item]], is_reversed: bool) -> tuple[LegForm, ...]:
+    """Sliding rods on arms: the platform is anywhere, wherever those are."""
+    if len(trunk) > MOST_ARMS or any(item.kind == "S" for item in trunk):
+        raise NoLeg("several joints carry its branches")
+    rods = [_rod(None, branch, is_reversed) for branch in branches]
+    for rod in rods:
+        ends = rod.foot_ending, rod.head_ending
+        if rod.slide is None or any(end.kind == "hinge" for end in ends) or keeps_from_spinning(rod):
+            raise NoLeg("arms carry rods that do not let the platform go wherever it may be wanted")
+    arms = [Arm(item, place > 0, is_reversed) for place, item in enumerate(trunk)]
+    return (*arms, *(replace(rod, is_shared=True) for rod in rods))
 
 
 def _with_parallelogram(mechanism: Mechanism, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
@@ -269,7 +298,7 @@ def _area(a: Floats, b: Floats) -> float:
     return float(np.linalg.norm(np.cross(a, b)))
 
 
-def _leg(items: list[Item], most_carriers: int) -> LegForm:
+def _leg(items: list[Item], most_carriers: int) -> tuple[LegForm, ...]:
     """The simplest leg that items in series are: fewest carriers, then read from the base, then the largest endings."""
     reasons = []
     for n_carriers in range(most_carriers + 1):
@@ -277,9 +306,15 @@ def _leg(items: list[Item], most_carriers: int) -> LegForm:
             own = [item.back for item in items[::-1]] if is_reversed else items
             for make in (_pivot, _rod_on):
                 try:
-                    return make(own, n_carriers, is_reversed)
+                    return (make(own, n_carriers, is_reversed),)
                 except NoLeg as reason:
                     reasons.append(str(reason))
+    for n_arms, is_reversed in product(range(1, MOST_ARMS + 1), (False, True)):
+        own = [item.back for item in items[::-1]] if is_reversed else items
+        try:
+            return _on_arms(own[:n_arms], [own[n_arms:]], is_reversed)
+        except NoLeg:
+            continue
     raise NoLeg(reasons[-1])
 
 
@@ -393,6 +428,11 @@ def _ends(foot: Ending, head: Ending) -> tuple[Floats, Floats]:
         item = head.items[0]
         return foot.centre, item.point + item.axis * (item.axis @ (foot.centre - item.point))
     return foot.centre, head.centre
+
+
+def keeps_from_spinning(rod: Rod) -> bool:
+    """Whether both ends keep a rod from spinning about itself, and nothing along it lets it: a constraint."""
+    return holds_spin(rod.foot_ending) and holds_spin(rod.head_ending) and rod.twist is None and not rod.beside
 
 
 def holds_spin(ending: Ending) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decomposition.leg_table import LegTable, leg_table
+from ..decomposition.leg_table import LegTable, table_without_arms
 from ..description.mechanism import Mechanism
 from ..description.task import Task, task_of
 from ..errors import UnsupportedMechanism
@@ -68,7 +68,7 @@ class Machine:
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
-        table = leg_table(mechanism)
+        table = table_without_arms(mechanism)
         if not isinstance(table, LegTable):
             raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"], "exported")
         self.mechanism = mechanism

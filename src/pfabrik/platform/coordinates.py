@@ -140,10 +140,14 @@ def _read_with(
 
 
 def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Floats:
-    """Which of its two solutions each leg takes in configurations, (n, legs); 0 where it has but one."""
+    """Which of its two solutions each leg takes in configurations, (n, legs), 0 where it has but one; of arms, where
+    they are."""
     if isinstance(start, LegAnswers):
         return start.sides
     sides = np.repeat(table.home_sides, len(start), axis=0)
+    if len(table.arms):
+        columns = table.known["column"][table.legs["kind"][table.known["leg"]] == K.ARM]
+        sides[:, table.arms["leg"]] = table.arms["sense"] * start.coordinates[:, columns] / table.arms["unit"]
     choosing = np.flatnonzero(table.home_sides[0])
     if not len(choosing):
         return sides

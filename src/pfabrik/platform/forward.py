@@ -56,6 +56,7 @@ def assembled(
         rows.status[near[rows.status[near] == P.PROJECTED]] = P.REACHED
     rows.poses[:] = in_lengths(found.poses, mechanism.characteristic_length)
     rows.measures[:, P.RESIDUAL] *= mechanism.characteristic_length
+    found.sides[:, table.arms["leg"]] = found.q[:, table.arms["leg"]]
     return rows, found.q, found.sides
 
 

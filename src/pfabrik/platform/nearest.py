@@ -136,21 +136,41 @@ def nearest_actuators(mechanism: Mechanism, table: LegTable, values: Floats, own
     return _approach(table, objective, own, corners_of(mechanism) if corners else no_starts(table), values)[0]
 
 
+def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
+    """Feasible configurations at targets (n, 4, 4) [length] whose arms are near to where the starts (n,) have them.
+
+    Searches start there alone: what they miss, projections from elsewhere find.
+    """
+    arms = table.arms
+    objective = _objective(
+        mechanism, targets, Way(task_of(mechanism).weights(LOCKED, LOCKED), P.HOLD_NOTHING), MOST_STEPS
+    )
+    values = arms["sense"] * own.q[:, arms["leg"]]
+    return _approach(table, objective, own, no_starts(table), values, arms)[0]
+
+
 def _approach(
     table: LegTable,
     objective: PoseObjective,
     own: Starts,
     others: Starts,
     values: Floats | None = None,
+    driven: Records | None = None,
     *,
     stays: bool = False,
 ) -> tuple[Found, Floats]:
-    """The kernel over all rows, on all cores: what was found, or what holds them where they start."""
+    """The kernel over all rows, on all cores: what was found, or what holds them where they start.
+
+    Parameters
+    ----------
+    values : what coordinates, those of actuators if no others are `driven`, are to be near to; see `Aim`.
+    """
+    driven = table.driven if driven is None else driven
     if values is None:
-        values = np.zeros((0, len(table.driven)))
+        values = np.zeros((0, len(driven)))
     from ..kernels.platform.nearest import approach
 
-    legs, found = kernel_table(table), _new_found(len(objective.targets), len(table.legs))
+    legs, found = kernel_table(table)._replace(driven=driven), _new_found(len(objective.targets), len(table.legs))
     limits = 2 * len(table.limited) + len(table.cones) + len(table.legs)
     weights = np.zeros((len(objective.targets), limits))
     hits = HITS if table.task[0]["rows"] > 0 or len(_carriers(table)) else HITS_OF_STRUTS
@@ -183,6 +203,8 @@ def starts_at(mechanism: Mechanism, table: LegTable, poses: Floats, sides: Float
     """
     own, other = (_carriers_at(table, poses, sign * sides) for sign in (1.0, -1.0))
     q = np.where(np.abs(own - other) < STRETCHED, own + BENT * sides, own)
+    arms = table.arms["leg"]
+    q[:, arms] = sides[:, arms]
     return Starts(in_lengths(poses, 1.0 / mechanism.characteristic_length), q, sides)
 
 
@@ -255,7 +277,7 @@ def corners_of(mechanism: Mechanism) -> Starts:
     else:
         poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
     q = np.zeros((DRAWS, len(table.legs)))
-    for carrier in _carriers(table):
+    for carrier in (*_carriers(table), *table.arms):
         lo, hi = max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi)
         q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, DRAWS)
     objective = PoseObjective(poses, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)

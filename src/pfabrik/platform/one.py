@@ -85,7 +85,7 @@ class OneAssembly:
             table.driven["unit"],
         )
         self._asked = turns, home_start(mechanism, table), no_starts(table)
-        self._legs = kernel_table(table)
+        self._legs, self._arms = kernel_table(table), table.arms["leg"]
 
     @cached_property
     def _kernel(self) -> Callable[..., None]:
@@ -103,6 +103,7 @@ class OneAssembly:
         self._kernel(self._legs, wanted, *self._asked, rows.status, rows.measures, ends)
         if rows.status[0] != P.REACHED:
             return False
+        ends.sides[:, self._arms] = ends.q[:, self._arms]
         pose = rows.poses[0]
         pose[:] = ends.poses[0]
         pose[:3, 3] *= self._length

@@ -77,7 +77,7 @@ class LegsEngine:
         first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
         sides = first
         rows = new_rows(self.mechanism, len(targets))
-        left = self._reach(targets, start, sides, keep_mode, rows)
+        left, sides = self._reach(targets, start, sides, keep_mode, rows)
         carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
         if left and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
@@ -167,14 +167,14 @@ class LegsEngine:
 
         Where legs can be as they are at the start, they decide; joint coordinates do where they are at dead points.
         """
-        mechanism, table, sides = self.mechanism, self._table, sides_at(self.mechanism, self._table, start)
+        mechanism, table, first = self.mechanism, self._table, sides_at(self.mechanism, self._table, start)
         rows, present = (new_rows(mechanism, len(targets)) for _ in range(2))
         coordinates = start.coordinates.copy()
-        self._reach(targets, start, sides, True, rows)
+        _, sides = self._reach(targets, start, first, True, rows)
         own = np.flatnonzero(rows.status == P.REACHED)
         coordinates[own] = settled(mechanism, table, rows.poses[own], rows.actuators[own], sides[own], coordinates[own])
         if len(own) < len(targets):
-            self._reach(start.rows.poses, start, sides, True, present)
+            self._reach(start.rows.poses, start, first, True, present)
             rest = np.flatnonzero((rows.status != P.REACHED) & (present.status != P.REACHED))
             others = self._inner.advance(targets[rest], start.at(rest), options)
             put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
@@ -249,16 +249,34 @@ class LegsEngine:
 
     def _reach(
         self, targets: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: P.Rows
-    ) -> int:
-        """Answer the rows that legs reach; how many they do not."""
+    ) -> tuple[int, Floats]:
+        """Answer the rows that legs reach; how many they do not, and the sides of answers with arms where they are."""
         begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
         task = self._table.task_within(STRANGE) if keep_mode else self._table.task
         left = self._run(self._table.is_for_blocks, task, targets, begins, sides, rows)
         if left and self._table.is_for_blocks and task["unset"][0]:
             left -= self._complete(task, targets, begins, sides, rows)
+        if left and len(self._table.arms):
+            sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
+            left -= self._reach_by_arms(task, targets, begins, sides, rows)
         if start is not None:
             self._count_turns(start.rows.actuators, rows)
-        return left
+        return left, sides
+
+    def _reach_by_arms(self, task: Records, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+        """Answer rows whose legs reach once arms have moved, and note where; how many these are."""
+        from .arms import move_arms
+
+        before, rest = sides.copy(), np.flatnonzero(rows.status != P.REACHED)
+        some, poses = move_arms(self.mechanism, self._table, targets, begins, sides, rest)
+        if not len(some):
+            return 0
+        own, begins = rows_at(rows, some), in_lengths(poses, self.mechanism.characteristic_length)
+        left = self._run(False, task, targets[some], begins, sides[some], own)
+        put_rows(rows, some, own)
+        lost = some[own.status != P.REACHED]
+        sides[lost] = before[lost]
+        return len(some) - left
 
     def _run(self, by_blocks: bool, task: Records, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
         """Answer targets on all cores, in blocks of poses or one by one; how many are not reached."""

@@ -13,13 +13,11 @@ from ..kernels.platform.records import Table
 
 @lru_cache(maxsize=64)
 def kernel_table(table: LegTable) -> Table:
-    """The same records, with the unknown that each carrier's coordinate is."""
+    """The same records, with the unknown that the coordinate of each carrier, then of each arm, is."""
     columns = np.full(len(table.legs), -1)
-    n = main = 0
-    for k, leg in enumerate(table.legs):
-        main = main if leg["carrier"] == K.SHARED else k
-        if leg["kind"] == K.ROD and leg["carrier"] in (K.CRANK, K.CARRIAGE):
-            columns[k] = 6 + n
-            n += 1
-        columns[k] = columns[main] if leg["kind"] == K.ROD else -1
+    carried = (table.legs["kind"] == K.ROD) & np.isin(table.legs["carrier"], (K.CRANK, K.CARRIAGE))
+    own = np.concatenate([np.flatnonzero(carried), np.flatnonzero(table.legs["kind"] == K.ARM)])
+    columns[own] = 6 + np.arange(len(own))
+    for k in np.flatnonzero(table.legs["carrier"] == K.SHARED):
+        columns[k] = columns[k - 1]
     return Table(table.legs, table.limited, table.cones, table.driven, table.task, columns)

@@ -14,7 +14,7 @@ from .. import geometric
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats
-from ..closure.configurations import new_rows
+from ..closure.configurations import new_rows, rows_at
 from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import CompiledPlan, compile_plan
 from ..description.mechanism import Mechanism
@@ -22,6 +22,7 @@ from ..geometric.topologies import closed_form
 from ..ik import solve_ik
 from ..kernels.reaching.plan import Rows, Seeds
 from ..options import Options
+from ..platform.arms import move_arms
 from ..poses import pose
 from ..reaching.solve import ReachingEngine, settings_of
 from .checking import Feasibility, feasibility
@@ -187,10 +188,23 @@ def _single(mechanism: Mechanism, targets: Floats, options: Options, warm: bool)
 
 
 def _single_legs(mechanism: Mechanism, table: LegTable, targets: Floats, warm: bool) -> Callable[[], object]:
-    """One kernel call of legs in closed form a target."""
+    """One kernel call of legs in closed form a target, and where arms must move, of the search for where to."""
     begins = np.concatenate([mechanism.home_pose[None], targets[:-1]]) if warm else mechanism.home_pose[None]
-    records = table.legs, table.limited, table.cones, table.driven, table.task
-    return partial(legs_one_by_one, *records, targets, begins, table.home_sides, new_rows(mechanism, len(targets)))
+    records, rows = (
+        (table.legs, table.limited, table.cones, table.driven, table.task),
+        new_rows(mechanism, len(targets)),
+    )
+    sides = np.repeat(table.home_sides, len(targets), axis=0)
+
+    def answer() -> None:
+        if not legs_one_by_one(*records, targets, begins, table.home_sides, rows) or not len(table.arms):
+            return
+        rest = np.flatnonzero(rows.status != Status.REACHED)
+        moved, _ = move_arms(mechanism, table, targets, begins, sides, rest)
+        for i in moved:
+            legs_one_by_one(*records, targets[i : i + 1], begins[:1], sides[i : i + 1], rows_at(rows, slice(i, i + 1)))
+
+    return answer
 
 
 def _answers_before(compiled: CompiledPlan, rows: Rows) -> Seeds:

@@ -12,8 +12,8 @@ from ..linear import solve_spd
 from ..vectors import Vec, cross, dot, norm, scale, vec, wrap_into
 from .endings import SURE, turned
 from .pivots import pivot_rows, pivot_slopes, place_pivot
-from .records import N_VALUES, PIVOT, SHARED, Floats, Record, Records
-from .rods import place_rod, rod_rows, rod_slopes
+from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Floats, Record, Records
+from .rods import place_arm, place_rod, rod_rows, rod_slopes
 
 # Status of a row; REACHED is the public one's number.
 REACHED, PENDING = 0, 9
@@ -52,11 +52,13 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
     sure, bearing, main = 1.0, 1.0, 0
     for k in range(legs.shape[0]):
         leg = legs[k]
-        frame = frames[leg["reversed"]]
+        frame, found = frames[leg["reversed"]], 1.0
+        main = main if leg["carrier"] == SHARED else k
         if leg["kind"] == PIVOT:
             found = place_pivot(leg, frame, sides[k], values[k])
+        elif leg["kind"] == ARM:
+            place_arm(leg, sides[k], values[k - leg["on_arm"]], values[k])
         else:
-            main = main if leg["carrier"] == SHARED else k
             found = place_rod(leg, legs[main], frame, sides[k], values[main], values[k], lines[k])
         sure = min(sure, found)
         bearing = min(bearing, found) if leg["bears"] == 1 else bearing
@@ -69,10 +71,10 @@ def put_rows(legs: Records, frames: Floats, values: Floats, lines: Floats, rows:
     main = 0
     for k in range(legs.shape[0]):
         leg = legs[k]
+        main = main if leg["carrier"] == SHARED else k
         if leg["kind"] == PIVOT:
             pivot_rows(leg, frames[leg["reversed"]], rows)
-        else:
-            main = main if leg["carrier"] == SHARED else k
+        elif leg["kind"] == ROD:
             rod_rows(leg, legs[main], frames[leg["reversed"]], values[main], values[k], lines[k], rows)
     worst = 0.0
     for i in range(rows.shape[0]):
@@ -86,13 +88,13 @@ def put_slopes(legs: Records, frames: Floats, values: Floats, lines: Floats, fol
     main = 0
     for k in range(legs.shape[0]):
         leg = legs[k]
+        main = main if leg["carrier"] == SHARED else k
         if leg["bears"] == 0:
             continue
         frame = frames[leg["reversed"]]
         if leg["kind"] == PIVOT:
             pivot_slopes(leg, frame, slopes)
-        else:
-            main = main if leg["carrier"] == SHARED else k
+        elif leg["kind"] == ROD:
             rod_slopes(leg, legs[main], frame, values[main], values[k], lines[k], follow[main], slopes)
 
 
@@ -277,7 +279,7 @@ def answer(
     ----------
     task : one record.
     begins : poses that targets are completed from, (n or 1, 4, 4) [length].
-    sides : which of its two solutions each leg takes, (n or 1, legs).
+    sides : which of its two solutions each leg takes, (n or 1, legs); of an arm, its coordinate [L or rad].
 
     Returns
     -------

@@ -4,7 +4,8 @@ Lengths are divided by the characteristic length L, angles are in radians, axes 
 base coordinates. A leg read from the base ends on the platform; one that is reversed is read from the platform and
 ends on the base. Its *foot* is the end it is read from, its *head* the other one.
 
-A rod is [carrier] + foot ending + rigid or sliding rod + head ending; a pivot is [slides] + one ending of no length.
+A rod is [carrier] + foot ending + rigid or sliding rod + head ending; a pivot is [slides] + one ending of no length. An
+arm is a hinge or a slide that the pose does not determine, and that carries sliding rods: its coordinate is given.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ Floats: TypeAlias = NDArray[np.float64]
 Records: TypeAlias = NDArray[np.void]
 Record: TypeAlias = Any  # one of them: its fields are numbers and arrays
 
-ROD, PIVOT = 0, 1
-# What carries the foot: nothing, a hinge, a slide; or what carries the rod before (a second forearm).
+ROD, PIVOT, ARM = 0, 1, 2
+# What carries the foot: nothing, a hinge, a slide; or what carries the rod before (a second forearm), or the arm.
+# Of an arm, what it is.
 NO_CARRIER, CRANK, CARRIAGE, SHARED = 0, 1, 2, 3
 # Endings: a weld, a hinge, two hinges that cross, three hinges through one point, a ball.
 WELD, HINGE, CROSS, TRIPLE, BALL = 0, 1, 2, 3, 4
@@ -31,6 +33,7 @@ LEG = np.dtype(
         ("kind", "i8"),
         ("reversed", "i8"),
         ("carrier", "i8"),
+        ("on_arm", "i8"),  # 1: an arm on the arm before
         ("slides", "i8"),  # 1: a rod that changes its length; of a pivot, how many slides there are
         ("twists", "i8"),  # 1: both endings hold the rod against spinning about itself
         ("foot", "i8"),  # ending of a rod's foot, or of a pivot
@@ -67,6 +70,7 @@ LEG = np.dtype(
 CARRIER, FOOT, SLIDE, HEAD = 0, 1, 4, 5  # three angles at FOOT and at HEAD; the slides of a pivot at HEAD
 FOOT_LINE, HEAD_LINE = 8, 11  # the rod's direction as seen by the body its foot, or its head, is on
 COSINE, SINE = 14, 15  # of the crank's angle
+PLACED = 1  # of an arm: its displacement from home, three rows of the rotation and then the translation
 N_VALUES = 16
 
 COORDINATE = np.dtype(

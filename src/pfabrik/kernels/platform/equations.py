@@ -2,8 +2,8 @@
 
 Nothing is eliminated here, so that all of it is smooth where rods are stretched out over what carries them, and both
 working modes are one set. Unknowns, n of them: the twist of the platform (velocity of its reference point, angular
-velocity), then one for each crank and carriage. Equations, besides those that `legs` leave on the pose: each rod on a
-carrier has its length.
+velocity), then one for each crank and carriage, then one for each arm. Equations, besides those that `legs` leave on
+the pose: each rod on a crank or carriage has its length.
 
 Whatever is told of a rod follows from y = du - B x u, the rate at which its line u turns as seen by the body that an
 end of it is on, with angular velocity B: hinges and cones at that end change by t . y, each with a vector t of its own.
@@ -21,6 +21,7 @@ from ..legs.answer import deviation, set_frames
 from ..legs.endings import put_pose_slope
 from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
 from ..legs.records import (
+    ARM,
     CARRIAGE,
     CARRIER,
     COSINE,
@@ -32,6 +33,7 @@ from ..legs.records import (
     HINGE,
     N_VALUES,
     PIVOT,
+    ROD,
     SHARED,
     SINE,
     SLIDE,
@@ -39,7 +41,7 @@ from ..legs.records import (
     Floats,
     Record,
 )
-from ..legs.rods import NOWHERE, carried, carried_foot, carrier_rate, mark, read_rod, rod_rows, twist_rate
+from ..legs.rods import NOWHERE, carried, carried_foot, carrier_rate, mark, place_arm, read_rod, rod_rows, twist_rate
 from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
 from .records import Table
 
@@ -52,7 +54,7 @@ class Now(NamedTuple):
     """A configuration under work."""
 
     pose: Floats  # (4, 4) [L]
-    q: Floats  # (legs,): of its carrier, deviation from home [L or rad]
+    q: Floats  # (legs,): of its carrier, or of an arm, deviation from home [L or rad]
     sides: Floats  # (legs,): which of its two solutions a pivot of three hinges takes
 
 
@@ -77,7 +79,7 @@ def new_now(legs: int) -> Now:
 def new_view(table: Table) -> View:
     """Memory for what is told of it."""
     legs, n = table.legs.shape[0], count_unknowns(table)
-    m = table.task[0]["rows"] + n - 6
+    m = table.task[0]["rows"] + count_carried(table)
     frames, values, lines = np.zeros((2, 4, 4)), np.zeros((legs, N_VALUES)), np.zeros((legs, 3))
     return View(frames, values, lines, np.zeros(m), np.zeros((m, n)), np.zeros(n))
 
@@ -91,9 +93,18 @@ def count_unknowns(table: Table) -> int:
 
 
 @routine
+def count_carried(table: Table) -> int:
+    """How many rods have a carrier of their own."""
+    n = 0
+    for k in range(table.legs.shape[0]):
+        n += 1 if is_carried(table.legs[k]) else 0
+    return n
+
+
+@routine
 def is_carried(leg: Record) -> bool:
     """Whether a leg is a rod with a carrier of its own."""
-    return bool(leg["kind"] != PIVOT and (leg["carrier"] == CRANK or leg["carrier"] == CARRIAGE))
+    return bool(leg["kind"] == ROD and (leg["carrier"] == CRANK or leg["carrier"] == CARRIAGE))
 
 
 @routine
@@ -105,11 +116,14 @@ def place(table: Table, now: Now, view: View) -> float:
     for k in range(legs.shape[0]):
         leg = legs[k]
         frame = frames[leg["reversed"]]
+        main = main if leg["carrier"] == SHARED else k
         if leg["kind"] == PIVOT:
             place_pivot(leg, frame, now.sides[k], values[k])
             pivot_rows(leg, frame, view.rows)
             continue
-        main = main if leg["carrier"] == SHARED else k
+        if leg["kind"] == ARM:
+            place_arm(leg, now.q[k], values[k - leg["on_arm"]], values[k])
+            continue
         if is_carried(leg):
             values[k, CARRIER] = now.q[k]
             values[k, COSINE], values[k, SINE] = math.cos(now.q[k]), math.sin(now.q[k])
@@ -127,22 +141,21 @@ def place(table: Table, now: Now, view: View) -> float:
 @routine
 def put_slopes(table: Table, view: View) -> None:
     """Fill the derivatives of the equations."""
-    legs, frames, values, lines, slopes = table.legs, view.frames, view.values, view.lines, view.slopes
+    legs, slopes = table.legs, view.slopes
     for i in range(slopes.shape[0]):
         for j in range(6, slopes.shape[1]):
             slopes[i, j] = 0.0
     main, own_row = 0, table.task[0]["rows"] - 6
     for k in range(legs.shape[0]):
-        leg, column = legs[k], table.columns[k]
-        frame = frames[leg["reversed"]]
-        if leg["kind"] == PIVOT:
-            pivot_slopes(leg, frame, view.slopes)
-            continue
+        leg = legs[k]
         main = main if leg["carrier"] == SHARED else k
-        if is_carried(leg):
-            u = direction(lines[k])
-            put_rate(leg, leg, frame, values[k], column, u, NOWHERE, NOWHERE, slopes[own_row + column])
-        put_rod_slopes(leg, legs[main], frame, values[main], values[k], lines[k], column, view.slopes)
+        if leg["kind"] == PIVOT:
+            pivot_slopes(leg, view.frames[leg["reversed"]], view.slopes)
+        elif leg["kind"] == ROD:
+            if is_carried(leg):
+                u = direction(view.lines[k])
+                put_rate(table, k, k, u, NOWHERE, NOWHERE, view, slopes[own_row + table.columns[k]])
+            put_rod_slopes(table, k, main, view)
 
 
 @routine
@@ -151,47 +164,53 @@ def direction(line: Floats) -> Vec:
 
 
 @routine
-def put_rate(
-    rod: Record, carrier: Record, frame: Floats, lead: Floats, column: int, a: Vec, b: Vec, c: Vec, slope: Floats
-) -> None:
-    """Derivative (n,) of a . (dH - dF) + b . W + c . w; only the entries of this leg's unknowns are written."""
-    put_pose_slope(rod, frame, a, c, slope)
-    if column >= 0:
-        slope[column] = carrier_rate(rod, carrier, lead, a, b)
+def put_rate(table: Table, k: int, main: int, a: Vec, b: Vec, c: Vec, view: View, slope: Floats) -> None:
+    """Derivative (n,) of a . (dH - dF) + b . W + c . w of a rod; only the entries of its unknowns are written.
+
+    Parameters
+    ----------
+    main : the leg whose carrier it is on, or the arm, which may be on others; itself if on none.
+    """
+    rod, legs, columns = table.legs[k], table.legs, table.columns
+    put_pose_slope(rod, view.frames[rod["reversed"]], a, c, slope)
+    if columns[main] >= 0:
+        foot = carried_foot(rod, legs[main], view.values[main])
+        slope[columns[main]] = carrier_rate(legs[main], view.values[main], foot, a, b)
+        while legs[main]["on_arm"] == 1:
+            main -= 1
+            slope[columns[main]] = carrier_rate(legs[main], view.values[main], foot, a, b)
 
 
 @routine
-def put_rod_slopes(
-    rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, line: Floats, column: int, slopes: Floats
-) -> None:
+def put_rod_slopes(table: Table, k: int, main: int, view: View) -> None:
     """Fill the derivatives of the equations that `rod_rows` fills."""
-    n, span, u = rod["first_row"], vec(line), direction(line)
+    rod, carrier, lead, slopes = table.legs[k], table.legs[main], view.values[main], view.slopes
+    frame, n, span, u = view.frames[rod["reversed"]], rod["first_row"], vec(view.lines[k]), direction(view.lines[k])
     if rod["slides"] == 0 and not is_carried(rod):
-        put_rate(rod, carrier, frame, lead, column, u, NOWHERE, NOWHERE, slopes[n])
+        put_rate(table, k, main, u, NOWHERE, NOWHERE, view, slopes[n])
         n += 1
     if rod["foot"] == HINGE:
         axis = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
-        put_rate(rod, carrier, frame, lead, column, axis, cross(axis, span), NOWHERE, slopes[n])
+        put_rate(table, k, main, axis, cross(axis, span), NOWHERE, view, slopes[n])
         n += 1
     if rod["head"] == HINGE:
         axis = turn(frame, vec(rod["head_axes"][0]))
-        put_rate(rod, carrier, frame, lead, column, axis, NOWHERE, cross(axis, span), slopes[n])
+        put_rate(table, k, main, axis, NOWHERE, cross(axis, span), view, slopes[n])
         n += 1
     if rod["twists"] == 1:
-        by_line, b, c = twist_rate(rod, carrier, frame, lead, own, u)
+        by_line, b, c = twist_rate(rod, carrier, frame, lead, view.values[k], u)
         by_line = scale(1.0 / norm(span), along(by_line, -dot(by_line, u), u))
-        put_rate(rod, carrier, frame, lead, column, by_line, b, c, slopes[n])
+        put_rate(table, k, main, by_line, b, c, view, slopes[n])
 
 
 @routine
 def put_turning(table: Table, k: int, main: int, end: int, t: Vec, view: View) -> None:
     """Derivative, into `view.slope`, of what changes by t . y at an end of a rod."""
-    leg, u = table.legs[k], direction(view.lines[k])
+    u = direction(view.lines[k])
     flat = along(t, -dot(t, u), u)
     a, spin = scale(1.0 / norm(vec(view.lines[k])), flat), scale(-1.0, cross(u, t))
     b, c = (spin, NOWHERE) if end == AT_FOOT else (NOWHERE, spin)
-    frame = view.frames[leg["reversed"]]
-    put_rate(leg, table.legs[main], frame, view.values[main], table.columns[k], a, b, c, view.slope)
+    put_rate(table, k, main, a, b, c, view, view.slope)
 
 
 @routine
@@ -210,7 +229,7 @@ def counts_turns(coordinate: Record) -> bool:
 
 @routine
 def main_of(table: Table, k: int) -> int:
-    """The leg whose carrier a leg is on; itself if it shares none."""
+    """The leg whose carrier a leg is on, or the arm; itself if it is on none but its own."""
     while table.legs[k]["carrier"] == SHARED:
         k -= 1
     return k
@@ -228,9 +247,7 @@ def coordinate_slope(table: Table, coordinate: Record, view: View) -> float:
     elif spot == CARRIER:
         slope[table.columns[k]] = 1.0
     elif spot == SLIDE:
-        main = main_of(table, k)
-        frame, u = view.frames[leg["reversed"]], direction(view.lines[k])
-        put_rate(leg, table.legs[main], frame, view.values[main], table.columns[k], u, NOWHERE, NOWHERE, view.slope)
+        put_rate(table, k, main_of(table, k), direction(view.lines[k]), NOWHERE, NOWHERE, view, view.slope)
     else:
         put_hinge_slope(table, k, spot, view)
     for j in range(slope.shape[0]):

@@ -11,7 +11,7 @@ from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..holding import balance
 from ..legs.answer import column, deviation, excess_of, make_exact, set_frames, turn_pose
-from ..legs.records import CARRIER, CRANK, PIVOT, SLIDE, Floats, Record, Records
+from ..legs.records import ARM, CARRIER, CRANK, PIVOT, SLIDE, Floats, Record, Records
 from ..legs.rods import carry
 from ..qp import new_qp
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
@@ -71,11 +71,13 @@ def nearest_carrier(leg: Record, frame: Floats, present: float, own: Floats) -> 
 
 @routine
 def put_sides(table: Table, now: Now, look: View) -> None:
-    """Tell which of their two solutions legs take."""
+    """Tell which of their two solutions legs take, and where arms are."""
     set_frames(now.pose, table.task[0], look.frames)
     sides, q = now.sides, now.q
     for k in range(q.shape[0]):
         leg = table.legs[k]
+        if leg["kind"] == ARM:
+            sides[k] = q[k]
         if is_carried(leg):
             frame = look.frames[leg["reversed"]]
             head = move(frame, vec(leg["head_point"]))
@@ -143,7 +145,12 @@ def is_global(table: Table, aim: PoseObjective, search: Search) -> bool:
     at most a right angle is convex; and the distance outweighs the least lengths if the sum of their multipliers, each
     over its length, is below 1.
     """
-    if aim.frame != BASE_AXES or aim.platform[3] != LOCKED or search.look.rows.shape[0] > 0:
+    if (
+        aim.frame != BASE_AXES
+        or aim.platform[3] != LOCKED
+        or search.force.shape[0] > 6
+        or search.look.rows.shape[0] > 0
+    ):
         return False
     for i in range(3):
         if aim.platform[i] != 1.0:
@@ -163,10 +170,10 @@ def is_global(table: Table, aim: PoseObjective, search: Search) -> bool:
 
 
 @routine
-def is_other_mode(first: Floats, sides: Floats) -> bool:
+def is_other_mode(legs: Records, first: Floats, sides: Floats) -> bool:
     """Whether some leg takes its other solution."""
     for k in range(sides.shape[0]):
-        if first[k] * sides[k] < 0.0:
+        if legs[k]["kind"] != ARM and first[k] * sides[k] < 0.0:
             return True
     return False
 
@@ -192,7 +199,7 @@ def search_row(
             begin(others, near if start == 1 else (start - 2 if start - 2 < near else start - 1), search.best)
         if start == n + 1 and least < math.inf:
             break
-        if stays == 1 and is_other_mode(own.sides[first], search.best.sides):
+        if stays == 1 and is_other_mode(table.legs, own.sides[first], search.best.sides):
             continue
         in_place = (start <= n) == (n > 0)
         fix(aim.pose, in_place, search)
@@ -201,7 +208,7 @@ def search_row(
         distance = descend(table, row, aim, least, best, search)
         if distance < math.inf:
             put_sides(table, search.best, search.look)
-            if stays == 1 and is_other_mode(own.sides[first], search.best.sides):
+            if stays == 1 and is_other_mode(table.legs, own.sides[first], search.best.sides):
                 distance = math.inf
         if distance < (1.0 - SAME) * least:
             least, met = distance, 1

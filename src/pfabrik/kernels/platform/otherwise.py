@@ -21,7 +21,7 @@ from ..legs.answer import (
     worst_of,
 )
 from ..legs.feasibility import largest_row
-from ..legs.records import N_VALUES, Floats
+from ..legs.records import ARM, N_VALUES, Floats
 from .equations import main_of
 from .records import Table
 
@@ -79,7 +79,7 @@ def answer_otherwise(
     pose, motions, normal, left = np.zeros((4, 4)), np.zeros((7, 6)), np.zeros((7, 8)), 0
     misfits, choosing, n_choices = np.zeros(n_legs), np.zeros(n_legs, np.int64), 0
     for k in range(n_legs):
-        if sides[0, k] != 0.0:
+        if sides[0, k] != 0.0 and legs[k]["kind"] != ARM:
             choosing[n_choices] = k
             n_choices += 1
     together = own["unset"] > 0

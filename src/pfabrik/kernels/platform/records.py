@@ -22,14 +22,14 @@ class Table(NamedTuple):
     cones: Records
     driven: Records
     task: Records  # one
-    columns: NDArray[np.int64]  # (legs,): the unknown that is the coordinate of a leg's carrier; -1 where it has none
+    columns: NDArray[np.int64]  # (legs,): the unknown that a leg's carrier, or the arm, has; -1 where there is none
 
 
 class Aim(NamedTuple):
     """What is to come near: the pose of the platform, or the values of actuators."""
 
     pose: PoseObjective
-    values: Floats  # (n, n_a): deviations from home [L or rad] that actuators are to have; no rows if that is no aim
+    values: Floats  # (n, n_a): deviations from home [L or rad] that `driven` are to have; no rows if that is no aim
 
 
 class Starts(NamedTuple):
