@@ -69,7 +69,7 @@ class LegTable:
     @cached_property
     def arms(self) -> Records:
         """The coordinates of arms, which poses leave open; their columns count them."""
-        arms = self.known[self.legs["kind"][self.known["leg"]] == K.ARM]
+        arms: Records = self.known[self.legs["kind"][self.known["leg"]] == K.ARM]
         arms["column"] = np.arange(len(arms))
         return arms
 

@@ -99,8 +99,8 @@ def _require_known(mechanism: Mechanism, form: LegForm) -> None:
     """Refuse legs that say more than what is written here."""
     known = _KNOWN.get(type(form), ())
     strange = [each.name for each in fields(form) if each.name not in known and _says_something(form, each.name)]
-    kinds = (form.foot_ending.kind, form.head_ending.kind) if isinstance(form, Rod) else (form.ending.kind,)
-    strange += [kind for kind in kinds if kind not in ENDINGS]
+    endings = [getattr(form, name) for name in ("foot_ending", "head_ending", "ending") if hasattr(form, name)]
+    strange += [ending.kind for ending in endings if ending.kind not in ENDINGS]
     if isinstance(form, Rod) and form.carrier is not None and form.carrier.kind not in CARRIERS:
         strange.append(f"a carrier of kind {form.carrier.kind}")
     if strange or not known:
