@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,9 +26,6 @@ if TYPE_CHECKING:
     from ..reproduce.study import Case
 
 QUICK_STEPS = 36
-
-SOON = 2.0
-"""Seconds between two signs of life."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +56,11 @@ def demo(out: Path, steps: int, quick: bool) -> int:
     with new_folder(out.resolve()):  # what cannot be written is found before the work begins
         runs = []
     count = QUICK_STEPS if quick else steps
-    first, *others = sorted(cases(), key=lambda case: case.mechanism.end_effector_is_joint)  # soonest compiled first
-    with compiled_meanwhile(others[0], count) as wait:
-        for case in (first, *others):
-            if case is others[0]:
-                wait()
-            runs.append(follow(case, count))
-            with whole_folder(out) as folder:
-                draw(runs[-1], folder)
-            click.echo(f"wrote {out / case.key}.png", err=True)
+    for case in sorted(cases(), key=lambda case: case.mechanism.end_effector_is_joint):  # soonest compiled first
+        runs.append(follow(case, count))
+        with whole_folder(out) as folder:
+            draw(runs[-1], folder)
+        click.echo(f"wrote {out / case.key}.png", err=True)
     with whole_folder(out) as folder:
         for run in runs:
             write(run, folder)
@@ -80,44 +69,16 @@ def demo(out: Path, steps: int, quick: bool) -> int:
     return 0 if all(holds(run.solution) for run in runs) else 1
 
 
-@contextmanager
-def compiled_meanwhile(case: Case, steps: int) -> Iterator[Callable[[], None]]:
-    """Have a second process compile what one machine needs, into the cache; gives what waits until it has."""
-    worker = get_context("spawn").Process(target=_rehearse, args=(case, steps), daemon=True)
-    worker.start()
-
-    def wait() -> None:
-        worker.join(SOON)
-        if worker.is_alive():
-            click.echo(f"pfabrik: compiling for {case.mechanism.name} in a second process ", nl=False, err=True)
-            while worker.is_alive():
-                click.echo(".", nl=False, err=True)
-                worker.join(SOON)
-            click.echo(err=True)
-
-    try:
-        yield wait
-    finally:
-        worker.terminate()
-        worker.join()
-
-
-def _rehearse(case: Case, steps: int) -> None:
-    """Ask for what the demo shows of a machine, silently."""
-    with open(os.devnull, "w", encoding="utf-8") as nowhere, redirect_stderr(nowhere):
-        assert rehearsed(case, steps).active_limits is not None
-
-
-def rehearsed(case: Case, steps: int) -> Track:
-    """A few steps inside and outside, for each has kernels of its own."""
-    return pf.track(case.mechanism, case.leaving.poses(steps)[:: max(1, steps // 12)])
+def rehearse(case: Case, steps: int) -> None:
+    """Ask for a few steps inside and outside, for each has kernels of its own."""
+    pf.track(case.mechanism, case.leaving.poses(steps)[:: max(1, steps // 12)])
 
 
 def follow(case: Case, steps: int) -> Run:
     """Track one circle, and time it without the compilation of the kernels."""
     mechanism = case.mechanism
     targets = case.leaving.poses(steps)
-    rehearsed(case, steps)
+    rehearse(case, steps)
     with progress(f"{mechanism.name}: {steps} steps") as on_progress:
         start = time.perf_counter()
         solution = pf.track(mechanism, targets, on_progress=on_progress)
