@@ -18,21 +18,28 @@ settings.register_profile(
 settings.register_profile("explore", deadline=None, max_examples=500)
 settings.load_profile(os.environ.get("PFABRIK_HYPOTHESIS", "fixed"))
 
-COMPILING = (
-    # positions: reached, and beyond reach
-    "import pfabrik as pf; m = pf.load('stewart'); pf.solve_ik(m, [[0, 0, 195], [0, 0, 900]])",
-    # all joints, and closed forms
-    "import pfabrik as pf; pf.warm_up(pf.load('delta'))\n"
-    "for m in map(pf.load, ('stewart', 'five_bar', 'nrpm')): pf.geometric.solve_ik(m, m.home_pose)",
-)
-"""Questions that need all kernels, in two parts that share none, for two processes."""
+COMPILING = """
+import sys
+import numba
+import pfabrik as pf
+from pfabrik.kernels import ahead
+
+of_legs = sys.argv[1] == "legs"
+for kernel, arguments in ahead.KERNELS:
+    if kernel.py_func.__module__.startswith(("pfabrik.kernels.legs", "pfabrik.kernels.reaching")) == of_legs:
+        kernel.compile(tuple(numba.typeof(argument) for argument in arguments))
+if of_legs:
+    for mechanism in map(pf.load, ("stewart", "five_bar", "nrpm")):
+        pf.geometric.solve_ik(mechanism, mechanism.home_pose)
+"""
+"""Compiles all kernels in two parts that share little and take about as long, for two processes."""
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile ahead where workers run in parallel: each that found no kernels would compile them for itself."""
     if INTERPRETED or not getattr(session.config.option, "numprocesses", None):
         return
-    started = [subprocess.Popen([sys.executable, "-c", questions]) for questions in COMPILING]
+    started = [subprocess.Popen([sys.executable, "-c", COMPILING, part]) for part in ("legs", "the rest")]
     for process in started:
         if process.wait():
-            raise pytest.UsageError(f"the kernels do not compile: {process.args[-1]}")
+            raise pytest.UsageError("the kernels do not compile")

@@ -58,6 +58,7 @@ def test_reached_exactly_where_the_closed_form_says_cold_and_warm(machine: pf.Me
 @pytest.mark.parametrize("count", [30, pytest.param(200, marks=pytest.mark.campaign)])
 def test_status_is_right_on_both_sides_of_the_boundary(machine: pf.Mechanism, count: int) -> None:
     """Targets a millionth of L inside and outside the edge, by the closed form."""
+    count = count // 5 if machine.name.startswith("Redundant") else count  # whose margins are searched for
     rng = np.random.default_rng(3)
     outward = rng.normal(size=(count, 3)) * ([0, 1, 1] if machine.name.startswith("Planar") else 1)
     outward /= np.linalg.norm(outward, axis=1)[:, None]
