@@ -1011,18 +1011,18 @@ def test_a_full_disk_is_told_in_one_line() -> None:
 
 @pytest.mark.slow
 def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
-    process = in_process("demo", "--steps", 200_000, "--out", tmp_path / "out", stdout=subprocess.PIPE)
-    deadline = time.monotonic() + 5
-    while not os.listdir(tmp_path) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    try:
-        said = process.communicate(timeout=30)[1]
-    except subprocess.TimeoutExpired:  # a signal that arrives in a callback of the compiler's C++ code is lost
+    with in_process("demo", "--steps", 200_000, "--out", tmp_path / "out", stdout=subprocess.PIPE) as process:
+        deadline = time.monotonic() + 5
+        while not os.listdir(tmp_path) and time.monotonic() < deadline:
+            time.sleep(0.05)
         process.send_signal(signal.SIGINT)
-        said = process.communicate(timeout=90)[1]
-    finally:
-        process.kill()  # where it has ended, nothing happens
+        try:
+            said = process.communicate(timeout=30)[1]
+        except subprocess.TimeoutExpired:  # a signal that arrives in a callback of the compiler's C++ code is lost
+            process.send_signal(signal.SIGINT)
+            said = process.communicate(timeout=90)[1]
+        finally:
+            process.kill()  # where it has ended, nothing happens
     assert "Traceback" not in said
     # a shell calls both 130; Python sends itself the signal again if it arrived in code that it was just generating
     assert process.returncode in (130, -signal.SIGINT)
