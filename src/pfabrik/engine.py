@@ -13,22 +13,26 @@ from .options import USUAL, Options
 from .platform.solve import LegsEngine
 from .reaching.solve import ReachingEngine
 
-Engine: TypeAlias = LegsEngine | ReachingEngine | ClosureEngine
-
-
-def engine_of(mechanism: Mechanism, options: Options = USUAL) -> Engine:
-    """The engine that answers for a mechanism.
-
-    Closed forms where every chain is a leg that has them, else joint positions where these express its chains and its
-    whole task, else joint coordinates: `decompose` says of each chain which of them, and why. The paper's passes and
-    its projection are on joint positions, closed forms or not.
-    """
-    return _engine_of(mechanism, options.exact and options.projection == "nearest")
+Engine: TypeAlias = LegsEngine | ClosureEngine
 
 
 @lru_cache(maxsize=64)
-def _engine_of(mechanism: Mechanism, nearest: bool) -> Engine:
-    on_positions, table = engine_for(mechanism) == "reaching", leg_table(mechanism)
-    if isinstance(table, LegTable) and not (on_positions and not nearest):
-        return LegsEngine(mechanism, table)
-    return ReachingEngine(mechanism) if on_positions else ClosureEngine(mechanism)
+def engine_of(mechanism: Mechanism) -> Engine:
+    """The engine that answers for a mechanism.
+
+    Closed forms where every chain is a leg that has them, else joint coordinates; `leg_table` says why it has none.
+    """
+    table = leg_table(mechanism)
+    return LegsEngine(mechanism, table) if isinstance(table, LegTable) else ClosureEngine(mechanism)
+
+
+def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> Engine | ReachingEngine:
+    """The engine that answers targets: the paper's passes and its projection are on joint positions, where these
+    express all chains and the whole task."""
+    nearest = options.exact and options.projection == "nearest"
+    return engine_of(mechanism) if nearest or engine_for(mechanism) != "reaching" else _reaching(mechanism)
+
+
+@lru_cache(maxsize=64)
+def _reaching(mechanism: Mechanism) -> ReachingEngine:
+    return ReachingEngine(mechanism)

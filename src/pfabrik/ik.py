@@ -6,7 +6,7 @@ from .answers.answer import Wanted
 from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .description.mechanism import Mechanism
-from .engine import engine_of
+from .engine import inverse_engine_of
 from .errors import InvalidArgument
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
@@ -43,7 +43,7 @@ def solve_ik(
     options = checked_options(options)
     targets, shape = as_targets(mechanism, target)
     begin = start_of(mechanism, start, shape)
-    found = engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keeps_mode(options, begin))
+    found = inverse_engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keeps_mode(options, begin))
     refuse_invalid(targets, shape, found.rows.status, options)
     return Solution(mechanism, found, shape, Wanted(targets.copy(), options.hold, options.rotation_length))
 

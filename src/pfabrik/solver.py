@@ -13,7 +13,7 @@ from .answers.status import Status
 from .arrays import Floats
 from .closure.configurations import new_rows
 from .description.mechanism import Mechanism, checked_mechanism
-from .engine import engine_of
+from .engine import inverse_engine_of
 from .errors import InvalidArgument
 from .fk import Actuators, solve_fk
 from .ik import keeps_mode, solve_ik
@@ -57,7 +57,7 @@ class Solver:
         self.mechanism, self.options = checked_mechanism(mechanism), checked_options(options)
         self._start, begin = start, start_of(mechanism, start, ())
         warm_up(mechanism)
-        self._engine = engine_of(mechanism, self.options)
+        self._engine = inverse_engine_of(mechanism, self.options)
         self._rows, self._target = new_rows(mechanism, 1), np.eye(4)[None]
         self._values = np.zeros((1, len(mechanism.actuator_names)))
         self._reach: Callable[[], int] | None = None

@@ -14,7 +14,7 @@ from .answers.starts import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track, pace_of
 from .description.mechanism import Mechanism
-from .engine import engine_of
+from .engine import inverse_engine_of
 from .errors import InvalidArgument
 from .kernels.reaching.plan import Rows
 from .options import Options, checked_options
@@ -65,7 +65,7 @@ def track(
         raise InvalidArgument("options.working_mode", "'any'", "'keep' or None: a machine cannot change it on its way")
     pace = pace_of(mechanism, len(poses), sample_time, times, speed_limits)
     begin = start_of(mechanism, start, ())
-    found = engine_of(mechanism, options).follow(poses, begin, options, on_progress)
+    found = inverse_engine_of(mechanism, options).follow(poses, begin, options, on_progress)
     if begin is not None:
         _count_on(mechanism, found.rows, begin.rows.actuators[0])
     refuse_invalid(poses, shape, found.rows.status, options)

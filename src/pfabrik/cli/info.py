@@ -14,14 +14,12 @@ import click
 import pfabrik as pf
 
 from ..answers.table import aligned
-from ..decomposition.decompose import closure_reason, engine_of
 from ..decomposition.leg_table import leg_table, legs_answer
 from ..description.joint_types import KINDS
 from .mech import MECH, load
 
 if TYPE_CHECKING:
     from ..answers.differential import Mobility
-    from ..decomposition.decompose import SubChain
     from ..description.mechanism import Joint, Mechanism
 
 
@@ -58,7 +56,7 @@ def as_object(mechanism: Mechanism) -> dict[str, object]:
         "mobility": dataclasses.asdict(counted) | {"redundancy": counted.redundancy},
         "joints": [joint_as_object(joint, mechanism) for joint in mechanism.joints],
         "sub_chains": [
-            {"notation": str(chain), "engine": shown_engine(mechanism), "why": why(chain, mechanism)}
+            {"notation": str(chain), "engine": shown_engine(mechanism), "why": why(mechanism)}
             for chain in pf.decompose(mechanism)
         ],
     }
@@ -175,7 +173,7 @@ def clean(value: float, scale: float = 1.0) -> float:
 
 def chain_table(mechanism: Mechanism) -> str:
     """The distinct sub-chains in the field's notation, how often each occurs, the engine that answers, and why."""
-    counts = Counter((str(chain), why(chain, mechanism)) for chain in pf.decompose(mechanism))
+    counts = Counter((str(chain), why(mechanism)) for chain in pf.decompose(mechanism))
     engine = shown_engine(mechanism)
     rows = [(str(count), notation, engine, reason) for (notation, reason), count in counts.items()]
     return aligned(("count", "sub-chain", "engine", "why"), rows)
@@ -183,18 +181,13 @@ def chain_table(mechanism: Mechanism) -> str:
 
 def shown_engine(mechanism: Mechanism) -> str:
     """The engine that answers first."""
-    return "legs" if legs_answer(mechanism) else engine_of(mechanism)
+    return "legs" if legs_answer(mechanism) else "closure"
 
 
-def why(chain: SubChain, mechanism: Mechanism) -> str:
-    """Why an engine answers for a sub-chain: for its own sake, or the mechanism's."""
-    if legs_answer(mechanism):
-        return "closed forms; closure where they do not reach"
-    for_all, no_legs = closure_reason(mechanism), leg_table(mechanism)
-    told = f"; no closed forms: {no_legs}" if isinstance(no_legs, str) else ""
-    if chain.reason is not None:
-        return chain.reason + told
-    return "positions alone express it" + (f", but {for_all}" if for_all else "") + told
+def why(mechanism: Mechanism) -> str:
+    """Why an engine answers for a mechanism."""
+    reason = leg_table(mechanism)
+    return f"no closed forms: {reason}" if isinstance(reason, str) else "closed forms; closure where they do not reach"
 
 
 def parallelogram_tables(mechanism: Mechanism) -> list[str]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import chain
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,6 @@ from .close import Closing, Closure, close, closure_of, platform_poses
 from .configurations import Configurations
 from .nearest import nearest
 from .starts import same_random_starts
-
-ByPositions: TypeAlias = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
 
 STRIDES = 8
 """Steps in which actuators are taken from the start's values to the asked ones where one step strays."""
@@ -40,32 +37,24 @@ SIGHT = 3.0
 """How far off asked values are at most looked for, where they are too far for a search to end [L or rad]."""
 
 
-def assemble(
-    mechanism: Mechanism, coordinates: Floats, values: Floats, *, seeded: bool, by_positions: ByPositions | None = None
-) -> Closing:
+def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
     """Close the loops at actuated values (n, n_a), or at feasible ones as near as a search brings them.
 
-    Newton's method with the actuators locked; where it strays, the actuators led to their values in steps; then the
-    legs assembled in positions; then, unless `seeded`, random starts; then the nearest feasible values.
+    Newton's method with the actuators locked; where it strays, the actuators led to their values in steps; then, unless
+    `seeded`, random starts; then the nearest feasible values.
 
     Parameters
     ----------
     coordinates : joint coordinates to start from, (n, columns), deviations from home.
-    by_positions : from coordinates, poses (n, 4, 4) and values, those of legs of these values around the platforms.
 
     Returns
     -------
     Closing : judge by `feasible`, and by `actuator_errors`.
     """
     closure, poses = closure_of(mechanism), platform_poses(mechanism, coordinates)
-
-    def reached(_: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
-        assembled = (coordinates, poses) if by_positions is None else by_positions(coordinates, poses, values)
-        return _locked(closure, *assembled, values)
-
     best = _locked(closure, coordinates, poses, values)
     if not best.feasible.all():
-        attempts = [] if _over_determined(mechanism) else [_led, reached]
+        attempts = [] if _over_determined(mechanism) else [_led]
         for attempt in attempts if seeded else [*attempts, _scattered]:
             rest = np.flatnonzero(~best.feasible)
             if len(rest):

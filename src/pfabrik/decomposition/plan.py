@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.reaching import plan as P
-from ..tolerances import TOLERANCES
 from .decompose import SubChain, beyond_positions, decompose
 from .forms import BranchForm, Coordinate, TrunkForm
 
@@ -227,22 +226,8 @@ class _Builder:
         ends = np.array([branch["end"] for branch in self.branches])
         span = float(np.sqrt(((ends - ends.mean(axis=0)) ** 2).sum(axis=1).mean()))
         is_point = float(self.mechanism.end_effector_is_joint)
-        on_struts = float(self._is_on_struts())
         span = span if span > 0.0 else length
-        return np.array([length, span, is_point, *self.mechanism.reference_point, on_struts])
-
-    def _is_on_struts(self) -> bool:
-        """Whether every branch is a strut, and every range leaves room to move."""
-        least = TOLERANCES.room * self.mechanism.characteristic_length
-        struts = all(
-            branch["kind"] == P.STRUT
-            and branch["last"] > branch["first"]
-            and not any(branch[name] for name in ("planar", "end_plane", "align", "rail"))
-            and self.nodes[branch["last"]]["hi"] - self.nodes[branch["last"]]["lo"] > least
-            for branch in self.branches
-        )
-        room = all(j["hi"] - j["lo"] > (TOLERANCES.room if j["kind"] == P.TURN else least) for j in self.trunk_joints)
-        return struts and room and all(cone["kind"] != P.LINK_CONE for cone in self.cones)
+        return np.array([length, span, is_point, *self.mechanism.reference_point])
 
 
 def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -99,7 +99,6 @@ class Plan(NamedTuple):
 
 # Plan.scalars
 LENGTH, SPAN, POINT_END, HOME_X = 0, 1, 2, 3  # HOME_X and the two behind it: the reference point at home
-ON_STRUTS = 6  # 1: every branch is a strut that may change its length, and what carries it may move
 
 
 # Columns of Rows.counters, and of Rows.measures.
@@ -170,8 +169,6 @@ class Settings(NamedTuple):
     exact: int  # 1: closed forms and polish; 0: the paper's passes alone, polished where they end
     any_mode: int  # 1: other working modes are tried
     hold: int  # 0 nothing, 1 orientation, 2 position
-    nearest: int  # 1: projections end at the nearest pose where struts carry the platform
-    rotation_length: float  # by which rotations count as lengths
     chained: int  # 1: every row starts from the answer of the one before
 
 

@@ -21,7 +21,6 @@ from .plan import (
     ITERATIONS,
     LENGTH,
     LIMIT_EXCESS,
-    ON_STRUTS,
     PENDING,
     POINT_END,
     POSITION_ERROR,
@@ -52,11 +51,6 @@ from .rows import (
 )
 from .search import place_ends, reach_pose
 from .settle import TRANSLATES, TURNS, settle
-from .strut_views import Descent, new_descent
-from .struts import find_nearest
-
-# Rounds of projection that bring a descent near enough to start: more lead it to the same pose.
-ROUNDS_BEFORE_DESCENT = 2
 
 
 @kernel
@@ -175,7 +169,6 @@ def solve_row(
     safe: Configuration,
     now: Configuration,
     work: Work,
-    search: Descent,
     settings: Settings,
     rows: Rows,
 ) -> None:
@@ -196,7 +189,7 @@ def solve_row(
         # the chains are bent toward the target by now; a projection that keeps what is held starts from there
         copy_table(now.nodes, work.seed_nodes)
         copy_row(now.trunks, work.seed_trunks)
-        staying = for_projection(plan, settings)
+        staying = staying_in_mode(settings)
         hold = settings.hold
         for _hold in range(2):
             copy_table(wanted, now.pose)
@@ -206,8 +199,6 @@ def solve_row(
             reached, more, more_rounds = project_target(plan, hold, now, work, staying)
             iterations += more
             rounds += more_rounds
-            if settings.nearest == 1 and plan.scalars[ON_STRUTS] == 1.0:
-                reached = find_nearest(plan, now, safe, wanted, hold, settings, search)
             rows.counters[i, HELD] = HOLD_NOTHING if plan.scalars[POINT_END] == 1.0 else hold
             if reached or hold == HOLD_NOTHING or plan.scalars[POINT_END] == 1.0:
                 break
@@ -221,20 +212,17 @@ def solve_row(
 
 
 @routine
-def for_projection(plan: Plan, settings: Settings) -> Settings:
-    """The same settings, staying in the working mode, with fewer rounds where a descent follows."""
-    descends = settings.nearest == 1 and plan.scalars[ON_STRUTS] == 1.0
+def staying_in_mode(settings: Settings) -> Settings:
+    """The same settings, staying in the working mode."""
     return Settings(
         settings.tolerance,
         settings.rotation_tolerance,
         settings.slack,
         settings.max_iterations,
-        min(settings.max_rounds, ROUNDS_BEFORE_DESCENT) if descends else settings.max_rounds,
+        settings.max_rounds,
         settings.exact,
         0,
         settings.hold,
-        settings.nearest,
-        settings.rotation_length,
         settings.chained,
     )
 
@@ -273,7 +261,7 @@ def solve_by_iteration(plan: Plan, targets: Floats, seeds: Seeds, settings: Sett
     Returns how many rows it answered.
     """
     now, safe, home = new_configuration(plan), new_configuration(plan), new_configuration(plan)
-    work, search = new_work(plan), new_descent(plan)
+    work = new_work(plan)
     first_modes = np.ones(plan.branches.shape[0])
     home_modes(plan, home, first_modes)
     identity_pose(home.pose)
@@ -295,6 +283,6 @@ def solve_by_iteration(plan: Plan, targets: Floats, seeds: Seeds, settings: Sett
         gap, excess = measure_all(plan, now)
         feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack
         copy_configuration(plan, now if feasible else home, safe)
-        solve_row(plan, i, targets, wanted, safe, now, work, search, settings, rows)
+        solve_row(plan, i, targets, wanted, safe, now, work, settings, rows)
         answered += 1
     return answered
