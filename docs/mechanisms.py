@@ -12,7 +12,7 @@ from PIL import Image
 
 import pfabrik as pf
 from pfabrik.catalog import catalog_file, description
-from pfabrik.decomposition.decompose import closure_reason, engine_of
+from pfabrik.decomposition.leg_table import leg_table
 from pfabrik.view.canvas import new_axes
 from pfabrik.view.plane import plane_of
 
@@ -103,9 +103,9 @@ def rods(chain: pf.SubChain, mechanism: pf.Mechanism) -> str:
 
 
 def engine(mechanism: pf.Mechanism) -> str:
-    """The engine that answers targets, and why it is not the quick one."""
-    reason = closure_reason(mechanism)
-    return engine_of(mechanism) + (f": {reason}" if reason else "")
+    """The engine that answers first, and why it is not the quick one."""
+    reason = leg_table(mechanism)
+    return f"closure, without closed forms: {reason}" if isinstance(reason, str) else "legs"
 
 
 def picture(name: str) -> Path:

@@ -24,7 +24,7 @@ from pfabrik import Cone, Joint, Mechanism
 from pfabrik.decomposition.plan import CompiledPlan, compile_plan
 from pfabrik.kernels import linear, vectors
 from pfabrik.kernels._jit import kernel
-from pfabrik.kernels.reaching import exact, frames, restrict, rows, search, settle
+from pfabrik.kernels.reaching import exact, frames, restrict, rows, settle
 from pfabrik.kernels.reaching import passes as reach
 from pfabrik.kernels.reaching import plan as P
 
@@ -98,7 +98,7 @@ def pass_once(plan, b, now, forward):
 @kernel
 def place_ends(plan, now):
     for c in range(plan.chains.shape[0]):
-        search.place_ends(plan, c, now)
+        frames.place_ends(plan, c, now)
 
 
 @kernel

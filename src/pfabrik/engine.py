@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import TypeAlias
 
 from .closure.solve import ClosureEngine
-from .decomposition.decompose import engine_of as engine_for
+from .decomposition.decompose import positions_express
 from .decomposition.leg_table import LegTable, leg_table
 from .description.mechanism import Mechanism
 from .options import USUAL, Options
@@ -30,9 +30,9 @@ def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> Engine 
     """The engine that answers targets: the paper's passes and its projection are on joint positions, where these
     express all chains and the whole task."""
     nearest = options.exact and options.projection == "nearest"
-    return engine_of(mechanism) if nearest or engine_for(mechanism) != "reaching" else _reaching(mechanism)
+    return engine_of(mechanism) if nearest or not positions_express(mechanism) else _reaching(mechanism)
 
 
 @lru_cache(maxsize=64)
 def _reaching(mechanism: Mechanism) -> ReachingEngine:
-    return ReachingEngine(mechanism)
+    return ReachingEngine(mechanism, engine_of(mechanism))

@@ -28,20 +28,20 @@ class Options:
     tolerance : E, how close the end effector must come to be REACHED [length]; None is 1e-9 of the mechanism's
         characteristic length.
     rotation_tolerance : the same for the orientation [rad].
-    max_iterations : K, forward and backward passes a chain may take for one target; of the reaching engine alone.
-    max_rounds : how often a projection may revise its target before exact steps take over, which more would bring to
-        the same answer; likewise.
+    max_iterations : K, forward and backward passes a chain may take for one target; of the paper's method alone.
+    max_rounds : how often its projection may revise a target before exact steps take over, which more would bring to
+        the same answer.
     working_mode : "keep" stays in the start's working mode (home's without a start), "any" may change it to reach;
         None keeps it if there is a start.
     hold : what a projection keeps: "orientation" (the paper's choice) or "position" if any feasible pose has it, None
         nothing. `Solution.held` tells what was kept.
     projection : which feasible pose answers a target that is not reached: the "nearest" that local searches from
-        several starts find; or the "centroid" of where the chains end, which is the paper's, where the reaching engine
-        answers.
+        several starts find; or the "centroid" of where the chains end, which is the paper's, where joint positions
+        express the mechanism.
     rotation_length : how a rotation counts beside a distance: by the angle times this [length per rad], in
         sqrt(distance^2 + (rotation_length angle)^2). None is `Mechanism.rotation_length`.
-    exact : closed forms and exact steps where they apply; False for the paper's passes alone, which end within
-        `tolerance` and then only close the loops, in the reaching engine.
+    exact : True for answers as exact as can be; False for the paper's passes alone, which end within `tolerance` and
+        then only close the loops, where joint positions express the mechanism.
     actuator_tolerance : how close actuated coordinates must come to the asked values to be REACHED [L or rad]. Readings
         of more encoders than the mechanism has freedoms never agree better than they are exact.
     on_invalid : what a row of a batch that is no pose does: "raise", or "mark" the row INVALID.

@@ -52,7 +52,7 @@ STEPS = 30
 
 
 class ClosureEngine:
-    """Answers found on joint coordinates; the same questions as `ReachingEngine` answers."""
+    """Answers found on joint coordinates."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism, checked_mechanism
@@ -13,8 +13,6 @@ from .forms import BranchForm, NotExpressible, TrunkForm
 from .parallelograms import Parallelogram, parallelogram_of
 from .positions import express_branch, express_trunk
 from .stages import TIP, Stage, graph_of, is_tree, leads, stages
-
-Engine: TypeAlias = Literal["reaching", "closure"]
 
 
 @dataclass(frozen=True)
@@ -68,11 +66,6 @@ class SubChain:
     reason: str | None
     trunk_form: TrunkForm | None = None
     branch_forms: tuple[BranchForm, ...] = ()
-
-    @property
-    def engine(self) -> Engine:
-        """The engine that could serve this chain; `engine_of` tells which one answers for the whole mechanism."""
-        return "reaching" if self.reason is None else "closure"
 
     @property
     def trunk(self) -> tuple[Step, ...]:
@@ -137,7 +130,7 @@ def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
     The graph is cut at the base and at the end effector (a joint end effector is cut in two, and stands for a point).
     Every connected rest that leads from one to the other is a sub-chain. It is decomposed again, the same way, between
     the bodies that all its ways pass: where several ways leave a body, they are branches if they end at the end
-    effector, else a loop of its own. Each sub-chain says which engine could serve it, and why.
+    effector, else a loop of its own. Each sub-chain says why positions alone cannot express it, if so.
 
     Source: the paper's TDS. Which chains positions can express: `pfabrik.positions`.
     """
@@ -200,15 +193,6 @@ def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=64)
-def closure_reason(mechanism: Mechanism) -> str | None:
-    """Why the closure engine answers targets of a mechanism, for its task's sake or a chain's; else None."""
-    if mechanism.task != mechanism.whole_task:
-        return "the task leaves some of the pose free"
-    if any(chain.reason is not None for chain in decompose(mechanism)):
-        return "some sub-chain needs more than positions"
-    return next(iter(beyond_positions(mechanism)), None)
-
-
-def engine_of(mechanism: Mechanism) -> Engine:
-    """The engine that answers targets of a mechanism: one for all its sub-chains."""
-    return "reaching" if closure_reason(mechanism) is None else "closure"
+def positions_express(mechanism: Mechanism) -> bool:
+    """Whether positions alone express all chains of a mechanism, and its task sets the whole pose."""
+    return mechanism.task == mechanism.whole_task and not beyond_positions(mechanism)

@@ -26,7 +26,7 @@ from .platform.nearest import judge, read_configurations
 from .platform.otherwise import answer_otherwise
 from .platform.records import Aim, Found, Starts, Table
 from .reaching import plan as P
-from .reaching.solve import solve_by_iteration, solve_directly
+from .reaching.solve import solve_by_iteration
 
 _typeof: Any = numba.typeof
 
@@ -48,7 +48,7 @@ _ROWS = (
     _PLAN,
     np.zeros((0, 4, 4)),
     P.Seeds(*_values("f3 f3 f2")),
-    P.Settings(*_values("f f f i i i i i i")),
+    P.Settings(*_values("f f f i i i i")),
     P.Rows(*_values("i1 i2 f3 f3 f2 f2 f2")),
 )
 
@@ -64,7 +64,6 @@ _ANSWERS = (_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("f3 f3 f2 i1 f3 f2 f2"))
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, _ANSWERS),
     (answer, _ANSWERS),
-    (solve_directly, _ROWS),
     (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
     (solve_by_iteration, _ROWS),
     (approach, (_LOOPS, _LAYOUT, _POSE_OBJECTIVE, _CLOSED, np.zeros((0, 0)))),

@@ -1,4 +1,4 @@
-"""Inverse kinematics by P-FABRIK: rows of targets answered by its kernels, and their projections drawn near."""
+"""The paper's method: targets answered by passes on joint positions, and projected where these do not reach."""
 
 from __future__ import annotations
 
@@ -12,18 +12,24 @@ from ..closure.close import closure_of, measured
 from ..closure.configurations import (
     Configurations,
     new_rows,
+    put_rows,
     rows_at,
     write_closing,
 )
+from ..closure.solve import ClosureEngine
 from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..options import Options
+from ..platform.solve import LegsEngine
 from ..tolerances import TOLERANCES
 from .completion import coordinates_of, positions_of
 
-Kernel = Callable[[P.Plan, Floats, P.Seeds, P.Settings, P.Rows], int]
+NEAR = 1e-3
+"""Share of L within which passes bring the ends of chains where exact steps follow."""
+
+ROWS_A_BLOCK = 64
 
 STEPS_A_REPORT = 16
 """Steps along a path between two reports of progress."""
@@ -32,19 +38,27 @@ _HOLDS = {None: P.HOLD_NOTHING, "orientation": P.HOLD_ORIENTATION, "position": P
 
 
 class ReachingEngine:
-    """Answers found on joint positions, for mechanisms whose chains these express."""
+    """The paper's method on joint positions, for mechanisms whose chains these express.
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
+    With `Options.exact`, what another engine reaches is that one's answer, and all else is projected as in the paper.
+    """
+
+    def __init__(self, mechanism: Mechanism, exact: LegsEngine | ClosureEngine) -> None:
+        self.mechanism, self._exact = mechanism, exact
         self._compiled = compile_plan(mechanism)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        settings = settings_of(self.mechanism, options, keep_mode)
         rows = self._new_rows(len(targets))
-        self._solve(targets, self._seeds(start), settings, rows)
+        if options.exact:
+            found = self._exact.answer(targets, start, options, keep_mode=keep_mode)
+            reached = np.flatnonzero(found.rows.status == P.REACHED)
+            own, told = self._positioned(found.at(reached)), rows_at(found.rows, reached)
+            own = own._replace(status=told.status, counters=told.counters, measures=told.measures)
+            put_rows(rows, reached, own)
+        self._solve(targets, self._seeds(start), settings_of(self.mechanism, options), rows)
         return self._found(rows, start)
 
     def follow(
@@ -54,21 +68,15 @@ class ReachingEngine:
         options: Options,
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
-        """Answer a path (n, 4, 4), each target from the answer before it, in its working mode.
-
-        The chained kernel runs in pieces where progress is reported.
-        """
-        from ..kernels.reaching.solve import solve_by_iteration
-
+        """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
         rows, before = self._new_rows(len(targets)), start
-        settings = settings_of(self.mechanism, options, keep_mode=True)._replace(chained=1)
-        piece = STEPS_A_REPORT if on_progress is not None else max(len(targets), 1)
-        for done in range(0, len(targets), piece):
-            own = rows_at(rows, slice(done, done + piece))
-            solve_by_iteration(self._compiled.plan, targets[done : done + piece], self._seeds(before), settings, own)
-            before = self._last_answer(own) or before
-            if on_progress is not None:
-                on_progress(done + len(own.status), len(targets))
+        for i in range(len(targets)):
+            found = self.answer(targets[i : i + 1], before, options, keep_mode=True)
+            put_rows(rows, slice(i, i + 1), found.rows)
+            if found.rows.status[0] != P.INVALID:
+                before = Configurations(found.rows, partial(coordinates_of, self.mechanism, found.rows))
+            if on_progress is not None and ((i + 1) % STEPS_A_REPORT == 0 or i + 1 == len(targets)):
+                on_progress(i + 1, len(targets))
         found = self._found(rows, start, chained=True)
         self._count_turns(rows)
         return found
@@ -111,30 +119,15 @@ class ReachingEngine:
         own = start.coordinates if start.were_given else partial(coordinates_of, self.mechanism, positioned)
         return Configurations(rows, partial(_nearest_to, self.mechanism, rows, own, chained))
 
-    def _last_answer(self, rows: P.Rows) -> Configurations | None:
-        """The last answer of some rows, alone; None where there is none."""
-        answered = np.flatnonzero(rows.status != P.INVALID)
-        if not len(answered):
-            return None
-        last = rows_at(rows, slice(answered[-1], answered[-1] + 1))
-        return Configurations(last, partial(coordinates_of, self.mechanism, last))
-
     def _solve(self, targets: Floats, seeds: P.Seeds, settings: P.Settings, rows: P.Rows) -> None:
-        """Answer independent rows: directly where closed forms reach, by iteration where not."""
-        from ..kernels.reaching.solve import solve_by_iteration, solve_directly
+        """Answer the rows that are pending, each for itself."""
+        from ..kernels.reaching.solve import solve_by_iteration
 
-        plan = self._compiled.plan
-        if len(targets) == 1:
-            if solve_directly(plan, targets, seeds, settings, rows):
-                solve_by_iteration(plan, targets, seeds, settings, rows)
-            return
-
-        def run(kernel: Kernel, block: slice) -> int:
+        def run(block: slice) -> int:
             own = seeds if len(seeds.poses) == 1 else P.Seeds._make(array[block] for array in seeds)
-            return kernel(plan, targets[block], own, settings, rows_at(rows, block))
+            return solve_by_iteration(self._compiled.plan, targets[block], own, settings, rows_at(rows, block))
 
-        if sum(in_blocks(partial(run, solve_directly), len(targets), rows_a_block=4096)):
-            in_blocks(partial(run, solve_by_iteration), len(targets), rows_a_block=64)
+        in_blocks(run, len(targets), ROWS_A_BLOCK)
 
     def _count_turns(self, rows: P.Rows) -> None:
         """Make the angles of revolute actuators that may turn more than once continuous along a path."""
@@ -154,17 +147,16 @@ def _nearest_to(mechanism: Mechanism, rows: P.Rows, start: Floats | Callable[[],
 
 
 @lru_cache(maxsize=256)
-def settings_of(mechanism: Mechanism, options: Options, keep_mode: bool) -> P.Settings:
-    """Options as the kernels take them."""
+def settings_of(mechanism: Mechanism, options: Options) -> P.Settings:
+    """Options as the kernel takes them; exact steps take over sooner than passes alone may end."""
     length = mechanism.characteristic_length
+    tolerance = float(options.tolerance or TOLERANCES.position * length)
     return P.Settings(
-        tolerance=float(options.tolerance or TOLERANCES.position * length),
+        tolerance=tolerance,
+        enough=max(tolerance, NEAR * length) if options.exact else tolerance,
         rotation_tolerance=float(options.rotation_tolerance),
         slack=0.1 * TOLERANCES.limit * length,
         max_iterations=int(options.max_iterations),
         max_rounds=int(options.max_rounds),
-        exact=int(options.exact),
-        any_mode=int(not keep_mode),
         hold=_HOLDS[options.hold],
-        chained=0,
     )

@@ -18,13 +18,13 @@ from ..closure.configurations import new_rows, rows_at
 from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import CompiledPlan, compile_plan
 from ..description.mechanism import Mechanism
+from ..engine import inverse_engine_of
 from ..geometric.topologies import closed_form
 from ..ik import solve_ik
 from ..kernels.reaching.plan import Rows, Seeds
-from ..options import Options
 from ..platform.arms import move_arms
 from ..poses import pose
-from ..reaching.solve import ReachingEngine, settings_of
+from ..reaching.solve import settings_of
 from .checking import Feasibility, feasibility
 from .efficacy import rms
 from .one_by_one import closed_form_one_by_one, legs_one_by_one, p_fabrik_one_by_one
@@ -159,13 +159,11 @@ def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str
     """
     calls: dict[tuple[str, str, str], Callable[[], object]] = {}
     table, many = leg_table(mechanism), np.tile(targets, (COPIES, 1, 1))
+    assert isinstance(table, LegTable)
     for start in ("cold", "warm"):
         is_warm = start == "warm"
-        calls["paper", start, "single"] = _single(mechanism, targets, ANY_MODE["paper"], is_warm)
-        if isinstance(table, LegTable):
-            calls["default", start, "single"] = _single_legs(mechanism, table, targets, is_warm)
-        else:
-            calls["default", start, "single"] = _single(mechanism, targets, ANY_MODE["default"], is_warm)
+        calls["paper", start, "single"] = _single_passes(mechanism, targets, is_warm)
+        calls["default", start, "single"] = _single_legs(mechanism, table, targets, is_warm)
         calls["geometric", start, "single"] = _single_closed(mechanism, targets, is_warm)
     for name, options in ANY_MODE.items():
         calls[name, "cold", "batch"] = partial(solve_ik, mechanism, many, options=options)
@@ -175,14 +173,14 @@ def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str
     return {key: seconds[key] / (len(many) if key[-1] == "batch" else len(targets)) for key in calls}
 
 
-def _single(mechanism: Mechanism, targets: Floats, options: Options, warm: bool) -> Callable[[], object]:
-    """One kernel call of P-FABRIK a target."""
-    compiled = compile_plan(mechanism)
-    settings = settings_of(mechanism, options, keep_mode=False)
+def _single_passes(mechanism: Mechanism, targets: Floats, warm: bool) -> Callable[[], object]:
+    """One kernel call of the paper's method a target."""
+    compiled, options = compile_plan(mechanism), ANY_MODE["paper"]
+    settings = settings_of(mechanism, options)
     seeds = compiled.home_seed
     rows = new_rows(mechanism, len(targets), seeds.nodes.shape[1], seeds.trunks.shape[1])
     if warm:
-        answers = ReachingEngine(mechanism).answer(targets, None, options, keep_mode=False)
+        answers = inverse_engine_of(mechanism, options).answer(targets, None, options, keep_mode=False)
         seeds = _answers_before(compiled, answers.rows)
     return partial(p_fabrik_one_by_one, compiled.plan, targets, seeds, settings, rows)
 

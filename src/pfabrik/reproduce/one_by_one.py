@@ -16,15 +16,15 @@ from ..kernels._jit import kernel
 from ..kernels.legs.answer import answer
 from ..kernels.legs.records import Records
 from ..kernels.reaching.plan import Floats, Plan, Rows, Seeds, Settings
-from ..kernels.reaching.solve import solve_by_iteration, solve_directly
+from ..kernels.reaching.solve import solve_by_iteration
 
 _njit: Any = numba.njit(nogil=True, error_model="numpy")
 
 
 @kernel
 def p_fabrik_one_by_one(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, rows: Rows) -> int:
-    """Answer every target by a call of its own; returns how many the direct step left to the iterations."""
-    left = 0
+    """Answer every target by a call of its own; returns how many it answered."""
+    answered = 0
     for i in range(targets.shape[0]):
         k = i if seeds.poses.shape[0] > 1 else 0
         own_seeds = Seeds(seeds.poses[k : k + 1], seeds.nodes[k : k + 1], seeds.trunks[k : k + 1])
@@ -37,9 +37,8 @@ def p_fabrik_one_by_one(plan: Plan, targets: Floats, seeds: Seeds, settings: Set
             rows.actuators[i : i + 1],
             rows.measures[i : i + 1],
         )
-        if solve_directly(plan, targets[i : i + 1], own_seeds, settings, own) > 0:
-            left += solve_by_iteration(plan, targets[i : i + 1], own_seeds, settings, own)
-    return left
+        answered += solve_by_iteration(plan, targets[i : i + 1], own_seeds, settings, own)
+    return answered
 
 
 @kernel

@@ -1,1 +1,1 @@
-"""P-FABRIK on joint positions: passes, restrictions, projection, and the exact steps that finish them."""
+"""P-FABRIK on joint positions: passes, restrictions, projection, and the exact step that finishes them."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .._jit import routine
-from ..vectors import Vec, add, along, cross, dot, norm, put, rotate, scale, sub, turn, vec
+from ..vectors import Vec, add, along, cross, dot, move, norm, put, rotate, scale, sub, turn, vec
 from .plan import TURN, Configuration, Floats, Plan
 
 # Above this sine of its angle a rotation shows its axis to twelve digits; below it, the limits at 0 and pi serve.
@@ -111,3 +111,14 @@ def rotation_between(A: Floats, B: Floats) -> Vec:
     if dot(axis, twice_sine) < 0.0:
         axis = scale(-1.0, axis)
     return scale(angle / norm(axis), axis)
+
+
+@routine
+def place_ends(plan: Plan, c: int, now: Configuration) -> None:
+    """Put the first and last nodes of a chain where carrier and platform have them."""
+    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+        branch = plan.branches[b]
+        first, last = branch["first"], branch["last"]
+        if branch["rail"] == 0:
+            put(now.nodes[first], move(now.carriers[branch["carrier"]], vec(plan.nodes[first]["home"])))
+        put(now.nodes[last], move(now.pose, vec(branch["end"])))

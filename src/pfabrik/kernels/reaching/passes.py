@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
-from .._jit import inlined, routine
+from .._jit import routine
 from ..linear import solve_spd
 from ..vectors import Vec, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec
-from .exact import reach_exact
 from .frames import move_carriers
-from .measure import measure_branch, measure_chain, measure_trunk
-from .plan import LENGTH, PASSES, PLATFORM_CONE, SLIDE, TURN, Configuration, Floats, Plan, Records, Settings
+from .plan import LENGTH, PLATFORM_CONE, SLIDE, TURN, Configuration, Floats, Plan, Records, Settings
 from .restrict import NO_LENGTH, clamp_cone, clamp_stroke, cone_axis, restrict_step
 
-# A pass that improves the error by less than this share has stalled: the target is out of reach ...
-STALL = 1e-3
-# ... unless it moves on after a while: so many stalls in a row are believed.
-STALLS = 4
 # A rail that leaves the plane of its branch by more than this sine moves the plane along.
 OBLIQUE = 1e-6
 # Two Gauss-Newton steps fit a trunk well enough for one pass; damped where a joint moves no branch joint.
@@ -92,54 +84,6 @@ def end_gap(plan: Plan, b: int, now: Configuration) -> float:
 
 
 @routine
-def chain_is_reached(plan: Plan, c: int, now: Configuration, slack: float) -> bool:
-    gap, excess = measure_chain(plan, c, now)
-    return gap <= slack and excess * plan.scalars[LENGTH] <= slack
-
-
-@inlined
-def reach_branch_exactly(
-    plan: Plan, b: int, now: Configuration, mode: float, settings: Settings
-) -> tuple[bool, float, float]:
-    """The closed form of one branch, in the seed's mode and, where allowed, in the other.
-
-    Whether it reaches with all limits kept, and the gap [length] and excess [L or rad] measured.
-    """
-    gap, excess = math.inf, math.inf
-    for _mode in range(1 + settings.any_mode):
-        if not reach_exact(plan, b, now, mode, settings.slack):
-            break
-        gap, excess = measure_branch(plan, b, now)
-        if gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack:
-            return True, gap, excess
-        mode = -mode
-    return False, gap, excess
-
-
-@inlined
-def reach_chain_directly(
-    plan: Plan, c: int, now: Configuration, modes: Floats, settings: Settings
-) -> tuple[bool, float, float]:
-    """One chain by closed forms alone, its trunk (if any) left where it is; returns as `reach_branch_exactly`."""
-    gap, excess = 0.0, measure_trunk(plan, plan.chains[c]["trunk"], now)
-    reached = excess * plan.scalars[LENGTH] <= settings.slack
-    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-        if reached:
-            reached = plan.branches[b]["kind"] != PASSES
-        if reached:
-            reached, branch_gap, branch_excess = reach_branch_exactly(plan, b, now, modes[b], settings)
-            gap, excess = max(gap, branch_gap), max(excess, branch_excess)
-    return reached, gap, excess
-
-
-@routine
-def try_directly(plan: Plan, c: int, now: Configuration, modes: Floats, settings: Settings) -> bool:
-    """`reach_chain_directly`, compiled once for the iterations to call."""
-    reached, _gap, _excess = reach_chain_directly(plan, c, now, modes, settings)
-    return reached
-
-
-@routine
 def pass_over_chain(plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats) -> float:
     """One iteration, forward and backward, of all branches of a chain; the largest end gap it leaves."""
     chain = plan.chains[c]
@@ -157,20 +101,14 @@ def pass_over_chain(plan: Plan, c: int, now: Configuration, wanted: Floats, syst
 
 @routine
 def reach_by_passes(
-    plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats, enough: float, settings: Settings
+    plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats, settings: Settings
 ) -> tuple[float, int]:
-    """Forward and backward passes until the ends are within `enough` or K iterations are spent.
-
-    Where an exact step follows, they also end when they stall.
-    """
+    """Forward and backward passes until the ends are within E or K iterations are spent; the gap left, and how many."""
     gap = pass_over_chain(plan, c, now, wanted, system)
-    stalls = 0
     for iteration in range(1, settings.max_iterations):
-        if gap <= enough or (settings.exact == 1 and stalls >= STALLS):
+        if gap <= settings.enough:
             return gap, iteration
-        previous = gap
         gap = pass_over_chain(plan, c, now, wanted, system)
-        stalls = stalls + 1 if gap > (1.0 - STALL) * previous else 0
     return gap, settings.max_iterations
 
 

@@ -136,9 +136,6 @@ class Work(NamedTuple):
     trunks: Floats
     seed_nodes: Floats  # where the row began
     seed_trunks: Floats
-    best_nodes: Floats  # the nearest a chain's search has come
-    best_trunks: Floats
-    sample_trunks: Floats
     modes: Floats  # (n_branches,)
     wanted: Floats  # (n_branches, 3): where each branch would have its first node
     normal: Floats  # (n + 1, n + 1): the normal equations, right-hand side in the last column
@@ -161,15 +158,13 @@ class Seeds(NamedTuple):
 class Settings(NamedTuple):
     """Options, as numbers; lengths in the mechanism's unit."""
 
-    tolerance: float  # E: the chains' ends are this close to their targets
+    tolerance: float  # how near a target counts as reached
+    enough: float  # E: passes end where the chains' ends are this close to their targets
     rotation_tolerance: float
     slack: float  # length by which a closed form may exceed a limit and count as on it
     max_iterations: int  # K
     max_rounds: int
-    exact: int  # 1: closed forms and polish; 0: the paper's passes alone, polished where they end
-    any_mode: int  # 1: other working modes are tried
     hold: int  # 0 nothing, 1 orientation, 2 position
-    chained: int  # 1: every row starts from the answer of the one before
 
 
 HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION = 0, 1, 2

@@ -5,17 +5,14 @@ from __future__ import annotations
 from .._jit import routine
 from ..linear import solve_spd
 from ..vectors import add, along, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec
-from .blocks import is_all_struts
 from .exact import branch_mode, reach_exact
-from .frames import move_carriers, orthonormalise, rotation_between, turn_pose, turn_pose_by_vector
+from .frames import move_carriers, orthonormalise, place_ends, rotation_between, turn_pose, turn_pose_by_vector
 from .measure import measure_all
-from .passes import end_gap, reach_backward, reach_by_passes, try_directly
-from .plan import HOLD_ORIENTATION, HOLD_POSITION, LENGTH, POINT_END, STRUT, Configuration, Floats, Plan, Settings, Work
-from .search import NEAR, place_ends, reach_pose
+from .passes import reach_by_passes
+from .plan import HOLD_ORIENTATION, HOLD_POSITION, LENGTH, POINT_END, Configuration, Floats, Plan, Settings, Work
 from .settle import TRANSLATES, TURNS, settle
-from .violations import note_violations, trunk_span
 
-# Rounds and exact step are tried so often; struts, whose violations have no valleys to be caught in, once.
+# Rounds and exact step are tried so often.
 TRIES = 3
 # Steps tried on the way back from an infeasible pose to a feasible one, and the share of the way not worth a try.
 TRIALS = 60
@@ -26,55 +23,13 @@ LARGEST_TURN, FIT_DAMPING = 0.5, 1e-9
 
 
 @routine
-def reach_out(plan: Plan, now: Configuration, work: Work, enough: float, settings: Settings) -> tuple[float, int]:
-    """Let every chain reach for the present pose as far as it can; the largest end gap left."""
+def reach_pose(plan: Plan, now: Configuration, work: Work, settings: Settings) -> tuple[float, int]:
+    """Let every chain reach for the present pose by passes; the largest end gap left, and the most iterations."""
     worst, iterations = 0.0, 0
     for c in range(plan.chains.shape[0]):
-        if settings.exact == 1 and try_directly(plan, c, now, work.modes, settings):
-            iterations = max(iterations, 1)
-            continue
-        if settings.exact == 1 and not is_struts(plan, c):
-            gap, chain_iterations = reach_nearest(plan, c, now, work), 1
-        else:
-            gap, chain_iterations = reach_by_passes(plan, c, now, work.wanted, work.system, enough, settings)
+        gap, chain_iterations = reach_by_passes(plan, c, now, work.wanted, work.system, settings)
         worst, iterations = max(worst, gap), max(iterations, chain_iterations)
     return worst, iterations
-
-
-@routine
-def is_struts(plan: Plan, c: int) -> bool:
-    """Whether one pass brings the ends of a chain as near as they come: single segments on the base."""
-    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-        if plan.branches[b]["kind"] != STRUT:
-            return False
-    return bool(plan.chains[c]["trunk"] < 0)
-
-
-@routine
-def reach_nearest(plan: Plan, c: int, now: Configuration, work: Work) -> float:
-    """Bring the ends of a chain that cannot reach as near to their targets as its limits allow; the gap left.
-
-    The least-squares compromise of the exact step, then one pass outward, which puts the whole miss at the ends.
-    """
-    place_ends(plan, c, now)
-    settle(plan, c, c + 1, 0, now, work)
-    for j in trunk_span(plan, c):
-        now.trunks[j] = min(max(now.trunks[j], plan.trunk_joints[j]["lo"]), plan.trunk_joints[j]["hi"])
-    move_carriers(plan, now)
-    gap = 0.0
-    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-        reach_backward(plan, b, now)
-        gap = max(gap, end_gap(plan, b, now))
-    return gap
-
-
-@routine
-def largest_violation(plan: Plan, now: Configuration, work: Work) -> float:
-    """How far the loops are from closed, and the limits from kept, when the platform is where it is wanted [length]."""
-    for c in range(plan.chains.shape[0]):
-        place_ends(plan, c, now)
-    note_violations(plan, 0, plan.chains.shape[0], now, work)
-    return float(work.totals[1])
 
 
 @routine
@@ -146,27 +101,25 @@ def project_target(plan: Plan, hold: int, now: Configuration, work: Work, settin
         free = TRANSLATES
     elif hold == HOLD_POSITION:
         free = TURNS
-    enough = settings.tolerance if settings.exact == 0 else NEAR * plan.scalars[LENGTH]
     feasible = False
     for _try in range(TRIES):
-        if settings.exact == 0 or largest_violation(plan, now, work) > enough:
-            for _round in range(settings.max_rounds):
-                gap, more = reach_out(plan, now, work, enough, settings)
-                iterations += more
-                if gap <= enough:
-                    break
-                rounds += 1
-                if free & TRANSLATES:
-                    move_to_centroid(plan, now)
-                if free & TURNS:
-                    turn_to_fit(plan, now, work, hold == HOLD_POSITION)
-            for c in range(plan.chains.shape[0]):
-                place_ends(plan, c, now)
+        for _round in range(settings.max_rounds):
+            gap, more = reach_pose(plan, now, work, settings)
+            iterations += more
+            if gap <= settings.enough:
+                break
+            rounds += 1
+            if free & TRANSLATES:
+                move_to_centroid(plan, now)
+            if free & TURNS:
+                turn_to_fit(plan, now, work, hold == HOLD_POSITION)
+        for c in range(plan.chains.shape[0]):
+            place_ends(plan, c, now)
         settle(plan, 0, plan.chains.shape[0], free, now, work)
         return_to_modes(plan, now, work, settings)
         gap, excess = measure_all(plan, now)
         feasible = gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack
-        if feasible or is_all_struts(plan):
+        if feasible:
             break
     return feasible, iterations, rounds
 
@@ -190,6 +143,9 @@ def step_back(
         for i in range(3):
             now.pose[i, 3] += step * (wanted[i, 3] - safe.pose[i, 3])
         reach_pose(plan, now, work, settings)
+        for c in range(plan.chains.shape[0]):
+            place_ends(plan, c, now)
+        settle(plan, 0, plan.chains.shape[0], 0, now, work)
         gap, excess = measure_all(plan, now)
         if gap <= settings.slack and excess * plan.scalars[LENGTH] <= settings.slack:
             copy_configuration(plan, now, safe)

@@ -9,20 +9,11 @@ import numpy as np
 from .._jit import allocator, inlined, routine
 from ..vectors import copy_row, copy_table, put, vec
 from .exact import branch_mode
-from .frames import move_carriers, orthonormalise
+from .frames import move_carriers, orthonormalise, place_ends
 from .measure import read_coordinate
 from .plan import (
-    HELD,
-    HOLD_NOTHING,
-    ITERATIONS,
     LENGTH,
-    LIMIT_EXCESS,
     POINT_END,
-    POSITION_ERROR,
-    REACHED,
-    RESIDUAL,
-    ROTATION_ERROR,
-    ROUNDS,
     Configuration,
     Floats,
     Plan,
@@ -30,7 +21,6 @@ from .plan import (
     Seeds,
     Work,
 )
-from .search import place_ends
 
 # Largest deviation of R^T R from I in a target, and below which it is machine noise.
 NOT_A_ROTATION, ROUNDED = 1e-6, 1e-15
@@ -59,9 +49,6 @@ def new_work(plan: Plan) -> Work:
         np.zeros((n_nodes, 3)),
         np.zeros(n_trunks),
         np.zeros((n_nodes, 3)),
-        np.zeros(n_trunks),
-        np.zeros((n_nodes, 3)),
-        np.zeros(n_trunks),
         np.zeros(n_trunks),
         np.zeros(n_branches),
         np.zeros((n_branches, 3)),
@@ -168,22 +155,3 @@ def write_row(plan: Plan, i: int, now: Configuration, rows: Rows) -> None:
         rows.trunks[i, j] = now.trunks[j]
     for j in range(rows.actuators.shape[1]):
         rows.actuators[i, j] = read_coordinate(plan, j, now)
-
-
-@routine
-def is_beyond_horizon(target: Floats, wanted: Floats) -> bool:
-    """Whether a target is solved for as if it lay nearer."""
-    return bool(target[0, 3] != wanted[0, 3] or target[1, 3] != wanted[1, 3] or target[2, 3] != wanted[2, 3])
-
-
-@routine
-def write_reached(i: int, gap: float, excess: float, rows: Rows) -> None:
-    """Status, counters and measures of a row that took one iteration and has its target's own pose."""
-    rows.status[i] = REACHED
-    rows.counters[i, ITERATIONS] = 1
-    rows.counters[i, ROUNDS] = 0
-    rows.counters[i, HELD] = HOLD_NOTHING
-    rows.measures[i, POSITION_ERROR] = 0.0
-    rows.measures[i, ROTATION_ERROR] = 0.0
-    rows.measures[i, RESIDUAL] = gap
-    rows.measures[i, LIMIT_EXCESS] = excess
