@@ -17,6 +17,7 @@ import pfabrik as pf
 from calls import calls
 from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
+from in_c import IS_THERE, InC
 from pfabrik.reproduce.timing import one_core
 from table import Row, cells, machine, table
 from timing import Solve, best_times, draw, in_blocks
@@ -42,18 +43,19 @@ print(time.perf_counter() - start)
 IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.perf_counter() - start)"
 
 
-NOTE = """Times are the shortest of several runs, subject and baseline by turns; a ratio below 1 is faster than the
-baseline. The closed forms (benchmarks/closed_forms.py) know their machine, use one core and blocks of 4096 poses, and
-return numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres
-only when `points` is read. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM: 0.4), those out of reach
-within 1 L and 0.5 rad; these are projected exactly where a row does not say "centroid", which is the paper's method on
-joint positions; a delta has no other way than exactly. Newton's method in NumPy (benchmarks/newton.py) knows the
-hexapod, solves six equations in the pose for whole batches at a time, and looks at no passive joint and no limit;
-forward kinematics here closes all loops in all joint coordinates, and measures limits. Starts are answers up to 0.01 L
-and 0.01 rad away. The platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new
-processes are for all of it, not for a pose. The viewer's motions are timed in a page of headless Chromium, which draws
-without a graphics card, from the motion of the mouse until the answer has been drawn; these rows are left out where it
-is not installed."""
+NOTE = """Times are the shortest of several runs, subject and baseline by turns; a ratio below 1 is faster than the baseline.
+The closed forms (benchmarks/closed_forms.py) know their machine, use one core and blocks of 4096 poses, and return
+numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres only
+when `points` is read. C is benchmarks/leg_table.c, compiled with -O3 -march=native: it knows its machine, looks at
+every limit, and goes row by row. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM: 0.4), those out of
+reach within 1 L and 0.5 rad; these are projected exactly where a row does not say "centroid", which is the paper's
+method on joint positions; a delta has no other way than exactly. Newton's method in NumPy (benchmarks/newton.py)
+knows the hexapod, solves six equations in the pose for whole batches at a time, and looks at no passive joint and
+no limit; forward kinematics here closes all loops in all joint coordinates, and measures limits. Starts are answers
+up to 0.01 L and 0.01 rad away. The platform with 40 modes is that of Dietmaier (1998). Times of modes, of
+workspaces and of new processes are for all of it, not for a pose. The viewer's motions are timed in a page of
+headless Chromium, which draws without a graphics card, from the motion of the mouse until the answer has been
+drawn; these rows are left out where it is not installed."""
 
 
 def agree(solution: pf.Solution, values: Array) -> None:
@@ -71,6 +73,10 @@ def batches(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
         targets = drawn[form.solve(drawn)[1]][:n]
         agree(pf.solve_ik(mechanism, targets), form.solve(targets)[0])
         baselines = {"NumPy, all limits": partial(in_blocks, form.solve, targets)}
+        if IS_THERE:
+            in_c = InC(form)
+            agree(pf.solve_ik(mechanism, targets), in_c.solve(targets)[0])
+            baselines["C, all limits"] = partial(in_c.solve, targets)
         if isinstance(form, Struts):
             baselines["NumPy, lengths only"] = partial(in_blocks, form.lengths, targets)
         yield from batch_rows(mechanism, f"{what}, batch, reachable", targets, baselines, runs)

@@ -145,7 +145,7 @@ def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: St
     objective = _objective(
         mechanism, targets, Way(task_of(mechanism).weights(LOCKED, LOCKED), P.HOLD_NOTHING), MOST_STEPS
     )
-    values = arms["sense"] * own.q[:, arms["leg"]]
+    values = np.ascontiguousarray(arms["sense"] * own.q[:, arms["leg"]])
     return _approach(table, objective, own, no_starts(table), values, arms)[0]
 
 
