@@ -43,7 +43,8 @@ print(time.perf_counter() - start)
 IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.perf_counter() - start)"
 
 
-NOTE = """Times are the shortest of several runs, subject and baseline by turns; a ratio below 1 is faster than the baseline.
+NOTE = """Times are the shortest of several runs, subject and baseline by turns; a ratio below 1 is faster than the
+baseline.
 The closed forms (benchmarks/closed_forms.py) know their machine, use one core and blocks of 4096 poses, and return
 numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres only
 when `points` is read. C is benchmarks/leg_table.c, compiled with -O3 -march=native: it knows its machine, looks at
