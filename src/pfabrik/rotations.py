@@ -13,13 +13,11 @@ def from_rotvec(vectors: Floats) -> Floats:
     R = I + sinc(a) K + sinc(a / 2)^2 / 2 K^2 with K the cross product by the vector and a its length: exact down to
     zero, so that there is no branch for small angles.
     """
-    squares = (vectors * vectors).sum(axis=-1)[..., None, None]
-    angles = np.sqrt(squares)
+    angles = np.sqrt((vectors * vectors).sum(axis=-1))[..., None, None]
     angles[angles == 0.0] = 1e-20  # whose sine is itself
     half = 0.5 * angles
     K = (vectors @ CROSSED).reshape(*vectors.shape, 3)
-    twice = vectors[..., :, None] * vectors[..., None, :] - squares * UNTURNED
-    return np.asarray(UNTURNED + np.sin(angles) / angles * K + 0.5 * (np.sin(half) / half) ** 2 * twice)
+    return np.asarray(UNTURNED + np.sin(angles) / angles * K + 0.5 * (np.sin(half) / half) ** 2 * (K @ K))
 
 
 UNTURNED = np.eye(3)
