@@ -157,8 +157,6 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
         found = measured(mechanism, found.coordinates)._replace(iterations=found.iterations)
     rows = new_rows(mechanism, len(wanted))
     write_closing(closure, found, rows)
-    if mechanism.end_effector_is_joint:
-        rows.poses[:, :3, :3] = wanted[:, :3, :3]
     position, rotation = task_of(mechanism).errors(rows.poses, wanted)
     rows.measures[:, P.POSITION_ERROR], rows.measures[:, P.ROTATION_ERROR] = position, rotation
     rows.counters[:, P.HELD] = holds

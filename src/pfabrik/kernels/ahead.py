@@ -48,7 +48,7 @@ _ROWS = (
     _PLAN,
     np.zeros((0, 4, 4)),
     P.Seeds(*_values("f3 f3 f2")),
-    P.Settings(*_values("f f f i i i i")),
+    P.Settings(*_values("f f f f i i i i")),
     P.Rows(*_values("i1 i2 f3 f3 f2 f2 f2")),
 )
 

@@ -156,6 +156,7 @@ def settings_of(mechanism: Mechanism, options: Options) -> P.Settings:
         enough=max(tolerance, NEAR * length) if options.exact else tolerance,
         rotation_tolerance=float(options.rotation_tolerance),
         slack=0.1 * TOLERANCES.limit * length,
+        exact=int(options.exact),
         max_iterations=int(options.max_iterations),
         max_rounds=int(options.max_rounds),
         hold=_HOLDS[options.hold],

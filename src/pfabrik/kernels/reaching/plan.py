@@ -162,6 +162,7 @@ class Settings(NamedTuple):
     enough: float  # E: passes end where the chains' ends are this close to their targets
     rotation_tolerance: float
     slack: float  # length by which a closed form may exceed a limit and count as on it
+    exact: int  # 1: chains come as near as they can by exact steps; 0: by the paper's passes alone
     max_iterations: int  # K
     max_rounds: int
     hold: int  # 0 nothing, 1 orientation, 2 position

@@ -8,9 +8,10 @@ from ..vectors import add, along, copy_row, copy_table, cross, dot, move, norm, 
 from .exact import branch_mode, reach_exact
 from .frames import move_carriers, orthonormalise, place_ends, rotation_between, turn_pose, turn_pose_by_vector
 from .measure import measure_all
-from .passes import reach_by_passes
-from .plan import HOLD_ORIENTATION, HOLD_POSITION, LENGTH, POINT_END, Configuration, Floats, Plan, Settings, Work
+from .passes import end_gap, reach_backward, reach_by_passes
+from .plan import HOLD_ORIENTATION, HOLD_POSITION, LENGTH, POINT_END, STRUT, Configuration, Floats, Plan, Settings, Work
 from .settle import TRANSLATES, TURNS, settle
+from .violations import trunk_span
 
 # Rounds and exact step are tried so often.
 TRIES = 3
@@ -24,12 +25,42 @@ LARGEST_TURN, FIT_DAMPING = 0.5, 1e-9
 
 @routine
 def reach_pose(plan: Plan, now: Configuration, work: Work, settings: Settings) -> tuple[float, int]:
-    """Let every chain reach for the present pose by passes; the largest end gap left, and the most iterations."""
+    """Let every chain reach for the present pose; the largest end gap left, and the most iterations."""
     worst, iterations = 0.0, 0
     for c in range(plan.chains.shape[0]):
-        gap, chain_iterations = reach_by_passes(plan, c, now, work.wanted, work.system, settings)
+        if settings.exact == 1 and not is_struts(plan, c):
+            gap, chain_iterations = reach_nearest(plan, c, now, work), 1
+        else:
+            gap, chain_iterations = reach_by_passes(plan, c, now, work.wanted, work.system, settings)
         worst, iterations = max(worst, gap), max(iterations, chain_iterations)
     return worst, iterations
+
+
+@routine
+def is_struts(plan: Plan, c: int) -> bool:
+    """Whether one pass brings the ends of a chain as near as they come: single segments on the base."""
+    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+        if plan.branches[b]["kind"] != STRUT:
+            return False
+    return bool(plan.chains[c]["trunk"] < 0)
+
+
+@routine
+def reach_nearest(plan: Plan, c: int, now: Configuration, work: Work) -> float:
+    """Bring the ends of a chain that cannot reach as near to their targets as its limits allow; the gap left.
+
+    The least-squares compromise of the exact step, then one pass outward, which puts the whole miss at the ends.
+    """
+    place_ends(plan, c, now)
+    settle(plan, c, c + 1, 0, now, work)
+    for j in trunk_span(plan, c):
+        now.trunks[j] = min(max(now.trunks[j], plan.trunk_joints[j]["lo"]), plan.trunk_joints[j]["hi"])
+    move_carriers(plan, now)
+    gap = 0.0
+    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+        reach_backward(plan, b, now)
+        gap = max(gap, end_gap(plan, b, now))
+    return gap
 
 
 @routine
