@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -141,12 +142,35 @@ def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: St
 
     Searches start there alone: what they miss, projections from elsewhere find.
     """
-    arms = table.arms
-    objective = _objective(
-        mechanism, targets, Way(task_of(mechanism).weights(LOCKED, LOCKED), P.HOLD_NOTHING), MOST_STEPS
-    )
-    values = np.ascontiguousarray(arms["sense"] * own.q[:, arms["leg"]])
-    return _approach(table, objective, own, no_starts(table), values, arms)[0]
+    way, n = Way(task_of(mechanism).weights(LOCKED, LOCKED), P.HOLD_NOTHING), len(targets)
+    objective, best = _objective(mechanism, targets, way, MOST_STEPS), _new_found(n, len(table.legs))
+    best.distances[:], best.q[:], best.sides[:] = 0.0, own.q, own.sides
+    for part, legs in _apart_by_arms(table):
+        begin, arms = Starts(own.poses, *(np.ascontiguousarray(array[:, legs]) for array in own[1:])), part.arms
+        values = np.ascontiguousarray(arms["sense"] * begin.q[:, arms["leg"]])
+        found = _approach(part, objective, begin, no_starts(part), values, arms)[0]
+        np.maximum(best.distances, found.distances, out=best.distances)
+        best.poses[:], best.q[:, legs], best.sides[:, legs] = found.poses, found.q, found.sides
+    return best
+
+
+@lru_cache(maxsize=64)
+def _apart_by_arms(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
+    """Tables of the legs on each set of arms, and which legs these are: they have nothing to do with each other where
+    the pose is given; else all in one."""
+    if table.task["unset"][0] > 0:
+        return ((table, slice(None)),)
+    legs, parts = table.legs, []
+    for k in np.flatnonzero((legs["kind"] == K.ARM) & (legs["on_arm"] == 0)).tolist():
+        end = k + 1
+        while end < len(legs) and (legs[end]["carrier"] == K.SHARED or legs[end]["on_arm"] == 1):
+            end += 1
+        own = {name: getattr(table, name) for name in ("limited", "cones", "known")}
+        own = {name: array[(array["leg"] >= k) & (array["leg"] < end)] for name, array in own.items()}
+        for array in own.values():
+            array["leg"] -= k
+        parts.append((replace(table, forms=table.forms[k:end], legs=legs[k:end], **own), slice(k, end)))
+    return tuple(parts)
 
 
 def _approach(

@@ -8,7 +8,7 @@ from ..vectors import add, along, copy_row, copy_table, cross, dot, move, norm, 
 from .exact import branch_mode, reach_exact
 from .frames import move_carriers, orthonormalise, place_ends, rotation_between, turn_pose, turn_pose_by_vector
 from .measure import measure_all
-from .passes import end_gap, reach_backward, reach_by_passes
+from .passes import end_gap, pass_over_chain, reach_backward, reach_by_passes
 from .plan import HOLD_ORIENTATION, HOLD_POSITION, LENGTH, POINT_END, STRUT, Configuration, Floats, Plan, Settings, Work
 from .settle import TRANSLATES, TURNS, settle
 from .violations import trunk_span
@@ -28,7 +28,7 @@ def reach_pose(plan: Plan, now: Configuration, work: Work, settings: Settings) -
     """Let every chain reach for the present pose; the largest end gap left, and the most iterations."""
     worst, iterations = 0.0, 0
     for c in range(plan.chains.shape[0]):
-        if settings.exact == 1 and not is_struts(plan, c):
+        if settings.exact == 1:
             gap, chain_iterations = reach_nearest(plan, c, now, work), 1
         else:
             gap, chain_iterations = reach_by_passes(plan, c, now, work.wanted, work.system, settings)
@@ -49,8 +49,11 @@ def is_struts(plan: Plan, c: int) -> bool:
 def reach_nearest(plan: Plan, c: int, now: Configuration, work: Work) -> float:
     """Bring the ends of a chain that cannot reach as near to their targets as its limits allow; the gap left.
 
-    The least-squares compromise of the exact step, then one pass outward, which puts the whole miss at the ends.
+    The least-squares compromise of the exact step, then one pass outward, which puts the whole miss at the ends: of
+    struts the pass alone does that.
     """
+    if is_struts(plan, c):
+        return pass_over_chain(plan, c, now, work.wanted, work.system)
     place_ends(plan, c, now)
     settle(plan, c, c + 1, 0, now, work)
     for j in trunk_span(plan, c):
