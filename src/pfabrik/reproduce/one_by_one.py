@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..kernels._jit import kernel
 from ..kernels.legs.answer import answer
 from ..kernels.legs.records import Records
-from ..kernels.reaching.plan import Floats, Plan, Rows, Seeds, Settings
+from ..kernels.reaching.plan import PENDING, Floats, Plan, Rows, Seeds, Settings
 from ..kernels.reaching.solve import solve_by_iteration
 
 _njit: Any = numba.njit(nogil=True, error_model="numpy")
@@ -27,6 +27,7 @@ def p_fabrik_one_by_one(plan: Plan, targets: Floats, seeds: Seeds, settings: Set
     answered = 0
     for i in range(targets.shape[0]):
         k = i if seeds.poses.shape[0] > 1 else 0
+        rows.status[i] = PENDING  # they hold the answers of the repeat before
         own_seeds = Seeds(seeds.poses[k : k + 1], seeds.nodes[k : k + 1], seeds.trunks[k : k + 1])
         own = Rows(
             rows.status[i : i + 1],
