@@ -25,7 +25,7 @@ class InC:
         assert COMPILER is not None
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder) / "leg_table.so"
-            source = Path(__file__).with_suffix("").with_name("leg_table.c")
+            source = Path(__file__).with_name("leg_table.c")
             subprocess.run([COMPILER, *FLAGS, str(source), "-o", str(library), "-lm"], check=True)
             loaded = ctypes.CDLL(str(library))
         if isinstance(form, Struts):

@@ -165,7 +165,7 @@ def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
         return _with_parallelogram(mechanism, chain, loops[0])
     if loops:
         raise NoLeg("has a loop of its own")
-    return _leg(_items(mechanism, chain.steps), most_carriers=1)
+    return _leg(_items(mechanism, chain.steps))
 
 
 def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
@@ -298,10 +298,11 @@ def _area(a: Floats, b: Floats) -> float:
     return float(np.linalg.norm(np.cross(a, b)))
 
 
-def _leg(items: list[Item], most_carriers: int) -> tuple[LegForm, ...]:
-    """The simplest leg that items in series are: fewest carriers, then read from the base, then the largest endings."""
+def _leg(items: list[Item]) -> tuple[LegForm, ...]:
+    """The simplest leg that items in series are: fewest carriers, then read from the base, then the largest endings;
+    rods on arms where it is none of these."""
     reasons = []
-    for n_carriers in range(most_carriers + 1):
+    for n_carriers in (0, 1):
         for is_reversed in (False, True):
             own = [item.back for item in items[::-1]] if is_reversed else items
             for make in (_pivot, _rod_on):
