@@ -33,13 +33,16 @@ CLOSED, NEARLY_CLOSED = 1e-13, 1e-10
 """Gaps and excesses of a feasible configuration, and of one that nothing makes more so [rad or L]: loops that are
 overconstrained close no better than their description is exact. The second is a tenth of what is promised."""
 
+OPEN = 0.01
+"""Share of what a step promises by which loops may stay open, and limits be exceeded, while a search is on its way."""
+
 FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
 it did not lead up by more than the second, for the objective itself is known no better."""
 
-LAST, CONVERGING = 1e-18, 1e-2
-"""Share of the objective that the last step promises: its length is a billionth of the distance. And, of a fine step,
-share of what the one before promised: if it is more, what moves is rounding."""
+LAST, CONVERGING = 1e-15, 1e-2
+"""Share of the objective that the last step promises: its length is some 1e-8 of the distance, and what it leaves is its
+square. And, of a fine step, share of what the one before promised: if it is more, what moves is rounding."""
 
 PROBE = 1e-6
 """How far curvature is felt for along each motion [rad or L]."""
@@ -47,19 +50,22 @@ PROBE = 1e-6
 RESTORING = 8
 """Steps to bring a configuration back within its limits."""
 
-ENOUGH, GOOD = 1e-4, 0.5
-"""Shares of what a step promised that make it worth keeping, and the model good enough for less damping."""
+ENOUGH, GOOD, EXACT = 1e-4, 0.5, 0.1
+"""Shares of what a step promised that make it worth keeping, and the model good enough for less damping; and by how
+much it may be off where the model is good enough for far less."""
 
 STEEPEST = 1e8
 """Damping, in units of curvature, that ends a search: no step however short leads down."""
 
-# Scalars and counts of a control.
-DAMPING, LARGEST, PROMISE, BEFORE = 0, 1, 2, 3
+# Scalars of a control: damping, the largest curvature, what the last step promised, and the one before, and the sum of
+# the multipliers of the equations. Counts: steps taken, and 1 where none is worth taking any more.
+DAMPING, LARGEST, PROMISE, BEFORE, HOLDING = 0, 1, 2, 3, 4
 STEPS, DONE = 0, 1
 
-# Scalars of a linear: the objective, the largest gap of a loop, the largest excess. Counts: unknowns, limits, rank.
+# Scalars of a linear: the objective, the largest gap of a loop, the largest excess. Counts: unknowns, limits, rank,
+# and equations of what is held.
 VALUE, GAP, EXCESS = 0, 1, 2
-MOTIONS, LIMITS, RANK = 0, 1, 2
+MOTIONS, LIMITS, RANK, HELD = 0, 1, 2, 3
 
 
 class Linearisation(NamedTuple):
@@ -72,14 +78,14 @@ class Linearisation(NamedTuple):
     drift: Floats  # (k,): what closing the loops adds to it
     which: Ints  # (k,): its number
     scalars: Floats  # (3,)
-    counts: Ints  # (3,)
+    counts: Ints  # (4,)
 
 
 class StepControl(NamedTuple):
     """Step control: how long the next step may be, and whether there is one."""
 
-    scalars: Floats  # (4,): damping, the largest curvature, what the last step promised, and the one before
-    counts: Ints  # (2,): steps taken, and 1 where none is worth taking any more
+    scalars: Floats  # (5,): see above
+    counts: Ints  # (2,)
 
 
 class Hessian(NamedTuple):
@@ -100,7 +106,7 @@ def new_linearisation(n: int, k: int) -> Linearisation:
         np.zeros(k),
         np.zeros(k, np.int64),
         np.zeros(3),
-        np.zeros(3, np.int64),
+        np.zeros(4, np.int64),
     )
 
 
@@ -111,7 +117,7 @@ def new_hessian(n: int, k: int) -> Hessian:
 
 @allocator
 def new_step_control() -> StepControl:
-    return StepControl(np.zeros(4), np.zeros(2, np.int64))
+    return StepControl(np.zeros(5), np.zeros(2, np.int64))
 
 
 @routine
@@ -121,6 +127,21 @@ def longest(step: Floats, n: int) -> float:
     for j in range(n):
         most = max(most, abs(step[j]))
     return most
+
+
+@routine
+def sum_of_sizes(multipliers: Floats) -> float:
+    """What one unit of the worst equation is worth, at most."""
+    total = 0.0
+    for i in range(multipliers.shape[0]):
+        total += abs(multipliers[i])
+    return total
+
+
+@routine
+def on_the_way(control: StepControl, share: float) -> float:
+    """How far loops may be open after a share of the step planned."""
+    return max(CLOSED, OPEN * share * control.scalars[PROMISE])
 
 
 @routine
@@ -189,9 +210,15 @@ def is_last(linear: Linearisation, promise: float, before: float) -> bool:
 
 
 @routine
-def leads_down(linear: Linearisation, other: Linearisation, promise: float) -> bool:
-    """Whether a step that promised so much led to something better."""
-    gain = linear.scalars[VALUE] - other.scalars[VALUE]
+def merit(linear: Linearisation, weight: float) -> float:
+    """The objective, and what it would cost to close what is open: an exact penalty, whose weight is more than the sum
+    of all multipliers."""
+    return linear.scalars[VALUE] + weight * max(linear.scalars[GAP], linear.scalars[EXCESS], 0.0)
+
+
+@routine
+def leads_down(linear: Linearisation, gain: float, promise: float) -> bool:
+    """Whether a step that promised so much gained enough."""
     if promise <= FINE * linear.scalars[VALUE]:
         return gain >= -ROUNDING * linear.scalars[VALUE]
     return gain > ENOUGH * promise
@@ -217,6 +244,22 @@ def begin_descent(linear: Linearisation, hessian: Hessian, control: StepControl)
 
 
 @routine
+def rests_open(linear: Linearisation, led_down: bool, control: StepControl) -> bool:
+    """Whether a search has come to rest, or has found no step that leads down, where something is open."""
+    if control.counts[DONE] == 1:
+        return not is_closed(linear, CLOSED)
+    return not led_down and not is_closed(linear, NEARLY_CLOSED)
+
+
+@routine
+def go_on(linear: Linearisation, control: StepControl) -> None:
+    """Ask anew whether a step is worth taking, now that what was open is closed."""
+    if is_closed(linear, CLOSED):
+        control.scalars[PROMISE] = math.inf
+        control.counts[DONE] = 0
+
+
+@routine
 def plan_step(linear: Linearisation, hessian: Hessian, control: StepControl, most_steps: int, p: QP) -> bool:
     """The next step to try, into `p.x`; False where none is worth trying."""
     control.counts[STEPS] += 1
@@ -231,16 +274,26 @@ def plan_step(linear: Linearisation, hessian: Hessian, control: StepControl, mos
 
 
 @routine
-def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, share: float, control: StepControl) -> bool:
-    """Whether a share of the step planned led from one linear down to another; damping follows how well it did."""
-    promise = control.scalars[PROMISE] = share * control.scalars[PROMISE]
-    led_down = feasible and leads_down(linear, other, promise)
-    if is_last(linear, promise, control.scalars[BEFORE]):
+def judge_step(
+    linear: Linearisation, other: Linearisation, feasible: bool, share: float, hessian: Hessian, control: StepControl
+) -> bool:
+    """Whether a share of the step planned led from one linear down to another; damping follows how well it did.
+
+    Where more was open than the step promised, closing it may have cost as much, and the promise says nothing of what
+    is left to gain.
+    """
+    promise = share * control.scalars[PROMISE]
+    weight = 2.0 * (control.scalars[HOLDING] + sum_of_sizes(hessian.multipliers))
+    gain = merit(linear, weight) - merit(other, weight)
+    led_down = feasible and leads_down(linear, gain, promise)
+    known = is_closed(linear, max(NEARLY_CLOSED, OPEN * promise))
+    control.scalars[PROMISE] = promise if known else math.inf
+    if known and is_last(linear, promise, control.scalars[BEFORE]):
         control.counts[DONE] = 1
     damping, largest = control.scalars[DAMPING], control.scalars[LARGEST]
     if not led_down:
         control.scalars[DAMPING] = max(4.0 * damping, 1e-3 * largest)
-    elif linear.scalars[VALUE] - other.scalars[VALUE] > GOOD * promise:
-        damping *= 0.1
+    elif gain > GOOD * promise:
+        damping *= 0.01 if abs(gain - promise) < EXACT * promise else 0.1
         control.scalars[DAMPING] = damping if damping > 1e-8 * largest else 0.0
     return led_down

@@ -20,6 +20,7 @@ from ..sqp import (
     DONE,
     EXCESS,
     GAP,
+    HOLDING,
     LARGEST,
     LONGEST_STEP,
     MOTIONS,
@@ -30,11 +31,15 @@ from ..sqp import (
     STEPS,
     VALUE,
     begin_descent,
+    go_on,
     is_closed,
     judge_step,
     longest,
+    on_the_way,
     plan_step,
     restoring_step,
+    rests_open,
+    sum_of_sizes,
 )
 from .linearise import (
     Workspace,
@@ -57,7 +62,7 @@ def lagrangian_gradient(
     """Gradient of the Lagrangian at a configuration, by multipliers of limits and the `balance` of the loops."""
     n, paths, multipliers = len(loops.lo), len(loops.paths) - 1, work.hessian.multipliers
     walk_all(loops, state, work)
-    _, held = pose_gradient(objective, objective.targets[row], state.X, work.gradient)
+    _, held = pose_gradient(objective, objective.targets[row], state.X, work.gradient, True)
     for j in range(n):
         out[j] = multipliers[2 * j + 1] - multipliers[2 * j]
     for i in range(6):
@@ -92,6 +97,7 @@ def lagrangian_hessian(
     for r in range(linear.counts[RANK]):
         for i in range(rows):
             work.balance[i] -= here[view.pivots[r]] * view.transform[r, i]
+    work.control.scalars[HOLDING] = sum_of_sizes(work.balance)
     lagrangian_gradient(loops, row, objective, state, work, work.here)
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
@@ -138,18 +144,28 @@ def take(loops: Loops, view: FreeMotions, x: Floats, state: State, work: Workspa
 
 @routine
 def restore_feasibility(
-    loops: Loops, row: int, objective: PoseObjective, state: State, work: Workspace, view: FreeMotions, p: QP
+    loops: Loops,
+    row: int,
+    objective: PoseObjective,
+    state: State,
+    tolerance: float,
+    work: Workspace,
+    view: FreeMotions,
+    p: QP,
 ) -> bool:
-    """Bring a configuration onto its loops and within its limits, by the shortest way; `view` is where it ends."""
+    """Bring a configuration onto its loops and within its limits, by the shortest way; `view` is where it ends.
+
+    Both to a tolerance; where rounding keeps it from that, to what counts as closed.
+    """
     for _step in range(RESTORING):
         linearise(loops, row, objective, state, work, view)
-        if is_closed(view.linear, CLOSED):
+        if is_closed(view.linear, tolerance):
             return True
         if not restoring_step(view.linear, p):
             return False
         take(loops, view, p.x, state, work, True)
     linearise(loops, row, objective, state, work, view)
-    return is_closed(view.linear, NEARLY_CLOSED)
+    return is_closed(view.linear, max(tolerance, NEARLY_CLOSED))
 
 
 @routine
@@ -186,11 +202,16 @@ def descend(
             if plan_step(view.linear, hessian, control, objective.max_iterations, p):
                 copy_state(best, trial)
                 share = take(loops, view, p.x, trial, work, False)
-                feasible = restore_feasibility(loops, row, objective, trial, work, other, p)
-                led_down = judge_step(view.linear, other.linear, feasible, share, control)
+                tolerance = on_the_way(control, share)
+                feasible = restore_feasibility(loops, row, objective, trial, tolerance, work, other, p)
+                led_down = judge_step(view.linear, other.linear, feasible, share, hessian, control)
                 if led_down:
                     copy_state(trial, best)
                     view, other = other, view
+            if rests_open(view.linear, led_down, control):
+                if restore_feasibility(loops, row, objective, best, CLOSED, work, view, p):
+                    go_on(view.linear, control)
+                led_down = True
     return int(control.counts[STEPS])
 
 
@@ -218,7 +239,7 @@ def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Clo
             for c in range(balance(first.linear, objective.near, p, pulls)):
                 weights[row, first.linear.which[c]] = p.x[c]
             continue
-        if restore_feasibility(loops, row, objective, best, work, first, p):
+        if restore_feasibility(loops, row, objective, best, CLOSED, work, first, p):
             closed.iterations[row] = descend(loops, row, objective, best, trial, work, first, second, p)
         linearise(loops, row, objective, best, work, first)
         store_row(loops, row, best, closed)

@@ -91,7 +91,7 @@ def linearise(
     """Look at a configuration."""
     linear, n, here = view.linear, len(loops.lo), work.here
     gap = walk_all(loops, state, work)
-    linear.scalars[VALUE], held = pose_gradient(objective, objective.targets[row], state.X, work.gradient)
+    linear.scalars[VALUE], held = pose_gradient(objective, objective.targets[row], state.X, work.gradient, True)
     for k in range(held):
         gap = max(gap, abs(work.gradient.errors[k]))
     linear.scalars[GAP] = gap

@@ -25,11 +25,14 @@ class PoseGradient(NamedTuple):
 
 
 @routine
-def pose_gradient(objective: PoseObjective, target: Floats, X: Floats, gradient: PoseGradient) -> tuple[float, int]:
-    """The objective, and how many components of the twist are held."""
+def pose_gradient(
+    objective: PoseObjective, target: Floats, X: Floats, gradient: PoseGradient, turns: bool
+) -> tuple[float, int]:
+    """The objective, and how many components of the twist are held; a rotation that does not turn is the target's."""
     w, force, unit = gradient.turn, gradient.force, gradient.unit[0]
-    difference(X, target, w[3:])
-    value, held = 0.0, 0
+    value, held, w[3], w[4], w[5] = 0.0, 0, 0.0, 0.0, 0.0
+    if turns and objective.frame == BASE_AXES:
+        difference(X, target, w[3:])
     for i in range(6):
         force[i] = 0.0
         if i < 3:

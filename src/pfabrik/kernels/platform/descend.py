@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import allocator, routine
-from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
+from ..closure.loops import BASE_AXES, LOCKED, Ints, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import (
     Elimination,
@@ -23,14 +23,16 @@ from ..free_motions import (
     new_free_motions,
     project_gradient,
 )
-from ..legs.answer import deviation, turn_pose
-from ..legs.records import Floats
+from ..legs.answer import deviation, set_frames, turn_pose
+from ..legs.records import SHARED, Floats
 from ..qp import QP, new_qp
 from ..sqp import (
     CLOSED,
     DONE,
     EXCESS,
     GAP,
+    HELD,
+    HOLDING,
     LARGEST,
     LIMITS,
     LONGEST_STEP,
@@ -44,15 +46,19 @@ from ..sqp import (
     Hessian,
     StepControl,
     begin_descent,
+    go_on,
     is_closed,
     judge_step,
     longest,
     new_hessian,
     new_step_control,
+    on_the_way,
     plan_step,
     restoring_step,
+    rests_open,
+    sum_of_sizes,
 )
-from ..vectors import copy_row, copy_table, wrap
+from ..vectors import copy_row, copy_table, dot, vec, wrap
 from .equations import (
     Now,
     View,
@@ -61,9 +67,13 @@ from .equations import (
     count_unknowns,
     counts_turns,
     dead_point_slope,
+    is_carried,
     new_now,
     new_view,
+    own_row,
     place,
+    place_leg,
+    put_leg_slopes,
     put_slopes,
 )
 from .records import Aim, Table
@@ -97,6 +107,8 @@ class Search(NamedTuple):
     best: Now
     trial: Now
     kept: Floats  # (legs,): the sides that carriers are to stay on; 0 for either
+    pulled: Ints  # (legs,): 1 for those that the Lagrangian asks for
+    near_cosines: Floats  # (cones,): of angles from their axes at which cones are near
 
 
 @allocator
@@ -107,6 +119,9 @@ def new_search(table: Table) -> Search:
     elimination = new_elimination(n, rows)
     for j in range(n):
         elimination.used[j] = 2 if j < 6 else 1
+    near_cosines = np.zeros(table.cones.shape[0])
+    for i in range(near_cosines.shape[0]):
+        near_cosines[i] = math.cos(max(table.cones[i]["half_angle"] - NEAR, 0.0))
     return Search(
         new_view(table),
         PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
@@ -124,6 +139,8 @@ def new_search(table: Table) -> Search:
         new_now(legs),
         new_now(legs),
         np.zeros(legs),
+        np.zeros(legs, np.int64),
+        near_cosines,
     )
 
 
@@ -143,8 +160,10 @@ def put_objective(table: Table, row: int, aim: Aim, now: Now, search: Search) ->
     force, slope = search.force, search.look.slope
     for j in range(6, force.shape[0]):
         force[j] = 0.0
-    value, held = pose_gradient(aim.pose, aim.pose.targets[row], now.pose, search.gradient)
-    held = held if search.elimination.used[3] > 0 and search.elimination.used[0] > 0 else 0
+    used = search.elimination.used
+    turns = used[3] + used[4] + used[5] > 0
+    value, held = pose_gradient(aim.pose, aim.pose.targets[row], now.pose, search.gradient, turns)
+    held = held if used[3] > 0 and used[0] > 0 else 0
     for j in range(6):
         force[j] = search.gradient.force[j]
     for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
@@ -175,6 +194,7 @@ def linearise(table: Table, row: int, aim: Aim, now: Now, search: Search, view: 
     for k in range(held):
         gap = max(gap, abs(errors[k]))
     scalars[GAP] = gap
+    view.linear.counts[HELD] = held
     eliminate(lay_out(held, search), search.elimination, view)
     project_gradient(search.force, view)
     linearise_limits(table, aim.pose.margin, search, view)
@@ -220,8 +240,10 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
                 slope[j] = -slope[j]
             k = add_limit(k, below, 2 * i, search.look.slope, view)
     for i in range(table.cones.shape[0]):
-        over = cone_slope(table, table.cones[i], NEAR, search.look) - table.cones[i]["half_angle"] + margin
-        if over > -NEAR:
+        cone = table.cones[i]
+        line = vec(values[cone["leg"], cone["place"] :])
+        if dot(vec(cone["axis"]), line) <= search.near_cosines[i]:
+            over = cone_slope(table, cone, search.look) - cone["half_angle"] + margin
             excess = max(excess, over)
             k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.look.slope, view)
     first = 2 * table.limited.shape[0] + table.cones.shape[0]
@@ -238,20 +260,11 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
 
 
 @routine
-def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Search, out: Floats) -> None:
-    """Gradient of the Lagrangian at a configuration, by multipliers of limits and the `balance` of the equations."""
-    place(table, now, search.look)
-    put_slopes(table, search.look)
-    _, held = put_objective(table, row, aim, now, search)
-    force, slopes, balance, multipliers = search.force, search.look.slopes, search.balance, search.hessian.multipliers
-    m, slope, holds, kept = slopes.shape[0], search.look.slope, search.gradient.holds, search.kept
+def put_force(table: Table, search: Search, out: Floats) -> None:
+    """Gradient of the objective and of the limits, by their multipliers, where `search.look` is."""
+    force, multipliers, slope, kept = search.force, search.hessian.multipliers, search.look.slope, search.kept
     for j in range(out.shape[0]):
         out[j] = force[j]
-        for r in range(m):
-            out[j] += balance[r] * slopes[r, j]
-    for k in range(held):
-        for j in range(6):
-            out[j] += balance[m + k] * holds[k, j]
     ranges = table.limited.shape[0]
     for i in range(ranges):
         pull = multipliers[2 * i + 1] - multipliers[2 * i]
@@ -262,7 +275,7 @@ def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Sear
     for i in range(table.cones.shape[0]):
         pull = multipliers[2 * ranges + i]
         if pull != 0.0:
-            cone_slope(table, table.cones[i], math.inf, search.look)
+            cone_slope(table, table.cones[i], search.look)
             for j in range(out.shape[0]):
                 out[j] += pull * slope[j]
     first = 2 * ranges + table.cones.shape[0]
@@ -275,21 +288,81 @@ def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Sear
 
 
 @routine
+def add_balance(held: int, search: Search, out: Floats) -> None:
+    """Add the gradient of the equations, by their multipliers."""
+    balance, slopes, holds = search.balance, search.look.slopes, search.gradient.holds
+    m = slopes.shape[0]
+    for r in range(m):
+        if balance[r] != 0.0:
+            for j in range(out.shape[0]):
+                out[j] += balance[r] * slopes[r, j]
+    for k in range(held):
+        for j in range(6):
+            out[j] += balance[m + k] * holds[k, j]
+
+
+@routine
+def note_pulled(table: Table, aim: Aim, search: Search) -> None:
+    """Note the legs that the Lagrangian asks for: those of limits and equations with multipliers, and what carries
+    them."""
+    legs, multipliers, balance, pulled = table.legs, search.hessian.multipliers, search.balance, search.pulled
+    ranges, n = table.limited.shape[0], legs.shape[0]
+    first = 2 * ranges + table.cones.shape[0]
+    for k in range(n):
+        end = legs[k + 1]["first_row"] if k + 1 < n else table.task[0]["rows"]
+        most = multipliers[first + k]
+        for r in range(legs[k]["first_row"], end):
+            most = max(most, abs(balance[r]))
+        if is_carried(legs[k]):
+            most = max(most, abs(balance[own_row(table, k)]))
+        pulled[k] = 1 if most > 0.0 else 0
+    for i in range(ranges):
+        if multipliers[2 * i] != multipliers[2 * i + 1]:
+            pulled[table.limited[i]["leg"]] = 1
+    for i in range(table.cones.shape[0]):
+        if multipliers[2 * ranges + i] > 0.0:
+            pulled[table.cones[i]["leg"]] = 1
+    for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
+        pulled[table.driven[i]["leg"]] = 1
+    for k in range(n - 1, 0, -1):
+        if pulled[k] == 1 and (legs[k]["carrier"] == SHARED or legs[k]["on_arm"] == 1):
+            pulled[k - 1] = 1
+
+
+@routine
+def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Search, out: Floats) -> None:
+    """Gradient of the Lagrangian at a configuration, from the legs that are `pulled`."""
+    pulled, main = search.pulled, 0
+    set_frames(now.pose, table.task[0], search.look.frames)
+    for k in range(pulled.shape[0]):
+        main = main if table.legs[k]["carrier"] == SHARED else k
+        if pulled[k] == 1:
+            place_leg(table, k, main, now, search.look)
+            put_leg_slopes(table, k, main, search.look)
+    _, held = put_objective(table, row, aim, now, search)
+    put_force(table, search, out)
+    add_balance(held, search, out)
+
+
+@routine
 def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: FreeMotions) -> float:
     """Curvature of the objective and of the active limits along free motions, into `hessian`; the largest on its
     diagonal.
 
-    By differences of the gradient of the Lagrangian, whose multipliers of the equations balance it at pivot unknowns.
+    By differences of the gradient of the Lagrangian, whose multipliers of the equations balance it at pivot unknowns,
+    from `best`, where `search.look` still is.
     """
     linear, H, basis, balance, step = view.linear, search.hessian.H, view.basis, search.balance, search.step
     motions, here, there = linear.counts[MOTIONS], search.here, search.there
+    put_force(table, search, search.here)
     for i in range(balance.shape[0]):
         balance[i] = 0.0
-    lagrangian_gradient(table, row, aim, search.best, search, search.here)
     for r in range(linear.counts[RANK]):
         for i in range(balance.shape[0]):
             balance[i] -= here[view.pivots[r]] * view.transform[r, i]
-    lagrangian_gradient(table, row, aim, search.best, search, search.here)
+    add_balance(linear.counts[HELD], search, search.here)
+    search.control.scalars[HOLDING] = sum_of_sizes(search.balance)
+    note_pulled(table, aim, search)
     largest = 0.0
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
@@ -336,17 +409,22 @@ def take(table: Table, view: FreeMotions, x: Floats, now: Now, search: Search, c
 
 
 @routine
-def restore_feasibility(table: Table, row: int, aim: Aim, now: Now, search: Search, view: FreeMotions) -> bool:
-    """Bring a configuration onto its equations and within its limits, by the shortest way; `view` is where it ends."""
+def restore_feasibility(
+    table: Table, row: int, aim: Aim, now: Now, tolerance: float, search: Search, view: FreeMotions
+) -> bool:
+    """Bring a configuration onto its equations and within its limits, by the shortest way; `view` is where it ends.
+
+    Both to a tolerance; where rounding keeps it from that, to what counts as closed.
+    """
     for _step in range(RESTORING):
         linearise(table, row, aim, now, search, view)
-        if is_closed(view.linear, CLOSED):
+        if is_closed(view.linear, tolerance):
             return True
         if not restoring_step(view.linear, search.p):
             return False
         take(table, view, search.p.x, now, search, True)
     linearise(table, row, aim, now, search, view)
-    return is_closed(view.linear, NEARLY_CLOSED)
+    return is_closed(view.linear, max(tolerance, NEARLY_CLOSED))
 
 
 @routine
@@ -383,7 +461,7 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
     view, other, hessian, control = search.first, search.second, search.hessian, search.control
     unit = search.gradient.unit
     unit[0] = 1.0
-    if not restore_feasibility(table, row, aim, search.best, search, view):
+    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view):
         return math.inf
     scale_objective(table, row, aim, search, view)
     begin_descent(view.linear, hessian, control)
@@ -394,8 +472,9 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
             if plan_step(view.linear, hessian, control, aim.pose.max_iterations, search.p):
                 copy_now(search.best, search.trial)
                 share = take(table, view, search.p.x, search.trial, search, False)
-                feasible = restore_feasibility(table, row, aim, search.trial, search, other)
-                led_down = judge_step(view.linear, other.linear, feasible, share, control)
+                tolerance = on_the_way(control, share)
+                feasible = restore_feasibility(table, row, aim, search.trial, tolerance, search, other)
+                led_down = judge_step(view.linear, other.linear, feasible, share, hessian, control)
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view
@@ -403,4 +482,9 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
                         return least
                     if HOPELESS * control.scalars[PROMISE] < view.linear.scalars[VALUE] - 0.5 * unit[0] * least * least:
                         return math.inf
+            if rests_open(view.linear, led_down, control):
+                if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view):
+                    return math.inf
+                go_on(view.linear, control)
+                led_down = True
     return math.sqrt(2.0 * view.linear.scalars[VALUE] / unit[0])

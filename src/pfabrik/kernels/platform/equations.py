@@ -110,27 +110,11 @@ def is_carried(leg: Record) -> bool:
 @routine
 def place(table: Table, now: Now, view: View) -> float:
     """Read all legs at a configuration, and fill the equations; the largest of them, infinite if not a number."""
-    legs, frames, values, lines, rows = table.legs, view.frames, view.values, view.lines, view.rows
+    legs, rows, main = table.legs, view.rows, 0
     set_frames(now.pose, table.task[0], view.frames)
-    main, own_row = 0, table.task[0]["rows"] - 6
     for k in range(legs.shape[0]):
-        leg = legs[k]
-        frame = frames[leg["reversed"]]
-        main = main if leg["carrier"] == SHARED else k
-        if leg["kind"] == PIVOT:
-            place_pivot(leg, frame, now.sides[k], values[k])
-            pivot_rows(leg, frame, view.rows)
-            continue
-        if leg["kind"] == ARM:
-            place_arm(leg, now.q[k], values[k - leg["on_arm"]], values[k])
-            continue
-        if is_carried(leg):
-            values[k, CARRIER] = now.q[k]
-            values[k, COSINE], values[k, SINE] = math.cos(now.q[k]), math.sin(now.q[k])
-        read_rod(leg, legs[main], frame, values[main], values[k], lines[k])
-        rod_rows(leg, legs[main], frame, values[main], values[k], lines[k], view.rows)
-        if is_carried(leg):
-            rows[own_row + table.columns[k]] = values[k, SLIDE]
+        main = main if legs[k]["carrier"] == SHARED else k
+        place_leg(table, k, main, now, view)
     worst = 0.0
     for i in range(rows.shape[0]):
         if not abs(rows[i]) <= worst:
@@ -139,23 +123,59 @@ def place(table: Table, now: Now, view: View) -> float:
 
 
 @routine
+def place_leg(table: Table, k: int, main: int, now: Now, view: View) -> None:
+    """Read one leg at a configuration whose `view.frames` are filled, and fill its equations.
+
+    Parameters
+    ----------
+    main : the leg whose carrier it is on, or the arm, read before; itself if it is on none but its own.
+    """
+    legs, values, lines, rows = table.legs, view.values, view.lines, view.rows
+    leg, lead = legs[k], legs[main]
+    frame = view.frames[leg["reversed"]]
+    if leg["kind"] == PIVOT:
+        place_pivot(leg, frame, now.sides[k], values[k])
+        pivot_rows(leg, frame, view.rows)
+    elif leg["kind"] == ARM:
+        place_arm(leg, now.q[k], values[k - leg["on_arm"]], values[k])
+    else:
+        if is_carried(leg):
+            values[k, CARRIER] = now.q[k]
+            values[k, COSINE], values[k, SINE] = math.cos(now.q[k]), math.sin(now.q[k])
+        read_rod(leg, lead, frame, values[main], values[k], lines[k])
+        rod_rows(leg, lead, frame, values[main], values[k], lines[k], view.rows)
+        if is_carried(leg):
+            rows[own_row(table, k)] = values[k, SLIDE]
+
+
+@routine
+def own_row(table: Table, k: int) -> int:
+    """The equation by which the rod of a carrier has its length."""
+    return int(table.task[0]["rows"] - 6 + table.columns[k])
+
+
+@routine
 def put_slopes(table: Table, view: View) -> None:
     """Fill the derivatives of the equations."""
-    legs, slopes = table.legs, view.slopes
+    legs, slopes, main = table.legs, view.slopes, 0
     for i in range(slopes.shape[0]):
         for j in range(6, slopes.shape[1]):
             slopes[i, j] = 0.0
-    main, own_row = 0, table.task[0]["rows"] - 6
     for k in range(legs.shape[0]):
-        leg = legs[k]
-        main = main if leg["carrier"] == SHARED else k
-        if leg["kind"] == PIVOT:
-            pivot_slopes(leg, view.frames[leg["reversed"]], view.slopes)
-        elif leg["kind"] == ROD:
-            if is_carried(leg):
-                u = direction(view.lines[k])
-                put_rate(table, k, k, u, NOWHERE, NOWHERE, view, slopes[own_row + table.columns[k]])
-            put_rod_slopes(table, k, main, view)
+        main = main if legs[k]["carrier"] == SHARED else k
+        put_leg_slopes(table, k, main, view)
+
+
+@routine
+def put_leg_slopes(table: Table, k: int, main: int, view: View) -> None:
+    """Fill the derivatives of one leg's equations, by the unknowns that they have."""
+    leg, slopes = table.legs[k], view.slopes
+    if leg["kind"] == PIVOT:
+        pivot_slopes(leg, view.frames[leg["reversed"]], view.slopes)
+    elif leg["kind"] == ROD:
+        if is_carried(leg):
+            put_rate(table, k, k, direction(view.lines[k]), NOWHERE, NOWHERE, view, slopes[own_row(table, k)])
+        put_rod_slopes(table, k, main, view)
 
 
 @routine
@@ -302,17 +322,12 @@ def put_pivot_slope(pivot: Record, frame: Floats, own: Floats, spot: int, slope:
 
 
 @routine
-def cone_slope(table: Table, cone: Record, horizon: float, view: View) -> float:
-    """The angle of a rod's line from the axis of its cone, its derivative into `view.slope`.
-
-    Of lines inside the cone by more than the horizon, they are not told: minus infinity.
-    """
+def cone_slope(table: Table, cone: Record, view: View) -> float:
+    """The angle of a rod's line from the axis of its cone, its derivative into `view.slope`."""
     slope, k = view.slope, cone["leg"]
     end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
     main = main_of(table, k)
     axis, u = seen(table, k, main, end, vec(cone["axis"]), view), direction(view.lines[k])
-    if dot(axis, u) > math.cos(max(cone["half_angle"] - horizon, 0.0)):
-        return -math.inf
     for j in range(slope.shape[0]):
         slope[j] = 0.0
     sine = norm(cross(axis, u))

@@ -130,7 +130,7 @@ def nearest_start(aim: PoseObjective, target: Floats, starts: Starts, gradient: 
     nearest, least = -1, math.inf
     gradient.unit[0] = 1.0
     for start in range(starts.poses.shape[0]):
-        value, _ = pose_gradient(aim, target, starts.poses[start], gradient)
+        value, _ = pose_gradient(aim, target, starts.poses[start], gradient, True)
         if value < least:
             nearest, least = start, value
     return nearest
@@ -170,6 +170,15 @@ def is_global(table: Table, aim: PoseObjective, search: Search) -> bool:
 
 
 @routine
+def holds_all(aim: PoseObjective) -> bool:
+    """Whether the whole pose is held."""
+    free = 0
+    for i in range(6):
+        free += 0 if aim.platform[i] == LOCKED else 1
+    return aim.frame == BASE_AXES and free == 0
+
+
+@routine
 def is_other_mode(legs: Records, first: Floats, sides: Floats) -> bool:
     """Whether some leg takes its other solution."""
     for k in range(sides.shape[0]):
@@ -184,14 +193,15 @@ def search_row(
 ) -> float:
     """The nearest configuration of a row, into `best`, and how far it is [L]; see `approach`.
 
-    What is held is put in its place at once where searches may start anywhere, and else brought there step by step; the
-    other way too, where that finds nothing.
+    What is held is put in its place at once where searches may start anywhere or nothing else has a place, and else
+    brought there step by step; the other way too, where that finds nothing.
     """
     least, met, target, n = math.inf, 0, aim.pose.targets[row], others.poses.shape[0]
     near = nearest_start(aim.pose, target, others, search.gradient)
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
     for k in range(kept.shape[0]):
         kept[k] = own.sides[first, k] if stays == 1 and is_carried(table.legs[k]) else 0.0
+    at_once = n > 0 or holds_all(aim.pose)
     for start in range(n + 2):
         if start == 0 or start == n + 1:
             begin(own, first, search.best)
@@ -201,7 +211,7 @@ def search_row(
             break
         if stays == 1 and is_other_mode(table.legs, own.sides[first], search.best.sides):
             continue
-        in_place = (start <= n) == (n > 0)
+        in_place = (start <= n) == at_once
         fix(aim.pose, in_place, search)
         if in_place:
             put_held(table, aim.pose, target, search.look, search.best)
