@@ -41,7 +41,7 @@ FINE, ROUNDING = 1e-11, 1e-13
 it did not lead up by more than the second, for the objective itself is known no better."""
 
 LAST, CONVERGING = 1e-15, 1e-2
-"""Share of the objective that the last step promises: its length is some 1e-8 of the distance, and what it leaves is its
+"""Share of the objective that the last step promises: its length is some 1e-8 of the distance, and what it leaves its
 square. And, of a fine step, share of what the one before promised: if it is more, what moves is rounding."""
 
 PROBE = 1e-6

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from .._jit import inlined, kernel
+from .._jit import inlined, search
 from ..rotations import exponential, turn_about_z, turn_ball, yaw_of
 from .equations import (
     add_anchors,
@@ -171,7 +171,7 @@ def is_close(problem: ClosureProblem, eq: Equations) -> bool:
     return largest <= problem.closeness
 
 
-@kernel
+@search
 def close(loops: Loops, layout: Layout, problem: ClosureProblem, closed: Closed) -> None:
     """Close the loops of every row, nearest to what is wished.
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from .._jit import kernel, routine
+from .._jit import routine, search
 from ..free_motions import FreeMotions, new_free_motions
 from ..holding import balance
 from ..qp import QP, new_qp
@@ -215,7 +215,7 @@ def descend(
     return int(control.counts[STEPS])
 
 
-@kernel
+@search
 def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Closed, weights: Floats) -> None:
     """Bring every row, from a configuration that is closed within its limits or nearly so, as near as it comes.
 

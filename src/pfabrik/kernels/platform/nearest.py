@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .._jit import kernel, routine
+from .._jit import kernel, routine, search
 from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..holding import balance
@@ -230,7 +230,7 @@ def search_row(
     return least
 
 
-@kernel
+@search
 def approach(
     table: Table, aim: Aim, own: Starts, others: Starts, hits: int, stays: int, found: Found, weights: Floats
 ) -> None:

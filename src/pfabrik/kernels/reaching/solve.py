@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._jit import kernel, routine
+from .._jit import routine, search
 from ..vectors import copy_row, copy_table
 from .frames import identity_pose, move_carriers, place_ends
 from .measure import measure_all, pose_errors
@@ -125,7 +125,7 @@ def judge_row(plan: Plan, i: int, settings: Settings, rows: Rows) -> int:
     return PROJECTED
 
 
-@kernel
+@search
 def solve_by_iteration(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, rows: Rows) -> int:
     """Answer every pending row; returns how many it answered."""
     now, safe, home = new_configuration(plan), new_configuration(plan), new_configuration(plan)
