@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .answers.answer import Wanted
 from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .description.mechanism import Mechanism
 from .engine import inverse_engine_of
 from .errors import InvalidArgument
+from .kernels.reaching.plan import REACHED
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
 
@@ -45,7 +48,9 @@ def solve_ik(
     begin = start_of(mechanism, start, shape)
     found = inverse_engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keeps_mode(options, begin))
     refuse_invalid(targets, shape, found.rows.status, options)
-    return Solution(mechanism, found, shape, Wanted(targets.copy(), options.hold, options.rotation_length))
+    is_missed = np.count_nonzero(found.rows.status != REACHED)
+    wanted = Wanted(targets.copy(), options.hold, options.rotation_length) if is_missed else None
+    return Solution(mechanism, found, shape, wanted)
 
 
 def keeps_mode(options: Options, start: object) -> bool:

@@ -40,7 +40,7 @@ class Answer:
     def __init__(
         self, mechanism: Mechanism, found: Configurations, shape: tuple[int, ...], wanted: Wanted | None = None
     ) -> None:
-        """Wrap configurations, as many as the batch shape has; `wanted` are the poses asked for, if any were."""
+        """Wrap configurations, as many as the batch shape has; `wanted` are the poses asked for, if any are missed."""
         self.mechanism = mechanism
         self.shape = shape
         self._found = found
