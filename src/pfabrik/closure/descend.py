@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats
-from ..kernels.closure.loops import BASE_AXES, Closed, PoseObjective
+from ..kernels.closure.loops import BASE_AXES, SIGHT, Closed, PoseObjective
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .close import MARGIN, Closing, Closure
@@ -16,9 +16,6 @@ from .close import MARGIN, Closing, Closure
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
 
-
-SIGHT = 1e6
-"""How far off targets are looked for [L]: farther ones in the same direction have the same nearest pose."""
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""

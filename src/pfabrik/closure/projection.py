@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -49,16 +50,17 @@ class Projected(NamedTuple):
     holds: NDArray[np.int64]
 
 
-def ways_of(mechanism: Mechanism, hold: str | None, rotation_length: float | None) -> list[Way]:
+@lru_cache(maxsize=256)
+def ways_of(mechanism: Mechanism, hold: str | None, rotation_length: float | None) -> tuple[Way, ...]:
     """The ways to project, in the order in which they are tried: what is to be held, then everything free."""
     task = task_of(mechanism)
     turning = ((rotation_length or mechanism.rotation_length) / mechanism.characteristic_length) ** 2
     free = Way(task.weights(1.0, turning), P.HOLD_NOTHING)
     if hold is None or not any(task.axes) or task.rotations == 0:
-        return [free]  # nothing is to be held, or nothing else could give way
+        return (free,)  # nothing is to be held, or nothing else could give way
     if hold == "orientation":
-        return [Way(task.weights(1.0, LOCKED), P.HOLD_ORIENTATION), free]
-    return [Way(task.weights(LOCKED, turning), P.HOLD_POSITION), free]
+        return Way(task.weights(1.0, LOCKED), P.HOLD_ORIENTATION), free
+    return Way(task.weights(LOCKED, turning), P.HOLD_POSITION), free
 
 
 def held_back(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: Way) -> Floats:
@@ -67,9 +69,9 @@ def held_back(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: W
     return weighed_limits(closure, coordinates, targets, platform=way.weights, frame=frame)
 
 
-def kept(mechanism: Mechanism, holds: NDArray[np.int64], poses: Floats, targets: Floats) -> NDArray[np.int64]:
-    """What poses (n, 4, 4) have of their targets, of what they were to hold: targets out of sight were not sought."""
-    position, rotation = task_of(mechanism).errors(poses, targets)
+def kept(mechanism: Mechanism, holds: NDArray[np.int64], position: Floats, rotation: Floats) -> NDArray[np.int64]:
+    """What poses have of their targets, of what they were to hold, by how far they are: targets out of sight were not
+    sought."""
     turned = (holds == P.HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
     moved = (holds == P.HOLD_POSITION) & (position > TOLERANCES.held * mechanism.characteristic_length)
     return np.where(turned | moved, P.HOLD_NOTHING, holds)

@@ -150,7 +150,7 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
         answers = project(
             closure, sought, starts, ways_of(mechanism, options.hold, options.rotation_length), corners=not keep_mode
         )
-        holds[away] = kept(mechanism, answers.holds, answers.closing.poses, wanted[away])
+        holds[away] = kept(mechanism, answers.holds, *task_of(mechanism).errors(answers.closing.poses, wanted[away]))
         found.take(away, answers.closing)
     within_turns(mechanism, found.coordinates)
     if _has_loops_aside(mechanism):

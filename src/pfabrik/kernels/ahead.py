@@ -22,7 +22,7 @@ from .legs.feasibility import feasibility
 from .legs.maps import margins_in_blocks
 from .platform.forward import assemble
 from .platform.nearest import approach as approach_by_pose
-from .platform.nearest import judge, read_configurations
+from .platform.nearest import read_configurations
 from .platform.otherwise import answer_otherwise
 from .platform.records import Aim, Found, Starts, Table
 from .reaching import plan as P
@@ -80,11 +80,10 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
             _STARTS,
             0,
             0,
-            Found(*_values("f1 f3 f2 f2 i1")),
+            Found(*_values("f1 f3 f2 f2 i1 f2 f2")),
             _F2,
         ),
     ),
-    (judge, (_TABLE, *_values("f3 f2 f2 f2 f2"))),
     (read_configurations, (_TABLE, _KNOWN, *_values("f3 f2 f2 f2"))),
     (assemble, (_TABLE, np.zeros((0, 0)), True, _STARTS, _STARTS, *_values("i1 f2"), _STARTS)),
     (margins_in_blocks, (_LEGS, *_LIMITS, _TASK, *_values("f3 f2 i1 i f3 f2 f1 i1"))),

@@ -52,7 +52,7 @@ RESTORING = 8
 
 ENOUGH, GOOD, EXACT = 1e-4, 0.5, 0.1
 """Shares of what a step promised that make it worth keeping, and the model good enough for less damping; and by how
-much it may be off where the model is good enough for far less."""
+much it may be off where the model, at the end of a whole step, is good enough for far less."""
 
 STEEPEST = 1e8
 """Damping, in units of curvature, that ends a search: no step however short leads down."""
@@ -294,6 +294,6 @@ def judge_step(
     if not led_down:
         control.scalars[DAMPING] = max(4.0 * damping, 1e-3 * largest)
     elif gain > GOOD * promise:
-        damping *= 0.01 if abs(gain - promise) < EXACT * promise else 0.1
+        damping *= 0.01 if share == 1.0 and abs(gain - promise) < EXACT * promise else 0.1
         control.scalars[DAMPING] = damping if damping > 1e-8 * largest else 0.0
     return led_down

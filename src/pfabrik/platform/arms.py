@@ -6,10 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.descend import within_sight
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..poses import are_poses, made_exact
 from .nearest import nearest_arms, starts_at
 
 
@@ -31,12 +29,10 @@ def move_arms(
 
     Returns
     -------
-    The rows for which there is such a place, and the poses that the searches ended at, (rows, 4, 4) [L].
+    The rows for which there is such a place, and the poses that the searches ended at, (rows, 4, 4) [length].
     """
-    places = places[are_poses(targets[places])]
-    wanted = within_sight(mechanism, made_exact(targets[places]))
     own = starts_at(mechanism, table, begins if len(begins) == 1 else begins[places], sides[places])
-    found = nearest_arms(mechanism, table, wanted, own)
+    found = nearest_arms(mechanism, table, targets[places], own)
     placed = np.isfinite(found.distances)
     sides[places[placed]] = found.sides[placed]
     return places[placed], found.poses[placed]

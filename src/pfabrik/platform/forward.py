@@ -50,12 +50,12 @@ def assembled(
     if start is None and len(rest):
         _assemble(mechanism, table, wanted, own, corners_of(mechanism), rest, rows, found)
         rest = np.flatnonzero(rows.status == P.PENDING)
+    rows.poses[:] = in_lengths(found.poses, mechanism.characteristic_length)
+    rows.measures[:, P.RESIDUAL] *= mechanism.characteristic_length
     if len(rest):
         _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
         near = rest[rows.measures[rest, P.ACTUATOR_ERROR] <= tolerance]
         rows.status[near[rows.status[near] == P.PROJECTED]] = P.REACHED
-    rows.poses[:] = in_lengths(found.poses, mechanism.characteristic_length)
-    rows.measures[:, P.RESIDUAL] *= mechanism.characteristic_length
     found.sides[:, table.arms["leg"]] = found.q[:, table.arms["leg"]]
     return rows, found.q, found.sides
 
@@ -72,15 +72,12 @@ def _project(
     anywhere: bool,
 ) -> None:
     """Answer rows by feasible configurations with actuators as near to their values as searches bring them."""
-    from ..kernels.platform.nearest import judge
-
-    first = own if len(own.poses) == 1 else Starts._make(array[places] for array in own)
+    first = own if len(own.poses) == 1 else own.at(places)
     ended = nearest_actuators(mechanism, table, values[places], first, corners=anywhere)
     near = np.flatnonzero(np.isfinite(ended.distances))
     ended, places = Found._make(array[near] for array in ended), places[near]
-    asked, measures = rows.actuators[places], rows.measures[places]
-    actuators = asked.copy()
-    judge(kernel_table(table), ended.poses, ended.q, ended.sides, actuators, measures)
+    asked, actuators, measures = rows.actuators[places], ended.actuators, ended.measures
+    measures[:, [P.POSITION_ERROR, P.ROTATION_ERROR]] = 0.0
     for driven in table.driven:
         column = driven["column"]
         now = actuators[:, column]  # a view
@@ -93,8 +90,7 @@ def _project(
     rows.actuators[places], rows.measures[places] = actuators, measures
     rows.status[places] = P.PROJECTED
     rows.counters[places, P.ITERATIONS] = ended.steps
-    for array, part in zip(found, ended[1:4], strict=True):
-        array[places] = part
+    rows.poses[places], found.q[places], found.sides[places] = ended.poses, ended.q, ended.sides
 
 
 def _assemble(
@@ -115,7 +111,7 @@ def _assemble(
     ended = Starts._make(array[places] for array in found)
 
     def run(block: slice) -> None:
-        first = own if len(own.poses) == 1 else Starts._make(array[places][block] for array in own)
+        first = own if len(own.poses) == 1 else own.at(places[block])
         ends = Starts._make(array[block] for array in ended)
         assemble(legs, wanted[block], turns, first, others, status[block], measures[block], ends)
 

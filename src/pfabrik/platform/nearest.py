@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.close import MARGIN
-from ..closure.descend import within_sight
 from ..closure.projection import Way
 from ..decomposition.leg_table import LegTable, Records, leg_table
 from ..description.home_mobility import column_joints
@@ -20,20 +19,20 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..kernels.legs import records as K
-from ..kernels.platform.records import STRETCHED, Aim, Found, Starts
+from ..kernels.platform.records import Aim, Found, Starts
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
-from .coordinates import read_into
 from .table import kernel_table
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
-CORNERS, HITS, HITS_OF_STRUTS = 16, 4, 3
+CORNERS, HITS, HITS_OF_STRUTS, HITS_OF_VALUES = 16, 4, 3, 6
 """How many configurations searches start from at most, and how many of them must end at the nearest one: fewer where
-struts leave the platform all its freedoms, and have no two ways to bend."""
+struts leave the platform all its freedoms, and have no two ways to bend; more where actuators have values, which a
+platform nearly has in many poses."""
 
 DRAWS, DRAWN_STEPS = 240, 30
 """How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
@@ -49,9 +48,6 @@ TURNING = 0.2
 
 OTHER_SIDE = 0.02
 """The same for the square of the sine of half the angle by which carriers differ."""
-
-BENT = 1e-2
-"""How far rods that are stretched out are bent where a search starts [L or rad]."""
 
 ROWS_A_BLOCK = 16
 
@@ -84,12 +80,13 @@ def project(
     corners : start from elsewhere too. Without, a search stays about where it starts.
     stays : in the working mode of the first start; through a dead point lies another.
     """
-    best = Projected(_new_found(len(targets), len(table.legs)), np.full(len(targets), P.HOLD_NOTHING))
-    for way in ways:
+    first, *others = ways
+    best = Projected(_search(mechanism, table, targets, own, first, corners, stays), np.full(len(targets), first.hold))
+    for way in others:
         rows = np.flatnonzero(np.isinf(best.found.distances))
         if len(rows):
-            first = own if len(own.poses) == 1 else Starts._make(array[rows] for array in own)
-            found = _search(mechanism, table, targets[rows], first, way, corners, stays)
+            start = own if len(own.poses) == 1 else own.at(rows)
+            found = _search(mechanism, table, targets[rows], start, way, corners, stays)
             for array, tried in zip(best.found, found, strict=True):
                 array[rows] = tried
             best.holds[rows] = way.hold
@@ -104,18 +101,16 @@ def _search(
 
 
 def _objective(mechanism: Mechanism, targets: Floats, way: Way, steps: int) -> PoseObjective:
-    wanted = in_lengths(targets, 1.0 / mechanism.characteristic_length)
     weights, frame = np.array(way.weights, dtype=float), task_of(mechanism).frame
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
-        wanted[:, :3, :3] = mechanism.home_pose[:3, :3]
         weights[3:], frame = LOCKED, BASE_AXES
-    return PoseObjective(wanted, weights, frame, MARGIN, TOLERANCES.active, steps)
+    return PoseObjective(targets, weights, frame, MARGIN, TOLERANCES.active, steps)
 
 
 def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: Way) -> Floats:
     """How hard every limit holds configurations back from targets (n, 4, 4) [length]: multipliers, in the order of
     those that `closure.descend.weighed_limits` gives."""
-    objective = _objective(mechanism, within_sight(mechanism, targets), way, 0)
+    objective = _objective(mechanism, targets, way, 0)
     found = _approach(table, objective, present, no_starts(table))[1]
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
     coned = [joint.name for joint in mechanism.joints if joint.cone is not None]
@@ -129,7 +124,8 @@ def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, prese
 
 def nearest_actuators(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts, *, corners: bool) -> Found:
     """Feasible configurations whose actuators are nearest to values (n, n_a), deviations from home [L or rad]."""
-    poses = own.poses if len(own.poses) == len(values) else np.repeat(own.poses, len(values), axis=0)
+    poses = in_lengths(own.poses, mechanism.characteristic_length)
+    poses = poses if len(poses) == len(values) else np.repeat(poses, len(values), axis=0)
     weights = np.zeros(6)
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:] = LOCKED
@@ -143,14 +139,14 @@ def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: St
     Searches start there alone: what they miss, projections from elsewhere find.
     """
     way, n = Way(task_of(mechanism).weights(LOCKED, LOCKED), P.HOLD_NOTHING), len(targets)
-    objective, best = _objective(mechanism, targets, way, MOST_STEPS), _new_found(n, len(table.legs))
-    best.distances[:], best.q[:], best.sides[:] = 0.0, own.q, own.sides
+    objective, best = _objective(mechanism, targets, way, MOST_STEPS), _new_found(n, table)
+    best.distances[:], best.sides[:] = 0.0, own.sides
     for part, legs in _apart_by_arms(table):
         begin, arms = Starts(own.poses, *(np.ascontiguousarray(array[:, legs]) for array in own[1:])), part.arms
-        values = np.ascontiguousarray(arms["sense"] * begin.q[:, arms["leg"]])
+        values = np.ascontiguousarray(arms["sense"] * begin.sides[:, arms["leg"]])
         found = _approach(part, objective, begin, no_starts(part), values, arms)[0]
         np.maximum(best.distances, found.distances, out=best.distances)
-        best.poses[:], best.q[:, legs], best.sides[:, legs] = found.poses, found.q, found.sides
+        best.poses[:], best.sides[:, legs] = found.poses, found.sides
     return best
 
 
@@ -190,18 +186,17 @@ def _approach(
     values : what coordinates, those of actuators if no others are `driven`, are to be near to; see `Aim`.
     """
     driven = table.driven if driven is None else driven
-    if values is None:
-        values = np.zeros((0, len(driven)))
     from ..kernels.platform.nearest import approach
 
-    legs, found = kernel_table(table)._replace(driven=driven), _new_found(len(objective.targets), len(table.legs))
+    legs, found = kernel_table(table)._replace(driven=driven), _new_found(len(objective.targets), table)
     limits = 2 * len(table.limited) + len(table.cones) + len(table.legs)
     weights = np.zeros((len(objective.targets), limits))
-    hits = HITS if table.task[0]["rows"] > 0 or len(_carriers(table)) else HITS_OF_STRUTS
+    hits = _hits(table) if values is None else HITS_OF_VALUES
+    near = np.zeros((0, len(driven))) if values is None else values
 
     def run(block: slice) -> None:
-        first = own if len(own.poses) == 1 else Starts._make(array[block] for array in own)
-        aim = Aim(objective._replace(targets=objective.targets[block]), values[block])
+        first = own if len(own.poses) == 1 else own.at(block)
+        aim = Aim(objective._replace(targets=objective.targets[block]), near[block])
         into = Found._make(array[block] for array in found)
         approach(legs, aim, first, others, hits, int(stays), into, weights[block])
 
@@ -209,9 +204,21 @@ def _approach(
     return found, weights
 
 
-def _new_found(n: int, legs: int) -> Found:
+@lru_cache(maxsize=64)
+def _hits(table: LegTable) -> int:
+    return HITS if table.task[0]["rows"] > 0 or len(_carriers(table)) else HITS_OF_STRUTS
+
+
+def _new_found(n: int, table: LegTable) -> Found:
+    legs, actuators = len(table.legs), len(table.driven)
     return Found(
-        np.full(n, np.inf), np.zeros((n, 4, 4)), np.zeros((n, legs)), np.zeros((n, legs)), np.zeros(n, np.int64)
+        np.full(n, np.inf),
+        np.zeros((n, 4, 4)),
+        np.zeros((n, legs)),
+        np.zeros((n, legs)),
+        np.zeros(n, np.int64),
+        np.zeros((n, actuators)),
+        np.zeros((n, 5)),
     )
 
 
@@ -220,26 +227,8 @@ def no_starts(table: LegTable) -> Starts:
 
 
 def starts_at(mechanism: Mechanism, table: LegTable, poses: Floats, sides: Floats) -> Starts:
-    """Poses (n, 4, 4) [length] with legs on given sides, (n, legs), as starts.
-
-    Rods that are stretched out over what carries them are bent a little to their sides: stretched out, nothing says to
-    first order that they could bend, and a search would stay there.
-    """
-    own, other = (_carriers_at(table, poses, sign * sides) for sign in (1.0, -1.0))
-    q = np.where(np.abs(own - other) < STRETCHED, own + BENT * sides, own)
-    arms = table.arms["leg"]
-    q[:, arms] = sides[:, arms]
-    return Starts(in_lengths(poses, 1.0 / mechanism.characteristic_length), q, sides)
-
-
-def _carriers_at(table: LegTable, poses: Floats, sides: Floats) -> Floats:
-    """Coordinates of carriers (n, legs) [L or rad] at poses (n, 4, 4) [length]."""
-    columns = np.zeros((len(poses), 1 + table.known["column"].max(initial=0)))
-    read_into(table, poses, sides, columns)
-    q = np.zeros(sides.shape)
-    for carrier in _carriers(table):
-        q[:, carrier["leg"]] = carrier["sense"] * columns[:, carrier["column"]] / carrier["unit"]
-    return q
+    """Poses (n, 4, 4) [length] with legs on given sides, (n, legs), as starts."""
+    return Starts(in_lengths(poses, 1.0 / mechanism.characteristic_length), np.zeros((0, len(table.legs))), sides)
 
 
 def _carriers(table: LegTable) -> Records:
@@ -304,9 +293,11 @@ def corners_of(mechanism: Mechanism) -> Starts:
     for carrier in (*_carriers(table), *table.arms):
         lo, hi = max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi)
         q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, DRAWS)
-    objective = PoseObjective(poses, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
+    targets = in_lengths(poses, mechanism.characteristic_length)
+    objective = PoseObjective(targets, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
     drawn = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, DRAWS, axis=0)), no_starts(table))[0]
     feasible = np.flatnonzero(np.isfinite(drawn.distances))
+    drawn.poses[:] = in_lengths(drawn.poses, 1.0 / mechanism.characteristic_length)
     every = Starts(*(np.concatenate([first, array[feasible]]) for first, array in zip(home, drawn[1:4], strict=True)))
     chosen: list[int] = []
     away = _apart(every, 0)

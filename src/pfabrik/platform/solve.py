@@ -70,14 +70,14 @@ class LegsEngine:
 
         Projections are the nearest found in the working mode, if that is kept, or `nearby` those next to the start.
         """
-        if len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1)):
-            found = self._reach_one(targets, start, keep_mode)
-            if found is not None:
-                return found
+        is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
         first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
-        sides = first
-        rows = new_rows(self.mechanism, len(targets))
-        left, sides = self._reach(targets, start, sides, keep_mode, rows)
+        rows = self._one.new_rows() if is_one else new_rows(self.mechanism, len(targets))
+        if is_one and self._reach_one(targets, start, first, keep_mode, rows):
+            begins = _begins(self.mechanism, self._table, start, first)
+            told = rows.poses, rows.actuators, first
+            return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins()), first)
+        left, sides = self._reach(targets, start, first, keep_mode, rows, tried=is_one)
         carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
         if left and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
@@ -236,24 +236,34 @@ class LegsEngine:
         end = rows.poses, rows.actuators, ends.sides, None, ends.q
         return LegAnswers(rows, partial(settled, self.mechanism, self._table, *end), ends.sides, ends.q)
 
-    def _reach_one(self, target: Floats, start: LegAnswers | None, keep_mode: bool) -> LegAnswers | None:
-        """Answer one target from home or from an answer before, if legs reach it."""
-        one, rows = self._one, self._one.new_rows()
-        begin, sides = (one.home, one.home_sides) if start is None else (start.rows.poses, start.sides)
-        if one.reach(target, begin, sides, rows, nearby=keep_mode):
-            return None
+    def _reach_one(
+        self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: P.Rows
+    ) -> bool:
+        """Answer one target from home or from one answer before; whether legs reach it as they are."""
+        begin = self._one.home if start is None else start.rows.poses
+        if self._one.reach(target, begin, sides, rows, nearby=keep_mode):
+            return False
         if start is not None:
             self._count_turns(start.rows.actuators, rows)
-        mechanism, table, begins = self.mechanism, self._table, _begins(self.mechanism, self._table, start, sides)
-        return LegAnswers(rows, lambda: settled(mechanism, table, rows.poses, rows.actuators, sides, begins()), sides)
+        return True
 
     def _reach(
-        self, targets: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: P.Rows
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        sides: Floats,
+        keep_mode: bool,
+        rows: P.Rows,
+        *,
+        tried: bool = False,
     ) -> tuple[int, Floats]:
-        """Answer the rows that legs reach; how many they do not, and the sides of answers with arms where they are."""
+        """Answer the rows that legs reach; how many they do not, and the sides of answers with arms where they are.
+
+        One row that was `tried` has a status already.
+        """
         begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
         task = self._table.task_within(STRANGE) if keep_mode else self._table.task
-        left = self._run(self._table.is_for_blocks, task, targets, begins, sides, rows)
+        left = 1 if tried else self._run(self._table.is_for_blocks, task, targets, begins, sides, rows)
         if left and self._table.is_for_blocks and task["unset"][0]:
             left -= self._complete(task, targets, begins, sides, rows)
         if left and len(self._table.arms):
@@ -271,7 +281,7 @@ class LegsEngine:
         some, poses = move_arms(self.mechanism, self._table, targets, begins, sides, rest)
         if not len(some):
             return 0
-        own, begins = rows_at(rows, some), in_lengths(poses, self.mechanism.characteristic_length)
+        own, begins = rows_at(rows, some), poses
         left = self._run(False, task, targets[some], begins, sides[some], own)
         put_rows(rows, some, own)
         lost = some[own.status != P.REACHED]

@@ -9,19 +9,16 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.configurations import put_rows, rows_at
-from ..closure.descend import within_sight
 from ..closure.projection import kept, ways_of
 from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..kernels.platform.records import Found
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..options import Options
-from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
-from .nearest import in_lengths, project, starts_at
+from .nearest import project, starts_at
 from .table import kernel_table
 
 ROWS_A_BLOCK = 64
@@ -58,20 +55,19 @@ def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, 
     """
     mechanism, table, targets, begins, options, keep_mode, _ = question
     carriers = np.full(sides.shape, np.nan)
-    rest = rest[are_poses(targets[rest])]
-    if not keep_mode:
+    if not keep_mode and table.home_sides.any():
         rest = _reach_otherwise(question, rest, sides, rows)
     if not len(rest):
         return carriers
-    wanted, places = made_exact(targets[rest]), rest[:1] if len(begins) == 1 else rest
+    places = rest[:1] if len(begins) == 1 else rest
     own = starts_at(mechanism, table, begins[places % len(begins)], sides[places])
     ways = ways_of(mechanism, options.hold, options.rotation_length)
-    sought = within_sight(mechanism, wanted)
-    found, holds = project(mechanism, table, sought, own, ways, corners=not question.nearby, stays=keep_mode)
-    placed = np.flatnonzero(np.isfinite(found.distances))
-    found, rest, wanted = Found._make(array[placed] for array in found), rest[placed], wanted[placed]
+    found, holds = project(mechanism, table, targets[rest], own, ways, corners=not question.nearby, stays=keep_mode)
+    placed = np.isfinite(found.distances)
+    if not placed.all():
+        found, rest, holds = Found._make(array[placed] for array in found), rest[placed], holds[placed]
     sides[rest], carriers[rest] = found.sides, found.q
-    _put_projected(question, rest, wanted, found, holds[placed], rows)
+    _put_projected(question, rest, found, holds, rows)
     is_near = found.distances <= NEARLY
     again = np.flatnonzero(is_near | (table.task[0]["unset"] > 0))
     if len(again):
@@ -136,20 +132,13 @@ def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, row
 
 
 def _put_projected(
-    question: Question, rest: NDArray[np.intp], wanted: Floats, found: Found, holds: NDArray[np.int64], rows: P.Rows
+    question: Question, rest: NDArray[np.intp], found: Found, holds: NDArray[np.int64], rows: P.Rows
 ) -> None:
-    """Write configurations found for rows `rest`, and how far they are from what was wanted."""
-    from ..kernels.platform.nearest import judge
-
+    """Write configurations found for rows `rest`."""
     mechanism, options = question.mechanism, question.options
-    own = rows_at(rows, rest)
-    judge(kernel_table(question.table), found.poses, found.q, found.sides, own.actuators, own.measures)
-    own.poses[:] = in_lengths(found.poses, mechanism.characteristic_length)
-    own.measures[:, P.RESIDUAL] *= mechanism.characteristic_length
-    position, rotation = task_of(mechanism).errors(own.poses, wanted)
-    own.measures[:, P.POSITION_ERROR], own.measures[:, P.ROTATION_ERROR] = position, rotation
-    own.counters[:, P.ITERATIONS] = found.steps
-    own.counters[:, P.HELD] = kept(mechanism, holds, own.poses, wanted)
+    position, rotation = found.measures[:, P.POSITION_ERROR], found.measures[:, P.ROTATION_ERROR]
     is_near = position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)
-    own.status[:] = np.where(is_near & (rotation <= options.rotation_tolerance), P.REACHED, P.PROJECTED)
-    put_rows(rows, rest, own)
+    rows.status[rest] = np.where(is_near & (rotation <= options.rotation_tolerance), P.REACHED, P.PROJECTED)
+    rows.poses[rest], rows.actuators[rest], rows.measures[rest] = found.poses, found.actuators, found.measures
+    rows.counters[rest, P.ITERATIONS] = found.steps
+    rows.counters[rest, P.HELD] = kept(mechanism, holds, position, rotation)

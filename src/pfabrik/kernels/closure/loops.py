@@ -79,6 +79,9 @@ class ClosureProblem(NamedTuple):
 
 LOCKED = 1e12
 
+SIGHT = 1e6
+"""How far off targets are looked for [L]: farther ones in the same direction have the same nearest pose."""
+
 
 class Closed(NamedTuple):
     """What is worked on, row by row."""

@@ -106,6 +106,7 @@ class Search(NamedTuple):
     balance: Floats  # (rows,): multipliers of the equations and of what is held
     best: Now
     trial: Now
+    target: Floats  # (4, 4): of the row [L]
     kept: Floats  # (legs,): the sides that carriers are to stay on; 0 for either
     pulled: Ints  # (legs,): 1 for those that the Lagrangian asks for
     near_cosines: Floats  # (cones,): of angles from their axes at which cones are near
@@ -138,6 +139,7 @@ def new_search(table: Table) -> Search:
         np.zeros(rows),
         new_now(legs),
         new_now(legs),
+        np.zeros((4, 4)),
         np.zeros(legs),
         np.zeros(legs, np.int64),
         near_cosines,
@@ -162,7 +164,7 @@ def put_objective(table: Table, row: int, aim: Aim, now: Now, search: Search) ->
         force[j] = 0.0
     used = search.elimination.used
     turns = used[3] + used[4] + used[5] > 0
-    value, held = pose_gradient(aim.pose, aim.pose.targets[row], now.pose, search.gradient, turns)
+    value, held = pose_gradient(aim.pose, search.target, now.pose, search.gradient, turns)
     held = held if used[3] > 0 and used[0] > 0 else 0
     for j in range(6):
         force[j] = search.gradient.force[j]

@@ -7,30 +7,84 @@ import math
 import numpy as np
 
 from .._jit import kernel, routine, search
-from ..closure.loops import BASE_AXES, LOCKED, TARGET_AXES, PoseObjective
-from ..closure.pose_objective import PoseGradient, pose_gradient
+from ..closure.loops import BASE_AXES, LOCKED, SIGHT, TARGET_AXES, PoseObjective
+from ..closure.pose_objective import PoseGradient, pose_gradient, turn_of_tilt
 from ..holding import balance
-from ..legs.answer import column, deviation, excess_of, make_exact, set_frames, turn_pose
+from ..legs.answer import column, deviation, excess_of, is_pose, make_exact, set_frames, turn_pose
 from ..legs.records import ARM, CARRIER, CRANK, PIVOT, SLIDE, Floats, Record, Records
 from ..legs.rods import carry
 from ..qp import new_qp
-from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
+from ..reaching.plan import LIMIT_EXCESS, POSITION_ERROR, RESIDUAL, ROTATION_ERROR
+from ..rotations import difference, yaw_difference
 from ..sqp import STEPS
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
 from .descend import Search, copy_now, descend, fix, new_search, scale_objective
 from .equations import Now, View, is_carried, new_now, new_view, place
 from .records import STRETCHED, Aim, Found, Starts, Table
 
+BENT = 1e-2
+"""How far rods that are stretched out are bent where a search starts [L or rad]."""
+
+LARGEST_NUMBER = 1.7976931348623157e308
+"""Distances are finite, however far a target is."""
+
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
 
 
 @routine
-def begin(starts: Starts, start: int, now: Now) -> None:
-    """Put a start into `now`."""
-    copy_table(starts.poses[start], now.pose)
-    copy_row(starts.q[start], now.q)
-    copy_row(starts.sides[start], now.sides)
+def load_target(table: Table, aim: PoseObjective, row: int, search: Search) -> bool:
+    """Put the target of a row into `search.target`, near enough to be told from others there; False if it is no pose.
+
+    Of a platform that cannot turn, and is not asked to, the rotation is home's.
+    """
+    own, target, task = aim.targets[row], search.target, table.task[0]
+    if not is_pose(own):
+        return False
+    most = 0.0
+    for i in range(3):
+        most = max(most, abs(own[i, 3] / task["length"] - task["reference"][i]))
+        for j in range(3):
+            target[i, j] = own[i, j]
+    if task["rotations"] == 0 and aim.platform[3] == LOCKED:
+        for i in range(9):
+            target[i // 3, i % 3] = 1.0 if i % 4 == 0 else 0.0
+    for i in range(3):
+        home = task["reference"][i]
+        target[i, 3] = home + (own[i, 3] / task["length"] - home) * min(1.0, SIGHT / max(most, SIGHT))
+    make_exact(target)
+    return True
+
+
+@routine
+def begin(table: Table, starts: Starts, start: int, search: Search) -> None:
+    """Put a start into `search.best`."""
+    copy_table(starts.poses[start], search.best.pose)
+    copy_row(starts.sides[start], search.best.sides)
+    if starts.q.shape[0] > 0:
+        copy_row(starts.q[start], search.best.q)
+    else:
+        put_carriers(table, search.best, search.look)
+
+
+@routine
+def put_carriers(table: Table, now: Now, look: View) -> None:
+    """Put carriers and arms where the pose and the sides have them.
+
+    Rods that are stretched out over what carries them are bent a little to their sides: stretched out, nothing says to
+    first order that they could bend, and a search would stay there.
+    """
+    q, sides = now.q, now.sides
+    set_frames(now.pose, table.task[0], look.frames)
+    for k in range(q.shape[0]):
+        leg, own = table.legs[k], look.values[k]
+        q[k] = sides[k] if leg["kind"] == ARM else 0.0
+        if is_carried(leg):
+            head = move(look.frames[leg["reversed"]], vec(leg["head_point"]))
+            carry(leg, head, -sides[k], own)
+            other = own[CARRIER]
+            carry(leg, head, sides[k], own)
+            q[k] = own[CARRIER] if abs(own[CARRIER] - other) >= STRETCHED else own[CARRIER] + BENT * sides[k]
 
 
 @routine
@@ -109,19 +163,45 @@ def read_configurations(table: Table, known: Records, poses: Floats, q: Floats, 
             found[row, known[i]["column"]] = deviation(known[i], look.values) * known[i]["unit"]
 
 
-@kernel
-def judge(table: Table, poses: Floats, q: Floats, sides: Floats, actuators: Floats, measures: Floats) -> None:
-    """Fill the actuators (n, n_a), and of `measures` the largest equation [L or rad] and the largest excess."""
-    now, look = new_now(table.legs.shape[0]), new_view(table)
-    for row in range(poses.shape[0]):
-        copy_table(poses[row], now.pose)
-        copy_row(q[row], now.q)
-        copy_row(sides[row], now.sides)
-        measures[row, RESIDUAL] = place(table, now, look)
-        measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, look.values), 0.0)
-        for i in range(table.driven.shape[0]):
-            driven = table.driven[i]
-            actuators[row, driven["column"]] = driven["home"] + deviation(driven, look.values) * driven["unit"]
+@routine
+def write(table: Table, row: int, aim: PoseObjective, search: Search, best: Now, found: Found) -> None:
+    """Write a configuration, and what is measured of it."""
+    look, length, own, pose, measures = (
+        search.look,
+        table.task[0]["length"],
+        aim.targets[row],
+        found.poses[row],
+        found.measures[row],
+    )
+    make_exact(best.pose)
+    measures[RESIDUAL] = place(table, best, look) * length
+    measures[LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, look.values), 0.0)
+    copy_row(best.q, found.q[row])
+    copy_row(best.sides, found.sides[row])
+    for i in range(table.driven.shape[0]):
+        driven = table.driven[i]
+        found.actuators[row, driven["column"]] = driven["home"] + deviation(driven, look.values) * driven["unit"]
+    copy_table(best.pose, pose)
+    away = 0.0
+    for i in range(3):
+        pose[i, 3] *= length
+        pose[3, i] = 0.0
+        away = math.hypot(away, pose[i, 3] - own[i, 3] if table.task[0]["axes"][i] == 1 else 0.0)
+    pose[3, 3] = 1.0
+    measures[POSITION_ERROR] = min(away, LARGEST_NUMBER)
+    measures[ROTATION_ERROR] = turned_by(table.task[0]["rotations"], best.pose, search)
+
+
+@routine
+def turned_by(rotations: int, pose: Floats, search: Search) -> float:
+    """The angle by which a pose is turned from the target, in what counts."""
+    if rotations == 3:
+        difference(pose, search.target, search.gradient.turn)
+        return norm(vec(search.gradient.turn))
+    if rotations == 2:
+        _, angle = turn_of_tilt(search.target, pose)
+        return angle
+    return abs(yaw_difference(pose, search.target)) if rotations == 1 else 0.0
 
 
 @routine
@@ -196,7 +276,7 @@ def search_row(
     What is held is put in its place at once where searches may start anywhere or nothing else has a place, and else
     brought there step by step; the other way too, where that finds nothing.
     """
-    least, met, target, n = math.inf, 0, aim.pose.targets[row], others.poses.shape[0]
+    least, met, target, n = math.inf, 0, search.target, others.poses.shape[0]
     near = nearest_start(aim.pose, target, others, search.gradient)
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
     for k in range(kept.shape[0]):
@@ -204,9 +284,9 @@ def search_row(
     at_once = n > 0 or holds_all(aim.pose)
     for start in range(n + 2):
         if start == 0 or start == n + 1:
-            begin(own, first, search.best)
+            begin(table, own, first, search)
         else:
-            begin(others, near if start == 1 else (start - 2 if start - 2 < near else start - 1), search.best)
+            begin(table, others, near if start == 1 else (start - 2 if start - 2 < near else start - 1), search)
         if start == n + 1 and least < math.inf:
             break
         if stays == 1 and is_other_mode(table.legs, own.sides[first], search.best.sides):
@@ -249,8 +329,11 @@ def approach(
     k, n = search.first.linear.G.shape
     p, pulls = new_qp(k, k), np.zeros((k, n))
     for row in range(found.distances.shape[0]):
+        found.distances[row] = math.inf
+        if not load_target(table, aim.pose, row, search):
+            continue
         if aim.pose.max_iterations == 0:
-            begin(own, row, search.best)
+            begin(table, own, row, search)
             fix(aim.pose, True, search)
             scale_objective(table, row, aim, search, search.first)
             for c in range(balance(search.first.linear, aim.pose.near, p, pulls)):
@@ -260,7 +343,4 @@ def approach(
         found.distances[row] = least
         found.steps[row] = search.control.counts[STEPS]
         if least < math.inf:
-            make_exact(best.pose)
-            copy_table(best.pose, found.poses[row])
-            copy_row(best.q, found.q[row])
-            copy_row(best.sides, found.sides[row])
+            write(table, row, aim.pose, search, best, found)

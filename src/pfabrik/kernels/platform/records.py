@@ -28,7 +28,7 @@ class Table(NamedTuple):
 class Aim(NamedTuple):
     """What is to come near: the pose of the platform, or the values of actuators."""
 
-    pose: PoseObjective
+    pose: PoseObjective  # its targets in [length]
     values: Floats  # (n, n_a): deviations from home [L or rad] that `driven` are to have; no rows if that is no aim
 
 
@@ -36,15 +36,21 @@ class Starts(NamedTuple):
     """Configurations that searches start from: poses [L], coordinates of carriers and sides, as of `Now`."""
 
     poses: Floats  # (s, 4, 4)
-    q: Floats  # (s, legs)
+    q: Floats  # (s, legs); no rows where they are what poses and sides tell
     sides: Floats  # (s, legs)
+
+    def at(self, places: NDArray[np.intp] | slice) -> Starts:
+        """Those at some places."""
+        return Starts(self.poses[places], self.q[places] if len(self.q) else self.q, self.sides[places])
 
 
 class Found(NamedTuple):
     """Where the searches of each row ended."""
 
-    distances: Floats  # (n,) [L]; infinite where nothing feasible was found
-    poses: Floats  # (n, 4, 4) [L]
+    distances: Floats  # (n,) [L]; infinite where nothing feasible was found, and where the target is no pose
+    poses: Floats  # (n, 4, 4) [length]
     q: Floats  # (n, legs)
     sides: Floats  # (n, legs)
     steps: NDArray[np.int64]  # (n,)
+    actuators: Floats  # (n, n_a)
+    measures: Floats  # (n, 5): distances from the target [length, rad], the largest equation [length], limit excess

@@ -1,0 +1,174 @@
+"""The same hexapod in PlaCo, a C++ solver of whole-body tasks with closed loops: one question at a time from Python.
+
+Its rows are in the table where PlaCo can be imported (`pip install placo`; it wants an older NumPy than we test with,
+so better in an environment of its own). Its cones are ranges of the hinges of universal joints there, at the platform's
+end alone, and a target counts as 1 rad for 1 L in both.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import pfabrik as pf
+from closed_forms import Array, Struts
+from pfabrik.rotations import to_rotvec
+from table import Row
+from timing import best_times, draw
+
+IS_THERE = importlib.util.find_spec("placo") is not None
+
+QUESTIONS = 100
+STILL, MOST_STEPS = 1e-9, 100
+"""Change of its coordinates [L or rad] at which a search has ended, and the steps after which it is given up."""
+
+INERTIA = (
+    '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'  # asked for
+)
+
+
+def along(line: Array) -> Array:
+    """A rotation (3, 3) whose z axis is a line."""
+    z = line / np.linalg.norm(line)
+    x = np.cross((0.0, 1.0, 0.0), z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def origin(point: Array, rotation: Array) -> str:
+    """A URDF frame: roll, pitch, yaw about fixed axes."""
+    R = rotation
+    angles = np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(R[2, 0]), np.arctan2(R[1, 0], R[0, 0])
+    return f'<origin xyz="{" ".join(map(str, point))}" rpy="{" ".join(map(str, angles))}"/>'
+
+
+class Hexapod:
+    """A platform that floats and six struts that hang from it, whose ends are held at the feet; lengths in L."""
+
+    def __init__(self, mechanism: pf.Mechanism, held: str | None = None, driven: bool = False) -> None:
+        import placo
+
+        L = self.length = mechanism.characteristic_length
+        struts = Struts(mechanism)
+        self.home = self.scaled(mechanism.home_pose)
+        self.feet, tops = struts.feet / L, struts.tops / L
+        lines = self.feet - (tops + self.home[:3, 3])
+        self.at_home = np.linalg.norm(lines, axis=1)
+        lean = np.arccos(struts.head_cosines)
+        parts = [f'<link name="platform">{INERTIA}</link>']
+        for i, (top, line) in enumerate(zip(tops, lines, strict=True)):
+            before = "platform"
+            slide = (struts.low[i] / L - self.at_home[i], struts.high[i] / L - self.at_home[i])
+            for kind, axis, frame, (lo, hi) in (
+                ("revolute", "1 0 0", origin(top, along(line)), (-lean[i], lean[i])),
+                ("revolute", "0 1 0", origin(np.zeros(3), np.eye(3)), (-lean[i], lean[i])),
+                ("prismatic", "0 0 1", origin(np.array([0.0, 0.0, self.at_home[i]]), np.eye(3)), slide),
+            ):
+                name = f"{before}_{i}" if before == "platform" else f"{before}_"
+                parts.append(
+                    f'<link name="{name}">{INERTIA}</link><joint name="to_{name}" type="{kind}"><parent link="{before}"/>'
+                    f'<child link="{name}"/>{frame}<axis xyz="{axis}"/>'
+                    f'<limit lower="{lo}" upper="{hi}" effort="1" velocity="1e6"/></joint>'
+                )
+                before = name
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "robot.urdf").write_text(f'<robot name="hexapod">{"".join(parts)}</robot>')
+            self.robot: Any = placo.RobotWrapper(folder, placo.Flags.ignore_collisions)
+        self.robot.set_T_world_frame("platform", self.home)
+        self.robot.update_kinematics()
+        self.begin = np.array(self.robot.state.q)
+        self.solver: Any = placo.KinematicsSolver(self.robot)
+        self.solver.enable_velocity_limits(False)
+        for i, foot in enumerate(self.feet):
+            self.solver.add_position_task(f"platform_{i}__", foot).configure(f"foot {i}", "hard")
+        self.lengths = self.position = self.orientation = None
+        if driven:
+            self.lengths = self.solver.add_joints_task()
+            self.lengths.configure("lengths", "hard")
+        else:
+            self.position = self.solver.add_position_task("platform", self.home[:3, 3])
+            self.position.configure("position", "soft", 1.0)
+            self.orientation = self.solver.add_orientation_task("platform", self.home[:3, :3])
+            self.orientation.configure("orientation", "hard" if held else "soft", 1.0)
+        self.solver.add_regularization_task(1e-9)
+
+    def scaled(self, pose: Array) -> Array:
+        scaled = np.array(pose)
+        scaled[:3, 3] /= self.length
+        return scaled
+
+    def ik(self, pose: Array) -> Array:
+        """Where its search for a pose (4, 4) [length] ends, from home."""
+        target = self.scaled(pose)
+        self.position.target_world, self.orientation.R_world_frame = target[:3, 3], target[:3, :3]
+        return self._search()
+
+    def fk(self, lengths: Array) -> Array:
+        """The pose of lengths (6,), from home."""
+        for i, off in enumerate(lengths / self.length - self.at_home):
+            self.lengths.set_joint(f"to_platform_{i}__", off)
+        return self._search()
+
+    def _search(self) -> Array:
+        state = self.robot.state
+        state.q = before = self.begin
+        self.robot.state = state
+        self.robot.update_kinematics()
+        for _ in range(MOST_STEPS):
+            self.solver.solve(True)
+            self.robot.update_kinematics()
+            present = np.array(self.robot.state.q)
+            if np.abs(present - before).max() < STILL:
+                break
+            before = present
+        pose: Array = np.array(self.robot.get_T_world_frame("platform"))
+        pose[:3, 3] *= self.length
+        return pose
+
+
+def distances(mechanism: pf.Mechanism, poses: Array, targets: Array) -> Array:
+    """From targets (n,) [L]."""
+    turned = to_rotvec(poses[:, :3, :3] @ np.swapaxes(targets[:, :3, :3], 1, 2))
+    moved = (poses - targets)[:, :3, 3] / mechanism.characteristic_length
+    return np.asarray(np.sqrt((moved * moved).sum(axis=1) + (turned * turned).sum(axis=1)))
+
+
+def peer(rng: np.random.Generator, runs: int) -> Iterator[Row]:
+    """One call each, both from home: in reach, out of reach in two ways, and forward."""
+    if not IS_THERE:
+        return
+    mechanism = pf.load("stewart")
+    struts, drawn = Struts(mechanism), draw(mechanism, rng, 8 * QUESTIONS, 0.2, 0.2)
+    near = drawn[struts.solve(drawn)[1]][:QUESTIONS]
+    drawn = draw(mechanism, rng, 8 * QUESTIONS, 1.0, 0.5)
+    far = drawn[~struts.solve(drawn)[1]][:QUESTIONS]
+    free = pf.Options(hold=None, rotation_length=mechanism.characteristic_length)
+    values = pf.solve_ik(mechanism, near).actuators
+    for what, asked, hexapod, ours in (
+        ("reachable", near, Hexapod(mechanism), lambda target: pf.solve_ik(mechanism, target)),
+        ("out of reach, hold nothing", far, Hexapod(mechanism), lambda x: pf.solve_ik(mechanism, x, options=free)),
+        ("out of reach, hold orientation", far, Hexapod(mechanism, "orientation"), partial_hold(mechanism, free)),
+    ):
+        yield row(f"6-UPS, one solve_ik, {what}", asked, ours, hexapod.ik, runs)
+    yield row(
+        "6-UPS, one solve_fk", values, lambda x: pf.solve_fk(mechanism, x), Hexapod(mechanism, driven=True).fk, runs
+    )
+
+
+def partial_hold(mechanism: pf.Mechanism, options: pf.Options) -> Callable[[Array], object]:
+    held = replace(options, hold="orientation")
+    return lambda target: pf.solve_ik(mechanism, target, options=held)
+
+
+def row(what: str, asked: Array, ours: Callable[[Array], object], theirs: Callable[[Array], object], runs: int) -> Row:
+    def all_of(question: Callable[[Array], object]) -> Callable[[], object]:
+        return lambda: [question(each) for each in asked]
+
+    own, peers = best_times(min(runs, 5), all_of(ours), all_of(theirs))
+    return Row(what, len(asked), own / len(asked), "PlaCo", peers / len(asked))
