@@ -13,8 +13,9 @@ from pfabrik.closure.solve import ClosureEngine
 from pfabrik.motion.displacements import rate_units
 from pfabrik.motion.first_order import actuated_columns
 from pfabrik.motion.singularities import measures
+from pfabrik.reproduce.timing import one_core
 from table import Row, cells, machine, table
-from timing import best_times
+from timing import best_times, draw
 
 CALLS = 200
 
@@ -69,6 +70,16 @@ def questions(name: str, what: str, rng: np.random.Generator, runs: int) -> Iter
     yield Row(f"{what}, Solver.fk, from home", n, prepared_fk / n, "one solve_fk", fk / n)
 
 
+def out_of_reach(name: str, what: str, rng: np.random.Generator, runs: int) -> Iterator[Row]:
+    """One projection at a time."""
+    mechanism = pf.load(name)
+    drawn = draw(mechanism, rng, 4 * CALLS, 1.0, 0.5)
+    far = drawn[pf.solve_ik(mechanism, drawn).status == pf.Status.PROJECTED][: CALLS // 2]
+    with one_core():
+        one, batch = best_times(runs, each(partial(pf.solve_ik, mechanism), *far), partial(pf.solve_ik, mechanism, far))
+    yield Row(f"{what}, one solve_ik, out of reach", len(far), one / len(far), "a pose of a batch", batch / len(far))
+
+
 def first_order(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     """Jacobians, singularity and margins of one answer of the 6-UPS whose joints are known."""
     mechanism = pf.load("stewart")
@@ -107,6 +118,7 @@ def calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     yield Row("6-UPS, one call, reachable", n, ours / n, baseline, theirs / n)
     for name, what in (("stewart", "6-UPS"), ("delta", "delta"), ("rps", "3-RPS")):
         yield from questions(name, what, rng, runs)
+        yield from out_of_reach(name, what, rng, min(runs, 5))
     yield from first_order(rng, runs)
     yield from closure(rng, runs)
 

@@ -1,8 +1,8 @@
 """The same hexapod in PlaCo, a C++ solver of whole-body tasks with closed loops: one question at a time from Python.
 
-Its rows are in the table where PlaCo can be imported (`pip install placo`; it wants an older NumPy than we test with,
-so better in an environment of its own). Its cones are ranges of the hinges of universal joints there, at the platform's
-end alone, and a target counts as 1 rad for 1 L in both.
+Its rows are in the table where PlaCo can be imported (`pip install placo`, which brings a NumPy of its own choice:
+better into an environment of its own). A cone is there the ranges of two hinges, at the platform's end alone, and a
+radian of the target counts as much as L in both. Both start at home; PlaCo's search ends where its coordinates rest.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import importlib.util
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,6 @@ import numpy as np
 
 import pfabrik as pf
 from closed_forms import Array, Struts
-from pfabrik.rotations import to_rotvec
 from table import Row
 from timing import best_times, draw
 
@@ -28,9 +28,7 @@ QUESTIONS = 100
 STILL, MOST_STEPS = 1e-9, 100
 """Change of its coordinates [L or rad] at which a search has ended, and the steps after which it is given up."""
 
-INERTIA = (
-    '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'  # asked for
-)
+INERTIA = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 
 
 def along(line: Array) -> Array:
@@ -71,11 +69,11 @@ class Hexapod:
                 ("prismatic", "0 0 1", origin(np.array([0.0, 0.0, self.at_home[i]]), np.eye(3)), slide),
             ):
                 name = f"{before}_{i}" if before == "platform" else f"{before}_"
-                parts.append(
-                    f'<link name="{name}">{INERTIA}</link><joint name="to_{name}" type="{kind}"><parent link="{before}"/>'
-                    f'<child link="{name}"/>{frame}<axis xyz="{axis}"/>'
-                    f'<limit lower="{lo}" upper="{hi}" effort="1" velocity="1e6"/></joint>'
-                )
+                parts += [
+                    f'<link name="{name}">{INERTIA}</link><joint name="to_{name}" type="{kind}">',
+                    f'<parent link="{before}"/><child link="{name}"/>{frame}<axis xyz="{axis}"/>',
+                    f'<limit lower="{lo}" upper="{hi}" effort="1" velocity="1e6"/></joint>',
+                ]
                 before = name
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "robot.urdf").write_text(f'<robot name="hexapod">{"".join(parts)}</robot>')
@@ -132,13 +130,6 @@ class Hexapod:
         return pose
 
 
-def distances(mechanism: pf.Mechanism, poses: Array, targets: Array) -> Array:
-    """From targets (n,) [L]."""
-    turned = to_rotvec(poses[:, :3, :3] @ np.swapaxes(targets[:, :3, :3], 1, 2))
-    moved = (poses - targets)[:, :3, 3] / mechanism.characteristic_length
-    return np.asarray(np.sqrt((moved * moved).sum(axis=1) + (turned * turned).sum(axis=1)))
-
-
 def peer(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     """One call each, both from home: in reach, out of reach in two ways, and forward."""
     if not IS_THERE:
@@ -149,21 +140,15 @@ def peer(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     drawn = draw(mechanism, rng, 8 * QUESTIONS, 1.0, 0.5)
     far = drawn[~struts.solve(drawn)[1]][:QUESTIONS]
     free = pf.Options(hold=None, rotation_length=mechanism.characteristic_length)
-    values = pf.solve_ik(mechanism, near).actuators
-    for what, asked, hexapod, ours in (
-        ("reachable", near, Hexapod(mechanism), lambda target: pf.solve_ik(mechanism, target)),
-        ("out of reach, hold nothing", far, Hexapod(mechanism), lambda x: pf.solve_ik(mechanism, x, options=free)),
-        ("out of reach, hold orientation", far, Hexapod(mechanism, "orientation"), partial_hold(mechanism, free)),
+    for what, asked, held in (
+        ("reachable", near, None),
+        ("out of reach, hold nothing", far, None),
+        ("out of reach, hold orientation", far, "orientation"),
     ):
-        yield row(f"6-UPS, one solve_ik, {what}", asked, ours, hexapod.ik, runs)
-    yield row(
-        "6-UPS, one solve_fk", values, lambda x: pf.solve_fk(mechanism, x), Hexapod(mechanism, driven=True).fk, runs
-    )
-
-
-def partial_hold(mechanism: pf.Mechanism, options: pf.Options) -> Callable[[Array], object]:
-    held = replace(options, hold="orientation")
-    return lambda target: pf.solve_ik(mechanism, target, options=held)
+        ours = partial(pf.solve_ik, mechanism, options=replace(free, hold=held))
+        yield row(f"6-UPS, one solve_ik, {what}", asked, ours, Hexapod(mechanism, held).ik, runs)
+    values, theirs = pf.solve_ik(mechanism, near).actuators, Hexapod(mechanism, driven=True)
+    yield row("6-UPS, one solve_fk", values, partial(pf.solve_fk, mechanism), theirs.fk, runs)
 
 
 def row(what: str, asked: Array, ours: Callable[[Array], object], theirs: Callable[[Array], object], runs: int) -> Row:

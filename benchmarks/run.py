@@ -18,6 +18,8 @@ from calls import calls
 from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
 from in_c import IS_THERE, InC
+from in_placo import peer
+from pfabrik import geometric
 from pfabrik.reproduce.timing import one_core
 from table import Row, cells, machine, table
 from timing import Solve, best_times, draw, in_blocks
@@ -39,6 +41,14 @@ for name in ("five_bar", "nrpm", "stewart"):
     pf.solve_fk(m, far.actuators * 1.1).joints
     pf.singularity(far)
 print(time.perf_counter() - start)
+"""
+FIRST_ANSWER = """
+import time
+start = time.process_time()
+import pfabrik as pf
+m = pf.load("{}")
+pf.solve_ik(m, m.home_pose)
+print(time.process_time() - start)
 """
 IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.perf_counter() - start)"
 
@@ -78,15 +88,25 @@ def batches(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
             in_c = InC(form)
             agree(pf.solve_ik(mechanism, targets), in_c.solve(targets)[0])
             baselines["C, all limits"] = partial(in_c.solve, targets)
+        baselines["pf.geometric"] = partial(geometric.solve_ik, mechanism, targets)
         if isinstance(form, Struts):
             baselines["NumPy, lengths only"] = partial(in_blocks, form.lengths, targets)
         yield from batch_rows(mechanism, f"{what}, batch, reachable", targets, baselines, runs)
     mechanism = pf.load("nrpm")
-    drawn = draw(mechanism, rng, n // 5, 0.4, 0.4)  # nearer to home, few targets need the arms to move
-    targets = drawn[pf.solve_ik(mechanism, drawn).status == pf.Status.REACHED][: n // 10]
+    drawn = draw(mechanism, rng, n // 2, 0.4, 0.4)
+    found = pf.solve_ik(mechanism, drawn)
+    arms = [name[0] in "AB" for name in mechanism.actuator_names]
+    rests = (np.abs(found.actuators - pf.solve_ik(mechanism, mechanism.home_pose).actuators)[:, arms] < 1e-9).all(
+        axis=1
+    )
     struts = Struts(mechanism)
-    baselines = {"NumPy, six lengths, arms unmoved": partial(in_blocks, struts.lengths, targets)}
-    yield from batch_rows(mechanism, "NRPM, batch, reachable within 0.4 L", targets, baselines, runs)
+    for what, which in (("arms rest", rests), ("arms move", ~rests)):
+        targets = drawn[which & (found.status == pf.Status.REACHED)][: n // 50]
+        baselines = {
+            "NumPy, six lengths, arms unmoved": partial(in_blocks, struts.lengths, targets),
+            "pf.geometric": partial(geometric.solve_ik, mechanism, targets),
+        }
+        yield from batch_rows(mechanism, f"NRPM, batch, reachable within 0.4 L, {what}", targets, baselines, runs)
 
 
 def batch_rows(
@@ -142,14 +162,18 @@ def start_up(runs: int) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as cache:
         environment = os.environ | {"NUMBA_CACHE_DIR": cache, "PYTHONPATH": os.pathsep.join(sys.path)}
 
-        def measured(code: str) -> float:
+        def measured(code: str, variables: dict[str, str] = environment) -> float:
             command = [sys.executable, "-c", code]
-            return float(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
+            return float(subprocess.run(command, env=variables, check=True, capture_output=True, text=True).stdout)
 
         def run(*arguments: str) -> None:
             subprocess.run([sys.executable, *arguments], env=environment, check=True, capture_output=True)
 
         command_line = partial(run, "-m", "pfabrik", "ik", "stewart", "--position", "10", "0", "190")
+        for name, what in (("stewart", "6-UPS"), ("delta", "delta")):
+            with tempfile.TemporaryDirectory() as empty:
+                first = environment | {"NUMBA_CACHE_DIR": empty}
+                yield Row(f"{what}: first answer, in an empty cache", 1, measured(FIRST_ANSWER.format(name), first))
         yield Row("compile and use every kernel, in an empty cache", 1, measured(USE_EVERYTHING))
         yield Row("the same with the cache filled", 1, min(measured(USE_EVERYTHING) for _ in range(runs)))
         ours, theirs = best_times(runs, command_line, partial(run, "-c", "import numba"))
@@ -166,6 +190,7 @@ def main() -> None:
     rows = [
         *calls(rng, runs),
         *batches(rng, runs, 10_000 if given.quick else 100_000),
+        *peer(np.random.default_rng(2), runs),
         *projections(rng, runs, 100 if given.quick else 1000),
         *forward(rng, runs, 200 if given.quick else 2000),
         *joint_coordinates(rng, runs, 200 if given.quick else 2000),

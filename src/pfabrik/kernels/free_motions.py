@@ -8,7 +8,7 @@ import numpy as np
 
 from ._jit import allocator, routine
 from .closure.loops import Floats, Ints
-from .sqp import MOTIONS, RANK, Linearisation, new_linearisation
+from .sqp import MOTIONS, RANK, ROWS, Linearisation, new_linearisation
 
 DEPENDENT = 1e-6
 """What is left of an equation that follows from the others: descriptions are typed with as many digits."""
@@ -98,7 +98,22 @@ def eliminate(rows: int, scratch: Elimination, view: FreeMotions) -> None:
         shift[pivots[r]] = A[r, n]
         for i in range(rows):
             view.transform[r, i] = A[r, n + 1 + i]
-    view.linear.counts[MOTIONS], view.linear.counts[RANK] = motions, rank
+    counts = view.linear.counts
+    counts[MOTIONS], counts[RANK], counts[ROWS] = motions, rank, rows
+
+
+@routine
+def put_multipliers(gradient: Floats, view: FreeMotions, multipliers: Floats) -> float:
+    """Multipliers with which the equations balance a gradient at the pivot unknowns; the sum of their sizes."""
+    counts, pivots, transform, total = view.linear.counts, view.pivots, view.transform, 0.0
+    for i in range(multipliers.shape[0]):
+        multipliers[i] = 0.0
+    for r in range(counts[RANK]):
+        for i in range(counts[ROWS]):
+            multipliers[i] -= gradient[pivots[r]] * transform[r, i]
+    for i in range(counts[ROWS]):
+        total += abs(multipliers[i])
+    return total
 
 
 @routine

@@ -40,9 +40,9 @@ FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
 it did not lead up by more than the second, for the objective itself is known no better."""
 
-LAST, CONVERGING = 1e-15, 1e-2
-"""Share of the objective that the last step promises: its length is some 1e-8 of the distance, and what it leaves its
-square. And, of a fine step, share of what the one before promised: if it is more, what moves is rounding."""
+LAST, CONVERGING = 1e-18, 1e-2
+"""Share of the objective that the last step promises: its length is a billionth of the distance. And, of a fine step,
+share of what the one before promised: if it is more, what moves is rounding."""
 
 PROBE = 1e-6
 """How far curvature is felt for along each motion [rad or L]."""
@@ -63,9 +63,9 @@ DAMPING, LARGEST, PROMISE, BEFORE, HOLDING = 0, 1, 2, 3, 4
 STEPS, DONE = 0, 1
 
 # Scalars of a linear: the objective, the largest gap of a loop, the largest excess. Counts: unknowns, limits, rank,
-# and equations of what is held.
+# and equations.
 VALUE, GAP, EXCESS = 0, 1, 2
-MOTIONS, LIMITS, RANK, HELD = 0, 1, 2, 3
+MOTIONS, LIMITS, RANK, ROWS = 0, 1, 2, 3
 
 
 class Linearisation(NamedTuple):
@@ -145,6 +145,12 @@ def on_the_way(control: StepControl, share: float) -> float:
 
 
 @routine
+def openness(linear: Linearisation) -> float:
+    """By how much more than what counts as closed loops are open, or limits exceeded."""
+    return max(linear.scalars[GAP], linear.scalars[EXCESS], CLOSED) - CLOSED
+
+
+@routine
 def is_closed(linear: Linearisation, tolerance: float) -> bool:
     """Whether loops are closed and limits kept."""
     return bool(linear.scalars[GAP] <= tolerance and linear.scalars[EXCESS] <= tolerance)
@@ -213,7 +219,7 @@ def is_last(linear: Linearisation, promise: float, before: float) -> bool:
 def merit(linear: Linearisation, weight: float) -> float:
     """The objective, and what it would cost to close what is open: an exact penalty, whose weight is more than the sum
     of all multipliers."""
-    return linear.scalars[VALUE] + weight * max(linear.scalars[GAP], linear.scalars[EXCESS], 0.0)
+    return linear.scalars[VALUE] + weight * openness(linear)
 
 
 @routine
@@ -231,6 +237,16 @@ def note_multipliers(linear: Linearisation, p: QP, hessian: Hessian) -> None:
         hessian.multipliers[c] = 0.0
     for c in range(linear.counts[LIMITS]):
         hessian.multipliers[linear.which[c]] = p.multipliers[c]
+
+
+@routine
+def scale_objective(linear: Linearisation) -> float:
+    """Choose the unit of the objective, 1 until now, so that its gradient is of order one; the unit."""
+    unit = 1.0 / max(math.sqrt(2.0 * linear.scalars[VALUE]), 1e-12)
+    linear.scalars[VALUE] *= unit
+    for a in range(linear.counts[MOTIONS]):
+        linear.g[a] *= unit
+    return unit
 
 
 @routine
@@ -279,14 +295,15 @@ def judge_step(
 ) -> bool:
     """Whether a share of the step planned led from one linear down to another; damping follows how well it did.
 
-    Where more was open than the step promised, closing it may have cost as much, and the promise says nothing of what
-    is left to gain.
+    Where more was open than the step promised, and could be closed, closing it may have cost as much, and the promise
+    says nothing of what is left to gain.
     """
     promise = share * control.scalars[PROMISE]
     weight = 2.0 * (control.scalars[HOLDING] + sum_of_sizes(hessian.multipliers))
     gain = merit(linear, weight) - merit(other, weight)
     led_down = feasible and leads_down(linear, gain, promise)
-    known = is_closed(linear, max(NEARLY_CLOSED, OPEN * promise))
+    left = openness(linear)
+    known = left <= OPEN * promise or (left <= NEARLY_CLOSED and openness(other) >= 0.1 * left)
     control.scalars[PROMISE] = promise if known else math.inf
     if known and is_last(linear, promise, control.scalars[BEFORE]):
         control.counts[DONE] = 1

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from .._jit import routine, search
-from ..free_motions import FreeMotions, new_free_motions
+from ..free_motions import FreeMotions, new_free_motions, put_multipliers
 from ..holding import balance
 from ..qp import QP, new_qp
 from ..rotations import turn_ball
@@ -26,10 +26,8 @@ from ..sqp import (
     MOTIONS,
     NEARLY_CLOSED,
     PROBE,
-    RANK,
     RESTORING,
     STEPS,
-    VALUE,
     begin_descent,
     go_on,
     is_closed,
@@ -39,7 +37,7 @@ from ..sqp import (
     plan_step,
     restoring_step,
     rests_open,
-    sum_of_sizes,
+    scale_objective,
 )
 from .linearise import (
     Workspace,
@@ -88,16 +86,13 @@ def lagrangian_hessian(
 
     By differences of the gradient of the Lagrangian, whose multipliers of the loops balance it at pivot coordinates.
     """
-    n, linear, H, rows = len(loops.lo), view.linear, work.hessian.H, len(work.balance)
+    n, linear, H = len(loops.lo), view.linear, work.hessian.H
     motions = linear.counts[MOTIONS]
     basis, here, there, along = view.basis, work.here, work.there, work.row
-    for i in range(rows):
+    for i in range(work.balance.shape[0]):
         work.balance[i] = 0.0
     lagrangian_gradient(loops, row, objective, state, work, work.here)
-    for r in range(linear.counts[RANK]):
-        for i in range(rows):
-            work.balance[i] -= here[view.pivots[r]] * view.transform[r, i]
-    work.control.scalars[HOLDING] = sum_of_sizes(work.balance)
+    work.control.scalars[HOLDING] = put_multipliers(work.here, view, work.balance)
     lagrangian_gradient(loops, row, objective, state, work, work.here)
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
@@ -169,17 +164,6 @@ def restore_feasibility(
 
 
 @routine
-def scale_objective(
-    loops: Loops, row: int, objective: PoseObjective, state: State, work: Workspace, view: FreeMotions
-) -> None:
-    """Choose the unit of the objective, so that its gradient is of order one, and look again."""
-    work.gradient.unit[0] = 1.0
-    linearise(loops, row, objective, state, work, view)
-    work.gradient.unit[0] = 1.0 / max(math.sqrt(2.0 * view.linear.scalars[VALUE]), 1e-12)
-    linearise(loops, row, objective, state, work, view)
-
-
-@routine
 def descend(
     loops: Loops,
     row: int,
@@ -191,9 +175,9 @@ def descend(
     second: FreeMotions,
     p: QP,
 ) -> int:
-    """From a feasible configuration down to the nearest; how many steps it took."""
+    """From a feasible configuration, at which `first` is, down to the nearest; how many steps it took."""
     view, other, hessian, control = first, second, work.hessian, work.control
-    scale_objective(loops, row, objective, best, work, view)
+    work.gradient.unit[0] = scale_objective(view.linear)
     begin_descent(view.linear, hessian, control)
     while control.counts[DONE] == 0:
         control.scalars[LARGEST] = lagrangian_hessian(loops, row, objective, best, trial, work, view)
@@ -234,8 +218,10 @@ def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Clo
     for row in range(len(closed.coordinates)):
         load_row(loops, layout, False, row, closed, best)
         closed.iterations[row] = 0
+        work.gradient.unit[0] = 1.0
         if objective.max_iterations == 0:
-            scale_objective(loops, row, objective, best, work, first)
+            linearise(loops, row, objective, best, work, first)
+            scale_objective(first.linear)
             for c in range(balance(first.linear, objective.near, p, pulls)):
                 weights[row, first.linear.which[c]] = p.x[c]
             continue

@@ -22,6 +22,7 @@ from ..free_motions import (
     new_elimination,
     new_free_motions,
     project_gradient,
+    put_multipliers,
 )
 from ..legs.answer import deviation, set_frames, turn_pose
 from ..legs.records import SHARED, Floats
@@ -31,7 +32,6 @@ from ..sqp import (
     DONE,
     EXCESS,
     GAP,
-    HELD,
     HOLDING,
     LARGEST,
     LIMITS,
@@ -40,8 +40,8 @@ from ..sqp import (
     NEARLY_CLOSED,
     PROBE,
     PROMISE,
-    RANK,
     RESTORING,
+    ROWS,
     VALUE,
     Hessian,
     StepControl,
@@ -56,7 +56,7 @@ from ..sqp import (
     plan_step,
     restoring_step,
     rests_open,
-    sum_of_sizes,
+    scale_objective,
 )
 from ..vectors import copy_row, copy_table, dot, vec, wrap
 from .equations import (
@@ -196,7 +196,6 @@ def linearise(table: Table, row: int, aim: Aim, now: Now, search: Search, view: 
     for k in range(held):
         gap = max(gap, abs(errors[k]))
     scalars[GAP] = gap
-    view.linear.counts[HELD] = held
     eliminate(lay_out(held, search), search.elimination, view)
     project_gradient(search.force, view)
     linearise_limits(table, aim.pose.margin, search, view)
@@ -354,16 +353,11 @@ def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: F
     By differences of the gradient of the Lagrangian, whose multipliers of the equations balance it at pivot unknowns,
     from `best`, where `search.look` still is.
     """
-    linear, H, basis, balance, step = view.linear, search.hessian.H, view.basis, search.balance, search.step
+    linear, H, basis, step = view.linear, search.hessian.H, view.basis, search.step
     motions, here, there = linear.counts[MOTIONS], search.here, search.there
     put_force(table, search, search.here)
-    for i in range(balance.shape[0]):
-        balance[i] = 0.0
-    for r in range(linear.counts[RANK]):
-        for i in range(balance.shape[0]):
-            balance[i] -= here[view.pivots[r]] * view.transform[r, i]
-    add_balance(linear.counts[HELD], search, search.here)
-    search.control.scalars[HOLDING] = sum_of_sizes(search.balance)
+    search.control.scalars[HOLDING] = put_multipliers(search.here, view, search.balance)
+    add_balance(linear.counts[ROWS] - search.look.slopes.shape[0], search, search.here)
     note_pulled(table, aim, search)
     largest = 0.0
     for a in range(motions):
@@ -430,16 +424,6 @@ def restore_feasibility(
 
 
 @routine
-def scale_objective(table: Table, row: int, aim: Aim, search: Search, view: FreeMotions) -> None:
-    """Choose the unit of the objective, so that its gradient is of order one, and look again."""
-    unit = search.gradient.unit
-    unit[0] = 1.0
-    linearise(table, row, aim, search.best, search, view)
-    unit[0] = 1.0 / max(math.sqrt(2.0 * view.linear.scalars[VALUE]), 1e-12)
-    linearise(table, row, aim, search.best, search, view)
-
-
-@routine
 def is_by(now: Now, met: Now) -> bool:
     """Whether a configuration is so near to another that a descent would end there."""
     pose, other, q = now.pose, met.pose, now.q
@@ -465,7 +449,9 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
     unit[0] = 1.0
     if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view):
         return math.inf
-    scale_objective(table, row, aim, search, view)
+    unit[0] = scale_objective(view.linear)
+    for j in range(search.force.shape[0]):
+        search.force[j] *= unit[0]
     begin_descent(view.linear, hessian, control)
     while control.counts[DONE] == 0:
         control.scalars[LARGEST] = lagrangian_hessian(table, row, aim, search, view)

@@ -16,9 +16,9 @@ from ..legs.rods import carry
 from ..qp import new_qp
 from ..reaching.plan import LIMIT_EXCESS, POSITION_ERROR, RESIDUAL, ROTATION_ERROR
 from ..rotations import difference, yaw_difference
-from ..sqp import STEPS
+from ..sqp import STEPS, scale_objective
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
-from .descend import Search, copy_now, descend, fix, new_search, scale_objective
+from .descend import Search, copy_now, descend, fix, linearise, new_search
 from .equations import Now, View, is_carried, new_now, new_view, place
 from .records import STRETCHED, Aim, Found, Starts, Table
 
@@ -335,7 +335,9 @@ def approach(
         if aim.pose.max_iterations == 0:
             begin(table, own, row, search)
             fix(aim.pose, True, search)
-            scale_objective(table, row, aim, search, search.first)
+            search.gradient.unit[0] = 1.0
+            linearise(table, row, aim, search.best, search, search.first)
+            scale_objective(search.first.linear)
             for c in range(balance(search.first.linear, aim.pose.near, p, pulls)):
                 weights[row, search.first.linear.which[c]] = p.x[c]
             continue
