@@ -19,7 +19,6 @@ from ..legs.records import CARRIER, PIVOT, Floats
 from ..linear import solve_spd
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..vectors import copy_row, copy_table, wrap
-from .descend import copy_now, move
 from .equations import (
     Now,
     View,
@@ -32,6 +31,7 @@ from .equations import (
     put_slopes,
 )
 from .records import Starts, Table
+from .search import copy_now, move
 
 ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
 """Largest equation of an assembled configuration, and of one that no step makes more so [L or rad]: more actuators than

@@ -1,0 +1,141 @@
+"""The Lagrangian of a search in the pose of the platform: its gradient, and its curvature by differences of that."""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import routine
+from ..free_motions import FreeMotions, put_multipliers
+from ..legs.answer import set_frames
+from ..legs.records import SHARED, Floats
+from ..sqp import HOLDING, MOTIONS, PROBE, ROWS
+from .equations import (
+    Now,
+    cone_slope,
+    coordinate_slope,
+    dead_point_slope,
+    is_carried,
+    own_row,
+    place_leg,
+    put_leg_slopes,
+)
+from .records import Aim, Table
+from .search import Search, copy_now, move, put_objective
+
+
+@routine
+def put_force(table: Table, search: Search, out: Floats) -> None:
+    """Gradient of the objective and of the limits, by their multipliers, where `search.look` is."""
+    force, multipliers, slope, kept = search.force, search.hessian.multipliers, search.look.slope, search.kept
+    for j in range(out.shape[0]):
+        out[j] = force[j]
+    ranges = table.limited.shape[0]
+    for i in range(ranges):
+        pull = multipliers[2 * i + 1] - multipliers[2 * i]
+        if pull != 0.0:
+            coordinate_slope(table, table.limited[i], search.look)
+            for j in range(out.shape[0]):
+                out[j] += pull * slope[j]
+    for i in range(table.cones.shape[0]):
+        pull = multipliers[2 * ranges + i]
+        if pull != 0.0:
+            cone_slope(table, table.cones[i], search.look)
+            for j in range(out.shape[0]):
+                out[j] += pull * slope[j]
+    first = 2 * ranges + table.cones.shape[0]
+    for k in range(kept.shape[0]):
+        pull = multipliers[first + k] * kept[k]
+        if pull != 0.0:
+            dead_point_slope(table, k, search.look)
+            for j in range(out.shape[0]):
+                out[j] += pull * slope[j]
+
+
+@routine
+def add_balance(held: int, search: Search, out: Floats) -> None:
+    """Add the gradient of the equations, by their multipliers."""
+    balance, slopes, holds = search.balance, search.look.slopes, search.gradient.holds
+    m = slopes.shape[0]
+    for r in range(m):
+        if balance[r] != 0.0:
+            for j in range(out.shape[0]):
+                out[j] += balance[r] * slopes[r, j]
+    for k in range(held):
+        for j in range(6):
+            out[j] += balance[m + k] * holds[k, j]
+
+
+@routine
+def note_pulled(table: Table, aim: Aim, search: Search) -> None:
+    """Note the legs that the Lagrangian asks for: those of limits and equations with multipliers, and what carries
+    them."""
+    legs, multipliers, balance, pulled = table.legs, search.hessian.multipliers, search.balance, search.pulled
+    ranges, n = table.limited.shape[0], legs.shape[0]
+    first = 2 * ranges + table.cones.shape[0]
+    for k in range(n):
+        end = legs[k + 1]["first_row"] if k + 1 < n else table.task[0]["rows"]
+        most = multipliers[first + k]
+        for r in range(legs[k]["first_row"], end):
+            most = max(most, abs(balance[r]))
+        if is_carried(legs[k]):
+            most = max(most, abs(balance[own_row(table, k)]))
+        pulled[k] = 1 if most > 0.0 else 0
+    for i in range(ranges):
+        if multipliers[2 * i] != multipliers[2 * i + 1]:
+            pulled[table.limited[i]["leg"]] = 1
+    for i in range(table.cones.shape[0]):
+        if multipliers[2 * ranges + i] > 0.0:
+            pulled[table.cones[i]["leg"]] = 1
+    for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
+        pulled[table.driven[i]["leg"]] = 1
+    for k in range(n - 1, 0, -1):
+        if pulled[k] == 1 and (legs[k]["carrier"] == SHARED or legs[k]["on_arm"] == 1):
+            pulled[k - 1] = 1
+
+
+@routine
+def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Search, out: Floats) -> None:
+    """Gradient of the Lagrangian at a configuration, from the legs that are `pulled`."""
+    pulled, main = search.pulled, 0
+    set_frames(now.pose, table.task[0], search.look.frames)
+    for k in range(pulled.shape[0]):
+        main = main if table.legs[k]["carrier"] == SHARED else k
+        if pulled[k] == 1:
+            place_leg(table, k, main, now, search.look)
+            put_leg_slopes(table, k, main, search.look)
+    _, held = put_objective(table, row, aim, now, search)
+    put_force(table, search, out)
+    add_balance(held, search, out)
+
+
+@routine
+def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: FreeMotions) -> float:
+    """Curvature of the objective and of the active limits along free motions, into `hessian`; the largest on its
+    diagonal.
+
+    By differences of the gradient of the Lagrangian, whose multipliers of the equations balance it at pivot unknowns,
+    from `best`, where `search.look` still is.
+    """
+    linear, H, basis, step = view.linear, search.hessian.H, view.basis, search.step
+    motions, here, there = linear.counts[MOTIONS], search.here, search.there
+    put_force(table, search, search.here)
+    search.control.scalars[HOLDING] = put_multipliers(search.here, view, search.balance)
+    add_balance(linear.counts[ROWS] - search.look.slopes.shape[0], search, search.here)
+    note_pulled(table, aim, search)
+    largest = 0.0
+    for a in range(motions):
+        probe = PROBE / math.sqrt(linear.metric[a, a])
+        for j in range(step.shape[0]):
+            step[j] = basis[j, a]
+        copy_now(search.best, search.trial)
+        move(table, search.step, probe, search.trial)
+        lagrangian_gradient(table, row, aim, search.trial, search, search.there)
+        for b in range(motions):
+            H[b, a] = 0.0
+            for j in range(step.shape[0]):
+                H[b, a] += basis[j, b] * (there[j] - here[j]) / probe
+    for a in range(motions):
+        largest = max(largest, abs(H[a, a]))
+        for b in range(a):
+            H[a, b] = H[b, a] = 0.5 * (H[a, b] + H[b, a])
+    return largest

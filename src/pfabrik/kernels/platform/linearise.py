@@ -1,0 +1,88 @@
+"""Objective, equations and limits of legs to first order, in the motions that their equations leave free."""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import routine
+from ..free_motions import FreeMotions, add_limit, eliminate, project_gradient
+from ..legs.answer import deviation
+from ..sqp import EXCESS, GAP, LIMITS, VALUE
+from ..vectors import dot, vec
+from .equations import Now, cone_slope, coordinate_slope, dead_point_slope, place, put_slopes
+from .records import Aim, Table
+from .search import NEAR, Search, put_objective
+
+
+@routine
+def linearise(table: Table, row: int, aim: Aim, now: Now, search: Search, view: FreeMotions) -> None:
+    """Look at a configuration."""
+    scalars, errors = view.linear.scalars, search.gradient.errors
+    gap = place(table, now, search.look)
+    put_slopes(table, search.look)
+    scalars[VALUE], held = put_objective(table, row, aim, now, search)
+    for k in range(held):
+        gap = max(gap, abs(errors[k]))
+    scalars[GAP] = gap
+    eliminate(lay_out(held, search), search.elimination, view)
+    project_gradient(search.force, view)
+    linearise_limits(table, aim.pose.margin, search, view)
+
+
+@routine
+def lay_out(held: int, search: Search) -> int:
+    """The equations of the legs and of what is held, with an identity beside them; how many."""
+    A, rows, slopes = search.elimination.A, search.look.rows, search.look.slopes
+    errors, holds = search.gradient.errors, search.gradient.holds
+    m, n = slopes.shape
+    for r in range(m + held):
+        for j in range(A.shape[1]):
+            A[r, j] = 0.0
+        A[r, n + 1 + r] = 1.0
+    for r in range(m):
+        A[r, n] = -rows[r]
+        for j in range(n):
+            A[r, j] = slopes[r, j]
+    for k in range(held):
+        A[m + k, n] = -errors[k]
+        for j in range(6):
+            A[m + k, j] = holds[k, j]
+    return int(m + held)
+
+
+@routine
+def linearise_limits(table: Table, margin: float, search: Search, view: FreeMotions) -> None:
+    """Excess and gradient of every limit within reach, and of dead points that are not to be passed."""
+    slope, values, kept, k, excess = search.look.slope, search.look.values, search.kept, 0, -math.inf
+    for i in range(table.limited.shape[0]):
+        limited = table.limited[i]
+        value = deviation(limited, values)
+        below, above = limited["lo"] + margin - value, value - limited["hi"] + margin
+        if max(below, above) <= -NEAR:
+            continue
+        excess = max(excess, max(below, above))
+        coordinate_slope(table, limited, search.look)
+        if above > -NEAR:
+            k = add_limit(k, above, 2 * i + 1, search.look.slope, view)
+        if below > -NEAR:
+            for j in range(slope.shape[0]):
+                slope[j] = -slope[j]
+            k = add_limit(k, below, 2 * i, search.look.slope, view)
+    for i in range(table.cones.shape[0]):
+        cone = table.cones[i]
+        line = vec(values[cone["leg"], cone["place"] :])
+        if dot(vec(cone["axis"]), line) <= search.near_cosines[i]:
+            over = cone_slope(table, cone, search.look) - cone["half_angle"] + margin
+            excess = max(excess, over)
+            k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.look.slope, view)
+    first = 2 * table.limited.shape[0] + table.cones.shape[0]
+    for leg in range(kept.shape[0]):
+        if kept[leg] != 0.0:
+            over = kept[leg] * dead_point_slope(table, leg, search.look)
+            if over > -NEAR:
+                excess = max(excess, over)
+                for j in range(slope.shape[0]):
+                    slope[j] *= kept[leg]
+                k = add_limit(k, over, first + leg, search.look.slope, view)
+    view.linear.counts[LIMITS] = k
+    view.linear.scalars[EXCESS] = excess

@@ -1,0 +1,133 @@
+"""Memory of a search in the pose of the platform, and what is asked of it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .._jit import allocator, routine
+from ..closure.loops import BASE_AXES, LOCKED, Ints, PoseObjective
+from ..closure.pose_objective import PoseGradient, pose_gradient
+from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
+from ..legs.answer import turn_pose
+from ..legs.records import Floats
+from ..qp import QP, new_qp
+from ..sqp import Hessian, StepControl, new_hessian, new_step_control
+from ..vectors import copy_row, copy_table, wrap
+from .equations import Now, View, coordinate_slope, count_unknowns, counts_turns, new_now, new_view
+from .records import Aim, Table
+
+NEAR = 0.3
+"""Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
+
+
+class Search(NamedTuple):
+    """Scratch memory of one thread."""
+
+    look: View
+    gradient: PoseGradient
+    hessian: Hessian
+    control: StepControl
+    p: QP
+    elimination: Elimination
+    first: FreeMotions
+    second: FreeMotions
+    force: Floats  # (n,): gradient of the objective
+    here: Floats  # (n,)
+    there: Floats  # (n,)
+    step: Floats  # (n,)
+    balance: Floats  # (rows,): multipliers of the equations and of what is held
+    best: Now
+    trial: Now
+    target: Floats  # (4, 4): of the row [L]
+    kept: Floats  # (legs,): the sides that carriers are to stay on; 0 for either
+    pulled: Ints  # (legs,): 1 for those that the Lagrangian asks for
+    near_cosines: Floats  # (cones,): of angles from their axes at which cones are near
+
+
+@allocator
+def new_search(table: Table) -> Search:
+    """Scratch memory of one thread."""
+    n, legs = count_unknowns(table), table.legs.shape[0]
+    rows, limits = table.task[0]["rows"] + n, 2 * table.limited.shape[0] + table.cones.shape[0] + legs
+    elimination = new_elimination(n, rows)
+    for j in range(n):
+        elimination.used[j] = 2 if j < 6 else 1
+    near_cosines = np.zeros(table.cones.shape[0])
+    for i in range(near_cosines.shape[0]):
+        near_cosines[i] = math.cos(max(table.cones[i]["half_angle"] - NEAR, 0.0))
+    return Search(
+        new_view(table),
+        PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
+        new_hessian(n, limits),
+        new_step_control(),
+        new_qp(n, limits),
+        elimination,
+        new_free_motions(n, rows, limits),
+        new_free_motions(n, rows, limits),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(rows),
+        new_now(legs),
+        new_now(legs),
+        np.zeros((4, 4)),
+        np.zeros(legs),
+        np.zeros(legs, np.int64),
+        near_cosines,
+    )
+
+
+@routine
+def copy_now(source: Now, to: Now) -> None:
+    copy_table(source.pose, to.pose)
+    copy_row(source.q, to.q)
+    copy_row(source.sides, to.sides)
+
+
+@routine
+def fix(aim: PoseObjective, in_place: bool, search: Search) -> None:
+    """Leave out the components of the twist that are held, if the platform is in place and they are its velocities."""
+    used = search.elimination.used
+    for j in range(6):
+        used[j] = 0 if in_place and aim.frame == BASE_AXES and aim.platform[j] == LOCKED else 2
+
+
+@routine
+def move(table: Table, step: Floats, share: float, now: Now) -> None:
+    """Take a share of a step."""
+    pose, q, columns = now.pose, now.q, table.columns
+    for i in range(3):
+        pose[i, 3] += share * step[i]
+    turn_pose(now.pose, (share * step[3], share * step[4], share * step[5]))
+    for k in range(q.shape[0]):
+        if columns[k] >= 0:
+            q[k] += share * step[columns[k]]
+
+
+@routine
+def put_objective(table: Table, row: int, aim: Aim, now: Now, search: Search) -> tuple[float, int]:
+    """The objective, its gradient into `search.force`; how many components of the twist are held by equations.
+
+    None are where what is held is in its place and does not move: see `fix`.
+    """
+    force, slope = search.force, search.look.slope
+    for j in range(6, force.shape[0]):
+        force[j] = 0.0
+    used = search.elimination.used
+    turns = used[3] + used[4] + used[5] > 0
+    value, held = pose_gradient(aim.pose, search.target, now.pose, search.gradient, turns)
+    held = held if used[3] > 0 and used[0] > 0 else 0
+    for j in range(6):
+        force[j] = search.gradient.force[j]
+    for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
+        driven = table.driven[i]
+        off = coordinate_slope(table, driven, search.look) - aim.values[row, driven["column"]]
+        off = wrap(off, 0.0) if counts_turns(driven) else off
+        value += 0.5 * search.gradient.unit[0] * off * off
+        for j in range(force.shape[0]):
+            force[j] += search.gradient.unit[0] * off * slope[j]
+    return value, held

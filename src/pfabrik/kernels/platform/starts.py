@@ -1,0 +1,143 @@
+"""Where searches in the pose of the platform begin: targets read, platforms and carriers put in their places."""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import routine
+from ..closure.loops import BASE_AXES, LOCKED, SIGHT, TARGET_AXES, PoseObjective
+from ..closure.pose_objective import PoseGradient, pose_gradient
+from ..legs.answer import column, is_pose, make_exact, set_frames, turn_pose
+from ..legs.records import ARM, CARRIER, CRANK, Floats, Record
+from ..legs.rods import carry
+from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
+from .equations import Now, View, is_carried
+from .records import STRETCHED, Starts, Table
+from .search import Search
+
+BENT = 1e-2
+"""How far rods that are stretched out are bent where a search starts [L or rad]."""
+
+
+@routine
+def load_target(table: Table, aim: PoseObjective, row: int, search: Search) -> bool:
+    """Put the target of a row into `search.target`, near enough to be told from others there; False if it is no pose.
+
+    Of a platform that cannot turn, and is not asked to, the rotation is home's.
+    """
+    own, target, task = aim.targets[row], search.target, table.task[0]
+    if not is_pose(own):
+        return False
+    most = 0.0
+    for i in range(3):
+        most = max(most, abs(own[i, 3] / task["length"] - task["reference"][i]))
+        for j in range(3):
+            target[i, j] = own[i, j]
+    if task["rotations"] == 0 and aim.platform[3] == LOCKED:
+        for i in range(9):
+            target[i // 3, i % 3] = 1.0 if i % 4 == 0 else 0.0
+    for i in range(3):
+        home = task["reference"][i]
+        target[i, 3] = home + (own[i, 3] / task["length"] - home) * min(1.0, SIGHT / max(most, SIGHT))
+    make_exact(target)
+    return True
+
+
+@routine
+def begin(table: Table, starts: Starts, start: int, search: Search) -> None:
+    """Put a start into `search.best`."""
+    copy_table(starts.poses[start], search.best.pose)
+    copy_row(starts.sides[start], search.best.sides)
+    if starts.q.shape[0] > 0:
+        copy_row(starts.q[start], search.best.q)
+    else:
+        put_carriers(table, search.best, search.look)
+
+
+@routine
+def put_carriers(table: Table, now: Now, look: View) -> None:
+    """Put carriers and arms where the pose and the sides have them.
+
+    Rods that are stretched out over what carries them are bent a little to their sides: stretched out, nothing says to
+    first order that they could bend, and a search would stay there.
+    """
+    q, sides = now.q, now.sides
+    set_frames(now.pose, table.task[0], look.frames)
+    for k in range(q.shape[0]):
+        leg, own = table.legs[k], look.values[k]
+        q[k] = sides[k] if leg["kind"] == ARM else 0.0
+        if is_carried(leg):
+            head = move(look.frames[leg["reversed"]], vec(leg["head_point"]))
+            carry(leg, head, -sides[k], own)
+            other = own[CARRIER]
+            carry(leg, head, sides[k], own)
+            q[k] = own[CARRIER] if abs(own[CARRIER] - other) >= STRETCHED else own[CARRIER] + BENT * sides[k]
+
+
+@routine
+def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, now: Now) -> None:
+    """Place the platform as it is to be held, and carriers where rods then put them."""
+    pose, q = now.pose, now.q
+    for i in range(3):
+        if aim.platform[i] == LOCKED:
+            pose[i, 3] = target[i, 3]
+        for j in range(3):
+            if aim.frame == BASE_AXES and aim.platform[3] == LOCKED:
+                pose[i, j] = target[i, j]
+    if aim.frame == TARGET_AXES and aim.platform[3] == LOCKED:
+        axis = cross(column(now.pose, 2), column(target, 2))
+        sine = norm(axis)
+        if sine > 0.0:
+            turn_pose(now.pose, scale(math.atan2(sine, dot(column(now.pose, 2), column(target, 2))) / sine, axis))
+    set_frames(now.pose, table.task[0], view.frames)
+    for k in range(q.shape[0]):
+        leg = table.legs[k]
+        if is_carried(leg):
+            q[k] = nearest_carrier(leg, view.frames[leg["reversed"]], q[k], view.values[k])
+
+
+@routine
+def nearest_carrier(leg: Record, frame: Floats, present: float, own: Floats) -> float:
+    """Of the two coordinates at which a carrier's rod reaches its head, or comes nearest, the one nearer to this."""
+    head, best = move(frame, vec(leg["head_point"])), math.inf
+    for i in range(2):
+        carry(leg, head, 2.0 * i - 1.0, own)
+        found: float = own[CARRIER]
+        if leg["carrier"] == CRANK:
+            found = wrap(found, present)
+        if abs(found - present) < abs(best - present):
+            best = found
+    return best
+
+
+@routine
+def put_sides(table: Table, now: Now, look: View) -> None:
+    """Tell which of their two solutions legs take, and where arms are."""
+    set_frames(now.pose, table.task[0], look.frames)
+    sides, q = now.sides, now.q
+    for k in range(q.shape[0]):
+        leg = table.legs[k]
+        if leg["kind"] == ARM:
+            sides[k] = q[k]
+        if is_carried(leg):
+            frame = look.frames[leg["reversed"]]
+            head = move(frame, vec(leg["head_point"]))
+            off = (0.0, 0.0)
+            for side in (-1.0, 1.0):
+                carry(leg, head, side, look.values[k])
+                away = look.values[k, CARRIER] - q[k]
+                off = (off[1], abs(wrap(away, 0.0) if leg["carrier"] == CRANK else away))
+            if abs(off[1] - off[0]) > STRETCHED:
+                sides[k] = 1.0 if off[1] < off[0] else -1.0
+
+
+@routine
+def nearest_start(aim: PoseObjective, target: Floats, starts: Starts, gradient: PoseGradient) -> int:
+    """The start whose pose is nearest to a target; -1 where there is none."""
+    nearest, least = -1, math.inf
+    gradient.unit[0] = 1.0
+    for start in range(starts.poses.shape[0]):
+        value, _ = pose_gradient(aim, target, starts.poses[start], gradient, True)
+        if value < least:
+            nearest, least = start, value
+    return nearest
