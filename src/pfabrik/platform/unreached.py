@@ -100,9 +100,11 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
 
     in_blocks(run, len(rest), ROWS_A_BLOCK)
     reached = own.status == P.REACHED
-    put_rows(rows, rest[reached], rows_at(own, reached))
-    sides[rest[reached]] = tried[reached]
-    return np.asarray(rest[~reached])
+    if reached.any():
+        put_rows(rows, rest[reached], rows_at(own, reached))
+        sides[rest[reached]] = tried[reached]
+        rest = rest[~reached]
+    return rest
 
 
 def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: P.Rows) -> NDArray[np.bool_]:
@@ -127,7 +129,8 @@ def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, row
     )
     own.measures[:, [P.POSITION_ERROR, P.ROTATION_ERROR]] = 0.0
     left = own.status != P.REACHED
-    put_rows(rows, again[~left], rows_at(own, ~left))
+    if not left.all():
+        put_rows(rows, again[~left], rows_at(own, ~left))
     return np.asarray(left)
 
 
