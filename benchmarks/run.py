@@ -63,10 +63,11 @@ reach within 1 L and 0.5 rad; these are projected exactly where a row does not s
 method on joint positions; a delta has no other way than exactly. Newton's method in NumPy (benchmarks/newton.py)
 knows the hexapod, solves six equations in the pose for whole batches at a time, and looks at no passive joint and
 no limit; forward kinematics here closes all loops in all joint coordinates, and measures limits. Starts are answers
-up to 0.01 L and 0.01 rad away. The platform with 40 modes is that of Dietmaier (1998). Times of modes, of
-workspaces and of new processes are for all of it, not for a pose. The viewer's motions are timed in a page of
-headless Chromium, which draws without a graphics card, from the motion of the mouse until the answer has been
-drawn; these rows are left out where it is not installed."""
+up to 0.01 L and 0.01 rad away. PlaCo is a C++ solver of tasks with closed loops (benchmarks/in_placo.py); its rows are
+left out where it is not installed, as are those of the viewer without headless Chromium. The platform with 40 modes is
+that of Dietmaier (1998). Times of modes, of workspaces and of new processes are for all of it, not for a pose; first
+answers count the processor's time. The viewer's motions are timed in a page of Chromium, which draws without a graphics
+card, from the motion of the mouse until the answer has been drawn."""
 
 
 def agree(solution: pf.Solution, values: Array) -> None:
