@@ -11,8 +11,12 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from conftest import INTERPRETED
 from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
 from pfabrik.kernels.legs import records as K
 from pfabrik.kernels.platform import equations as E
+from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
+from pfabrik.kernels.platform.records import Aim
+from pfabrik.kernels.platform.search import new_search
 from pfabrik.platform.table import kernel_table
 
 pytestmark = pytest.mark.skipif(not INTERPRETED, reason="routines are parts of compiled kernels")
@@ -31,6 +35,17 @@ def moved(now: E.Now, unknown: int, step: float, columns: np.ndarray) -> E.Now:
     else:
         q[columns == unknown] += step
     return E.Now(pose, q, now.sides)
+
+
+def somewhere(mechanism: pf.Mechanism, table: LegTable, rng: np.random.Generator) -> E.Now:
+    """A configuration about home, on its legs or not."""
+    now = E.new_now(len(table.legs))
+    now.sides[:], now.q[:] = table.home_sides[0], rng.uniform(-0.3, 0.3, len(table.legs))
+    now.pose[:] = pf.pose(
+        mechanism.home_pose[:3, 3] / mechanism.characteristic_length + rng.uniform(-0.1, 0.1, 3),
+        rotvec=rng.uniform(-0.2, 0.2, 3),
+    )
+    return now
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -52,7 +67,7 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
             [
                 *look.rows,
                 *(E.coordinate_slope(table, each, look) for each in told),
-                *(E.cone_slope(table, cone, np.inf, look) for cone in table.cones),
+                *(E.cone_slope(table, cone, look) for cone in table.cones),
                 *(E.dead_point_slope(table, leg, look) for leg in on_carriers),
             ]
         )
@@ -60,17 +75,12 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
     def slopes(measure: Callable[..., float], asked: Sequence[np.void | int]) -> list[np.ndarray]:
         found = []
         for each in asked:
-            measure(table, each, *([np.inf] if measure is E.cone_slope else []), look)
+            measure(table, each, look)
             found.append(look.slope.copy())
         return found
 
     for _ in range(3):
-        now = E.new_now(len(table.legs))
-        now.sides[:], now.q[:] = described.home_sides[0], rng.uniform(-0.3, 0.3, len(table.legs))
-        now.pose[:] = pf.pose(
-            mechanism.home_pose[:3, 3] / mechanism.characteristic_length + rng.uniform(-0.1, 0.1, 3),
-            rotvec=rng.uniform(-0.2, 0.2, 3),
-        )
+        now = somewhere(mechanism, described, rng)
         E.place(table, now, look)
         E.put_slopes(table, look)
         told_by = [*look.slopes.copy(), *slopes(E.coordinate_slope, told), *slopes(E.cone_slope, list(table.cones))]
@@ -79,3 +89,35 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
             ends = [values(moved(now, unknown, sign * STEP, table.columns)) for sign in (1.0, -1.0)]
             difference = (ends[0] - ends[1]) / (2.0 * STEP)
             np.testing.assert_allclose(np.array(told_by)[:, unknown], difference, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> None:
+    """Looked at alone, those that have multipliers, and what carries them, give the gradient that all legs give."""
+    mechanism, rng = pf.load(name), np.random.default_rng(1)
+    described = leg_table(mechanism)
+    assert isinstance(described, LegTable)
+    table = kernel_table(described)
+    search, n = new_search(table), E.count_unknowns(table)
+    objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
+    aim = Aim(objective, np.zeros((0, len(table.driven))))
+    search.target[:] = somewhere(mechanism, described, rng).pose
+    search.gradient.unit[0] = 1.0
+    limits, rows = 2 * len(table.limited) + len(table.cones), len(search.look.rows)
+    seen = set()
+    for which in range(limits + rows):
+        E.place(table, somewhere(mechanism, described, rng), search.look)
+        E.put_slopes(table, search.look)
+        search.hessian.multipliers[:], search.balance[:] = 0.0, 0.0
+        if which < limits:
+            search.hessian.multipliers[which] = 1.0
+        else:
+            search.balance[which - limits] = 1.0
+        now, own, every = somewhere(mechanism, described, rng), np.zeros(n), np.zeros(n)
+        note_pulled(table, aim, search)
+        seen.add(int(search.pulled.sum()))
+        lagrangian_gradient(table, 0, aim, now, search, own)
+        search.pulled[:] = 1
+        lagrangian_gradient(table, 0, aim, now, search, every)
+        np.testing.assert_allclose(own, every, rtol=0, atol=1e-12)
+    assert min(seen) < len(table.legs)

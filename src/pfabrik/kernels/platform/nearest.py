@@ -53,13 +53,8 @@ def read_configurations(table: Table, known: Records, poses: Floats, q: Floats, 
 @routine
 def write(table: Table, row: int, aim: PoseObjective, search: Search, best: Now, found: Found) -> None:
     """Write a configuration, and what is measured of it."""
-    look, length, own, pose, measures = (
-        search.look,
-        table.task[0]["length"],
-        aim.targets[row],
-        found.poses[row],
-        found.measures[row],
-    )
+    look, task, own = search.look, table.task[0], aim.targets[row]
+    pose, measures, length = found.poses[row], found.measures[row], task["length"]
     make_exact(best.pose)
     measures[RESIDUAL] = place(table, best, look) * length
     measures[LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, look.values), 0.0)
@@ -73,10 +68,10 @@ def write(table: Table, row: int, aim: PoseObjective, search: Search, best: Now,
     for i in range(3):
         pose[i, 3] *= length
         pose[3, i] = 0.0
-        away = math.hypot(away, pose[i, 3] - own[i, 3] if table.task[0]["axes"][i] == 1 else 0.0)
+        away = math.hypot(away, pose[i, 3] - own[i, 3] if task["axes"][i] == 1 else 0.0)
     pose[3, 3] = 1.0
     measures[POSITION_ERROR] = min(away, LARGEST_NUMBER)
-    measures[ROTATION_ERROR] = turned_by(table.task[0]["rotations"], best.pose, search)
+    measures[ROTATION_ERROR] = turned_by(task["rotations"], best.pose, search)
 
 
 @routine
