@@ -109,6 +109,8 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
     for j in range(search.force.shape[0]):
         search.force[j] *= unit[0]
     begin_descent(view.linear, hessian, control)
+    if view.linear.scalars[VALUE] == 0.0:
+        return 0.0
     while control.counts[DONE] == 0:
         control.scalars[LARGEST] = lagrangian_hessian(table, row, aim, search, view)
         led_down = False
