@@ -84,6 +84,8 @@ class OneAssembly:
             table.driven["home"],
             table.driven["unit"],
         )
+        self._lengths = np.ones((1, 4, 4))
+        self._lengths[:, :3, 3] = self._length
         self._asked = turns, home_start(mechanism, table), no_starts(table)
         self._legs, self._arms = kernel_table(table), table.arms["leg"]
 
@@ -103,10 +105,9 @@ class OneAssembly:
         self._kernel(self._legs, wanted, *self._asked, rows.status, rows.measures, ends)
         if rows.status[0] != P.REACHED:
             return False
-        ends.sides[:, self._arms] = ends.q[:, self._arms]
-        pose = rows.poses[0]
-        pose[:] = ends.poses[0]
-        pose[:3, 3] *= self._length
+        if len(self._arms):
+            ends.sides[:, self._arms] = ends.q[:, self._arms]
+        np.multiply(ends.poses, self._lengths, out=rows.poses)
         rows.actuators[:] = values
         rows.measures[0, P.RESIDUAL] *= self._length
         return True
