@@ -269,6 +269,8 @@ class LegsEngine:
         if left and len(self._table.arms):
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
             left -= self._reach_by_arms(task, targets, begins, sides, rows)
+            if left and start is not None and not keep_mode:
+                left -= self._reach_from_home(task, targets, sides, rows)
         if start is not None:
             self._count_turns(start.rows.actuators, rows)
         return left, sides
@@ -287,6 +289,15 @@ class LegsEngine:
         lost = some[own.status != P.REACHED]
         sides[lost] = before[lost]
         return len(some) - left
+
+    def _reach_from_home(self, task: Records, targets: Floats, sides: Floats, rows: P.Rows) -> int:
+        """The same, with arms that start at home: from where they are, limits may be in the way."""
+        away, home, arms = rows.status != P.REACHED, sides.copy(), self._table.arms["leg"]
+        home[:, arms] = self._table.home_sides[:, arms]
+        n = self._reach_by_arms(task, targets, self._one.home, home, rows)
+        found = away & (rows.status == P.REACHED)
+        sides[found] = home[found]
+        return n
 
     def _run(self, by_blocks: bool, task: Records, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
         """Answer targets on all cores, in blocks of poses or one by one; how many are not reached."""
