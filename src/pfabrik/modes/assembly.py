@@ -108,15 +108,24 @@ class _Search:
         self._refuse_continuum(range(known, len(self.found.hits)))
 
     def _refuse_continuum(self, fresh: range) -> None:
-        """Raise where a new mode is one of a continuum: a step along its free motion, closed again, stays away."""
+        """Raise where a new mode is one of a continuum: steps along its free motion, closed again, stay away.
+
+        And stay apart from each other: of two single modes that have nearly met, steps of any length lead to the other.
+        """
         mechanism = self.closure.mechanism
         for place in fresh:
-            moved = stepped_freely(mechanism, self.found.coordinates[place], ALONG)
-            if not len(moved):
-                continue
-            closed = close(self.closure, moved, platform_poses(mechanism, moved), locked=self.locked)
-            apart = np.abs(self._marks(closed.poses) - self.found.marks[place]).max(axis=1)
-            gone_on = (apart > 0.1 * ALONG) & (apart < 2.0 * ALONG) & (closed.gap <= TOLERANCES.position)
+            ends, gone_on = [], np.ones(0, bool)
+            for along in (ALONG, 0.5 * ALONG):
+                moved = stepped_freely(mechanism, self.found.coordinates[place], along)
+                if not len(moved):
+                    break
+                closed = close(self.closure, moved, platform_poses(mechanism, moved), locked=self.locked)
+                ends.append(self._marks(closed.poses))
+                apart = np.abs(ends[-1] - self.found.marks[place]).max(axis=1)
+                stays = (apart > 0.1 * along) & (apart < 2.0 * along) & (closed.gap <= TOLERANCES.position)
+                gone_on = (
+                    stays if len(ends) == 1 else gone_on & stays & (np.abs(ends[0] - ends[1]).max(axis=1) > 0.1 * along)
+                )
             if gone_on.any():
                 raise ContinuumOfSolutions(mechanism.name, int(gone_on.sum()))
 
