@@ -15,7 +15,7 @@ from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
 from pfabrik.kernels.legs import records as K
 from pfabrik.kernels.platform import equations as E
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
-from pfabrik.kernels.platform.records import Aim
+from pfabrik.kernels.platform.records import Aim, Table
 from pfabrik.kernels.platform.search import new_search
 from pfabrik.platform.table import kernel_table
 
@@ -37,6 +37,14 @@ def moved(now: E.Now, unknown: int, step: float, columns: np.ndarray) -> E.Now:
     return E.Now(pose, q, now.sides)
 
 
+def described_by_name(name: str) -> tuple[pf.Mechanism, LegTable, Table]:
+    """A machine, its legs, and these as kernels take them."""
+    mechanism = pf.load(name)
+    described = leg_table(mechanism)
+    assert isinstance(described, LegTable)
+    return mechanism, described, kernel_table(described)
+
+
 def somewhere(mechanism: pf.Mechanism, table: LegTable, rng: np.random.Generator) -> E.Now:
     """A configuration about home, on its legs or not."""
     now = E.new_now(len(table.legs))
@@ -51,10 +59,8 @@ def somewhere(mechanism: pf.Mechanism, table: LegTable, rng: np.random.Generator
 @pytest.mark.parametrize("name", MACHINES)
 def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: str) -> None:
     """At any pose, on its legs or not; angles of two crossed hinges in a pivot only where it is kept, so not here."""
-    mechanism, rng = pf.load(name), np.random.default_rng(0)
-    described = leg_table(mechanism)
-    assert isinstance(described, LegTable)
-    table = kernel_table(described)
+    mechanism, described, table = described_by_name(name)
+    rng = np.random.default_rng(0)
     n, look = E.count_unknowns(table), E.new_view(table)
     pivots = (table.legs["kind"] == K.PIVOT) & (table.legs["foot"] == K.CROSS)
     told = [each for each in (*table.limited, *table.driven) if not pivots[each["leg"]] or each["place"] >= K.HEAD]
@@ -94,10 +100,8 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
 @pytest.mark.parametrize("name", MACHINES)
 def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> None:
     """Looked at alone, those that have multipliers, and what carries them, give the gradient that all legs give."""
-    mechanism, rng = pf.load(name), np.random.default_rng(1)
-    described = leg_table(mechanism)
-    assert isinstance(described, LegTable)
-    table = kernel_table(described)
+    mechanism, described, table = described_by_name(name)
+    rng = np.random.default_rng(1)
     search, n = new_search(table), E.count_unknowns(table)
     objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
     aim = Aim(objective, np.zeros((0, len(table.driven))))

@@ -334,7 +334,7 @@ def kernel(function: F) -> F:
 def search(function: F) -> F:
     """Compile `function` as a kernel that searches: much code, of which no loop is short enough for vectors.
 
-    A few in a hundred slower than a `kernel`, and compiled in two thirds of the time.
+    A few in a hundred slower than a `kernel`, and optimised in half the time.
     """
     return _cached(_njit(**_SEARCH)(function), function)
 

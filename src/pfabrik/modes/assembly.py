@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.close import Closing, Closure, close, closure_of, platform_poses
@@ -112,22 +113,19 @@ class _Search:
 
         And stay apart from each other: of two single modes that have nearly met, steps of any length lead to the other.
         """
-        mechanism = self.closure.mechanism
         for place in fresh:
-            ends, gone_on = [], np.ones(0, bool)
-            for along in (ALONG, 0.5 * ALONG):
-                moved = stepped_freely(mechanism, self.found.coordinates[place], along)
-                if not len(moved):
-                    break
-                closed = close(self.closure, moved, platform_poses(mechanism, moved), locked=self.locked)
-                ends.append(self._marks(closed.poses))
-                apart = np.abs(ends[-1] - self.found.marks[place]).max(axis=1)
-                stays = (apart > 0.1 * along) & (apart < 2.0 * along) & (closed.gap <= TOLERANCES.position)
-                gone_on = (
-                    stays if len(ends) == 1 else gone_on & stays & (np.abs(ends[0] - ends[1]).max(axis=1) > 0.1 * along)
-                )
+            (ends, stay), (nearer, stay_too) = (self._stepped(place, along) for along in (ALONG, 0.5 * ALONG))
+            gone_on = stay & stay_too & (np.abs(ends - nearer).max(axis=1) > 0.05 * ALONG)
             if gone_on.any():
-                raise ContinuumOfSolutions(mechanism.name, int(gone_on.sum()))
+                raise ContinuumOfSolutions(self.closure.mechanism.name, int(gone_on.sum()))
+
+    def _stepped(self, place: int, along: float) -> tuple[Floats, NDArray[np.bool_]]:
+        """Where steps along each free motion of a mode end once they are closed again, and which stay about so far."""
+        moved = stepped_freely(self.closure.mechanism, self.found.coordinates[place], along)
+        closed = close(self.closure, moved, platform_poses(self.closure.mechanism, moved), locked=self.locked)
+        marks = self._marks(closed.poses)
+        apart = np.abs(marks - self.found.marks[place]).max(axis=1)
+        return marks, (apart > 0.1 * along) & (apart < 2.0 * along) & (closed.gap <= TOLERANCES.position)
 
     def _marks(self, poses: Floats) -> Floats:
         """What modes are told apart by, (n, 3 or 12): positions [L], and rotation matrices of a body."""
