@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import oracles
 import pfabrik as pf
 from pfabrik.closure.solve import ClosureEngine
 from pfabrik.decomposition.leg_table import LegTable, leg_table
@@ -173,3 +174,15 @@ def test_maps_and_code_that_know_no_arms_say_so() -> None:
     for name in NAMES:
         with pytest.raises(UnsupportedMechanism, match="leave joints"):
             pf.feasibility(machine(name), machine(name).home_pose)
+
+
+def test_arms_that_limits_hold_where_a_start_has_them_are_looked_for_from_home() -> None:
+    """Three targets well within reach, each from an answer from which no search along the arms leads there."""
+    mechanism, rng = pf.load("nrpm"), np.random.default_rng(10_000)
+    targets = oracles.random_targets(mechanism, rng, 10_000)
+    starts = targets[rng.permutation(len(targets))]
+    places = [1400, 1687, 9263]
+    assert (oracles.margin(mechanism, targets[places]) > 0.05).all()
+    begun = pf.solve_ik(mechanism, starts[places])
+    answer = pf.solve_ik(mechanism, targets[places], start=begun, options=Options(working_mode="any"))
+    assert (answer.status == pf.Status.REACHED).all()
