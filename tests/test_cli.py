@@ -1011,7 +1011,11 @@ def test_a_full_disk_is_told_in_one_line() -> None:
 
 @pytest.mark.slow
 def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
-    with in_process("demo", "--steps", 200_000, "--out", tmp_path / "out", stdout=subprocess.PIPE) as process:
+    def interruptible() -> None:  # a shell starts what runs in its background with interrupts ignored
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    line = ("demo", "--steps", 200_000, "--out", tmp_path / "out")
+    with in_process(*line, stdout=subprocess.PIPE, preexec_fn=interruptible) as process:
         deadline = time.monotonic() + 5
         while not os.listdir(tmp_path) and time.monotonic() < deadline:
             time.sleep(0.05)
