@@ -8,7 +8,7 @@ import numpy as np
 
 from ._jit import allocator, routine
 from .closure.loops import Floats, Ints
-from .sqp import MOTIONS, RANK, ROWS, Linearisation, new_linearisation
+from .sqp import CLOSING, MOTIONS, RANK, ROWS, Linearisation, new_linearisation
 
 DEPENDENT = 1e-6
 """What is left of an equation that follows from the others: descriptions are typed with as many digits."""
@@ -120,6 +120,9 @@ def put_multipliers(gradient: Floats, view: FreeMotions, multipliers: Floats) ->
 def project_gradient(force: Floats, view: FreeMotions) -> None:
     """The gradient of the objective in the free motions, from that in the unknowns, and the metric."""
     basis, g, metric, n = view.basis, view.linear.g, view.linear.metric, force.shape[0]
+    view.linear.scalars[CLOSING] = 0.0
+    for j in range(n):
+        view.linear.scalars[CLOSING] += force[j] * view.shift[j]
     for a in range(view.linear.counts[MOTIONS]):
         g[a] = 0.0
         for j in range(n):

@@ -1,8 +1,9 @@
 """Descending to the nearest feasible configuration: what every such search does, whatever its unknowns are.
 
-Sequential quadratic programming: at a feasible configuration the distance is modelled to second order and the limits
-to first, the step that this asks for is taken, brought back within the limits, and kept if it led down. Damping
-shortens steps where the model is poor, and vanishes where it is good (Nocedal and Wright, chapter 18).
+Sequential quadratic programming: at a configuration the distance is modelled to second order, loops and limits to
+first; the step that this asks for, and that closes what is open, is taken, and kept if it led down in an exact penalty:
+the distance, and what is open times more than all multipliers. Where it did not, what it left open is closed first.
+Damping shortens steps where the model is poor, and vanishes where it is good (Nocedal and Wright, chapter 18).
 
 With g and H the gradient of the objective f and the Hessian of the Lagrangian f + sum_k m_k h_k, G the gradients of
 the limits h <= 0 and M the metric of the unknowns, a step x solves the quadratic programme
@@ -23,8 +24,9 @@ from ._jit import allocator, routine
 from .closure.loops import Floats, Ints
 from .qp import QP, factorise, solve_qp
 
-LONGEST_STEP = 0.3
-"""Longest step of any unknown [rad or L]: beyond it the quadratic model says little."""
+LONGEST_STEP, AT_FIRST = 0.4, 0.1
+"""Longest step of any unknown [rad or L]: beyond it the quadratic model says little. And the damping to begin with, as
+a share of what would make the first step so long."""
 
 REACH = 1.0
 """Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
@@ -34,37 +36,42 @@ CLOSED, NEARLY_CLOSED = 1e-13, 1e-10
 overconstrained close no better than their description is exact. The second is a tenth of what is promised."""
 
 OPEN = 0.01
-"""Share of what a step promises by which loops may stay open, and limits be exceeded, while a search is on its way."""
+"""Share of what a step promises to which what it left open is closed, where it did not lead down."""
 
 FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
 it did not lead up by more than the second, for the objective itself is known no better."""
 
-LAST, CONVERGING = 1e-18, 1e-2
-"""Share of the objective that the last step promises: its length is a billionth of the distance. And, of a fine step,
-share of what the one before promised: if it is more, what moves is rounding."""
+LAST, CONVERGING = 1e-13, 1e-2
+"""Share of the objective that the last step promises: its length is less than a millionth of the distance, and the
+next would be its square. And, of a fine step, share of what the one before promised: if it is more, what moves is
+rounding."""
 
 PROBE = 1e-6
 """How far curvature is felt for along each motion [rad or L]."""
 
-RESTORING = 8
-"""Steps to bring a configuration back within its limits."""
+RESTORING, CORRECTIONS = 8, 1
+"""Steps to bring a configuration back within its limits; and to close what a step left open that did not lead down."""
 
 ENOUGH, GOOD, EXACT = 1e-4, 0.5, 0.1
 """Shares of what a step promised that make it worth keeping, and the model good enough for less damping; and by how
 much it may be off where the model, at the end of a whole step, is good enough for far less."""
 
+WORTH = 0.1
+"""Damping after a step that did not lead down, at least, in units of curvature."""
+
 STEEPEST = 1e8
 """Damping, in units of curvature, that ends a search: no step however short leads down."""
 
-# Scalars of a control: damping, the largest curvature, what the last step promised, and the one before, and the sum of
-# the multipliers of the equations. Counts: steps taken, and 1 where none is worth taking any more.
-DAMPING, LARGEST, PROMISE, BEFORE, HOLDING = 0, 1, 2, 3, 4
-STEPS, DONE = 0, 1
+# Scalars of a control: damping, the largest curvature, what the last step promised, and the one before, the sum of the
+# multipliers of the equations, and what the penalty counts the largest gap or excess. Counts: steps taken, and 1 where
+# none is worth taking any more.
+DAMPING, LARGEST, PROMISE, BEFORE, HOLDING, WEIGHT = 0, 1, 2, 3, 4, 5
+STEPS, DONE, REJECTED = 0, 1, 2
 
-# Scalars of a linear: the objective, the largest gap of a loop, the largest excess. Counts: unknowns, limits, rank,
-# and equations.
-VALUE, GAP, EXCESS = 0, 1, 2
+# Scalars of a linear: the objective, the largest gap of a loop, the largest excess, and what closing the loops adds to
+# the objective. Counts: unknowns, limits, rank, and equations.
+VALUE, GAP, EXCESS, CLOSING = 0, 1, 2, 3
 MOTIONS, LIMITS, RANK, ROWS = 0, 1, 2, 3
 
 
@@ -77,15 +84,15 @@ class Linearisation(NamedTuple):
     h: Floats  # (k,): excess over each, negative inside
     drift: Floats  # (k,): what closing the loops adds to it
     which: Ints  # (k,): its number
-    scalars: Floats  # (3,)
+    scalars: Floats  # (4,)
     counts: Ints  # (4,)
 
 
 class StepControl(NamedTuple):
     """Step control: how long the next step may be, and whether there is one."""
 
-    scalars: Floats  # (5,): see above
-    counts: Ints  # (2,)
+    scalars: Floats  # (6,): see above
+    counts: Ints  # (3,)
 
 
 class Hessian(NamedTuple):
@@ -105,7 +112,7 @@ def new_linearisation(n: int, k: int) -> Linearisation:
         np.zeros(k),
         np.zeros(k),
         np.zeros(k, np.int64),
-        np.zeros(3),
+        np.zeros(4),
         np.zeros(4, np.int64),
     )
 
@@ -117,7 +124,7 @@ def new_hessian(n: int, k: int) -> Hessian:
 
 @allocator
 def new_step_control() -> StepControl:
-    return StepControl(np.zeros(5), np.zeros(2, np.int64))
+    return StepControl(np.zeros(6), np.zeros(3, np.int64))
 
 
 @routine
@@ -171,14 +178,14 @@ def restoring_step(linear: Linearisation, p: QP) -> bool:
 
 @routine
 def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: float, p: QP) -> tuple[float, float]:
-    """The step that the damped programme asks for, into `p.x`: what it promises, and the damping it took.
+    """The step that the damped programme asks for, into `p.x`: what it takes from the objective, and the damping.
 
     Where curvature is not positive, that across active limits counts more: there is no room to move there. Where that
-    is not enough, damping grows. A programme without a solution promises less than nothing.
+    is not enough, damping grows. A programme without a solution takes up what is exceeded as if it were just met.
     """
     motions, k = linear.counts[MOTIONS], linear.counts[LIMITS]
     for c in range(k):
-        p.h[c] = min(linear.h[c], 0.0)
+        p.h[c] = linear.h[c] + linear.drift[c]
         for a in range(motions):
             p.G[c, a] = linear.G[c, a]
     stiff = 0.0
@@ -199,8 +206,11 @@ def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: fl
         else:
             damping = max(2.0 * damping, 1e-3 * largest)
     if not solve_qp(p, motions, k):
-        return -1.0, damping
-    promise = 0.0
+        for c in range(k):
+            p.h[c] = min(linear.h[c], 0.0)
+        if not solve_qp(p, motions, k):
+            return -math.inf, damping
+    promise = -linear.scalars[CLOSING]
     for a in range(motions):
         promise -= linear.g[a] * p.x[a]
         for b in range(motions):
@@ -244,6 +254,7 @@ def scale_objective(linear: Linearisation) -> float:
     """Choose the unit of the objective, 1 until now, so that its gradient is of order one; the unit."""
     unit = 1.0 / max(math.sqrt(2.0 * linear.scalars[VALUE]), 1e-12)
     linear.scalars[VALUE] *= unit
+    linear.scalars[CLOSING] *= unit
     for a in range(linear.counts[MOTIONS]):
         linear.g[a] *= unit
     return unit
@@ -254,35 +265,35 @@ def begin_descent(linear: Linearisation, hessian: Hessian, control: StepControl)
     """Start at a feasible configuration."""
     for c in range(len(hessian.multipliers)):
         hessian.multipliers[c] = 0.0
-    control.scalars[DAMPING] = longest(linear.g, linear.counts[MOTIONS]) / LONGEST_STEP
+    control.scalars[DAMPING] = AT_FIRST * longest(linear.g, linear.counts[MOTIONS]) / LONGEST_STEP
     control.scalars[PROMISE] = math.inf
-    control.counts[STEPS] = control.counts[DONE] = 0
+    control.counts[STEPS] = control.counts[DONE] = control.counts[REJECTED] = 0
 
 
 @routine
-def rests_open(linear: Linearisation, led_down: bool, control: StepControl) -> bool:
-    """Whether a search has come to rest, or has found no step that leads down, where something is open."""
-    if control.counts[DONE] == 1:
-        return not is_closed(linear, CLOSED)
-    return not led_down and not is_closed(linear, NEARLY_CLOSED)
+def rests_open(linear: Linearisation, led_down: bool, most_steps: int, control: StepControl) -> bool:
+    """Whether no step leads down where something is open."""
+    return not led_down and not is_closed(linear, NEARLY_CLOSED) and control.counts[STEPS] <= most_steps
 
 
 @routine
-def go_on(linear: Linearisation, control: StepControl) -> None:
+def go_on(control: StepControl) -> None:
     """Ask anew whether a step is worth taking, now that what was open is closed."""
-    if is_closed(linear, CLOSED):
-        control.scalars[PROMISE] = math.inf
-        control.counts[DONE] = 0
+    control.scalars[PROMISE] = math.inf
+    control.counts[DONE] = 0
 
 
 @routine
 def plan_step(linear: Linearisation, hessian: Hessian, control: StepControl, most_steps: int, p: QP) -> bool:
     """The next step to try, into `p.x`; False where none is worth trying."""
+    scalars = control.scalars
     control.counts[STEPS] += 1
-    control.scalars[BEFORE] = control.scalars[PROMISE]
-    promise, damping = propose(linear, hessian, control.scalars[DAMPING], control.scalars[LARGEST], p)
-    control.scalars[PROMISE], control.scalars[DAMPING] = promise, damping
-    if promise <= 0.0 or damping > STEEPEST * control.scalars[LARGEST] or control.counts[STEPS] > most_steps:
+    scalars[BEFORE] = scalars[PROMISE]
+    promise, damping = propose(linear, hessian, scalars[DAMPING], scalars[LARGEST], p)
+    scalars[WEIGHT] = 2.0 * (scalars[HOLDING] + sum_of_sizes(p.multipliers))
+    promise += scalars[WEIGHT] * openness(linear)
+    scalars[PROMISE], scalars[DAMPING] = promise, damping
+    if promise <= 0.0 or damping > STEEPEST * scalars[LARGEST] or control.counts[STEPS] > most_steps:
         control.counts[DONE] = 1
         return False
     note_multipliers(linear, p, hessian)
@@ -290,27 +301,34 @@ def plan_step(linear: Linearisation, hessian: Hessian, control: StepControl, mos
 
 
 @routine
-def judge_step(
-    linear: Linearisation, other: Linearisation, feasible: bool, share: float, hessian: Hessian, control: StepControl
-) -> bool:
-    """Whether a share of the step planned led from one linear down to another; damping follows how well it did.
+def gained(linear: Linearisation, other: Linearisation, control: StepControl) -> float:
+    """By how much the penalty is less at another configuration."""
+    weight = control.scalars[WEIGHT]
+    return merit(linear, weight) - merit(other, weight)
 
-    Where more was open than the step promised, and could be closed, closing it may have cost as much, and the promise
-    says nothing of what is left to gain.
-    """
+
+@routine
+def is_to_close(linear: Linearisation, other: Linearisation, share: float, control: StepControl) -> bool:
+    """Whether a share of the step planned did not lead down, perhaps for what it left open."""
     promise = share * control.scalars[PROMISE]
-    weight = 2.0 * (control.scalars[HOLDING] + sum_of_sizes(hessian.multipliers))
-    gain = merit(linear, weight) - merit(other, weight)
-    led_down = feasible and leads_down(linear, gain, promise)
-    left = openness(linear)
-    known = left <= OPEN * promise or (left <= NEARLY_CLOSED and openness(other) >= 0.1 * left)
-    control.scalars[PROMISE] = promise if known else math.inf
-    if known and is_last(linear, promise, control.scalars[BEFORE]):
+    return not leads_down(linear, gained(linear, other, control), promise) and not is_closed(
+        other, on_the_way(control, share)
+    )
+
+
+@routine
+def judge_step(linear: Linearisation, other: Linearisation, share: float, control: StepControl) -> bool:
+    """Whether a share of the step planned led from one linear down to another; damping follows how well it did."""
+    promise, gain = share * control.scalars[PROMISE], gained(linear, other, control)
+    led_down = leads_down(linear, gain, promise)
+    if is_last(linear, promise, control.scalars[BEFORE]):
         control.counts[DONE] = 1
+    control.scalars[PROMISE] = promise
     damping, largest = control.scalars[DAMPING], control.scalars[LARGEST]
     if not led_down:
-        control.scalars[DAMPING] = max(4.0 * damping, 1e-3 * largest)
-    elif gain > GOOD * promise:
+        control.scalars[DAMPING] = max(4.0 * damping, WORTH * largest)
+    elif gain > GOOD * promise and control.counts[REJECTED] == 0:
         damping *= 0.01 if share == 1.0 and abs(gain - promise) < EXACT * promise else 0.1
         control.scalars[DAMPING] = damping if damping > 1e-8 * largest else 0.0
+    control.counts[REJECTED] = 0 if led_down else 1
     return led_down

@@ -24,6 +24,7 @@ from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
+from .rotation import constraints_at, keeps_rotation, without_idle_legs
 from .table import kernel_table
 
 MOST_STEPS = 200
@@ -37,9 +38,6 @@ platform nearly has in many poses."""
 DRAWS, DRAWN_STEPS = 240, 30
 """How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
 
-SAMPLES, NEARBY = 8, 0.05
-"""How many poses about home are looked at, and how far off they are [L]."""
-
 FAR, TURNED = 1.0, 1.5
 """How far from home they are [L], and how far they are turned [rad]."""
 
@@ -48,6 +46,10 @@ TURNING = 0.2
 
 OTHER_SIDE = 0.02
 """The same for the square of the sine of half the angle by which carriers differ."""
+
+OF_A_MODE, SELDOM = 4, 0.2
+"""How many corners of one working mode are enough, and by how much more those of a mode that has fewer count as apart
+[L^2]: a mode may have a room of its own, small as it is."""
 
 ROWS_A_BLOCK = 16
 
@@ -188,8 +190,10 @@ def _approach(
     driven = table.driven if driven is None else driven
     from ..kernels.platform.nearest import approach
 
-    legs, found = kernel_table(table)._replace(driven=driven), _new_found(len(objective.targets), table)
-    limits = 2 * len(table.limited) + len(table.cones) + len(table.legs)
+    at_home = table.task[0]["rotations"] == 0 and objective.platform[3] == LOCKED and objective.max_iterations > 0
+    legs = (without_idle_legs(table) if at_home else kernel_table(table))._replace(driven=driven)
+    found = _new_found(len(objective.targets), table)
+    limits = 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)
     weights = np.zeros((len(objective.targets), limits))
     hits = _hits(table) if values is None else HITS_OF_VALUES
     near = np.zeros((0, len(driven))) if values is None else values
@@ -244,35 +248,6 @@ def home_start(mechanism: Mechanism, table: LegTable) -> Starts:
 
 
 @lru_cache(maxsize=64)
-def keeps_rotation(mechanism: Mechanism) -> bool:
-    """Whether legs keep the platform from turning, though its task leaves the rotation open: parallelograms do.
-
-    A platform that has turned over on its rods is of no use, though its loops close, and no answer.
-    """
-    table = leg_table(mechanism)
-    if not isinstance(table, LegTable) or task_of(mechanism).rotations > 0 or mechanism.end_effector_is_joint:
-        return False
-    if table.task[0]["rows"] < 3:
-        return False
-    poses = np.repeat(mechanism.home_pose[None], SAMPLES, axis=0)
-    shifts = np.random.default_rng(0).uniform(-NEARBY, NEARBY, (SAMPLES, 3))
-    poses[:, :3, 3] += mechanism.characteristic_length * shifts
-    rows, slopes = _constraints(table, poses)
-    stays = np.abs(rows).max(initial=0.0) <= TOLERANCES.position
-    return bool(stays and (np.linalg.svd(slopes[:, :, 3:])[1][:, -1] > TOLERANCES.nearly_implied).all())
-
-
-def _constraints(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
-    """The constraints of home's legs on poses (n, 4, 4) [length], (n, rows), and their derivatives, (n, rows, 6)."""
-    from ..kernels.legs.answer import measure_rows
-
-    n_rows = table.task[0]["rows"]
-    rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6))
-    measure_rows(table.legs, table.task, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
-    return rows, slopes
-
-
-@lru_cache(maxsize=64)
 def corners_of(mechanism: Mechanism) -> Starts:
     """Feasible configurations far from home and from each other: the nearest to random poses, chosen one by one."""
     table = leg_table(mechanism)
@@ -280,7 +255,7 @@ def corners_of(mechanism: Mechanism) -> Starts:
     rng, home = np.random.default_rng(0), home_start(mechanism, table)
     poses = np.repeat(home.poses, DRAWS, axis=0)
     twists = rng.uniform(-1.0, 1.0, (DRAWS, 6)) * np.repeat([FAR, TURNED], 3)
-    _, sizes, directions = np.linalg.svd(_constraints(table, mechanism.home_pose[None])[1][0])
+    _, sizes, directions = np.linalg.svd(constraints_at(table, mechanism.home_pose[None])[1][0])
     bound = directions[: (sizes > TOLERANCES.alignment).sum()]
     twists -= twists @ bound.T @ bound  # what the legs do not allow at home they hardly do elsewhere
     poses[:, :3, 3] += twists[:, :3]
@@ -299,10 +274,12 @@ def corners_of(mechanism: Mechanism) -> Starts:
     feasible = np.flatnonzero(np.isfinite(drawn.distances))
     drawn.poses[:] = in_lengths(drawn.poses, 1.0 / mechanism.characteristic_length)
     every = Starts(*(np.concatenate([first, array[feasible]]) for first, array in zip(home, drawn[1:4], strict=True)))
+    modes = np.unique(np.sign(every.sides), axis=0, return_inverse=True)[1].ravel()
     chosen: list[int] = []
     away = _apart(every, 0)
     while len(chosen) < min(CORNERS, len(feasible)):
-        chosen.append(int(away.argmax()))
+        rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < OF_A_MODE
+        chosen.append(int(np.where(rare & (away > 0.0), away + SELDOM, away).argmax()))
         away = np.minimum(away, _apart(every, chosen[-1]))
     return Starts._make(array[chosen] for array in every)
 

@@ -18,6 +18,4 @@ def kernel_table(table: LegTable) -> Table:
     carried = (table.legs["kind"] == K.ROD) & np.isin(table.legs["carrier"], (K.CRANK, K.CARRIAGE))
     own = np.concatenate([np.flatnonzero(carried), np.flatnonzero(table.legs["kind"] == K.ARM)])
     columns[own] = 6 + np.arange(len(own))
-    for k in np.flatnonzero(table.legs["carrier"] == K.SHARED):
-        columns[k] = columns[k - 1]
     return Table(table.legs, table.limited, table.cones, table.driven, table.task, columns)

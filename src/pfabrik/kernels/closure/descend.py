@@ -17,6 +17,7 @@ from ..qp import QP, new_qp
 from ..rotations import turn_ball
 from ..sqp import (
     CLOSED,
+    CORRECTIONS,
     DONE,
     EXCESS,
     GAP,
@@ -31,6 +32,7 @@ from ..sqp import (
     begin_descent,
     go_on,
     is_closed,
+    is_to_close,
     judge_step,
     longest,
     on_the_way,
@@ -125,11 +127,11 @@ def move(loops: Loops, step: Floats, share: float, state: State) -> None:
 
 
 @routine
-def take(loops: Loops, view: FreeMotions, x: Floats, state: State, work: Workspace, closing: bool) -> float:
+def take(loops: Loops, view: FreeMotions, x: Floats, state: State, work: Workspace) -> float:
     """Take a step of the free motions, and with it one that closes the loops; the share of it that is not too long."""
     n = len(loops.lo)
     for j in range(n):
-        work.row[j] = view.shift[j] if closing else 0.0
+        work.row[j] = view.shift[j]
         for a in range(view.linear.counts[MOTIONS]):
             work.row[j] += view.basis[j, a] * x[a]
     share = LONGEST_STEP / max(longest(work.row, n), LONGEST_STEP)
@@ -146,20 +148,20 @@ def restore_feasibility(
     tolerance: float,
     work: Workspace,
     view: FreeMotions,
+    steps: int,
     p: QP,
 ) -> bool:
-    """Bring a configuration onto its loops and within its limits, by the shortest way; `view` is where it ends.
+    """Bring a configuration, at which `view` is, onto its loops and within its limits, by the shortest way.
 
     Both to a tolerance; where rounding keeps it from that, to what counts as closed.
     """
-    for _step in range(RESTORING):
-        linearise(loops, row, objective, state, work, view)
+    for _step in range(steps):
         if is_closed(view.linear, tolerance):
             return True
         if not restoring_step(view.linear, p):
             return False
-        take(loops, view, p.x, state, work, True)
-    linearise(loops, row, objective, state, work, view)
+        take(loops, view, p.x, state, work)
+        linearise(loops, row, objective, state, work, view)
     return is_closed(view.linear, max(tolerance, NEARLY_CLOSED))
 
 
@@ -176,26 +178,29 @@ def descend(
     p: QP,
 ) -> int:
     """From a feasible configuration, at which `first` is, down to the nearest; how many steps it took."""
-    view, other, hessian, control = first, second, work.hessian, work.control
+    view, other, hessian, control, most = first, second, work.hessian, work.control, objective.max_iterations
     work.gradient.unit[0] = scale_objective(view.linear)
     begin_descent(view.linear, hessian, control)
     while control.counts[DONE] == 0:
         control.scalars[LARGEST] = lagrangian_hessian(loops, row, objective, best, trial, work, view)
         led_down = False
         while not led_down and control.counts[DONE] == 0:
-            if plan_step(view.linear, hessian, control, objective.max_iterations, p):
+            if plan_step(view.linear, hessian, control, most, p):
                 copy_state(best, trial)
-                share = take(loops, view, p.x, trial, work, False)
-                tolerance = on_the_way(control, share)
-                feasible = restore_feasibility(loops, row, objective, trial, tolerance, work, other, p)
-                led_down = judge_step(view.linear, other.linear, feasible, share, hessian, control)
+                share = take(loops, view, p.x, trial, work)
+                linearise(loops, row, objective, trial, work, other)
+                if is_to_close(view.linear, other.linear, share, control):
+                    closed = on_the_way(control, share)
+                    restore_feasibility(loops, row, objective, trial, closed, work, other, CORRECTIONS, p)
+                led_down = judge_step(view.linear, other.linear, share, control)
                 if led_down:
                     copy_state(trial, best)
                     view, other = other, view
-            if rests_open(view.linear, led_down, control):
-                if restore_feasibility(loops, row, objective, best, CLOSED, work, view, p):
-                    go_on(view.linear, control)
+            if rests_open(view.linear, led_down, most, control):
+                if restore_feasibility(loops, row, objective, best, CLOSED, work, view, RESTORING, p):
+                    go_on(control)
                 led_down = True
+    restore_feasibility(loops, row, objective, best, CLOSED, work, view, RESTORING, p)
     return int(control.counts[STEPS])
 
 
@@ -225,7 +230,8 @@ def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Clo
             for c in range(balance(first.linear, objective.near, p, pulls)):
                 weights[row, first.linear.which[c]] = p.x[c]
             continue
-        if restore_feasibility(loops, row, objective, best, CLOSED, work, first, p):
+        linearise(loops, row, objective, best, work, first)
+        if restore_feasibility(loops, row, objective, best, CLOSED, work, first, RESTORING, p):
             closed.iterations[row] = descend(loops, row, objective, best, trial, work, first, second, p)
         linearise(loops, row, objective, best, work, first)
         store_row(loops, row, best, closed)

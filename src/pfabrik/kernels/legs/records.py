@@ -19,7 +19,8 @@ Floats: TypeAlias = NDArray[np.float64]
 Records: TypeAlias = NDArray[np.void]
 Record: TypeAlias = Any  # one of them: its fields are numbers and arrays
 
-ROD, PIVOT, ARM = 0, 1, 2
+# An idle leg has nothing to say of a platform that does not turn.
+ROD, PIVOT, ARM, IDLE = 0, 1, 2, 3
 # What carries the foot: nothing, a hinge, a slide; or what carries the rod before (a second forearm), or the arm.
 # Of an arm, what it is.
 NO_CARRIER, CRANK, CARRIAGE, SHARED = 0, 1, 2, 3

@@ -13,6 +13,7 @@ from ..free_motions import FreeMotions
 from ..legs.records import Floats
 from ..sqp import (
     CLOSED,
+    CORRECTIONS,
     DONE,
     LARGEST,
     LONGEST_STEP,
@@ -24,8 +25,8 @@ from ..sqp import (
     begin_descent,
     go_on,
     is_closed,
+    is_to_close,
     judge_step,
-    longest,
     on_the_way,
     plan_step,
     restoring_step,
@@ -33,7 +34,7 @@ from ..sqp import (
     scale_objective,
 )
 from ..vectors import wrap
-from .equations import Now
+from .equations import Now, close_rods
 from .lagrangian import lagrangian_hessian
 from .linearise import linearise
 from .records import Aim, Table
@@ -42,40 +43,46 @@ from .search import Search, copy_now, move
 HOPELESS = 20.0
 """A search that is farther than the nearest yet by so many times what its last step promised is given up."""
 
+OF_CARRIERS = 0.6
+"""What the steps of carriers count beside those of the platform: they end where rods have their lengths."""
+
 BY = 0.03
 """A search that comes so near to the nearest configuration met yet [rad or L] would end there."""
 
 
 @routine
-def take(table: Table, view: FreeMotions, x: Floats, now: Now, search: Search, closing: bool) -> float:
+def take(table: Table, view: FreeMotions, x: Floats, now: Now, search: Search) -> float:
     """Take a step of the free motions, and with it one that meets the equations; the share of it not too long."""
     basis, shift, step = view.basis, view.shift, search.step
     n = step.shape[0]
     for j in range(n):
-        step[j] = shift[j] if closing else 0.0
+        step[j] = shift[j]
         for a in range(view.linear.counts[MOTIONS]):
             step[j] += basis[j, a] * x[a]
-    share = LONGEST_STEP / max(longest(search.step, n), LONGEST_STEP)
+    most = 0.0
+    for j in range(n):
+        most = max(most, abs(step[j]) * (1.0 if j < 6 else OF_CARRIERS))
+    share = LONGEST_STEP / max(most, LONGEST_STEP)
     move(table, search.step, share, now)
+    close_rods(table, now, search.look)
     return share
 
 
 @routine
 def restore_feasibility(
-    table: Table, row: int, aim: Aim, now: Now, tolerance: float, search: Search, view: FreeMotions
+    table: Table, row: int, aim: Aim, now: Now, tolerance: float, search: Search, view: FreeMotions, steps: int
 ) -> bool:
-    """Bring a configuration onto its equations and within its limits, by the shortest way; `view` is where it ends.
+    """Bring a configuration, at which `view` is, onto its equations and within its limits, by the shortest way.
 
     Both to a tolerance; where rounding keeps it from that, to what counts as closed.
     """
-    for _step in range(RESTORING):
-        linearise(table, row, aim, now, search, view)
+    for _step in range(steps):
         if is_closed(view.linear, tolerance):
             return True
         if not restoring_step(view.linear, search.p):
             return False
-        take(table, view, search.p.x, now, search, True)
-    linearise(table, row, aim, now, search, view)
+        take(table, view, search.p.x, now, search)
+        linearise(table, row, aim, now, search, view)
     return is_closed(view.linear, max(tolerance, NEARLY_CLOSED))
 
 
@@ -103,7 +110,8 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
     view, other, hessian, control = search.first, search.second, search.hessian, search.control
     unit = search.gradient.unit
     unit[0] = 1.0
-    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view):
+    linearise(table, row, aim, search.best, search, view)
+    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
         return math.inf
     unit[0] = scale_objective(view.linear)
     for j in range(search.force.shape[0]):
@@ -117,10 +125,13 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
         while not led_down and control.counts[DONE] == 0:
             if plan_step(view.linear, hessian, control, aim.pose.max_iterations, search.p):
                 copy_now(search.best, search.trial)
-                share = take(table, view, search.p.x, search.trial, search, False)
-                tolerance = on_the_way(control, share)
-                feasible = restore_feasibility(table, row, aim, search.trial, tolerance, search, other)
-                led_down = judge_step(view.linear, other.linear, feasible, share, hessian, control)
+                share = take(table, view, search.p.x, search.trial, search)
+                linearise(table, row, aim, search.trial, search, other)
+                if is_to_close(view.linear, other.linear, share, control):
+                    restore_feasibility(
+                        table, row, aim, search.trial, on_the_way(control, share), search, other, CORRECTIONS
+                    )
+                led_down = judge_step(view.linear, other.linear, share, control)
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view
@@ -128,9 +139,11 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
                         return least
                     if HOPELESS * control.scalars[PROMISE] < view.linear.scalars[VALUE] - 0.5 * unit[0] * least * least:
                         return math.inf
-            if rests_open(view.linear, led_down, control):
-                if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view):
+            if rests_open(view.linear, led_down, aim.pose.max_iterations, control):
+                if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
                     return math.inf
-                go_on(view.linear, control)
+                go_on(control)
                 led_down = True
+    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
+        return math.inf
     return math.sqrt(2.0 * view.linear.scalars[VALUE] / unit[0])

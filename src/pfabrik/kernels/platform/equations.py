@@ -41,13 +41,26 @@ from ..legs.records import (
     Floats,
     Record,
 )
-from ..legs.rods import NOWHERE, carried, carried_foot, carrier_rate, mark, place_arm, read_rod, rod_rows, twist_rate
-from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
+from ..legs.rods import (
+    NOWHERE,
+    carried,
+    carried_foot,
+    carrier_rate,
+    carry,
+    mark,
+    place_arm,
+    read_rod,
+    rod_rows,
+    twist_rate,
+)
+from ..vectors import Vec, along, angle_between, cross, dot, move, norm, scale, sub, turn, vec, wrap
 from .records import Table
 
 AT_FOOT, AT_HEAD = 0, 1
 # Sine below which a line is straight along the axis of its cone: no direction leads in or out.
 ALIGNED = 1e-12
+# How far from a dead point, as `carry` says, a carrier must be to be put where its rod has its length.
+SURELY = 1e-2
 
 
 class Now(NamedTuple):
@@ -138,7 +151,7 @@ def place_leg(table: Table, k: int, main: int, now: Now, view: View) -> None:
         pivot_rows(leg, frame, view.rows)
     elif leg["kind"] == ARM:
         place_arm(leg, now.q[k], values[k - leg["on_arm"]], values[k])
-    else:
+    elif leg["kind"] == ROD:
         if is_carried(leg):
             values[k, CARRIER] = now.q[k]
             values[k, COSINE], values[k, SINE] = math.cos(now.q[k]), math.sin(now.q[k])
@@ -146,6 +159,31 @@ def place_leg(table: Table, k: int, main: int, now: Now, view: View) -> None:
         rod_rows(leg, lead, frame, values[main], values[k], lines[k], view.rows)
         if is_carried(leg):
             rows[own_row(table, k)] = values[k, SLIDE]
+
+
+@routine
+def close_rods(table: Table, now: Now, view: View) -> None:
+    """Bring carriers to where their rods have their lengths, on the sides that they are on, but not near dead points:
+    there a pose says little of them."""
+    q, own = now.q, view.values
+    set_frames(now.pose, table.task[0], view.frames)
+    for k in range(q.shape[0]):
+        leg = table.legs[k]
+        if is_carried(leg):
+            head = move(view.frames[leg["reversed"]], vec(leg["head_point"]))
+            if carry(leg, head, side_of(leg, head, q[k]), own[k]) > SURELY:
+                q[k] = wrap(own[k, CARRIER], q[k]) if leg["carrier"] == CRANK else own[k, CARRIER]
+
+
+@routine
+def side_of(rod: Record, head: Vec, q: float) -> float:
+    """The side of a carrier: of its dead point, where the rod comes nearest to the head."""
+    if rod["carrier"] == CRANK:
+        x = sub(head, vec(rod["carrier_point"]))
+        return math.copysign(
+            1.0, dot(vec(rod["spoke"]), x) * math.sin(q) - dot(vec(rod["spoke_across"]), x) * math.cos(q)
+        )
+    return math.copysign(1.0, q - dot(sub(head, vec(rod["foot_point"])), vec(rod["carrier_axis"])))
 
 
 @routine

@@ -22,7 +22,7 @@ class Table(NamedTuple):
     cones: Records
     driven: Records
     task: Records  # one
-    columns: NDArray[np.int64]  # (legs,): the unknown that a leg's carrier, or the arm, has; -1 where there is none
+    columns: NDArray[np.int64]  # (legs,): the unknown that a leg's own carrier, or the arm, has; -1 where there is none
 
 
 class Aim(NamedTuple):

@@ -1,0 +1,87 @@
+"""Platforms that their legs keep from turning, and the legs that say nothing while one does not turn."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..decomposition.leg_table import LegTable, leg_table
+from ..description.mechanism import Mechanism
+from ..description.task import task_of
+from ..kernels.legs import records as K
+from ..kernels.platform.records import Table
+from ..tolerances import TOLERANCES
+from .table import kernel_table
+
+SAMPLES, NEARBY = 8, 0.05
+"""How many poses about home are looked at, and how far off they are [L]."""
+
+
+@lru_cache(maxsize=64)
+def keeps_rotation(mechanism: Mechanism) -> bool:
+    """Whether legs keep the platform from turning, though its task leaves the rotation open: parallelograms do.
+
+    A platform that has turned over on its rods is of no use, though its loops close, and no answer.
+    """
+    table = leg_table(mechanism)
+    if not isinstance(table, LegTable) or task_of(mechanism).rotations > 0 or mechanism.end_effector_is_joint:
+        return False
+    if table.task[0]["rows"] < 3:
+        return False
+    rows, slopes = constraints_at(table, _shifted_about_home(table))
+    stays = np.abs(rows).max(initial=0.0) <= TOLERANCES.position
+    return bool(stays and (np.linalg.svd(slopes[:, :, 3:])[1][:, -1] > TOLERANCES.nearly_implied).all())
+
+
+@lru_cache(maxsize=64)
+def without_idle_legs(table: LegTable) -> Table:
+    """What kernels are given to search where the platform does not turn from home.
+
+    There a second forearm of a parallelogram goes along with the first, and three slides and a hinge say nothing: such
+    legs are idle. A cone of such a forearm is one of the first one, whose line is the same.
+    """
+    legs, rows = table.legs.copy(), table.task[0]["rows"]
+    values, slopes = constraints_at(table, _shifted_about_home(table))
+    quiet = np.maximum(np.abs(values), np.abs(slopes[:, :, :3]).max(axis=2)).max(axis=0) <= TOLERANCES.implied
+    ends = np.append(legs["first_row"][1:], rows)
+    limited = np.concatenate([table.limited["leg"], table.driven["leg"]])
+    cones = table.cones.copy()
+    for k in range(len(legs)):
+        own = quiet[legs["first_row"][k] : ends[k]]
+        second = legs["kind"][k] == K.ROD and legs["carrier"][k] == K.SHARED and legs["kind"][k - 1] == K.ROD
+        if len(own) and own.all() and k not in limited and (second or k not in cones["leg"]):
+            legs["kind"][k] = K.IDLE
+            cones["leg"][cones["leg"] == k] = k - 1
+    return kernel_table(table)._replace(legs=legs, cones=cones[_of_their_own(cones)])
+
+
+def _of_their_own(cones: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Which cones limit what none before limits as much."""
+    own = np.ones(len(cones), dtype=bool)
+    for i, cone in enumerate(cones):
+        before = cones[:i][own[:i]]
+        same = (before["leg"] == cone["leg"]) & (before["place"] == cone["place"])
+        same &= (np.abs(before["axis"] - cone["axis"]) <= TOLERANCES.implied).all(axis=1)
+        own[i] = not (same & (before["half_angle"] <= cone["half_angle"])).any()
+    return own
+
+
+def _shifted_about_home(table: LegTable) -> Floats:
+    """Poses (n, 4, 4) [length] about home, not turned."""
+    task, poses = table.task[0], np.repeat(np.eye(4)[None], SAMPLES, axis=0)
+    shifts = np.random.default_rng(0).uniform(-NEARBY, NEARBY, (SAMPLES, 3))
+    poses[:, :3, 3] = task["length"] * (task["reference"] + shifts)
+    return poses
+
+
+def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
+    """The constraints of home's legs on poses (n, 4, 4) [length], (n, rows), and their derivatives, (n, rows, 6)."""
+    from ..kernels.legs.answer import measure_rows
+
+    n_rows = table.task[0]["rows"]
+    rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6))
+    measure_rows(table.legs, table.task, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
+    return rows, slopes
