@@ -57,7 +57,7 @@ ENOUGH, GOOD, EXACT = 1e-4, 0.5, 0.1
 """Shares of what a step promised that make it worth keeping, and the model good enough for less damping; and by how
 much it may be off where the model, at the end of a whole step, is good enough for far less."""
 
-WORTH = 0.1
+WORTH = 0.01
 """Damping after a step that did not lead down, at least, in units of curvature."""
 
 STEEPEST = 1e8
@@ -137,11 +137,11 @@ def longest(step: Floats, n: int) -> float:
 
 
 @routine
-def sum_of_sizes(multipliers: Floats) -> float:
-    """What one unit of the worst equation is worth, at most."""
+def sum_of(multipliers: Floats, k: int) -> float:
+    """The sum of the first k."""
     total = 0.0
-    for i in range(multipliers.shape[0]):
-        total += abs(multipliers[i])
+    for c in range(k):
+        total += multipliers[c]
     return total
 
 
@@ -290,7 +290,7 @@ def plan_step(linear: Linearisation, hessian: Hessian, control: StepControl, mos
     control.counts[STEPS] += 1
     scalars[BEFORE] = scalars[PROMISE]
     promise, damping = propose(linear, hessian, scalars[DAMPING], scalars[LARGEST], p)
-    scalars[WEIGHT] = 2.0 * (scalars[HOLDING] + sum_of_sizes(p.multipliers))
+    scalars[WEIGHT] = 2.0 * (scalars[HOLDING] + sum_of(p.multipliers, linear.counts[LIMITS]))
     promise += scalars[WEIGHT] * openness(linear)
     scalars[PROMISE], scalars[DAMPING] = promise, damping
     if promise <= 0.0 or damping > STEEPEST * scalars[LARGEST] or control.counts[STEPS] > most_steps:
@@ -317,10 +317,10 @@ def is_to_close(linear: Linearisation, other: Linearisation, share: float, contr
 
 
 @routine
-def judge_step(linear: Linearisation, other: Linearisation, share: float, control: StepControl) -> bool:
+def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, share: float, control: StepControl) -> bool:
     """Whether a share of the step planned led from one linear down to another; damping follows how well it did."""
     promise, gain = share * control.scalars[PROMISE], gained(linear, other, control)
-    led_down = leads_down(linear, gain, promise)
+    led_down = feasible and leads_down(linear, gain, promise)
     if is_last(linear, promise, control.scalars[BEFORE]):
         control.counts[DONE] = 1
     control.scalars[PROMISE] = promise

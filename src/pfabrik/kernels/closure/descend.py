@@ -17,7 +17,6 @@ from ..qp import QP, new_qp
 from ..rotations import turn_ball
 from ..sqp import (
     CLOSED,
-    CORRECTIONS,
     DONE,
     EXCESS,
     GAP,
@@ -32,7 +31,6 @@ from ..sqp import (
     begin_descent,
     go_on,
     is_closed,
-    is_to_close,
     judge_step,
     longest,
     on_the_way,
@@ -148,14 +146,13 @@ def restore_feasibility(
     tolerance: float,
     work: Workspace,
     view: FreeMotions,
-    steps: int,
     p: QP,
 ) -> bool:
     """Bring a configuration, at which `view` is, onto its loops and within its limits, by the shortest way.
 
     Both to a tolerance; where rounding keeps it from that, to what counts as closed.
     """
-    for _step in range(steps):
+    for _step in range(RESTORING):
         if is_closed(view.linear, tolerance):
             return True
         if not restoring_step(view.linear, p):
@@ -189,18 +186,17 @@ def descend(
                 copy_state(best, trial)
                 share = take(loops, view, p.x, trial, work)
                 linearise(loops, row, objective, trial, work, other)
-                if is_to_close(view.linear, other.linear, share, control):
-                    closed = on_the_way(control, share)
-                    restore_feasibility(loops, row, objective, trial, closed, work, other, CORRECTIONS, p)
-                led_down = judge_step(view.linear, other.linear, share, control)
+                tolerance = on_the_way(control, share)
+                feasible = restore_feasibility(loops, row, objective, trial, tolerance, work, other, p)
+                led_down = judge_step(view.linear, other.linear, feasible, share, control)
                 if led_down:
                     copy_state(trial, best)
                     view, other = other, view
             if rests_open(view.linear, led_down, most, control):
-                if restore_feasibility(loops, row, objective, best, CLOSED, work, view, RESTORING, p):
+                if restore_feasibility(loops, row, objective, best, CLOSED, work, view, p):
                     go_on(control)
                 led_down = True
-    restore_feasibility(loops, row, objective, best, CLOSED, work, view, RESTORING, p)
+    restore_feasibility(loops, row, objective, best, CLOSED, work, view, p)
     return int(control.counts[STEPS])
 
 
@@ -231,7 +227,7 @@ def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Clo
                 weights[row, first.linear.which[c]] = p.x[c]
             continue
         linearise(loops, row, objective, best, work, first)
-        if restore_feasibility(loops, row, objective, best, CLOSED, work, first, RESTORING, p):
+        if restore_feasibility(loops, row, objective, best, CLOSED, work, first, p):
             closed.iterations[row] = descend(loops, row, objective, best, trial, work, first, second, p)
         linearise(loops, row, objective, best, work, first)
         store_row(loops, row, best, closed)

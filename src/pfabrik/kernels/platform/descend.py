@@ -131,7 +131,7 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
                     restore_feasibility(
                         table, row, aim, search.trial, on_the_way(control, share), search, other, CORRECTIONS
                     )
-                led_down = judge_step(view.linear, other.linear, share, control)
+                led_down = judge_step(view.linear, other.linear, True, share, control)
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view
