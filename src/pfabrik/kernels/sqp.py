@@ -42,8 +42,8 @@ FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
 it did not lead up by more than the second, for the objective itself is known no better."""
 
-LAST, CONVERGING = 1e-13, 1e-2
-"""Share of the objective that the last step promises: its length is less than a millionth of the distance, and the
+LAST, CONVERGING = 1e-15, 1e-2
+"""Share of the objective that the last step promises: its length is some hundred-millionths of the distance, and the
 next would be its square. And, of a fine step, share of what the one before promised: if it is more, what moves is
 rounding."""
 
