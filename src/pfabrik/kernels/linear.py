@@ -27,20 +27,20 @@ def solve_spd(A: Floats, n: int, damping: float) -> bool:
             for i in range(n):
                 A[i, n] = 0.0
             return False
-        pivot = math.sqrt(pivot)
-        A[j, j] = pivot
+        inverse = 1.0 / math.sqrt(pivot)
+        A[j, j] = inverse
         for i in range(j + 1, n):
             entry = A[i, j]
             for k in range(j):
                 entry -= A[i, k] * A[j, k]
-            A[i, j] = entry / pivot
+            A[i, j] = entry * inverse
         entry = A[j, n]
         for k in range(j):
             entry -= A[j, k] * A[k, n]
-        A[j, n] = entry / pivot
+        A[j, n] = entry * inverse
     for j in range(n - 1, -1, -1):
         entry = A[j, n]
         for k in range(j + 1, n):
             entry -= A[k, j] * A[k, n]
-        A[j, n] = entry / A[j, j]
+        A[j, n] = entry * A[j, j]
     return True

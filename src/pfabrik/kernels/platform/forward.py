@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .._jit import allocator, kernel, routine
 from ..legs.answer import KEPT, PENDING, REACHED, deviation, excess_of, make_exact
-from ..legs.records import CARRIER, PIVOT, Floats
+from ..legs.records import CARRIER, PIVOT, Floats, Record
 from ..linear import solve_spd
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..vectors import copy_row, copy_table, wrap
@@ -51,8 +51,9 @@ class Newton(NamedTuple):
     """Scratch memory of one thread."""
 
     look: View
-    free: NDArray[np.int64]  # (n,): place of each unknown among those that are free; -1 where it is not
-    normal: Floats  # (n, n + 1): normal equations, right-hand side last
+    free: NDArray[np.int64]  # (m,): the unknowns that are free
+    normal: Floats  # (m, m + 1): normal equations, right-hand side last
+    slope: Floats  # (m,): of an equation
     step: Floats  # (n,)
     values: Floats  # (n_a,): deviations from home that the actuators are led to
     begin: Floats  # (n_a,)
@@ -64,21 +65,19 @@ class Newton(NamedTuple):
 def new_newton(table: Table, turns: bool) -> Newton:
     """Scratch memory of one thread; without `turns` the platform does not turn."""
     n, legs, n_driven = count_unknowns(table), table.legs.shape[0], table.driven.shape[0]
-    free = np.zeros(n, np.int64)
-    for j in range(n):
-        free[j] = -1 if 3 <= j < 6 and not turns else 0
+    kept = np.zeros(n, np.int64)
+    for j in range(3, 6):
+        kept[j] = 0 if turns else 1
     for i in range(n_driven):
         if drives_carrier(table, i):
-            free[table.columns[table.driven[i]["leg"]]] = -1
-    place = 0
-    for j in range(n):
-        if free[j] == 0:
-            free[j] = place
-            place += 1
+            kept[table.columns[table.driven[i]["leg"]]] = 1
+    free = np.flatnonzero(kept == 0)
+    m = free.shape[0]
     return Newton(
         new_view(table),
         free,
-        np.zeros((n, n + 1)),
+        np.zeros((m, m + 1)),
+        np.zeros(m),
         np.zeros(n),
         np.zeros(n_driven),
         np.zeros(n_driven),
@@ -106,60 +105,69 @@ def put_drivers(table: Table, work: Newton) -> None:
 @routine
 def add_equation(residual: float, slope: Floats, work: Newton) -> None:
     """Add an equation to the normal equations."""
-    free, normal = work.free, work.normal
-    n = normal.shape[0]
-    for i in range(n):
-        a = free[i]
-        if a >= 0 and slope[i] != 0.0:
-            for j in range(i + 1):
-                if free[j] >= 0:
-                    normal[a, free[j]] += slope[i] * slope[j]
-            normal[a, n] -= slope[i] * residual
+    free, normal, own = work.free, work.normal, work.slope
+    m = free.shape[0]
+    for a in range(m):
+        own[a] = slope[free[a]]
+    for a in range(m):
+        for b in range(a + 1):
+            normal[a, b] += own[a] * own[b]
+        normal[a, m] -= own[a] * residual
 
 
 @routine
-def put_normal(table: Table, work: Newton) -> float:
-    """Fill the normal equations at the present configuration; the largest residual."""
+def off_by(driven: Record, value: float, work: Newton) -> float:
+    """By how much a coordinate that is no carrier's deviates from what it is to be."""
+    off = value - work.values[driven["column"]]
+    return wrap(off, 0.0) if counts_turns(driven) else off
+
+
+@routine
+def largest_residual(table: Table, work: Newton) -> float:
+    """Read the legs at the present configuration; the largest residual."""
+    worst = place(table, work.now, work.look)
+    for i in range(table.driven.shape[0]):
+        if not drives_carrier(table, i):
+            driven = table.driven[i]
+            worst = max(worst, abs(off_by(driven, deviation(driven, work.look.values), work)))
+    return worst
+
+
+@routine
+def put_normal(table: Table, work: Newton) -> None:
+    """Fill the normal equations where the legs have been read."""
     normal, rows, slopes, look = work.normal, work.look.rows, work.look.slopes, work.look
     for i in range(normal.shape[0]):
         for j in range(normal.shape[1]):
             normal[i, j] = 0.0
-    worst = place(table, work.now, look)
     put_slopes(table, look)
     for r in range(rows.shape[0]):
         add_equation(rows[r], slopes[r], work)
     for i in range(table.driven.shape[0]):
         if not drives_carrier(table, i):
             driven = table.driven[i]
-            off = coordinate_slope(table, driven, look) - work.values[driven["column"]]
-            off = wrap(off, 0.0) if counts_turns(driven) else off
-            worst = max(worst, abs(off))
-            add_equation(off, look.slope, work)
-    return worst
+            add_equation(off_by(driven, coordinate_slope(table, driven, look), work), look.slope, work)
 
 
 @routine
 def newton(table: Table, steps: int, work: Newton) -> float:
     """Solve for the actuators' values from the present configuration; the largest residual left."""
     free, normal, step = work.free, work.normal, work.step
-    n, before = normal.shape[0], math.inf
+    m, before = free.shape[0], math.inf
     put_drivers(table, work)
     for _ in range(steps):
-        worst = put_normal(table, work)
+        worst = largest_residual(table, work)
         if not worst < math.inf or worst <= ASSEMBLED or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * before):
             return worst
-        before, most, n_free = worst, 0.0, 0
-        for j in range(n):
-            n_free = max(n_free, free[j] + 1)
-        for i in range(n_free):
-            normal[i, n_free] = normal[i, n]
-        if not solve_spd(normal, n_free, 0.0):
+        put_normal(table, work)
+        if not solve_spd(normal, m, 0.0):
             return math.inf
-        for j in range(n):
-            step[j] = normal[free[j], n_free] if free[j] >= 0 else 0.0
-            most = max(most, abs(step[j]))
+        before, most = worst, 0.0
+        for a in range(m):
+            step[free[a]] = normal[a, m]
+            most = max(most, abs(normal[a, m]))
         move(table, step, min(1.0, FAR_STEP / max(most, FAR_STEP)), work.now)
-    return put_normal(table, work)
+    return largest_residual(table, work)
 
 
 @routine
