@@ -21,6 +21,8 @@ from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
 from pfabrik.platform.coordinates import sides_at
 from pfabrik.platform.solve import LegsEngine
+from pfabrik.platform.table import machine as legs_of
+from pfabrik.platform.table import machine_aimed
 
 SERVED = [name for name in pf.catalog() if isinstance(table_without_arms(pf.load(name)), LegTable)]
 IN_FRONT = [name for name in SERVED if isinstance(engine_of(pf.load(name)), LegsEngine)]
@@ -86,7 +88,7 @@ def constraints(name: str, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     own = table(name)
     rows = np.zeros((len(poses), own.task["rows"][0]))
     slopes = np.zeros((*rows.shape, 6))
-    measure_rows(own.legs, own.task, poses, own.home_sides, rows, slopes)
+    measure_rows(legs_of(own).address, poses, own.home_sides, rows, slopes)
     return rows, slopes
 
 
@@ -116,7 +118,7 @@ def test_coordinates_told_by_legs_are_those_of_closed_loops(name: str) -> None:
     at_home = np.asarray(answers.status) == pf.Status.REACHED
     poses = np.ascontiguousarray(answers.pose[at_home])
     told = np.zeros((len(poses), len(mechanism.coordinate_names)))
-    read_coordinates(own.aimed, own.known, own.task, poses, own.home_sides, told)
+    read_coordinates(machine_aimed(own).address, poses, own.home_sides, told)
     columns = own.known["column"]
     closed = answers.q[at_home] - home_coordinates(mechanism)
     away = (told - closed)[:, columns] / own.known["unit"]

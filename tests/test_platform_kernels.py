@@ -13,9 +13,10 @@ from conftest import INTERPRETED
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
 from pfabrik.kernels.legs import records as K
+from pfabrik.kernels.legs.records import Table
 from pfabrik.kernels.platform import equations as E
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
-from pfabrik.kernels.platform.records import Aim, Table
+from pfabrik.kernels.platform.records import Aim
 from pfabrik.kernels.platform.search import new_search
 from pfabrik.platform.table import kernel_table
 

@@ -16,6 +16,7 @@ from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism
 from .kernels.threads import in_blocks
 from .platform.coordinates import sides_at
+from .platform.table import machine
 from .targets import Target, as_targets
 
 ROWS_A_BLOCK, ROWS_A_RUN, POSES_MADE = 1024, 4096, 65536
@@ -90,7 +91,7 @@ class _Asked:
         table = table_without_arms(checked_mechanism(mechanism))
         if not isinstance(table, LegTable):
             raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"])
-        self._table, self._machine = table, (table.legs, table.limited, table.cones, table.task)
+        self._table, self._machine = table, machine(table).address
         self._begin, self._sides = mechanism.home_pose[None].copy(), table.home_sides
         if start is not None:
             found = start_of(mechanism, start, ())
@@ -133,7 +134,7 @@ class _Asked:
             targets = poses if len(counts) else poses[block]
             told = margin[block], binding[block]
             return margins_in_blocks(
-                *self._machine, targets, steps, counts, block.start, self._begin, self._sides, *told
+                self._machine, targets, steps, counts, block.start, self._begin, self._sides, *told
             )
 
         return margin, binding, sum(in_blocks(run, n, ROWS_A_RUN))
@@ -144,7 +145,7 @@ class _Asked:
         margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
 
         def run(block: slice) -> None:
-            measure(*self._machine, poses[block], self._begin, self._sides, margin[block], binding[block])
+            measure(self._machine, poses[block], self._begin, self._sides, margin[block], binding[block])
 
         in_blocks(run, len(poses), ROWS_A_BLOCK)
         return margin, binding

@@ -15,7 +15,6 @@ from .closure.descend import approach
 from .closure.first_order import first_order
 from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Layout, Loops, PoseObjective
 from .lattice import join, number_points
-from .legs import records as R
 from .legs.answer import answer, measure_rows, read_coordinates
 from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
@@ -24,7 +23,7 @@ from .platform.forward import assemble
 from .platform.nearest import approach as approach_by_pose
 from .platform.nearest import read_configurations
 from .platform.otherwise import answer_otherwise
-from .platform.records import Aim, Found, Starts, Table
+from .platform.records import Aim, Found, Starts
 from .reaching import plan as P
 from .reaching.solve import solve_by_iteration
 
@@ -52,14 +51,9 @@ _ROWS = (
     P.Rows(*_values("i1 i2 f3 f3 f2 f2 f2")),
 )
 
-_LEGS, _TASK = np.zeros(0, R.LEG), np.zeros(0, R.TASK)
-_LIMITS = (np.zeros(0, R.COORDINATE), np.zeros(0, R.CONE))
-_KNOWN = np.zeros(0, R.COORDINATE)
-
-_TABLE = Table(_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("i1"))
 _STARTS = Starts(*_values("f3 f2 f2"))
 _POSE_OBJECTIVE = PoseObjective(*_values("f3 f1 i f f i"))
-_ANSWERS = (_LEGS, *_LIMITS, _KNOWN, _TASK, *_values("f3 f3 f2 i1 f3 f2 f2"))
+_ANSWERS = tuple(_values("i f3 f3 f2 i1 f3 f2 f2"))
 
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, _ANSWERS),
@@ -67,14 +61,14 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
     (solve_by_iteration, _ROWS),
     (approach, (_LOOPS, _LAYOUT, _POSE_OBJECTIVE, _CLOSED, np.zeros((0, 0)))),
-    (read_coordinates, (_LEGS, _KNOWN, _TASK, *_values("f3 f2 f2"))),
+    (read_coordinates, tuple(_values("i f3 f2 f2"))),
     (first_order, (_LOOPS, _LAYOUT, FirstOrderPlan(*_values("f2 f1 f2 i1 i i i i f i")), _F2, _FIRST_ORDER)),
-    (feasibility, (_LEGS, *_LIMITS, _TASK, *_values("f3 f3 f2 f1 i1"))),
-    (answer_otherwise, (_TABLE, *_values("f3 f3 f2 i1 f3 f2 f2"))),
+    (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
+    (answer_otherwise, _ANSWERS),
     (
         approach_by_pose,
         (
-            _TABLE,
+            0,
             Aim(_POSE_OBJECTIVE, np.zeros((0, 0))),
             _STARTS,
             _STARTS,
@@ -84,10 +78,10 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
             _F2,
         ),
     ),
-    (read_configurations, (_TABLE, _KNOWN, *_values("f3 f2 f2 f2"))),
-    (assemble, (_TABLE, np.zeros((0, 0)), True, _STARTS, _STARTS, *_values("i1 f2"), _STARTS)),
-    (margins_in_blocks, (_LEGS, *_LIMITS, _TASK, *_values("f3 f2 i1 i f3 f2 f1 i1"))),
-    (measure_rows, (_LEGS, _TASK, *_values("f3 f2 f2 f3"))),
+    (read_configurations, tuple(_values("i f3 f2 f2 f2"))),
+    (assemble, (0, np.zeros((0, 0)), True, _STARTS, _STARTS, *_values("i1 f2"), _STARTS)),
+    (margins_in_blocks, tuple(_values("i f3 f2 i1 i f3 f2 f1 i1"))),
+    (measure_rows, tuple(_values("i f3 f2 f2 f3"))),
     (number_points, (*_values("i1 i1 i1 i"), True, *_values("i1"))),
     (join, tuple(_values("i2 i1"))),
 )

@@ -18,7 +18,7 @@ from ..motion.displacements import gaps
 from ..motion.limits import within_turns
 from ..motion.meeting import meeting_joints, put_meeting_joints
 from ..tolerances import TOLERANCES
-from .table import kernel_table
+from .table import machine_aimed
 
 Floats = NDArray[np.float64]
 
@@ -123,7 +123,7 @@ def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats) -> N
     """Write the coordinates that legs tell at poses (n, 4, 4) [length] into joint coordinates (n, columns)."""
     from ..kernels.legs.answer import read_coordinates
 
-    read_coordinates(table.aimed, table.known, table.task, np.require(poses, requirements=["C", "W"]), sides, found)
+    read_coordinates(machine_aimed(table).address, np.require(poses, requirements=["C", "W"]), sides, found)
 
 
 def _read_with(
@@ -134,8 +134,7 @@ def _read_with(
 
     scaled = poses.copy()
     scaled[:, :3, 3] /= mechanism.characteristic_length
-    legs = kernel_table(table)._replace(legs=table.aimed)
-    read_configurations(legs, table.known, scaled, carriers, sides, found)
+    read_configurations(machine_aimed(table).address, scaled, carriers, sides, found)
     return found
 
 

@@ -13,7 +13,7 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from .nearest import corners_of, home_start, in_lengths, nearest_actuators, no_starts, starts_at
-from .table import kernel_table
+from .table import machine
 
 ROWS_A_BLOCK = 256
 
@@ -106,7 +106,7 @@ def _assemble(
     """Assemble the rows at some places."""
     from ..kernels.platform.forward import assemble
 
-    legs, turns, wanted = kernel_table(table), not mechanism.end_effector_is_joint, values[places]
+    legs, turns, wanted = machine(table).address, not mechanism.end_effector_is_joint, values[places]
     status, measures = rows.status[places], rows.measures[places]
     ended = Starts._make(array[places] for array in found)
 

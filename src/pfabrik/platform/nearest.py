@@ -18,6 +18,7 @@ from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
+from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Aim, Found, Starts
 from ..kernels.reaching import plan as P
@@ -25,7 +26,7 @@ from ..kernels.threads import in_blocks
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 from .rotation import constraints_at, keeps_rotation, without_idle_legs
-from .table import kernel_table
+from .table import machine
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
@@ -187,22 +188,22 @@ def _approach(
     ----------
     values : what coordinates, those of actuators if no others are `driven`, are to be near to; see `Aim`.
     """
-    driven = table.driven if driven is None else driven
     from ..kernels.platform.nearest import approach
 
     at_home = table.task[0]["rotations"] == 0 and objective.platform[3] == LOCKED and objective.max_iterations > 0
-    legs = (without_idle_legs(table) if at_home else kernel_table(table))._replace(driven=driven)
-    found = _new_found(len(objective.targets), table)
+    asked = without_idle_legs(table) if at_home else machine(table)
+    asked = asked if driven is None else Handle(asked.record._replace(driven=driven))
+    found, legs = _new_found(len(objective.targets), table), asked.record
     limits = 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)
     weights = np.zeros((len(objective.targets), limits))
     hits = _hits(table) if values is None else HITS_OF_VALUES
-    near = np.zeros((0, len(driven))) if values is None else values
+    near = np.zeros((0, len(legs.driven))) if values is None else values
 
     def run(block: slice) -> None:
         first = own if len(own.poses) == 1 else own.at(block)
         aim = Aim(objective._replace(targets=objective.targets[block]), near[block])
         into = Found._make(array[block] for array in found)
-        approach(legs, aim, first, others, hits, int(stays), into, weights[block])
+        approach(asked.address, aim, first, others, hits, int(stays), into, weights[block])
 
     in_blocks(run, len(found.distances), ROWS_A_BLOCK)
     return found, weights

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.solve import STRANGE
-from ..decomposition.leg_table import LegTable, Records
+from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Starts
 from ..kernels.reaching import plan as P
 from .nearest import home_start, no_starts
-from .table import kernel_table
+from .table import machine, machine_nearby
 
 
 class OneTarget:
@@ -28,8 +27,7 @@ class OneTarget:
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators = len(mechanism.actuator_names)
         self._is_for_blocks = table.is_for_blocks
-        machine = table.legs, table.limited, table.cones, table.driven
-        self._anywhere, self._nearby = (*machine, table.task), (*machine, table.task_within(STRANGE))
+        self._anywhere, self._nearby = machine(table).address, machine_nearby(table).address
         self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
 
     @cached_property
@@ -61,16 +59,13 @@ class OneTarget:
         ----------
         begin : the pose from which it is completed, (1, 4, 4); only `nearby`, if so asked.
         """
-        return self._kernel(*self._given(nearby), target, begin, sides, *_filled(rows))
+        return self._kernel(self._nearby if nearby else self._anywhere, target, begin, sides, *_filled(rows))
 
     def prepared(
         self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool
     ) -> Callable[[], int]:
         """`reach` with all that it takes."""
-        return partial(self._kernel, *self._given(nearby), target, begin, sides, *_filled(rows))
-
-    def _given(self, nearby: bool) -> tuple[Records, ...]:
-        return self._nearby if nearby else self._anywhere
+        return partial(self._kernel, self._nearby if nearby else self._anywhere, target, begin, sides, *_filled(rows))
 
 
 class OneAssembly:
@@ -87,7 +82,7 @@ class OneAssembly:
         self._lengths = np.ones((1, 4, 4))
         self._lengths[:, :3, 3] = self._length
         self._asked = turns, home_start(mechanism, table), no_starts(table)
-        self._legs, self._arms = kernel_table(table), table.arms["leg"]
+        self._legs, self._arms = machine(table).address, table.arms["leg"]
 
     @cached_property
     def _kernel(self) -> Callable[..., None]:

@@ -11,10 +11,10 @@ from ..arrays import Floats
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
+from ..kernels.handle import Handle
 from ..kernels.legs import records as K
-from ..kernels.platform.records import Table
 from ..tolerances import TOLERANCES
-from .table import kernel_table
+from .table import kernel_table, machine
 
 SAMPLES, NEARBY = 8, 0.05
 """How many poses about home are looked at, and how far off they are [L]."""
@@ -37,7 +37,7 @@ def keeps_rotation(mechanism: Mechanism) -> bool:
 
 
 @lru_cache(maxsize=64)
-def without_idle_legs(table: LegTable) -> Table:
+def without_idle_legs(table: LegTable) -> Handle[K.Table]:
     """What kernels are given to search where the platform does not turn from home.
 
     There a second forearm of a parallelogram goes along with the first, and three slides and a hinge say nothing: such
@@ -55,7 +55,7 @@ def without_idle_legs(table: LegTable) -> Table:
         if len(own) and own.all() and k not in limited and (second or k not in cones["leg"]):
             legs["kind"][k] = K.IDLE
             cones["leg"][cones["leg"] == k] = k - 1
-    return kernel_table(table)._replace(legs=legs, cones=cones[_of_their_own(cones)])
+    return Handle(kernel_table(table)._replace(legs=legs, cones=cones[_of_their_own(cones)]))
 
 
 def _of_their_own(cones: NDArray[np.void]) -> NDArray[np.bool_]:
@@ -83,5 +83,5 @@ def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
 
     n_rows = table.task[0]["rows"]
     rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6))
-    measure_rows(table.legs, table.task, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
+    measure_rows(machine(table).address, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
     return rows, slopes

@@ -12,7 +12,7 @@ from ..closure.close import Closing
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at
 from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import Way
-from ..closure.solve import STRANGE, ClosureEngine
+from ..closure.solve import ClosureEngine
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Starts
@@ -25,10 +25,10 @@ from .coordinates import LegAnswers, settled, sides_at
 from .forward import assembled
 from .nearest import in_lengths, weighed_limits
 from .one import OneAssembly, OneTarget
+from .table import machine, machine_nearby
 from .unreached import Question, answer_unreached
 
 Floats = NDArray[np.float64]
-Records = NDArray[np.void]
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of a kernel that answers one by one, or in blocks."""
@@ -262,20 +262,20 @@ class LegsEngine:
         One row that was `tried` has a status already.
         """
         begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
-        task = self._table.task_within(STRANGE) if keep_mode else self._table.task
-        left = 1 if tried else self._run(self._table.is_for_blocks, task, targets, begins, sides, rows)
-        if left and self._table.is_for_blocks and task["unset"][0]:
-            left -= self._complete(task, targets, begins, sides, rows)
+        asked = (machine_nearby(self._table) if keep_mode else machine(self._table)).address
+        left = 1 if tried else self._run(self._table.is_for_blocks, asked, targets, begins, sides, rows)
+        if left and self._table.is_for_blocks and self._table.task["unset"][0]:
+            left -= self._complete(asked, targets, begins, sides, rows)
         if left and len(self._table.arms):
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
-            left -= self._reach_by_arms(task, targets, begins, sides, rows)
+            left -= self._reach_by_arms(asked, targets, begins, sides, rows)
             if left and start is not None and not keep_mode:
-                left -= self._reach_from_home(task, targets, sides, rows)
+                left -= self._reach_from_home(asked, targets, sides, rows)
         if start is not None:
             self._count_turns(start.rows.actuators, rows)
         return left, sides
 
-    def _reach_by_arms(self, task: Records, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _reach_by_arms(self, asked: int, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
         """Answer rows whose legs reach once arms have moved, and note where; how many these are."""
         from .arms import move_arms
 
@@ -284,24 +284,23 @@ class LegsEngine:
         if not len(some):
             return 0
         own, begins = rows_at(rows, some), poses
-        left = self._run(False, task, targets[some], begins, sides[some], own)
+        left = self._run(False, asked, targets[some], begins, sides[some], own)
         put_rows(rows, some, own)
         lost = some[own.status != P.REACHED]
         sides[lost] = before[lost]
         return len(some) - left
 
-    def _reach_from_home(self, task: Records, targets: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _reach_from_home(self, asked: int, targets: Floats, sides: Floats, rows: P.Rows) -> int:
         """The same, with arms that start at home: from where they are, limits may be in the way."""
         away, home, arms = rows.status != P.REACHED, sides.copy(), self._table.arms["leg"]
         home[:, arms] = self._table.home_sides[:, arms]
-        n = self._reach_by_arms(task, targets, self._one.home, home, rows)
+        n = self._reach_by_arms(asked, targets, self._one.home, home, rows)
         found = away & (rows.status == P.REACHED)
         sides[found] = home[found]
         return n
 
-    def _run(self, by_blocks: bool, task: Records, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _run(self, by_blocks: bool, asked: int, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
         """Answer targets on all cores, in blocks of poses or one by one; how many are not reached."""
-        table = self._table
         if by_blocks:
             from ..kernels.legs.blocks import answer_blocks as answer
         else:
@@ -309,11 +308,7 @@ class LegsEngine:
 
         def run(block: slice) -> int:
             return answer(
-                table.legs,
-                table.limited,
-                table.cones,
-                table.driven,
-                task,
+                asked,
                 targets[block],
                 _part(begins, block),
                 _part(sides, block),
@@ -325,7 +320,7 @@ class LegsEngine:
 
         return sum(in_blocks(run, len(targets), ROWS_A_RUN if by_blocks else ROWS_A_BLOCK))
 
-    def _complete(self, task: Records, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _complete(self, asked: int, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
         """Answer the rows that blocks left OPEN, whose poses are to be completed; how many of them are reached."""
         from ..kernels.legs.blocks import OPEN
 
@@ -334,7 +329,7 @@ class LegsEngine:
             return 0
         own = rows_at(rows, some)
         begins, sides = (array if len(array) == 1 else array[some] for array in (begins, sides))
-        left = self._run(False, task, targets[some], begins, sides, own)
+        left = self._run(False, asked, targets[some], begins, sides, own)
         put_rows(rows, some, own)
         return len(some) - left
 

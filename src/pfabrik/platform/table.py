@@ -1,4 +1,4 @@
-"""A table of legs as the kernels in the platform's pose take it."""
+"""A table of legs as kernels take it."""
 
 from __future__ import annotations
 
@@ -6,16 +6,35 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable
+from ..kernels.handle import Handle
 from ..kernels.legs import records as K
-from ..kernels.platform.records import Table
 
 
 @lru_cache(maxsize=64)
-def kernel_table(table: LegTable) -> Table:
+def kernel_table(table: LegTable) -> K.Table:
     """The same records, with the unknown that the coordinate of each carrier, then of each arm, is."""
     columns = np.full(len(table.legs), -1)
     carried = (table.legs["kind"] == K.ROD) & np.isin(table.legs["carrier"], (K.CRANK, K.CARRIAGE))
     own = np.concatenate([np.flatnonzero(carried), np.flatnonzero(table.legs["kind"] == K.ARM)])
     columns[own] = 6 + np.arange(len(own))
-    return Table(table.legs, table.limited, table.cones, table.driven, table.task, columns)
+    return K.Table(table.legs, table.limited, table.cones, table.driven, table.known, table.task, columns)
+
+
+@lru_cache(maxsize=64)
+def machine(table: LegTable) -> Handle[K.Table]:
+    """What kernels are given."""
+    return Handle(kernel_table(table))
+
+
+@lru_cache(maxsize=64)
+def machine_nearby(table: LegTable) -> Handle[K.Table]:
+    """The same for poses that are completed near to where they began alone."""
+    return Handle(kernel_table(table)._replace(task=table.task_within(STRANGE)))
+
+
+@lru_cache(maxsize=64)
+def machine_aimed(table: LegTable) -> Handle[K.Table]:
+    """The same with the angles of all endings asked for."""
+    return Handle(kernel_table(table)._replace(legs=table.aimed))

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..closure.configurations import put_rows, rows_at
 from ..closure.projection import kept, ways_of
-from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Found
@@ -19,7 +18,7 @@ from ..kernels.threads import in_blocks
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .nearest import project, starts_at
-from .table import kernel_table
+from .table import machine, machine_nearby
 
 ROWS_A_BLOCK = 64
 
@@ -84,7 +83,7 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
 
     begins, own, tried = question.begins, rows_at(rows, rest), sides[rest]
     first = begins if len(begins) == 1 else begins[rest]
-    legs, targets = kernel_table(question.table), question.targets[rest]
+    legs, targets = machine(question.table).address, question.targets[rest]
 
     def run(block: slice) -> int:
         return answer_otherwise(
@@ -114,11 +113,7 @@ def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, row
     table, own = question.table, rows_at(rows, again)
     begins = own.poses.copy()
     answer(
-        table.legs,
-        table.limited,
-        table.cones,
-        table.driven,
-        table.task_within(STRANGE) if question.nearby else table.task,
+        (machine_nearby(table) if question.nearby else machine(table)).address,
         question.targets[again],
         begins,
         sides[again],

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ..kernels._jit import kernel
 from ..kernels.legs.answer import answer
-from ..kernels.legs.records import Records
 from ..kernels.reaching.plan import PENDING, Floats, Plan, Rows, Seeds, Settings
 from ..kernels.reaching.solve import solve_by_iteration
 
@@ -43,27 +42,13 @@ def p_fabrik_one_by_one(plan: Plan, targets: Floats, seeds: Seeds, settings: Set
 
 
 @kernel
-def legs_one_by_one(
-    legs: Records,
-    limited: Records,
-    cones: Records,
-    driven: Records,
-    task: Records,
-    targets: Floats,
-    begins: Floats,
-    sides: Floats,
-    rows: Rows,
-) -> int:
+def legs_one_by_one(machine: int, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
     """The same by legs in closed form, all on the sides they take at home; returns how many these did not reach."""
     left = 0
     for i in range(targets.shape[0]):
         k = i if begins.shape[0] > 1 else 0
         left += answer(
-            legs,
-            limited,
-            cones,
-            driven,
-            task,
+            machine,
             targets[i : i + 1],
             begins[k : k + 1],
             sides,

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._jit import kernel, routine
+from .._jit import allocator, kernel, routine
 from ..linear import solve_spd
 from ..vectors import Vec, cross, dot, norm, scale, vec, wrap_into
 from .endings import SURE, turned
 from .pivots import pivot_rows, pivot_slopes, place_pivot
-from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Floats, Record, Records
+from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Floats, Record, Records, Table
 from .rods import place_arm, place_rod, rod_rows, rod_slopes
+from .table import open_table
 
 # Status of a row; REACHED is the public one's number.
 REACHED, PENDING = 0, 9
@@ -28,6 +30,37 @@ LONGEST_STEP = 0.5
 NOT_A_ROTATION, ROUNDED = 1e-6, 1e-14
 # Excess up to which a limit counts as kept [L or rad].
 KEPT = 1e-9
+
+
+class Completion(NamedTuple):
+    """Scratch memory of one thread."""
+
+    pose: Floats  # (4, 4) [L]
+    frames: Floats  # (2, 4, 4): see `set_frames`
+    values: Floats  # (legs, N_VALUES)
+    lines: Floats  # (legs, 3): of a rod, from foot to head
+    follow: Floats  # (legs, 6): derivatives of carriers' coordinates
+    rows: Floats  # (m,): the constraints
+    slopes: Floats  # (m, 6): their derivatives
+    motions: Floats  # (7, 6)
+    normal: Floats  # (7, 8)
+
+
+@allocator
+def new_completion(table: Table) -> Completion:
+    """Scratch memory of one thread."""
+    legs, m = table.legs.shape[0], table.task[0]["rows"]
+    return Completion(
+        np.zeros((4, 4)),
+        np.zeros((2, 4, 4)),
+        np.zeros((legs, N_VALUES)),
+        np.zeros((legs, 3)),
+        np.zeros((legs, 6)),
+        np.zeros(m),
+        np.zeros((m, 6)),
+        np.zeros((7, 6)),
+        np.zeros((7, 8)),
+    )
 
 
 @routine
@@ -260,11 +293,7 @@ def cone_cosine(cone: Record, values: Floats) -> float:
 
 @kernel
 def answer(
-    legs: Records,
-    limited: Records,
-    cones: Records,
-    driven: Records,
-    task: Records,
+    machine: int,
     targets: Floats,
     begins: Floats,
     sides: Floats,
@@ -277,7 +306,7 @@ def answer(
 
     Parameters
     ----------
-    task : one record.
+    machine : see `open_table`.
     begins : poses that targets are completed from, (n or 1, 4, 4) [length].
     sides : which of its two solutions each leg takes, (n or 1, legs); of an arm, its coordinate [L or rad].
 
@@ -285,34 +314,36 @@ def answer(
     -------
     How many are PENDING.
     """
-    n_legs, n_rows = legs.shape[0], task[0]["rows"]
-    frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
-    follow, rows, slopes = np.zeros((n_legs, 6)), np.zeros(n_rows), np.zeros((n_rows, 6))
-    pose, motions, normal, left = np.zeros((4, 4)), np.zeros((7, 6)), np.zeros((7, 8)), 0
+    table, left = open_table(machine), 0
+    work = new_completion(table)
     for row in range(targets.shape[0]):
         status[row] = PENDING
         begin = begins[row if begins.shape[0] > 1 else 0]
         side = sides[row if sides.shape[0] > 1 else 0]
-        own = task[0]
-        if load(targets[row], begin, own, pose) and complete(
-            legs, own, side, frames, values, lines, follow, rows, slopes, motions, normal, pose
-        ):
-            excess = excess_of(limited, cones, values)
-            if excess <= KEPT:
-                status[row] = REACHED
-                for i in range(3):
-                    poses[row, i, 3] = pose[i, 3] * own["length"]
-                    poses[row, 3, i] = 0.0
-                    for j in range(3):
-                        poses[row, i, j] = pose[i, j]
-                poses[row, 3, 3] = 1.0
-                for i in range(driven.shape[0]):
-                    moved = deviation(driven[i], values) * driven[i]["unit"]
-                    actuators[row, driven[i]["column"]] = driven[i]["home"] + moved
-                measures[row, 2] = worst_of(rows) * own["length"]
-                measures[row, 3] = max(excess, 0.0)
+        if load(targets[row], begin, table.task[0], work.pose) and complete(table, side, work):
+            status[row] = write_answer(table, work, poses[row], actuators[row], measures[row])
         left += status[row]
     return left // PENDING
+
+
+@routine
+def write_answer(table: Table, work: Completion, pose: Floats, actuators: Floats, measures: Floats) -> int:
+    """Write a completed pose and what is measured of it, if all limits are kept; its status."""
+    excess, task = excess_of(table.limited, table.cones, work.values), table.task[0]
+    if not excess <= KEPT:
+        return PENDING
+    for i in range(3):
+        pose[i, 3] = work.pose[i, 3] * task["length"]
+        pose[3, i] = 0.0
+        for j in range(3):
+            pose[i, j] = work.pose[i, j]
+    pose[3, 3] = 1.0
+    for i in range(table.driven.shape[0]):
+        driven = table.driven[i]
+        actuators[driven["column"]] = driven["home"] + deviation(driven, work.values) * driven["unit"]
+    measures[2] = worst_of(work.rows) * task["length"]
+    measures[3] = max(excess, 0.0)
+    return REACHED
 
 
 @routine
@@ -324,70 +355,59 @@ def worst_of(rows: Floats) -> float:
 
 
 @routine
-def complete(
-    legs: Records,
-    task: Record,
-    sides: Floats,
-    frames: Floats,
-    values: Floats,
-    lines: Floats,
-    follow: Floats,
-    rows: Floats,
-    slopes: Floats,
-    motions: Floats,
-    normal: Floats,
-    pose: Floats,
-) -> bool:
+def complete(table: Table, sides: Floats, work: Completion) -> bool:
     """Move what is not set of a pose until all legs close; whether they do, none of them near a dead point.
 
     On the way legs that bear no constraint may be beyond one.
     """
+    legs, task, frames, values, lines = table.legs, table.task[0], work.frames, work.values, work.lines
     gone, enough = 0.0, CLOSED if task["unset"] > 0 else CLOSE
     for _ in range(MOST_STEPS):
-        set_frames(pose, task, frames)
+        set_frames(work.pose, task, frames)
         sure, bearing = place_legs(legs, frames, sides, values, lines)
         if not bearing > SURE * SURE:
             return False
-        if put_rows(legs, frames, values, lines, rows) <= enough:
+        if put_rows(legs, frames, values, lines, work.rows) <= enough:
             return sure > SURE * SURE
         if task["unset"] == 0:
             return False
-        put_slopes(legs, frames, values, lines, follow, slopes)
-        gone += newton_step(task, pose, rows, slopes, motions, normal)
+        put_slopes(legs, frames, values, lines, work.follow, work.slopes)
+        gone += newton_step(task, work.pose, work.rows, work.slopes, work.motions, work.normal)
         if not gone <= task["farthest"]:
             return False
     return False
 
 
+@routine
+def load_pose(pose: Floats, length: float, to: Floats) -> None:
+    """A pose [length], as one [L]."""
+    for i in range(3):
+        to[i, 3] = pose[i, 3] / length
+        for j in range(3):
+            to[i, j] = pose[i, j]
+
+
 @kernel
-def read_coordinates(legs: Records, known: Records, task: Records, poses: Floats, sides: Floats, found: Floats) -> None:
+def read_coordinates(machine: int, poses: Floats, sides: Floats, found: Floats) -> None:
     """Fill deviations from home [length or rad], `found` (n, columns), of the coordinates that legs tell at poses."""
-    n_legs = legs.shape[0]
-    frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
-    pose = np.zeros((4, 4))
+    table = open_table(machine)
+    work, known = new_completion(table), table.known
     for row in range(poses.shape[0]):
-        for i in range(3):
-            pose[i, 3] = poses[row, i, 3] / task[0]["length"]
-            for j in range(3):
-                pose[i, j] = poses[row, i, j]
-        set_frames(pose, task[0], frames)
-        place_legs(legs, frames, sides[row if sides.shape[0] > 1 else 0], values, lines)
+        load_pose(poses[row], table.task[0]["length"], work.pose)
+        set_frames(work.pose, table.task[0], work.frames)
+        place_legs(table.legs, work.frames, sides[row if sides.shape[0] > 1 else 0], work.values, work.lines)
         for i in range(known.shape[0]):
-            found[row, known[i]["column"]] = deviation(known[i], values) * known[i]["unit"]
+            found[row, known[i]["column"]] = deviation(known[i], work.values) * known[i]["unit"]
 
 
 @kernel
-def measure_rows(legs: Records, task: Records, poses: Floats, sides: Floats, rows: Floats, slopes: Floats) -> None:
+def measure_rows(machine: int, poses: Floats, sides: Floats, rows: Floats, slopes: Floats) -> None:
     """Fill the constraints (n, rows) of all legs at poses [length], and their derivatives (n, rows, 6) [L, rad]."""
-    n_legs = legs.shape[0]
-    frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
-    pose, follow = np.zeros((4, 4)), np.zeros((n_legs, 6))
+    table = open_table(machine)
+    work, legs = new_completion(table), table.legs
     for row in range(poses.shape[0]):
-        for i in range(3):
-            pose[i, 3] = poses[row, i, 3] / task[0]["length"]
-            for j in range(3):
-                pose[i, j] = poses[row, i, j]
-        set_frames(pose, task[0], frames)
-        place_legs(legs, frames, sides[row if sides.shape[0] > 1 else 0], values, lines)
-        put_rows(legs, frames, values, lines, rows[row])
-        put_slopes(legs, frames, values, lines, follow, slopes[row])
+        load_pose(poses[row], table.task[0]["length"], work.pose)
+        set_frames(work.pose, table.task[0], work.frames)
+        place_legs(legs, work.frames, sides[row if sides.shape[0] > 1 else 0], work.values, work.lines)
+        put_rows(legs, work.frames, work.values, work.lines, rows[row])
+        put_slopes(legs, work.frames, work.values, work.lines, work.follow, slopes[row])

@@ -57,8 +57,8 @@ from .records import (
     SLIDE,
     Floats,
     Record,
-    Records,
 )
+from .table import open_table
 
 # Status of a row that is a pose and within reach, but does not close before what its target leaves open is completed.
 OPEN = 8
@@ -268,11 +268,7 @@ def note_cone(cone: Record, carrier: Record, n: int, S: Floats) -> None:
 
 @kernel
 def answer_blocks(
-    legs: Records,
-    limited: Records,
-    cones: Records,
-    driven: Records,
-    task: Records,
+    machine: int,
     targets: Floats,
     begins: Floats,
     sides: Floats,
@@ -285,6 +281,8 @@ def answer_blocks(
 
     Those that close once what they leave open is completed may be reached too: they are OPEN, the others PENDING.
     """
+    table = open_table(machine)
+    legs, limited, cones, driven, task = table.legs, table.limited, table.cones, table.driven, table.task
     S, pose, left = np.empty((MORE + driven.shape[0], BLOCK)), np.zeros((4, 4)), 0
     for first in range(0, targets.shape[0], BLOCK):
         n = min(BLOCK, targets.shape[0] - first)

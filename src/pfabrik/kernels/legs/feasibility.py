@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from .._jit import kernel, routine
 from ..vectors import angle_between, vec
-from .answer import CLOSE, KEPT, complete, deviation, lean_to, load, put_rows
-from .records import CARRIAGE, CRANK, N_VALUES, ROD, SLIDE, Floats, Record, Records
+from .answer import CLOSE, KEPT, complete, deviation, lean_to, load, new_completion, put_rows
+from .records import CARRIAGE, CRANK, ROD, SLIDE, Floats, Record, Records
+from .table import open_table
 
 PARTS = 4
 """Parts of the way from the start in which a pose is completed where, all at once, it does not close within limits."""
@@ -44,10 +45,7 @@ def least_margin(limited: Records, cones: Records, values: Floats) -> tuple[floa
 
 @kernel
 def feasibility(
-    legs: Records,
-    limited: Records,
-    cones: Records,
-    task: Records,
+    machine: int,
     targets: Floats,
     begins: Floats,
     sides: Floats,
@@ -59,11 +57,9 @@ def feasibility(
     After the limits of `least_margin` come, for each leg, that it reaches (margin: minus the gap, as a share of the
     rod) and, for each, that it closes (minus its largest constraint). NaN and -1 where a target is no pose.
     """
-    n_legs, n_rows = legs.shape[0], task[0]["rows"]
-    frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
-    follow, rows, slopes = np.zeros((n_legs, 6)), np.zeros(n_rows), np.zeros((n_rows, 6))
-    pose, motions, normal = np.zeros((4, 4)), np.zeros((7, 6)), np.zeros((7, 8))
-    before, toward = np.zeros((4, 4)), np.zeros((4, 4))
+    table = open_table(machine)
+    work, legs, task, limited, cones = new_completion(table), table.legs, table.task, table.limited, table.cones
+    before, toward, n_legs = np.zeros((4, 4)), np.zeros((4, 4)), legs.shape[0]
     n_limits = 2 * limited.shape[0] + cones.shape[0]
     for row in range(targets.shape[0]):
         margins[row], bindings[row] = math.nan, -1
@@ -74,23 +70,21 @@ def feasibility(
             is_pose, closed = True, True
             for part in range(1, parts + 1):
                 aim(targets[row], begins[0], part / parts, task[0], toward)
-                is_pose = load(toward, before, task[0], pose)
-                closed = is_pose and complete(
-                    legs, task[0], sides[0], frames, values, lines, follow, rows, slopes, motions, normal, pose
-                )
+                is_pose = load(toward, before, task[0], work.pose)
+                closed = is_pose and complete(table, sides[0], work)
                 if not closed:
                     break
-                put_pose(pose, task[0]["length"], before)
+                put_pose(work.pose, task[0]["length"], before)
             if not is_pose or (parts > 1 and not closed):
                 break
-            least, binding = least_margin(limited, cones, values)
+            least, binding = least_margin(limited, cones, work.values)
             if not closed:
-                put_rows(legs, frames, values, lines, rows)
+                put_rows(legs, work.frames, work.values, work.lines, work.rows)
                 for k in range(n_legs):
-                    share = reach_of(legs[k], values[k])
+                    share = reach_of(legs[k], work.values[k])
                     if share < -CLOSE and share < least:
                         least, binding = share, n_limits + k
-                    share = -largest_row(legs, rows, k)
+                    share = -largest_row(legs, work.rows, k)
                     if share < -CLOSE and share < least:
                         least, binding = share, n_limits + n_legs + k
             if parts == 1 or least > margins[row]:

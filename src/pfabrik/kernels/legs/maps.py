@@ -36,6 +36,7 @@ from .columns import (
 )
 from .feasibility import share_of
 from .records import CARRIAGE, CRANK, HINGE, NO_CARRIER, SHARED, SLIDE, Floats, Record, Records
+from .table import open_table
 
 # Of a row whose margin blocks do not tell: its pose is still to be completed, or a leg has no direction there.
 UNKNOWN = -2
@@ -159,10 +160,7 @@ def has_rows(rod: Record) -> bool:
 
 @kernel
 def margins_in_blocks(
-    legs: Records,
-    limited: Records,
-    cones: Records,
-    task: Records,
+    machine: int,
     targets: Floats,
     steps: Floats,
     counts: NDArray[np.int64],
@@ -176,11 +174,14 @@ def margins_in_blocks(
 
     Parameters
     ----------
+    machine : see `open_table`.
     targets : (n, 4, 4) [length]; or one, at which a grid begins.
     steps, counts : of a grid, (3, 3) [length] and (3,): from a pose to the next along each of three lines, and how many
         there are on each; the last line's run fastest. No counts, (0,), for `targets` themselves.
     first : which of the grid's poses is the first to be told of.
     """
+    table = open_table(machine)
+    legs, limited, cones, task = table.legs, table.limited, table.cones, table.task
     S, pose, unknown = np.empty((CONES + 2 * cones.shape[0], BLOCK)), np.zeros((4, 4)), 0
     n_legs, n_limits = legs.shape[0], 2 * limited.shape[0] + cones.shape[0]
     enough = CLOSED if task[0]["unset"] > 0 else CLOSE

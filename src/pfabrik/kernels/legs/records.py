@@ -10,7 +10,7 @@ arm is a hinge or a slide that the pose does not determine, and that carries sli
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,3 +110,15 @@ TASK = np.dtype(
         ("farthest", "f8"),  # what is not set may not go farther from where it began [L or rad]
     ]
 )
+
+
+class Table(NamedTuple):
+    """A mechanism's legs, as `decomposition.leg_table` has them."""
+
+    legs: Records
+    limited: Records
+    cones: Records
+    driven: Records
+    known: Records
+    task: Records  # one
+    columns: NDArray[np.int64]  # (legs,): the unknown that a leg's own carrier, or the arm, has; -1 where there is none

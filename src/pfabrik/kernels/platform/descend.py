@@ -10,7 +10,7 @@ import math
 
 from .._jit import routine
 from ..free_motions import FreeMotions
-from ..legs.records import Floats
+from ..legs.records import Floats, Table
 from ..sqp import (
     CLOSED,
     CORRECTIONS,
@@ -37,7 +37,7 @@ from ..vectors import wrap
 from .equations import Now, close_rods
 from .lagrangian import lagrangian_hessian
 from .linearise import linearise
-from .records import Aim, Table
+from .records import Aim
 from .search import Search, copy_now, move
 
 HOPELESS = 20.0

@@ -40,6 +40,7 @@ from ..legs.records import (
     TRIPLE,
     Floats,
     Record,
+    Table,
 )
 from ..legs.rods import (
     NOWHERE,
@@ -54,7 +55,6 @@ from ..legs.rods import (
     twist_rate,
 )
 from ..vectors import Vec, along, angle_between, cross, dot, move, norm, scale, sub, turn, vec, wrap
-from .records import Table
 
 AT_FOOT, AT_HEAD = 0, 1
 # Sine below which a line is straight along the axis of its cone: no direction leads in or out.

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from .._jit import allocator, kernel, routine
 from ..legs.answer import KEPT, PENDING, REACHED, deviation, excess_of, make_exact
-from ..legs.records import CARRIER, PIVOT, Floats, Record
+from ..legs.records import CARRIER, PIVOT, Floats, Record, Table
+from ..legs.table import open_table
 from ..linear import solve_spd
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..vectors import copy_row, copy_table, wrap
@@ -30,7 +31,7 @@ from .equations import (
     place,
     put_slopes,
 )
-from .records import Starts, Table
+from .records import Starts
 from .search import copy_now, move
 
 ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
@@ -243,7 +244,7 @@ def assemble_row(table: Table, values: Floats, own: Starts, row: int, others: St
 
 @kernel
 def assemble(
-    table: Table,
+    machine: int,
     values: Floats,
     turns: bool,
     own: Starts,
@@ -258,12 +259,14 @@ def assemble(
 
     Parameters
     ----------
+    machine : see `open_table`.
     values : (n, n_a), deviations from home [L or rad].
     turns : whether the platform turns; a point that is an end effector does not.
     own : where each row starts, or all of them.
     others : starts that follow; of the configurations that they find, the one nearest to the row's start is taken.
     found : the configurations, (n,).
     """
+    table = open_table(machine)
     work = new_newton(table, turns)
     for row in range(values.shape[0]):
         status[row] = PENDING

@@ -7,7 +7,7 @@ import math
 from .._jit import routine
 from ..free_motions import FreeMotions, put_multipliers
 from ..legs.answer import set_frames
-from ..legs.records import SHARED, Floats
+from ..legs.records import SHARED, Floats, Table
 from ..sqp import HOLDING, MOTIONS, PROBE, ROWS
 from .equations import (
     Now,
@@ -19,7 +19,7 @@ from .equations import (
     place_leg,
     put_leg_slopes,
 )
-from .records import Aim, Table
+from .records import Aim
 from .search import Search, copy_now, move, put_objective
 
 

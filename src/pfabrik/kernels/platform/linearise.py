@@ -7,10 +7,11 @@ import math
 from .._jit import routine
 from ..free_motions import FreeMotions, add_limit, eliminate, project_gradient
 from ..legs.answer import deviation
+from ..legs.records import Table
 from ..sqp import EXCESS, GAP, LIMITS, VALUE
 from ..vectors import dot, vec
 from .equations import Now, cone_slope, coordinate_slope, dead_point_slope, place, put_slopes
-from .records import Aim, Table
+from .records import Aim
 from .search import NEAR, Search, put_objective
 
 

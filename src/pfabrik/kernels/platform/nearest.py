@@ -11,7 +11,8 @@ from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import turn_of_tilt
 from ..holding import balance
 from ..legs.answer import deviation, excess_of, make_exact
-from ..legs.records import ARM, PIVOT, SLIDE, Floats, Records
+from ..legs.records import ARM, PIVOT, SLIDE, Floats, Records, Table
+from ..legs.table import open_table
 from ..qp import new_qp
 from ..reaching.plan import LIMIT_EXCESS, POSITION_ERROR, RESIDUAL, ROTATION_ERROR
 from ..rotations import difference, yaw_difference
@@ -20,7 +21,7 @@ from ..vectors import copy_row, copy_table, norm, vec
 from .descend import descend
 from .equations import Now, is_carried, new_now, new_view, place
 from .linearise import linearise
-from .records import Aim, Found, Starts, Table
+from .records import Aim, Found, Starts
 from .search import Search, copy_now, fix, new_search
 from .starts import begin, load_target, nearest_start, put_held, put_sides
 
@@ -32,15 +33,16 @@ SAME = 1e-7
 
 
 @kernel
-def read_configurations(table: Table, known: Records, poses: Floats, q: Floats, sides: Floats, found: Floats) -> None:
+def read_configurations(machine: int, poses: Floats, q: Floats, sides: Floats, found: Floats) -> None:
     """Fill deviations from home [length or rad], `found` (n, columns), of the coordinates that legs tell.
 
     Parameters
     ----------
-    known : what legs tell; its column is that in `found`.
+    machine : see `open_table`.
     poses, q, sides : as of `Found`.
     """
-    now, look = new_now(table.legs.shape[0]), new_view(table)
+    table = open_table(machine)
+    now, look, known = new_now(table.legs.shape[0]), new_view(table), table.known
     for row in range(poses.shape[0]):
         copy_table(poses[row], now.pose)
         copy_row(q[row], now.q)
@@ -182,7 +184,7 @@ def search_row(
 
 @search
 def approach(
-    table: Table, aim: Aim, own: Starts, others: Starts, hits: int, stays: int, found: Found, weights: Floats
+    machine: int, aim: Aim, own: Starts, others: Starts, hits: int, stays: int, found: Found, weights: Floats
 ) -> None:
     """Fill the nearest feasible configuration of every row.
 
@@ -191,10 +193,12 @@ def approach(
 
     Parameters
     ----------
+    machine : see `open_table`.
     own : the first start of each row, or one for all.
     others : starts that follow, for any row, until the nearest configuration has been met as often as `hits` says.
     stays : 1 for configurations in the working mode of a row's first start alone.
     """
+    table = open_table(machine)
     search, best = new_search(table), new_now(table.legs.shape[0])
     k, n = search.first.linear.G.shape
     p, pulls = new_qp(k, k), np.zeros((k, n))

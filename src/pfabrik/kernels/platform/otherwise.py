@@ -13,17 +13,17 @@ from ..legs.answer import (
     complete,
     cone_cosine,
     deviation,
-    excess_of,
     load,
+    new_completion,
     place_legs,
     put_rows,
     set_frames,
-    worst_of,
+    write_answer,
 )
 from ..legs.feasibility import largest_row
-from ..legs.records import ARM, N_VALUES, Floats
+from ..legs.records import ARM, Floats, Table
+from ..legs.table import open_table
 from .equations import main_of
-from .records import Table
 
 MOST_CHOICES = 8
 """Legs with two solutions beyond which not every combination of them is tried, where a pose is completed by all."""
@@ -49,7 +49,7 @@ def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) ->
 
 @kernel
 def answer_otherwise(
-    table: Table,
+    machine: int,
     targets: Floats,
     begins: Floats,
     sides: Floats,
@@ -65,6 +65,7 @@ def answer_otherwise(
 
     Parameters
     ----------
+    machine : see `open_table`.
     begins : poses that targets are completed from, (n or 1, 4, 4) [length].
     sides : where to start, (n, legs), and where answers are.
 
@@ -72,11 +73,8 @@ def answer_otherwise(
     -------
     How many are PENDING.
     """
-    legs, n_legs, own = table.legs, table.legs.shape[0], table.task[0]
-    n_rows = own["rows"]
-    frames, values, lines = np.zeros((2, 4, 4)), np.zeros((n_legs, N_VALUES)), np.zeros((n_legs, 3))
-    follow, rows, slopes = np.zeros((n_legs, 6)), np.zeros(n_rows), np.zeros((n_rows, 6))
-    pose, motions, normal, left = np.zeros((4, 4)), np.zeros((7, 6)), np.zeros((7, 8)), 0
+    table = open_table(machine)
+    work, legs, n_legs, own, left = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
     misfits, choosing, n_choices = np.zeros(n_legs), np.zeros(n_legs, np.int64), 0
     for k in range(n_legs):
         if sides[0, k] != 0.0 and legs[k]["kind"] != ARM:
@@ -85,35 +83,22 @@ def answer_otherwise(
     together = own["unset"] > 0
     tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if together else 1
     for row in range(targets.shape[0]):
-        status[row] = PENDING
-        if not together and load(targets[row], begins[row if begins.shape[0] > 1 else 0], own, pose):
-            set_frames(pose, own, frames)
-            place_legs(legs, frames, sides[row], values, lines)
-            put_rows(legs, frames, values, lines, rows)
-            note_misfits(table, values, rows, misfits)
+        status[row], begin = PENDING, begins[row if begins.shape[0] > 1 else 0]
+        if not together and load(targets[row], begin, own, work.pose):
+            set_frames(work.pose, own, work.frames)
+            place_legs(legs, work.frames, sides[row], work.values, work.lines)
+            put_rows(legs, work.frames, work.values, work.lines, work.rows)
+            note_misfits(table, work.values, work.rows, misfits)
         for attempt in range(1, tries + 1):
             for c in range(n_choices):
                 k = choosing[c]
                 flips = misfits[k] == 1.0 if not together else (attempt ^ (attempt - 1)) >> c & 1 == 1
                 sides[row, k] = -sides[row, k] if flips else sides[row, k]
-            if not load(targets[row], begins[row if begins.shape[0] > 1 else 0], own, pose):
+            if not load(targets[row], begin, own, work.pose):
                 break
-            if not complete(legs, own, sides[row], frames, values, lines, follow, rows, slopes, motions, normal, pose):
-                continue
-            excess = excess_of(table.limited, table.cones, values)
-            if excess <= KEPT:
-                status[row] = REACHED
-                for i in range(3):
-                    poses[row, i, 3] = pose[i, 3] * own["length"]
-                    poses[row, 3, i] = 0.0
-                    for j in range(3):
-                        poses[row, i, j] = pose[i, j]
-                poses[row, 3, 3] = 1.0
-                for i in range(table.driven.shape[0]):
-                    driven = table.driven[i]
-                    actuators[row, driven["column"]] = driven["home"] + deviation(driven, values) * driven["unit"]
-                measures[row, 2] = worst_of(rows) * own["length"]
-                measures[row, 3] = max(excess, 0.0)
-                break
+            if complete(table, sides[row], work):
+                status[row] = write_answer(table, work, poses[row], actuators[row], measures[row])
+                if status[row] == REACHED:
+                    break
         left += status[row]
     return left // PENDING

@@ -8,21 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..closure.loops import PoseObjective
-from ..legs.records import Floats, Records
+from ..legs.records import Floats
 
 STRETCHED = 1e-4
 """Difference of a carrier's two solutions below which it is at a dead point, and its side is the start's [L or rad]."""
-
-
-class Table(NamedTuple):
-    """A mechanism's legs, as `decomposition.leg_table` has them."""
-
-    legs: Records
-    limited: Records
-    cones: Records
-    driven: Records
-    task: Records  # one
-    columns: NDArray[np.int64]  # (legs,): the unknown that a leg's own carrier, or the arm, has; -1 where there is none
 
 
 class Aim(NamedTuple):

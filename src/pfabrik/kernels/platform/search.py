@@ -12,12 +12,12 @@ from ..closure.loops import BASE_AXES, LOCKED, Ints, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
 from ..legs.answer import turn_pose
-from ..legs.records import Floats
+from ..legs.records import Floats, Table
 from ..qp import QP, new_qp
 from ..sqp import Hessian, StepControl, new_hessian, new_step_control
 from ..vectors import copy_row, copy_table, wrap
 from .equations import Now, View, coordinate_slope, count_unknowns, counts_turns, new_now, new_view
-from .records import Aim, Table
+from .records import Aim
 
 NEAR = 0.3
 """Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""

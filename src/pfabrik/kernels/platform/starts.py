@@ -8,11 +8,11 @@ from .._jit import routine
 from ..closure.loops import BASE_AXES, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..legs.answer import column, is_pose, make_exact, set_frames, turn_pose
-from ..legs.records import ARM, CARRIER, CRANK, Floats, Record
+from ..legs.records import ARM, CARRIER, CRANK, Floats, Record, Table
 from ..legs.rods import carry
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
 from .equations import Now, View, is_carried
-from .records import STRETCHED, Starts, Table
+from .records import STRETCHED, Starts
 from .search import Search
 
 BENT = 1e-2

@@ -1,0 +1,13 @@
+"""The table of a machine's legs, as kernels open it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..references import opener
+from .records import CONE, COORDINATE, LEG, TASK, Table
+
+_RECORDS = (LEG, COORDINATE, CONE, COORDINATE, COORDINATE, TASK, np.dtype(np.int64))
+
+open_table = opener(Table._make(np.zeros(0, record) for record in _RECORDS))
+"""The table of a mechanism, of which a kernel is given the address of a `Handle`."""
