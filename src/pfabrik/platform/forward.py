@@ -9,10 +9,11 @@ from ..arrays import Floats
 from ..closure.configurations import Configurations, new_rows
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
+from ..kernels.handle import Handle
 from ..kernels.platform.records import Found, Starts
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
-from .nearest import corners_of, home_start, in_lengths, nearest_actuators, no_starts, starts_at
+from .nearest import corners_of, home_start, nearest_actuators, no_starts, starts_at
 from .table import machine
 
 ROWS_A_BLOCK = 256
@@ -38,7 +39,7 @@ def assembled(
     """
     own = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
     rows, n = new_rows(mechanism, len(values)), len(values)
-    found = Starts(np.zeros((n, 4, 4)), np.zeros((n, len(table.legs))), np.zeros((n, len(table.legs))))
+    found = Starts(rows.poses, np.zeros((n, len(table.legs))), np.zeros((n, len(table.legs))))
     wanted = np.zeros_like(values)
     for driven in table.driven:
         off = (values[:, driven["column"]] - driven["home"]) / driven["unit"]
@@ -50,8 +51,6 @@ def assembled(
     if start is None and len(rest):
         _assemble(mechanism, table, wanted, own, corners_of(mechanism), rest, rows, found)
         rest = np.flatnonzero(rows.status == P.PENDING)
-    rows.poses[:] = in_lengths(found.poses, mechanism.characteristic_length)
-    rows.measures[:, P.RESIDUAL] *= mechanism.characteristic_length
     if len(rest):
         _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
         near = rest[rows.measures[rest, P.ACTUATOR_ERROR] <= tolerance]
@@ -107,15 +106,15 @@ def _assemble(
     from ..kernels.platform.forward import assemble
 
     legs, turns, wanted = machine(table).address, not mechanism.end_effector_is_joint, values[places]
-    status, measures = rows.status[places], rows.measures[places]
-    ended = Starts._make(array[places] for array in found)
+    status, filled, elsewhere = rows.status[places], (*found, rows.measures), Handle(others)
+    parts = [array[places] for array in filled]
 
     def run(block: slice) -> None:
-        first = own if len(own.poses) == 1 else own.at(places[block])
-        ends = Starts._make(array[block] for array in ended)
-        assemble(legs, wanted[block], turns, first, others, status[block], measures[block], ends)
+        first = Handle(own if len(own.poses) == 1 else own.at(places[block]))
+        into = [part[block] for part in parts]
+        assemble(legs, wanted[block], turns, first.address, elsewhere.address, status[block], *into)
 
     in_blocks(run, len(places), ROWS_A_BLOCK)
-    rows.status[places], rows.measures[places] = status, measures
-    for array, own_array in zip(found, ended, strict=True):
-        array[places] = own_array
+    rows.status[places] = status
+    for array, part in zip(filled, parts, strict=True):
+        array[places] = part

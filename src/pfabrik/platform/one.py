@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..kernels.platform.records import Starts
+from ..kernels.handle import Handle
 from ..kernels.reaching import plan as P
 from .nearest import home_start, no_starts
 from .table import machine, machine_nearby
@@ -68,20 +68,26 @@ class OneTarget:
         return partial(self._kernel, self._nearby if nearby else self._anywhere, target, begin, sides, *_filled(rows))
 
 
+class Ends(NamedTuple):
+    """Where one row's carriers are, and which solutions its legs take, as of `Starts`."""
+
+    q: Floats  # (1, legs)
+    sides: Floats  # (1, legs)
+
+
 class OneAssembly:
     """Forward kinematics of a machine of legs from home, one row after the other, prepared likewise."""
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
-        self._length, turns = mechanism.characteristic_length, not mechanism.end_effector_is_joint
+        turns = not mechanism.end_effector_is_joint
         self._home, self._units = np.zeros(n_actuators), np.ones(n_actuators)
         self._home[table.driven["column"]], self._units[table.driven["column"]] = (
             table.driven["home"],
             table.driven["unit"],
         )
-        self._lengths = np.ones((1, 4, 4))
-        self._lengths[:, :3, 3] = self._length
-        self._asked = turns, home_start(mechanism, table), no_starts(table)
+        self._starts = Handle(home_start(mechanism, table)), Handle(no_starts(table))
+        self._asked = turns, *(starts.address for starts in self._starts)
         self._legs, self._arms = machine(table).address, table.arms["leg"]
 
     @cached_property
@@ -90,21 +96,19 @@ class OneAssembly:
 
         return assemble
 
-    def new_ends(self) -> Starts:
-        """Room for where one search ends."""
-        return Starts(np.empty((1, 4, 4)), np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
+    def new_ends(self) -> Ends:
+        """Room for where carriers and legs are in the end."""
+        return Ends(np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
 
-    def assemble(self, values: Floats, rows: P.Rows, ends: Starts) -> bool:
+    def assemble(self, values: Floats, rows: P.Rows, ends: Ends) -> bool:
         """Answer actuated values (1, n_a) if they assemble from home within all limits; whether they do."""
         wanted = (values - self._home) / self._units
-        self._kernel(self._legs, wanted, *self._asked, rows.status, rows.measures, ends)
+        self._kernel(self._legs, wanted, *self._asked, rows.status, rows.poses, *ends, rows.measures)
         if rows.status[0] != P.REACHED:
             return False
         if len(self._arms):
             ends.sides[:, self._arms] = ends.q[:, self._arms]
-        np.multiply(ends.poses, self._lengths, out=rows.poses)
         rows.actuators[:] = values
-        rows.measures[0, P.RESIDUAL] *= self._length
         return True
 
 

@@ -19,6 +19,7 @@ from ..legs.records import CARRIER, PIVOT, Floats, Record, Table
 from ..legs.table import open_table
 from ..linear import solve_spd
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
+from ..references import opener
 from ..vectors import copy_row, copy_table, wrap
 from .equations import (
     Now,
@@ -33,6 +34,7 @@ from .equations import (
 )
 from .records import Starts
 from .search import copy_now, move
+from .starts import put_carriers
 
 ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
 """Largest equation of an assembled configuration, and of one that no step makes more so [L or rad]: more actuators than
@@ -46,6 +48,10 @@ STRIDES = 8
 
 FAR_STEP = 0.5
 """Longest step of Newton's method [L or rad]."""
+
+
+open_starts = opener(Starts(np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0))))
+"""Starts, of which a kernel is given the address of a `Handle`."""
 
 
 class Newton(NamedTuple):
@@ -200,10 +206,14 @@ def is_feasible(table: Table, values: Floats, work: Newton) -> bool:
 
 
 @routine
-def load_start(starts: Starts, start: int, now: Now) -> None:
+def load_start(table: Table, starts: Starts, start: int, work: Newton) -> None:
+    now = work.now
     copy_table(starts.poses[start], now.pose)
-    copy_row(starts.q[start], now.q)
     copy_row(starts.sides[start], now.sides)
+    if starts.q.shape[0] > 0:
+        copy_row(starts.q[start], now.q)
+    else:
+        put_carriers(table, work.now, work.look)
 
 
 @routine
@@ -221,7 +231,7 @@ def assemble_row(table: Table, values: Floats, own: Starts, row: int, others: St
     """Assemble one row, into `work.now`, within all limits; see `assemble`."""
     first = row if own.poses.shape[0] > 1 else 0
     for attempt in range(2):
-        load_start(own, first, work.now)
+        load_start(table, own, first, work)
         copy_row(values, work.values)
         worst = newton(table, STEPS, work) if attempt == 0 else lead(table, values, work)
         if worst <= NEARLY_ASSEMBLED:
@@ -230,7 +240,7 @@ def assemble_row(table: Table, values: Floats, own: Starts, row: int, others: St
             break
     nearest = math.inf
     for start in range(others.poses.shape[0]):
-        load_start(others, start, work.now)
+        load_start(table, others, start, work)
         copy_row(values, work.values)
         if newton(table, STEPS, work) <= NEARLY_ASSEMBLED and is_feasible(table, values, work):
             distance = apart(work.now.pose, own.poses[first])
@@ -247,11 +257,13 @@ def assemble(
     machine: int,
     values: Floats,
     turns: bool,
-    own: Starts,
-    others: Starts,
+    own: int,
+    others: int,
     status: NDArray[np.int64],
+    poses: Floats,
+    q: Floats,
+    sides: Floats,
     measures: Floats,
-    found: Starts,
 ) -> None:
     """Assemble legs at given actuators, within all limits; rows for which none is found are PENDING.
 
@@ -262,19 +274,22 @@ def assemble(
     machine : see `open_table`.
     values : (n, n_a), deviations from home [L or rad].
     turns : whether the platform turns; a point that is an end effector does not.
-    own : where each row starts, or all of them.
+    own : where each row starts, or all of them; as `others` the address of `Starts`.
     others : starts that follow; of the configurations that they find, the one nearest to the row's start is taken.
-    found : the configurations, (n,).
+    poses : of the configurations, (n, 4, 4) [length].
+    q, sides : as of `Starts`.
     """
-    table = open_table(machine)
-    work = new_newton(table, turns)
+    table, first, rest = open_table(machine), open_starts(own), open_starts(others)
+    work, length = new_newton(table, turns), table.task[0]["length"]
     for row in range(values.shape[0]):
         status[row] = PENDING
-        if assemble_row(table, values[row], own, row, others, work):
+        if assemble_row(table, values[row], first, row, rest, work):
             status[row] = REACHED
             make_exact(work.now.pose)
-            measures[row, RESIDUAL] = place(table, work.now, work.look)
+            measures[row, RESIDUAL] = place(table, work.now, work.look) * length
             measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, work.look.values), 0.0)
-            copy_table(work.now.pose, found.poses[row])
-            copy_row(work.now.q, found.q[row])
-            copy_row(work.now.sides, found.sides[row])
+            copy_table(work.now.pose, poses[row])
+            for i in range(3):
+                poses[row, i, 3] *= length
+            copy_row(work.now.q, q[row])
+            copy_row(work.now.sides, sides[row])
