@@ -91,7 +91,7 @@ class _Asked:
         table = table_without_arms(checked_mechanism(mechanism))
         if not isinstance(table, LegTable):
             raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"])
-        self._table, self._machine = table, machine(table).address
+        self._table, self._machine = table, machine(table)
         self._begin, self._sides = mechanism.home_pose[None].copy(), table.home_sides
         if start is not None:
             found = start_of(mechanism, start, ())
@@ -134,7 +134,7 @@ class _Asked:
             targets = poses if len(counts) else poses[block]
             told = margin[block], binding[block]
             return margins_in_blocks(
-                self._machine, targets, steps, counts, block.start, self._begin, self._sides, *told
+                self._machine.address, targets, steps, counts, block.start, self._begin, self._sides, *told
             )
 
         return margin, binding, sum(in_blocks(run, n, ROWS_A_RUN))
@@ -145,7 +145,7 @@ class _Asked:
         margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
 
         def run(block: slice) -> None:
-            measure(self._machine, poses[block], self._begin, self._sides, margin[block], binding[block])
+            measure(self._machine.address, poses[block], self._begin, self._sides, margin[block], binding[block])
 
         in_blocks(run, len(poses), ROWS_A_BLOCK)
         return margin, binding

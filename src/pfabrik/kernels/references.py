@@ -1,72 +1,13 @@
-"""NamedTuples of arrays as compiled code takes them: by reference, and from Python by the address of a `Handle`."""
+"""From the address of a `Handle` to what it keeps."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numba
-from numba import extending
-from numba.core import cgutils, imputils, types
-from numba.core.typing.templates import AttributeTemplate
-
-# Numba is typed in some versions and not in others.
-_types: Any = types
-_cgutils: Any = cgutils
-_imputils: Any = imputils
-_extending: Any = extending
-_AttributeTemplate: Any = AttributeTemplate
-_typeof: Any = numba.typeof
-_config: Any = numba.config
+from ._jit import Reference, _config, _extending, _typeof, _types
 
 R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays
-
-
-class Reference(_types.Type):  # type: ignore[misc]  # a class only at run time
-    """Numba's type of a NamedTuple of arrays taken by reference: a pointer to what its owner keeps alive.
-
-    In compiled code it reads like the NamedTuple; whoever calls a part with one converts it. By value, every array
-    would be seven or more arguments of every function that it goes through.
-    """
-
-    def __init__(self, record: Any) -> None:
-        self.record = record
-        super().__init__(f"Reference({record.name})")
-
-
-@_extending.register_model(Reference)
-class _ReferenceModel(_extending.models.PrimitiveModel):  # type: ignore[misc]  # a class only at run time
-    def __init__(self, manager: Any, reference: Any) -> None:
-        super().__init__(manager, reference, manager.lookup(reference.record).get_value_type().as_pointer())
-
-
-@_extending.infer_getattr
-class _ReferenceAttribute(_AttributeTemplate):  # type: ignore[misc]  # a class only at run time
-    key = Reference
-
-    def generic_resolve(self, reference: Any, name: str) -> Any:
-        fields = reference.record.fields
-        return argument_type(reference.record.types[fields.index(name)]) if name in fields else None
-
-
-@_extending.lower_getattr_generic(Reference)
-def _load_field(context: Any, builder: Any, reference: Any, pointer: Any, name: str) -> Any:
-    place = reference.record.fields.index(name)
-    own, field = reference.record.types[place], _cgutils.gep_inbounds(builder, pointer, 0, place)
-    if isinstance(own, _types.BaseNamedTuple):
-        return field
-    return _imputils.impl_ret_borrowed(context, builder, own, builder.load(field))
-
-
-@_extending.lower_cast(_types.BaseNamedTuple, Reference)
-def _refer(context: Any, builder: Any, record: Any, reference: Any, value: Any) -> Any:
-    return _cgutils.alloca_once_value(builder, value)
-
-
-def argument_type(given: Any) -> Any:
-    """The type by which a part takes an argument: a number's value is not part of it, a NamedTuple is a reference."""
-    given = _types.unliteral(given)
-    return Reference(given) if isinstance(given, _types.BaseNamedTuple) else given
 
 
 def opener(sample: R) -> Callable[[Any], R]:

@@ -123,7 +123,8 @@ def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats) -> N
     """Write the coordinates that legs tell at poses (n, 4, 4) [length] into joint coordinates (n, columns)."""
     from ..kernels.legs.answer import read_coordinates
 
-    read_coordinates(machine_aimed(table).address, np.require(poses, requirements=["C", "W"]), sides, found)
+    legs = machine_aimed(table)
+    read_coordinates(legs.address, np.require(poses, requirements=["C", "W"]), sides, found)
 
 
 def _read_with(
@@ -134,7 +135,8 @@ def _read_with(
 
     scaled = poses.copy()
     scaled[:, :3, 3] /= mechanism.characteristic_length
-    read_configurations(machine_aimed(table).address, scaled, carriers, sides, found)
+    legs = machine_aimed(table)
+    read_configurations(legs.address, scaled, carriers, sides, found)
     return found
 
 

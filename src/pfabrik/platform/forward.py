@@ -105,14 +105,14 @@ def _assemble(
     """Assemble the rows at some places."""
     from ..kernels.platform.forward import assemble
 
-    legs, turns, wanted = machine(table).address, not mechanism.end_effector_is_joint, values[places]
+    legs, turns, wanted = machine(table), not mechanism.end_effector_is_joint, values[places]
     status, filled, elsewhere = rows.status[places], (*found, rows.measures), Handle(others)
     parts = [array[places] for array in filled]
 
     def run(block: slice) -> None:
         first = Handle(own if len(own.poses) == 1 else own.at(places[block]))
         into = [part[block] for part in parts]
-        assemble(legs, wanted[block], turns, first.address, elsewhere.address, status[block], *into)
+        assemble(legs.address, wanted[block], turns, first.address, elsewhere.address, status[block], *into)
 
     in_blocks(run, len(places), ROWS_A_BLOCK)
     rows.status[places] = status

@@ -27,7 +27,7 @@ class OneTarget:
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators = len(mechanism.actuator_names)
         self._is_for_blocks = table.is_for_blocks
-        self._anywhere, self._nearby = machine(table).address, machine_nearby(table).address
+        self._anywhere, self._nearby = machine(table), machine_nearby(table)
         self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
 
     @cached_property
@@ -59,13 +59,15 @@ class OneTarget:
         ----------
         begin : the pose from which it is completed, (1, 4, 4); only `nearby`, if so asked.
         """
-        return self._kernel(self._nearby if nearby else self._anywhere, target, begin, sides, *_filled(rows))
+        return self._kernel((self._nearby if nearby else self._anywhere).address, target, begin, sides, *_filled(rows))
 
     def prepared(
         self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool
     ) -> Callable[[], int]:
-        """`reach` with all that it takes."""
-        return partial(self._kernel, self._nearby if nearby else self._anywhere, target, begin, sides, *_filled(rows))
+        """`reach` with all that it takes, as long as this object is kept."""
+        return partial(
+            self._kernel, (self._nearby if nearby else self._anywhere).address, target, begin, sides, *_filled(rows)
+        )
 
 
 class Ends(NamedTuple):
@@ -88,7 +90,7 @@ class OneAssembly:
         )
         self._starts = Handle(home_start(mechanism, table)), Handle(no_starts(table))
         self._asked = turns, *(starts.address for starts in self._starts)
-        self._legs, self._arms = machine(table).address, table.arms["leg"]
+        self._legs, self._arms = machine(table), table.arms["leg"]
 
     @cached_property
     def _kernel(self) -> Callable[..., None]:
@@ -103,7 +105,7 @@ class OneAssembly:
     def assemble(self, values: Floats, rows: P.Rows, ends: Ends) -> bool:
         """Answer actuated values (1, n_a) if they assemble from home within all limits; whether they do."""
         wanted = (values - self._home) / self._units
-        self._kernel(self._legs, wanted, *self._asked, rows.status, rows.poses, *ends, rows.measures)
+        self._kernel(self._legs.address, wanted, *self._asked, rows.status, rows.poses, *ends, rows.measures)
         if rows.status[0] != P.REACHED:
             return False
         if len(self._arms):

@@ -14,7 +14,7 @@ from ..description.task import task_of
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
-from .table import kernel_table, machine
+from .table import Machine, kernel_table, machine
 
 SAMPLES, NEARBY = 8, 0.05
 """How many poses about home are looked at, and how far off they are [L]."""
@@ -37,7 +37,7 @@ def keeps_rotation(mechanism: Mechanism) -> bool:
 
 
 @lru_cache(maxsize=64)
-def without_idle_legs(table: LegTable) -> Handle[K.Table]:
+def without_idle_legs(table: LegTable) -> Machine:
     """What kernels are given to search where the platform does not turn from home.
 
     There a second forearm of a parallelogram goes along with the first, and three slides and a hinge say nothing: such
@@ -83,5 +83,6 @@ def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
 
     n_rows = table.task[0]["rows"]
     rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6))
-    measure_rows(machine(table).address, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
+    legs = machine(table)
+    measure_rows(legs.address, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
     return rows, slopes

@@ -25,7 +25,7 @@ from .coordinates import LegAnswers, settled, sides_at
 from .forward import assembled
 from .nearest import in_lengths, weighed_limits
 from .one import OneAssembly, OneTarget
-from .table import machine, machine_nearby
+from .table import Machine, machine, machine_nearby
 from .unreached import Question, answer_unreached
 
 Floats = NDArray[np.float64]
@@ -262,7 +262,7 @@ class LegsEngine:
         One row that was `tried` has a status already.
         """
         begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
-        asked = (machine_nearby(self._table) if keep_mode else machine(self._table)).address
+        asked = machine_nearby(self._table) if keep_mode else machine(self._table)
         left = 1 if tried else self._run(self._table.is_for_blocks, asked, targets, begins, sides, rows)
         if left and self._table.is_for_blocks and self._table.task["unset"][0]:
             left -= self._complete(asked, targets, begins, sides, rows)
@@ -275,7 +275,7 @@ class LegsEngine:
             self._count_turns(start.rows.actuators, rows)
         return left, sides
 
-    def _reach_by_arms(self, asked: int, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _reach_by_arms(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
         """Answer rows whose legs reach once arms have moved, and note where; how many these are."""
         from .arms import move_arms
 
@@ -290,7 +290,7 @@ class LegsEngine:
         sides[lost] = before[lost]
         return len(some) - left
 
-    def _reach_from_home(self, asked: int, targets: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _reach_from_home(self, asked: Machine, targets: Floats, sides: Floats, rows: P.Rows) -> int:
         """The same, with arms that start at home: from where they are, limits may be in the way."""
         away, home, arms = rows.status != P.REACHED, sides.copy(), self._table.arms["leg"]
         home[:, arms] = self._table.home_sides[:, arms]
@@ -299,7 +299,9 @@ class LegsEngine:
         sides[found] = home[found]
         return n
 
-    def _run(self, by_blocks: bool, asked: int, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _run(
+        self, by_blocks: bool, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows
+    ) -> int:
         """Answer targets on all cores, in blocks of poses or one by one; how many are not reached."""
         if by_blocks:
             from ..kernels.legs.blocks import answer_blocks as answer
@@ -308,7 +310,7 @@ class LegsEngine:
 
         def run(block: slice) -> int:
             return answer(
-                asked,
+                asked.address,
                 targets[block],
                 _part(begins, block),
                 _part(sides, block),
@@ -320,7 +322,7 @@ class LegsEngine:
 
         return sum(in_blocks(run, len(targets), ROWS_A_RUN if by_blocks else ROWS_A_BLOCK))
 
-    def _complete(self, asked: int, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _complete(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
         """Answer the rows that blocks left OPEN, whose poses are to be completed; how many of them are reached."""
         from ..kernels.legs.blocks import OPEN
 

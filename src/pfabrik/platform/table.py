@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
+
+Machine: TypeAlias = Handle[K.Table]
 
 
 @lru_cache(maxsize=64)
@@ -23,18 +26,18 @@ def kernel_table(table: LegTable) -> K.Table:
 
 
 @lru_cache(maxsize=64)
-def machine(table: LegTable) -> Handle[K.Table]:
+def machine(table: LegTable) -> Machine:
     """What kernels are given."""
     return Handle(kernel_table(table))
 
 
 @lru_cache(maxsize=64)
-def machine_nearby(table: LegTable) -> Handle[K.Table]:
+def machine_nearby(table: LegTable) -> Machine:
     """The same for poses that are completed near to where they began alone."""
     return Handle(kernel_table(table)._replace(task=table.task_within(STRANGE)))
 
 
 @lru_cache(maxsize=64)
-def machine_aimed(table: LegTable) -> Handle[K.Table]:
+def machine_aimed(table: LegTable) -> Machine:
     """The same with the angles of all endings asked for."""
     return Handle(kernel_table(table)._replace(legs=table.aimed))

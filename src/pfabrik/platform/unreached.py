@@ -83,11 +83,11 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
 
     begins, own, tried = question.begins, rows_at(rows, rest), sides[rest]
     first = begins if len(begins) == 1 else begins[rest]
-    legs, targets = machine(question.table).address, question.targets[rest]
+    legs, targets = machine(question.table), question.targets[rest]
 
     def run(block: slice) -> int:
         return answer_otherwise(
-            legs,
+            legs.address,
             targets[block],
             first if len(first) == 1 else first[block],
             tried[block],
@@ -111,9 +111,10 @@ def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, row
     from ..kernels.legs.answer import answer
 
     table, own = question.table, rows_at(rows, again)
+    legs = machine_nearby(table) if question.nearby else machine(table)
     begins = own.poses.copy()
     answer(
-        (machine_nearby(table) if question.nearby else machine(table)).address,
+        legs.address,
         question.targets[again],
         begins,
         sides[again],

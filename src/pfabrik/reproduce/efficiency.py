@@ -189,16 +189,18 @@ def _single_passes(mechanism: Mechanism, targets: Floats, warm: bool) -> Callabl
 def _single_legs(mechanism: Mechanism, table: LegTable, targets: Floats, warm: bool) -> Callable[[], object]:
     """One kernel call of legs in closed form a target, and where arms must move, of the search for where to."""
     begins = np.concatenate([mechanism.home_pose[None], targets[:-1]]) if warm else mechanism.home_pose[None]
-    legs, rows = machine(table).address, new_rows(mechanism, len(targets))
+    legs, rows = machine(table), new_rows(mechanism, len(targets))
     sides = np.repeat(table.home_sides, len(targets), axis=0)
 
     def answer() -> None:
-        if not legs_one_by_one(legs, targets, begins, table.home_sides, rows) or not len(table.arms):
+        if not legs_one_by_one(legs.address, targets, begins, table.home_sides, rows) or not len(table.arms):
             return
         rest = np.flatnonzero(rows.status != Status.REACHED)
         moved, _ = move_arms(mechanism, table, targets, begins, sides, rest)
         for i in moved:
-            legs_one_by_one(legs, targets[i : i + 1], begins[:1], sides[i : i + 1], rows_at(rows, slice(i, i + 1)))
+            legs_one_by_one(
+                legs.address, targets[i : i + 1], begins[:1], sides[i : i + 1], rows_at(rows, slice(i, i + 1))
+            )
 
     return answer
 
