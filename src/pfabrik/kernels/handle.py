@@ -13,7 +13,8 @@ class Handle(Generic[R]):
     """A NamedTuple of arrays kept in memory as compiled code has it.
 
     A kernel takes its `address`, a number, and opens it; from Python that costs a tenth of what the arrays would. The
-    arrays are kept alive, and may be written to; whoever hands the address over keeps the handle until the kernel is done.
+    arrays are kept alive, and may be written to; whoever hands the address over keeps the handle until the kernel is
+    done.
     """
 
     def __init__(self, record: R) -> None:

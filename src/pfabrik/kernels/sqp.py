@@ -42,10 +42,9 @@ FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
 it did not lead up by more than the second, for the objective itself is known no better."""
 
-LAST, CONVERGING = 1e-15, 1e-2
-"""Share of the objective that the last step promises: its length is some hundred-millionths of the distance, and the
-next would be its square. And, of a fine step, share of what the one before promised: if it is more, what moves is
-rounding."""
+LAST, CONVERGING = 1e-18, 1e-2
+"""Share of the objective that the last step promises: its length is a billionth of the distance. And, of a fine step,
+share of what the one before promised: if it is more, what moves is rounding."""
 
 PROBE = 1e-6
 """How far curvature is felt for along each motion [rad or L]."""
@@ -181,11 +180,13 @@ def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: fl
     """The step that the damped programme asks for, into `p.x`: what it takes from the objective, and the damping.
 
     Where curvature is not positive, that across active limits counts more: there is no room to move there. Where that
-    is not enough, damping grows. A programme without a solution takes up what is exceeded as if it were just met.
+    is not enough, damping grows. A programme without a solution takes what is exceeded as if it were just met; so does
+    one where all is closed, for what is open by rounding is nothing to close.
     """
     motions, k = linear.counts[MOTIONS], linear.counts[LIMITS]
+    closed = is_closed(linear, CLOSED)
     for c in range(k):
-        p.h[c] = linear.h[c] + linear.drift[c]
+        p.h[c] = min(linear.h[c], 0.0) if closed else linear.h[c] + linear.drift[c]
         for a in range(motions):
             p.G[c, a] = linear.G[c, a]
     stiff = 0.0
@@ -210,7 +211,7 @@ def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: fl
             p.h[c] = min(linear.h[c], 0.0)
         if not solve_qp(p, motions, k):
             return -math.inf, damping
-    promise = -linear.scalars[CLOSING]
+    promise = 0.0 if closed else -linear.scalars[CLOSING]
     for a in range(motions):
         promise -= linear.g[a] * p.x[a]
         for b in range(motions):
