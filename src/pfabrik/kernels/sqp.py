@@ -40,7 +40,7 @@ OPEN = 0.01
 
 FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
-it did not lead up by more than the second, for the objective itself is known no better."""
+it did not lead up by more than the second, or than it costs to close what counts as closed: it is known no better."""
 
 LAST, CONVERGING = 1e-18, 1e-2
 """Share of the objective that the last step promises: its length is a billionth of the distance. And, of a fine step,
@@ -152,8 +152,8 @@ def on_the_way(control: StepControl, share: float) -> float:
 
 @routine
 def openness(linear: Linearisation) -> float:
-    """By how much more than what counts as closed loops are open, or limits exceeded."""
-    return max(linear.scalars[GAP], linear.scalars[EXCESS], CLOSED) - CLOSED
+    """How far loops are open, or limits exceeded; nothing where that counts as closed."""
+    return 0.0 if is_closed(linear, CLOSED) else max(linear.scalars[GAP], linear.scalars[EXCESS])
 
 
 @routine
@@ -234,10 +234,10 @@ def merit(linear: Linearisation, weight: float) -> float:
 
 
 @routine
-def leads_down(linear: Linearisation, gain: float, promise: float) -> bool:
+def leads_down(linear: Linearisation, gain: float, promise: float, weight: float) -> bool:
     """Whether a step that promised so much gained enough."""
     if promise <= FINE * linear.scalars[VALUE]:
-        return gain >= -ROUNDING * linear.scalars[VALUE]
+        return gain >= -ROUNDING * linear.scalars[VALUE] - weight * CLOSED
     return gain > ENOUGH * promise
 
 
@@ -312,7 +312,8 @@ def gained(linear: Linearisation, other: Linearisation, control: StepControl) ->
 def is_to_close(linear: Linearisation, other: Linearisation, share: float, control: StepControl) -> bool:
     """Whether a share of the step planned did not lead down, perhaps for what it left open."""
     promise = share * control.scalars[PROMISE]
-    return not leads_down(linear, gained(linear, other, control), promise) and not is_closed(
+    gain = gained(linear, other, control)
+    return not leads_down(linear, gain, promise, control.scalars[WEIGHT]) and not is_closed(
         other, on_the_way(control, share)
     )
 
@@ -321,7 +322,7 @@ def is_to_close(linear: Linearisation, other: Linearisation, share: float, contr
 def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, share: float, control: StepControl) -> bool:
     """Whether a share of the step planned led from one linear down to another; damping follows how well it did."""
     promise, gain = share * control.scalars[PROMISE], gained(linear, other, control)
-    led_down = feasible and leads_down(linear, gain, promise)
+    led_down = feasible and leads_down(linear, gain, promise, control.scalars[WEIGHT])
     if is_last(linear, promise, control.scalars[BEFORE]):
         control.counts[DONE] = 1
     control.scalars[PROMISE] = promise
