@@ -427,3 +427,30 @@ def test_what_holds_a_projection_back_is_the_same_in_the_platforms_pose_and_on_a
     assert (told > 0).any(axis=1).sum() >= 4
     on_joints = ClosureEngine(machine).weighed_limits(found, targets[rows], way)
     np.testing.assert_allclose(told, on_joints, atol=1e-5 * on_joints.max())
+
+
+@pytest.mark.parametrize("name", ["delta", "linear_delta"])
+def test_the_second_forearm_of_a_parallelogram_keeps_its_own_cone(name: str) -> None:
+    """Both have one line, so a cone is worth the same on either."""
+    mechanism = pf.load(name)
+    first, second = (mechanism.joint(joint) for joint in ("BL1", "BR1"))
+    assert first.cone is not None and second.cone is not None
+    narrow = [mechanism.with_limits({j.name: replace(j.cone, half_angle=0.5)}) for j in (first, second) if j.cone]
+    rng, length = np.random.default_rng(0), mechanism.characteristic_length
+    targets = mechanism.home_pose[:3, 3] + length * rng.uniform(-1.5, 1.5, (60, 3))
+    on_first, on_second, wide = (pf.solve_ik(each, targets) for each in (*narrow, mechanism))
+    assert (on_first.position_error > wide.position_error + 1e-3 * length).any()
+    np.testing.assert_allclose(on_second.position_error, on_first.position_error, atol=1e-6 * length)
+    assert all(margin.min() >= -1e-8 for margin in pf.margins(on_second).values())
+
+
+def test_a_working_mode_with_a_small_room_of_its_own_is_searched() -> None:
+    """A delta's platform can be above its base, where nothing leads from below: a target there is answered there."""
+    mechanism = pf.load("delta")
+    targets = mechanism.characteristic_length * np.array([[0.0, 0.0, 0.6], [0.2, 0.1, 0.6], [-0.3, 0.0, 0.5]])
+    answers = pf.solve_ik(mechanism, targets)
+    below = pf.solve_ik(
+        mechanism, targets, start=pf.solve_ik(mechanism, mechanism.home_pose), options=Options(working_mode="keep")
+    )
+    assert (answers.pose[:, 2, 3] > 0.0).all()
+    assert (answers.position_error < 0.9 * below.position_error).all()

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from pfabrik import Options, Status
+from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.errors import InvalidArgument
+from pfabrik.platform.table import machine
 
 MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]
 
@@ -144,3 +149,18 @@ def test_what_is_no_mechanism_or_no_single_start_is_refused() -> None:
     batch = pf.solve_ik(mechanism, np.tile(mechanism.home_pose, (2, 1, 1)))
     with pytest.raises(InvalidArgument, match="start: found batch shape"):
         pf.Solver(mechanism, start=batch)
+
+
+def test_what_kernels_are_given_is_kept_as_long_as_a_solver() -> None:
+    """Kernels take an address: what it leads to must not go when a cache has forgotten the machine."""
+    mechanism = pf.load("stewart")
+    solver, home = pf.Solver(mechanism), mechanism.home_pose
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
+    given = weakref.ref(machine(table))
+    solver.ik(home)
+    machine.cache_clear()
+    gc.collect()
+    assert given() is not None
+    assert solver.ik(home) == Status.REACHED and solver.fk(solver.actuators.copy()) == Status.REACHED
+    np.testing.assert_allclose(solver.pose, home, atol=1e-9 * mechanism.characteristic_length)

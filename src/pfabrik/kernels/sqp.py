@@ -36,7 +36,8 @@ CLOSED, NEARLY_CLOSED = 1e-13, 1e-10
 overconstrained close no better than their description is exact. The second is a tenth of what is promised."""
 
 OPEN = 0.01
-"""Share of what a step promises to which what it left open is closed, where it did not lead down."""
+"""Share of what a step promises to which what it left open is closed: where it did not lead down, and on joint
+coordinates always, for there a step may end where loops no longer close."""
 
 FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that

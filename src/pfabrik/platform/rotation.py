@@ -48,13 +48,15 @@ def without_idle_legs(table: LegTable) -> Machine:
     quiet = np.maximum(np.abs(values), np.abs(slopes[:, :, :3]).max(axis=2)).max(axis=0) <= TOLERANCES.implied
     ends = np.append(legs["first_row"][1:], rows)
     limited = np.concatenate([table.limited["leg"], table.driven["leg"]])
-    cones = table.cones.copy()
+    cones, main = table.cones.copy(), 0
     for k in range(len(legs)):
+        is_second = legs["carrier"][k] == K.SHARED
+        main = main if is_second else k
+        has_first = is_second and legs["kind"][main] == K.ROD
         own = quiet[legs["first_row"][k] : ends[k]]
-        second = legs["kind"][k] == K.ROD and legs["carrier"][k] == K.SHARED and legs["kind"][k - 1] == K.ROD
-        if len(own) and own.all() and k not in limited and (second or k not in cones["leg"]):
+        if len(own) and own.all() and k not in limited and (has_first or k not in cones["leg"]):
             legs["kind"][k] = K.IDLE
-            cones["leg"][cones["leg"] == k] = k - 1
+            cones["leg"][cones["leg"] == k] = main
     return Handle(kernel_table(table)._replace(legs=legs, cones=cones[_of_their_own(cones)]))
 
 
