@@ -445,12 +445,11 @@ def test_the_second_forearm_of_a_parallelogram_keeps_its_own_cone(name: str) -> 
 
 
 def test_a_working_mode_with_a_small_room_of_its_own_is_searched() -> None:
-    """A delta's platform can be above its base, where nothing leads from below: a target there is answered there."""
+    """A delta's platform can be above its base, where nothing leads from below: a target under that room is nearest to
+    it."""
     mechanism = pf.load("delta")
-    targets = mechanism.characteristic_length * np.array([[0.0, 0.0, 0.6], [0.2, 0.1, 0.6], [-0.3, 0.0, 0.5]])
-    answers = pf.solve_ik(mechanism, targets)
-    below = pf.solve_ik(
-        mechanism, targets, start=pf.solve_ik(mechanism, mechanism.home_pose), options=Options(working_mode="keep")
-    )
+    targets = [[-0.07, -0.26, 0.2], [0.04, -0.27, 0.13], [0.11, 0.02, 0.13], [0.08, 0.12, 0.16], [-0.16, 0.11, 0.19]]
+    answers = pf.solve_ik(mechanism, mechanism.characteristic_length * np.array(targets))
+    assert (answers.status == Status.PROJECTED).all()
     assert (answers.pose[:, 2, 3] > 0.0).all()
-    assert (answers.position_error < 0.9 * below.position_error).all()
+    assert (answers.position_error < 0.35 * mechanism.characteristic_length).all()
