@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .answers.starts import Start, start_of
 from .arrays import Floats, Ints
-from .decomposition.leg_table import LegTable, table_without_arms
+from .decomposition.leg_table import LegTable, table_of_poses
 from .decomposition.legs import LegForm, Rod
 from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism
@@ -88,7 +88,7 @@ class _Asked:
     """A mechanism's legs in the working mode of a start."""
 
     def __init__(self, mechanism: Mechanism, start: Start | None) -> None:
-        table = table_without_arms(checked_mechanism(mechanism))
+        table = table_of_poses(checked_mechanism(mechanism))
         if not isinstance(table, LegTable):
             raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"])
         self._table, self._machine = table, machine(table)
@@ -154,7 +154,7 @@ class _Asked:
 @lru_cache(maxsize=64)
 def _limits(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
     """Limits in the order of the kernel: ranges and cones, then whether legs reach, then whether they close."""
-    table = table_without_arms(mechanism)
+    table = table_of_poses(mechanism)
     assert isinstance(table, LegTable)
     reach = tuple((_carrier(form), "reach") for form in table.forms)
     closed = tuple((form.items[0].joint.name if form.items else "", "closed") for form in table.forms)

@@ -68,10 +68,15 @@ class LegTable:
 
     @cached_property
     def arms(self) -> Records:
-        """The coordinates of arms, which poses leave open; their columns count them."""
+        """The coordinates of arms; their columns count them."""
         arms: Records = self.known[self.legs["kind"][self.known["leg"]] == K.ARM]
         arms["column"] = np.arange(len(arms))
         return arms
+
+    @property
+    def arms_follow(self) -> bool:
+        """Whether arms follow from the pose, by what the legs on them ask for; else poses leave them open."""
+        return bool(self.task["arms"][0])
 
     @cached_property
     def is_for_blocks(self) -> bool:
@@ -79,8 +84,8 @@ class LegTable:
         legs = self.legs
         aimed = [(legs[f"{end}_aimed"] == 0) | (legs[end] == K.HINGE) for end in ("foot", "head")]
         twists = (legs["twists"] == 0) | ((legs["foot"] == K.HINGE) & (legs["head"] == K.HINGE))
-        rods = (legs["kind"] == K.ROD) & (legs["reversed"] == 0)
-        return bool(np.all([rods, twists, *aimed]) and self.task["rotations"][0] != 2)
+        rods = (legs["kind"] == K.ROD) & (legs["frame"] == 0)
+        return bool(np.all([rods, twists, *aimed]) and self.task["rotations"][0] in (0, 3))
 
     def task_within(self, farthest: float) -> Records:
         """The task, with what it leaves open going no farther than that [L or rad]."""
@@ -98,10 +103,10 @@ def leg_table(mechanism: Mechanism) -> LegTable | str:
         return str(reason)
 
 
-def table_without_arms(mechanism: Mechanism) -> LegTable | str:
+def table_of_poses(mechanism: Mechanism) -> LegTable | str:
     """A mechanism's table of legs if a pose leaves none of their limits open, or the reason why it has none."""
     table = leg_table(mechanism)
-    if isinstance(table, str) or not len(table.arms):
+    if isinstance(table, str) or table.arms_follow or not len(table.arms):
         return table
     names = dict.fromkeys(item.joint.name for form in table.forms if isinstance(form, Arm) for item in form.items)
     return f"poses leave joints {', '.join(names)} open"
@@ -113,10 +118,9 @@ def legs_answer(mechanism: Mechanism) -> bool:
 
 
 def _table(mechanism: Mechanism) -> LegTable:
-    if task_of(mechanism).rotations == 1:
-        raise NoLeg("the task sets the yaw alone of the rotation")
     forms = _forms(mechanism)
     legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
+    _put_frames(legs, forms)
     counts = _row_counts(legs)
     legs["first_row"] = [0, *accumulate(counts)][:-1]
     legs["bears"] = _bear(legs, counts)
@@ -142,9 +146,23 @@ def _table(mechanism: Mechanism) -> LegTable:
 
 
 def _bear(legs: Records, counts: Sequence[int]) -> list[bool]:
-    """Whether each leg, or a rod on its carrier, leaves a constraint: these follow the leg that has the carrier."""
+    """Whether each leg, or a rod on its carrier, leaves a constraint: these follow the leg that has the carrier. Of an
+    arm, whether a leg on it does."""
     mains = np.maximum.accumulate(np.where(legs["carrier"] != K.SHARED, np.arange(len(legs)), 0))
-    return [bool(np.sum(np.array(counts)[mains == main])) for main in mains]
+    bear = [bool(np.sum(np.array(counts)[mains == main])) for main in mains]
+    for k in range(len(legs) - 1, -1, -1):
+        if legs["arm"][k] >= 0:
+            bear[legs["arm"][k]] |= bear[k]
+    return bear
+
+
+def _put_frames(legs: Records, forms: Sequence[LegForm]) -> None:
+    """Number the frames: two of the platform and the base, then one for each arm."""
+    numbers = {id(form): k for k, form in enumerate(forms)}
+    legs["arm"] = [-1 if form.on is None else numbers[id(form.on)] for form in forms]
+    arms = legs["kind"] == K.ARM
+    legs["makes"][arms] = 2 + np.arange(arms.sum())
+    legs["frame"] = np.where(legs["arm"] >= 0, legs["makes"][legs["arm"]], legs["reversed"])
 
 
 def _forms(mechanism: Mechanism) -> list[LegForm]:
@@ -237,7 +255,7 @@ def _record(mechanism: Mechanism, form: LegForm) -> Records:
     if isinstance(form, Rod):
         return _rod_record(mechanism, form)
     if isinstance(form, Arm):
-        return _arm_record(form)
+        return _arm_record(mechanism, form)
     return _pivot_record(mechanism, form) if isinstance(form, Pivot) else _kept_axis_record(form)
 
 
@@ -283,11 +301,11 @@ def _kept_axis_record(form: KeptAxis) -> Records:
     return record
 
 
-def _arm_record(arm: Arm) -> Records:
-    record = np.zeros((), K.LEG)
-    record["kind"], record["reversed"], record["on_arm"] = K.ARM, arm.is_reversed, arm.is_on_arm
-    record["carrier"] = _CARRIERS[arm.item.kind]
-    record["carrier_axis"], record["carrier_point"] = arm.item.axis, arm.item.point
+def _arm_record(mechanism: Mechanism, arm: Arm) -> Records:
+    record, point = np.zeros((), K.LEG), arm.item.point
+    record["kind"], record["reversed"], record["at_head"] = K.ARM, arm.is_reversed, arm.at_head
+    record["carrier"], record["carrier_axis"] = _CARRIERS[arm.item.kind], arm.item.axis
+    record["carrier_point"] = _head_point(mechanism, point, arm.is_reversed) if arm.at_head else point
     return record
 
 
@@ -390,6 +408,8 @@ def _task(mechanism: Mechanism, legs: Records) -> Records:
     if mechanism.end_effector_is_joint:  # it has no orientation: home's
         task["rotations"] = 0
     task["rows"], task["farthest"] = sum(_row_counts(legs)), COMPLETED_WITHIN
+    arms = legs[legs["kind"] == K.ARM]
+    task["arms"] = len(arms) if arms["bears"].any() else 0
     return task
 
 

@@ -5,10 +5,12 @@ With every joint as hinges (R), slides (P) and balls (S) in series, a chain is
 - a rod: at most one carrier (R or P), a foot ending, a rigid or sliding rod, a head ending; the carrier of a rigid
   rod is turned until the rod reaches;
 - a pivot: slides, then one ending of no length;
-- arms: hinges and slides that carry sliding rods, which reach wherever arms are: their coordinates are free.
+- arms, and legs on them: hinges and slides next to the base or the platform, which the pose alone does not tell. Their
+  coordinates are free, below rods that reach wherever arms are, or follow from what the legs on them ask for.
 
 Endings are a hinge, two that cross, three through one point, or a ball. Where a chain branches, its first branch places
-the carrier and the others are rods on it, or all are rods on its arms. A pinned parallelogram between two parallel
+the carrier and the others are rods on it, or all are legs on its arms. Where branches meet again before the platform,
+what is beyond are arms of the platform. A pinned parallelogram between two parallel
 hinges is a rod between pairs of crossed hinges, and an axis that the platform keeps.
 """
 
@@ -101,6 +103,7 @@ class Rod:
     is_reversed: bool
     is_shared: bool = False
     beside: tuple[Item, ...] = ()
+    on: Arm | None = None
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -115,6 +118,7 @@ class Pivot:
     slides: tuple[Item, ...]
     ending: Ending
     is_reversed: bool
+    on: Arm | None = None
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -127,6 +131,7 @@ class KeptAxis:
 
     ending: Ending
     is_reversed: bool = False
+    on: Arm | None = None
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -135,11 +140,18 @@ class KeptAxis:
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """A hinge or slide that carries sliding rods; see above."""
+    """A hinge or slide that legs are on; see above.
+
+    Attributes
+    ----------
+    at_head : whether it moves the body that their heads are on.
+    on : the arm that it is on.
+    """
 
     item: Item
-    is_on_arm: bool
     is_reversed: bool
+    at_head: bool = False
+    on: Arm | None = None
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -161,11 +173,40 @@ def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
     if chain.trunk:
         return _branched(mechanism, chain)
     loops = [part for part in chain.parts if not isinstance(part, Step)]
-    if len(loops) == 1 and isinstance(loops[0], Split) and loops[0].parallelogram is not None:
-        return _with_parallelogram(mechanism, chain, loops[0])
-    if loops:
+    if not loops:
+        return _leg(_items(mechanism, chain.steps))
+    if len(loops) > 1 or not isinstance(loops[0], Split):
         raise NoLeg("has a loop of its own")
-    return _leg(_items(mechanism, chain.steps))
+    if loops[0].parallelogram is not None and loops[0].parallelogram.pinned:
+        return _with_parallelogram(mechanism, chain, loops[0])
+    return _between_arms(mechanism, chain, loops[0])
+
+
+def _between_arms(mechanism: Mechanism, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
+    """Legs side by side between two bodies, which arms join to the base and to the platform."""
+    place = chain.parts.index(split)
+    inward, outward = (_items(mechanism, _steps_of(parts)) for parts in (chain.parts[:place], chain.parts[place + 1 :]))
+    if len(inward) + len(outward) > MOST_ARMS or any(item.kind == "S" for item in (*inward, *outward)):
+        raise NoLeg("has a loop of its own")
+    arms: list[Arm] = []
+    for item in inward:
+        arms.append(Arm(item, False, False, arms[-1] if arms else None))
+    for item in outward[::-1]:
+        arms.append(Arm(item.back, False, True, arms[-1] if arms else None))
+    legs = [leg for way in split.ways for leg in legs_of_chain(mechanism, SubChain(way, None))]
+    if any(leg.is_reversed for leg in legs):
+        raise NoLeg("a leg on arms that is read from the platform")
+    return (*arms, *_on(arms[-1] if arms else None, legs))
+
+
+def _on(arm: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
+    """Legs that are on an arm, those of them that are on none yet."""
+    placed: dict[int, LegForm] = {}
+    for leg in legs:
+        on = arm if leg.on is None else placed[id(leg.on)]
+        assert on is None or isinstance(on, Arm)
+        placed[id(leg)] = replace(leg, on=on)
+    return tuple(placed.values())
 
 
 def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
@@ -190,14 +231,14 @@ def _on_arms(trunk: Sequence[Item], branches: Sequence[list[Item]], is_reversed:
         ends = rod.foot_ending, rod.head_ending
         if rod.slide is None or any(end.kind == "hinge" for end in ends) or keeps_from_spinning(rod):
             raise NoLeg("arms carry rods that do not let the platform go wherever it may be wanted")
-    arms = [Arm(item, place > 0, is_reversed) for place, item in enumerate(trunk)]
-    return (*arms, *(replace(rod, is_shared=True) for rod in rods))
+    arms: list[Arm] = []
+    for item in trunk:
+        arms.append(Arm(item, is_reversed, on=arms[-1] if arms else None))
+    return (*arms, *_on(arms[-1], rods))
 
 
 def _with_parallelogram(mechanism: Mechanism, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
     """A pinned parallelogram between two parallel hinges: its outer body turns as its inner one does."""
-    if split.parallelogram is None or not split.parallelogram.pinned:
-        raise NoLeg("has a loop of its own")
     place = chain.parts.index(split)
     before, after = (_items(mechanism, _steps_of(parts)) for parts in (chain.parts[:place], chain.parts[place + 1 :]))
     (inner, outer), (inner_beside, outer_beside) = (_items(mechanism, _steps_of(way)) for way in split.ways)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decomposition.leg_table import LegTable, table_without_arms
+from ..decomposition.leg_table import LegTable, table_of_poses
 from ..description.mechanism import Mechanism
 from ..description.task import Task, task_of
 from ..errors import UnsupportedMechanism
@@ -68,9 +68,11 @@ class Machine:
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
-        table = table_without_arms(mechanism)
+        table = table_of_poses(mechanism)
         if not isinstance(table, LegTable):
             raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"], "exported")
+        if len(table.arms):
+            raise UnsupportedMechanism(mechanism.name, ["its poses do not tell all joints in closed form"], "exported")
         self.mechanism = mechanism
         self.table = table
         self.task: Task = task_of(mechanism)

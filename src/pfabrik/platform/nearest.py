@@ -36,6 +36,9 @@ CORNERS, HITS, HITS_OF_STRUTS, HITS_OF_VALUES = 16, 4, 3, 6
 struts leave the platform all its freedoms, and have no two ways to bend; more where actuators have values, which a
 platform nearly has in many poses."""
 
+CORNERS_OF_ARMS, HITS_OF_ARMS = 32, 8
+"""The same where arms follow: between two bodies that legs meet on there are many more configurations."""
+
 DRAWS, DRAWN_STEPS = 240, 30
 """How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
 
@@ -157,18 +160,23 @@ def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: St
 def _apart_by_arms(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
     """Tables of the legs on each set of arms, and which legs these are: they have nothing to do with each other where
     the pose is given; else all in one."""
-    if table.task["unset"][0] > 0:
+    if table.task["unset"][0] > 0 or table.task["rows"][0] > 0:
         return ((table, slice(None)),)
     legs, parts = table.legs, []
-    for k in np.flatnonzero((legs["kind"] == K.ARM) & (legs["on_arm"] == 0)).tolist():
+    starts = np.flatnonzero((legs["kind"] == K.ARM) & (legs["arm"] < 0)).tolist()
+    for k, after in zip(starts, [*starts[1:], len(legs)], strict=True):
         end = k + 1
-        while end < len(legs) and (legs[end]["carrier"] == K.SHARED or legs[end]["on_arm"] == 1):
+        while end < after and legs[end]["arm"] >= k:
             end += 1
+        own_legs, before = legs[k:end].copy(), legs[k]["makes"] - 2
+        own_legs["arm"] -= np.where(own_legs["arm"] >= 0, k, 0)
+        own_legs["makes"] -= before
+        own_legs["frame"] -= np.where(own_legs["frame"] >= 2, before, 0)
         own = {name: getattr(table, name) for name in ("limited", "cones", "known")}
         own = {name: array[(array["leg"] >= k) & (array["leg"] < end)] for name, array in own.items()}
         for array in own.values():
             array["leg"] -= k
-        parts.append((replace(table, forms=table.forms[k:end], legs=legs[k:end], **own), slice(k, end)))
+        parts.append((replace(table, forms=table.forms[k:end], legs=own_legs, **own), slice(k, end)))
     return tuple(parts)
 
 
@@ -191,7 +199,7 @@ def _approach(
     from ..kernels.platform.nearest import approach
 
     at_home = table.task[0]["rotations"] == 0 and objective.platform[3] == LOCKED and objective.max_iterations > 0
-    asked = without_idle_legs(table) if at_home else machine(table)
+    asked = without_idle_legs(table) if at_home and not table.arms_follow else machine(table)
     asked = asked if driven is None else Handle(asked.record._replace(driven=driven))
     found, legs = _new_found(len(objective.targets), table), asked.record
     limits = 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)
@@ -211,6 +219,8 @@ def _approach(
 
 @lru_cache(maxsize=64)
 def _hits(table: LegTable) -> int:
+    if table.arms_follow:
+        return HITS_OF_ARMS
     return HITS if table.task[0]["rows"] > 0 or len(_carriers(table)) else HITS_OF_STRUTS
 
 
@@ -278,7 +288,7 @@ def corners_of(mechanism: Mechanism) -> Starts:
     modes = np.unique(np.sign(every.sides), axis=0, return_inverse=True)[1].ravel()
     chosen: list[int] = []
     away = _apart(every, 0)
-    while len(chosen) < min(CORNERS, len(feasible)):
+    while len(chosen) < min(CORNERS_OF_ARMS if table.arms_follow else CORNERS, len(feasible)):
         rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < OF_A_MODE
         chosen.append(int(np.where(rare & (away > 0.0), away + SELDOM, away).argmax()))
         away = np.minimum(away, _apart(every, chosen[-1]))

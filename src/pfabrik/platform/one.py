@@ -26,7 +26,7 @@ class OneTarget:
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators = len(mechanism.actuator_names)
-        self._is_for_blocks = table.is_for_blocks
+        self._is_for_blocks, self._arms_follow = table.is_for_blocks, table.arms_follow
         self._anywhere, self._nearby = machine(table), machine_nearby(table)
         self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
 
@@ -57,6 +57,7 @@ class OneTarget:
 
         Parameters
         ----------
+        sides : where arms follow, they end here.
         begin : the pose from which it is completed, (1, 4, 4); only `nearby`, if so asked.
         """
         return self._kernel((self._nearby if nearby else self._anywhere).address, target, begin, sides, *_filled(rows))
@@ -64,10 +65,17 @@ class OneTarget:
     def prepared(
         self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool
     ) -> Callable[[], int]:
-        """`reach` with all that it takes, as long as this object is kept."""
-        return partial(
-            self._kernel, (self._nearby if nearby else self._anywhere).address, target, begin, sides, *_filled(rows)
-        )
+        """`reach` with all that it takes, as long as this object is kept; arms begin anew each time."""
+        asked, own = self._nearby if nearby else self._anywhere, sides.copy()
+        call = partial(self._kernel, asked.address, target, begin, own, *_filled(rows))
+        if not self._arms_follow:
+            return call
+
+        def call_anew() -> int:
+            own[:] = sides
+            return call()
+
+        return call_anew
 
 
 class Ends(NamedTuple):

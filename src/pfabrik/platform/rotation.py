@@ -80,11 +80,15 @@ def _shifted_about_home(table: LegTable) -> Floats:
 
 
 def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
-    """The constraints of home's legs on poses (n, 4, 4) [length], (n, rows), and their derivatives, (n, rows, 6)."""
+    """The constraints of home's legs on poses (n, 4, 4) [length], (n, rows), and their derivatives, (n, rows, 6).
+
+    Where arms follow, without what these give way to.
+    """
     from ..kernels.legs.answer import measure_rows
 
     n_rows = table.task[0]["rows"]
-    rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6))
+    rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6 + len(table.arms)))
     legs = machine(table)
     measure_rows(legs.address, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
-    return rows, slopes
+    by_pose, by_arms = slopes[:, :, :6], slopes[:, :, 6:]
+    return rows, by_pose - by_arms @ (np.linalg.pinv(by_arms) @ by_pose) if table.arms_follow else by_pose

@@ -73,10 +73,11 @@ class LegsEngine:
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
         first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
         rows = self._one.new_rows() if is_one else new_rows(self.mechanism, len(targets))
-        if is_one and self._reach_one(targets, start, first, keep_mode, rows):
+        ends = first.copy() if self._table.arms_follow else first
+        if is_one and self._reach_one(targets, start, ends, keep_mode, rows):
             begins = _begins(self.mechanism, self._table, start, first)
-            told = rows.poses, rows.actuators, first
-            return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins()), first)
+            told = rows.poses, rows.actuators, ends
+            return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins()), ends)
         left, sides = self._reach(targets, start, first, keep_mode, rows, tried=is_one)
         carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
         if left and self._searches:
@@ -263,10 +264,12 @@ class LegsEngine:
         """
         begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
         asked = machine_nearby(self._table) if keep_mode else machine(self._table)
+        if self._table.arms_follow:
+            sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
         left = 1 if tried else self._run(self._table.is_for_blocks, asked, targets, begins, sides, rows)
         if left and self._table.is_for_blocks and self._table.task["unset"][0]:
             left -= self._complete(asked, targets, begins, sides, rows)
-        if left and len(self._table.arms):
+        if left and len(self._table.arms) and not self._table.arms_follow:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
             left -= self._reach_by_arms(asked, targets, begins, sides, rows)
             if left and start is not None and not keep_mode:

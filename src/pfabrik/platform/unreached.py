@@ -112,12 +112,12 @@ def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, row
 
     table, own = question.table, rows_at(rows, again)
     legs = machine_nearby(table) if question.nearby else machine(table)
-    begins = own.poses.copy()
+    begins, ends = own.poses.copy(), sides[again]
     answer(
         legs.address,
         question.targets[again],
         begins,
-        sides[again],
+        ends,
         own.status,
         own.poses,
         own.actuators,
@@ -127,6 +127,7 @@ def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, row
     left = own.status != P.REACHED
     if not left.all():
         put_rows(rows, again[~left], rows_at(own, ~left))
+        sides[again[~left]] = ends[~left]
     return np.asarray(left)
 
 

@@ -11,7 +11,7 @@ from ..answers.limits import active_limits
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats, Ints, Mask
-from ..decomposition.leg_table import LegTable, table_without_arms
+from ..decomposition.leg_table import LegTable, table_of_poses
 from ..description.mechanism import Mechanism
 from ..feasibility import feasibility
 from ..ik import solve_ik
@@ -56,7 +56,7 @@ class Question:
     @property
     def has_margins(self) -> bool:
         """Whether closed forms tell margins; else points are asked for one by one, and only told whether reached."""
-        return self.hold == "orientation" and isinstance(table_without_arms(self.mechanism), LegTable)
+        return self.hold == "orientation" and isinstance(table_of_poses(self.mechanism), LegTable)
 
     @property
     def limits(self) -> Limits:

@@ -6,7 +6,7 @@ import math
 
 from .._jit import routine
 from ..vectors import Vec, cross, dot, scale, sub, vec
-from .answer import NOT_A_ROTATION, ROUNDED, make_exact
+from .poses import NOT_A_ROTATION, ROUNDED, make_exact
 from .records import CRANK, Floats, Record
 
 # Few enough for the nearest cache, many enough to pay for what is read once a block.

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 from .._jit import routine
-from ..vectors import Vec, add, along, cross, dot, move, put, scale, sub, vec
-from .records import Floats, Record
+from ..vectors import Vec, along, cross, dot, scale
+from .records import Floats
 
 # Sine of the angle from a dead point, or from aligned hinges, below which a solution is not sure to half its digits.
 SURE = 1e-6
@@ -71,17 +71,3 @@ def spin_angle(T: Floats, axis: Vec) -> float:
     """Angle of a rotation about `axis`, its own axis, in (-pi, pi]."""
     sine = axis[0] * (T[2, 1] - T[1, 2]) + axis[1] * (T[0, 2] - T[2, 0]) + axis[2] * (T[1, 0] - T[0, 1])
     return math.atan2(sine, T[0, 0] + T[1, 1] + T[2, 2] - 1.0)
-
-
-@routine
-def put_pose_slope(leg: Record, frame: Floats, a: Vec, c: Vec, slope: Floats) -> None:
-    """Derivative (6,) of a . dH + c . w by the platform's velocity (at its reference point) and angular velocity.
-
-    dH and w are those of the head as `frame` has them: the platform's, or the base's as seen from the platform.
-    """
-    arm = sub(move(frame, vec(leg["head_point"])), vec(frame[3]))
-    spin = add(cross(arm, a), c)
-    if leg["reversed"] == 1:
-        a, spin = scale(-1.0, turned_back(frame, a)), scale(-1.0, turned_back(frame, spin))
-    put(slope[:3], a)
-    put(slope[3:], spin)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from .._jit import kernel, routine
 from ..vectors import angle_between, vec
-from .answer import CLOSE, KEPT, complete, deviation, lean_to, load, new_completion, put_rows
+from .answer import CLOSE, KEPT, complete, deviation, end_of_rows, new_completion, put_rows
+from .poses import lean_to, load, put_pose
 from .records import CARRIAGE, CRANK, ROD, SLIDE, Floats, Record, Records
 from .table import open_table
 
@@ -112,15 +113,6 @@ def aim(target: Floats, begin: Floats, share: float, task: Record, toward: Float
 
 
 @routine
-def put_pose(pose: Floats, length: float, to: Floats) -> None:
-    """A pose [L], (4, 4), as one [length]."""
-    for i in range(3):
-        to[i, 3] = pose[i, 3] * length
-        for j in range(3):
-            to[i, j] = pose[i, j]
-
-
-@routine
 def reach_of(leg: Record, own: Floats) -> float:
     """Minus the gap that a leg leaves where its carrier does not reach, as a share of its rod."""
     if leg["kind"] == ROD and (leg["carrier"] == CRANK or leg["carrier"] == CARRIAGE):
@@ -131,8 +123,7 @@ def reach_of(leg: Record, own: Floats) -> float:
 @routine
 def largest_row(legs: Records, rows: Floats, k: int) -> float:
     """The largest constraint of a leg [L or rad]."""
-    last = legs[k + 1]["first_row"] if k + 1 < legs.shape[0] else rows.shape[0]
     worst = 0.0
-    for i in range(legs[k]["first_row"], last):
+    for i in range(legs[k]["first_row"], end_of_rows(legs, k, rows.shape[0])):
         worst = max(worst, abs(rows[i]))
     return worst

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._jit import kernel, routine
-from .answer import CLOSE, CLOSED, load
+from .answer import CLOSE, CLOSED
 from .blocks import lay_cone_axis, lay_deviation, lay_rod, lay_sides
 from .columns import (
     AX,
@@ -35,6 +35,7 @@ from .columns import (
     lay_out,
 )
 from .feasibility import share_of
+from .poses import load
 from .records import CARRIAGE, CRANK, HINGE, NO_CARRIER, SHARED, SLIDE, Floats, Record, Records
 from .table import open_table
 

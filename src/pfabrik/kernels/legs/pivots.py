@@ -10,10 +10,10 @@ import math
 
 from .._jit import routine
 from ..vectors import Vec, cross, dot, move, sub, turn, vec
-from .endings import aim, angle_to, put_pose_slope, spin_angle, turned
+from .endings import aim, angle_to, spin_angle, turned
+from .frames import NOWHERE, put_pose_slope
 from .records import CROSS, FOOT, HEAD, HINGE, TRIPLE, Floats, Record
 
-NOWHERE: Vec = (0.0, 0.0, 0.0)
 # What is added to conditions that an axis meets also where it is turned over.
 TURNED_OVER = 2.0
 

@@ -5,7 +5,8 @@ base coordinates. A leg read from the base ends on the platform; one that is rev
 ends on the base. Its *foot* is the end it is read from, its *head* the other one.
 
 A rod is [carrier] + foot ending + rigid or sliding rod + head ending; a pivot is [slides] + one ending of no length. An
-arm is a hinge or a slide that the pose does not determine, and that carries sliding rods: its coordinate is given.
+arm is a hinge or a slide next to the base or the platform that other legs are on, and that the pose alone does not
+tell: its coordinate is given, or found with what a target leaves open.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ Record: TypeAlias = Any  # one of them: its fields are numbers and arrays
 
 # An idle leg has nothing to say of a platform that does not turn.
 ROD, PIVOT, ARM, IDLE = 0, 1, 2, 3
-# What carries the foot: nothing, a hinge, a slide; or what carries the rod before (a second forearm), or the arm.
-# Of an arm, what it is.
+# What carries the foot: nothing, a hinge, a slide; or what carries the rod before (a second forearm). Of an arm, what
+# it is.
 NO_CARRIER, CRANK, CARRIAGE, SHARED = 0, 1, 2, 3
 # Endings: a weld, a hinge, two hinges that cross, three hinges through one point, a ball.
 WELD, HINGE, CROSS, TRIPLE, BALL = 0, 1, 2, 3, 4
@@ -33,8 +34,11 @@ LEG = np.dtype(
     [
         ("kind", "i8"),
         ("reversed", "i8"),
+        ("arm", "i8"),  # the leg which is the arm that it is on; -1 if it is on none
+        ("frame", "i8"),  # that it is read in, see `frames`
+        ("makes", "i8"),  # of an arm: the frame that it makes
+        ("at_head", "i8"),  # of an arm, 1: it moves the body that heads are on
         ("carrier", "i8"),
-        ("on_arm", "i8"),  # 1: an arm on the arm before
         ("slides", "i8"),  # 1: a rod that changes its length; of a pivot, how many slides there are
         ("twists", "i8"),  # 1: both endings hold the rod against spinning about itself
         ("foot", "i8"),  # ending of a rod's foot, or of a pivot
@@ -62,7 +66,7 @@ LEG = np.dtype(
         ("moved", "f8", (3, 3)),
         ("value", *_vector),
         ("first_row", "i8"),  # place of its first constraint among all
-        ("bears", "i8"),  # 1: it, or a rod on its carrier, leaves a constraint
+        ("bears", "i8"),  # 1: it, or a rod on its carrier, leaves a constraint; of an arm, a leg on it
         ("upright", "i8"),  # of a pivot: how many of its `foot_axes` R must not turn over
     ]
 )
@@ -71,7 +75,7 @@ LEG = np.dtype(
 CARRIER, FOOT, SLIDE, HEAD = 0, 1, 4, 5  # three angles at FOOT and at HEAD; the slides of a pivot at HEAD
 FOOT_LINE, HEAD_LINE = 8, 11  # the rod's direction as seen by the body its foot, or its head, is on
 COSINE, SINE = 14, 15  # of the crank's angle
-PLACED = 1  # of an arm: its displacement from home, three rows of the rotation and then the translation
+RATE = 1  # of an arm: the velocity and angular velocity of the platform that would change as much in its frame
 N_VALUES = 16
 
 COORDINATE = np.dtype(
@@ -104,8 +108,9 @@ TASK = np.dtype(
         ("length", "f8"),
         ("reference", *_vector),  # at home [L]
         ("axes", "i8", (3,)),  # 1: this coordinate of the position is set
-        ("rotations", "i8"),  # 3: the rotation is set, 2: the direction of the z axis, 0: nothing
+        ("rotations", "i8"),  # 3: the rotation is set, 2: the direction of the z axis, 1: the yaw, 0: nothing
         ("unset", "i8"),  # how many coordinates of the pose are not
+        ("arms", "i8"),  # how many arms there are that bear: these are found with them
         ("rows", "i8"),  # how many constraints the legs have
         ("farthest", "f8"),  # what is not set may not go farther from where it began [L or rad]
     ]

@@ -17,9 +17,9 @@ import math
 
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec, wrap
-from .endings import aim, angle_to, either_angle, put_pose_slope, turned, turned_back
+from .endings import aim, angle_to, either_angle, turned, turned_back
+from .frames import NOWHERE, put_pose_slope
 from .records import (
-    ARM,
     CARRIAGE,
     CARRIER,
     COSINE,
@@ -30,15 +30,12 @@ from .records import (
     HEAD_LINE,
     HINGE,
     NO_CARRIER,
-    PLACED,
     SHARED,
     SINE,
     SLIDE,
     Floats,
     Record,
 )
-
-NOWHERE: Vec = (0.0, 0.0, 0.0)
 
 
 @routine
@@ -68,8 +65,6 @@ def carried_foot(rod: Record, carrier: Record, own: Floats) -> Vec:
     """Where the foot is, with the carrier (the rod's, or the one it shares) as `own` says."""
     if carrier["carrier"] == NO_CARRIER:
         return vec(rod["foot_point"])
-    if carrier["kind"] == ARM:
-        return moved_by_arm(own, vec(rod["foot_point"]))
     if carrier["carrier"] == CARRIAGE:
         return along(vec(rod["foot_point"]), own[CARRIER], vec(carrier["carrier_axis"]))
     if rod["carrier"] == SHARED:
@@ -83,46 +78,9 @@ def carried_foot(rod: Record, carrier: Record, own: Floats) -> Vec:
 @routine
 def carried(carrier: Record, own: Floats, v: Vec, sense: float) -> Vec:
     """A direction turned with the crank, or back (sense -1)."""
-    if carrier["kind"] == ARM:
-        return turned_by_arm(own, v) if sense > 0.0 else turned_back_by_arm(own, v)
     if carrier["carrier"] != CRANK:
         return v
     return turned(v, vec(carrier["carrier_axis"]), own[COSINE], sense * own[SINE])
-
-
-@routine
-def turned_by_arm(own: Floats, v: Vec) -> Vec:
-    return dot(vec(own[1:4]), v), dot(vec(own[4:7]), v), dot(vec(own[7:10]), v)
-
-
-@routine
-def turned_back_by_arm(own: Floats, v: Vec) -> Vec:
-    return add(scale(v[0], vec(own[1:4])), along(scale(v[1], vec(own[4:7])), v[2], vec(own[7:10])))
-
-
-@routine
-def moved_by_arm(own: Floats, point: Vec) -> Vec:
-    return add(vec(own[10:13]), turned_by_arm(own, point))
-
-
-@routine
-def place_arm(arm: Record, q: float, before: Floats, own: Floats) -> None:
-    """Fill an arm's values, its coordinate given.
-
-    Parameters
-    ----------
-    before : values of the arm that it is on; unused where it is on the body it is read from.
-    """
-    own[CARRIER], axis, at = q, vec(arm["carrier_axis"]), vec(arm["carrier_point"])
-    cosine, sine = math.cos(q), math.sin(q)
-    for j in range(3):
-        e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
-        column = turned(e, axis, cosine, sine) if arm["carrier"] == CRANK else e
-        column = turned_by_arm(before, column) if arm["on_arm"] == 1 else column
-        for i in range(3):
-            own[PLACED + 3 * i + j] = column[i]
-    shift = sub(at, turned(at, axis, cosine, sine)) if arm["carrier"] == CRANK else scale(q, axis)
-    put(own[10:13], moved_by_arm(before, shift) if arm["on_arm"] == 1 else shift)
 
 
 @routine
@@ -217,28 +175,26 @@ def put_slope(
     follow : derivative of the carrier's coordinate (6,).
     """
     put_pose_slope(rod, frame, a, c, slope)
-    if carrier["carrier"] != NO_CARRIER and carrier["kind"] != ARM:
-        by_carrier = carrier_rate(carrier, lead, carried_foot(rod, carrier, lead), a, b)
+    if carrier["carrier"] != NO_CARRIER:
+        by_carrier = carrier_rate(carrier, carried_foot(rod, carrier, lead), a, b)
         for i in range(6):
             slope[i] += by_carrier * follow[i]
 
 
 @routine
-def carrier_rate(carrier: Record, lead: Floats, foot: Vec, a: Vec, b: Vec) -> float:
-    """Derivative of - a . F + b . W by the coordinate of a carrier, or of an arm, with the foot F on it."""
-    axis, at = vec(carrier["carrier_axis"]), vec(carrier["carrier_point"])
-    if carrier["kind"] == ARM:
-        axis, at = turned_by_arm(lead, axis), moved_by_arm(lead, at)
+def carrier_rate(carrier: Record, foot: Vec, a: Vec, b: Vec) -> float:
+    """Derivative of - a . F + b . W by the coordinate of a carrier, with the foot F on it."""
+    axis = vec(carrier["carrier_axis"])
     if carrier["carrier"] == CARRIAGE:
         return -dot(a, axis)
-    return dot(b, axis) - dot(a, cross(axis, sub(foot, at)))
+    return dot(b, axis) - dot(a, cross(axis, sub(foot, vec(carrier["carrier_point"]))))
 
 
 @routine
 def put_follow(rod: Record, frame: Floats, own: Floats, u: Vec, follow: Floats) -> None:
     """Derivative (6,) of the coordinate of a carrier that keeps the rod's length."""
     put_pose_slope(rod, frame, u, NOWHERE, follow)
-    rate = carrier_rate(rod, own, carried_foot(rod, rod, own), u, NOWHERE)
+    rate = carrier_rate(rod, carried_foot(rod, rod, own), u, NOWHERE)
     for i in range(6):
         follow[i] /= -rate
 

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import allocator, routine
-from ..legs.answer import deviation, set_frames
-from ..legs.endings import put_pose_slope
+from ..legs.answer import deviation, end_of_rows
+from ..legs.frames import NOWHERE, by_arm, new_frames, place_arm, put_pose_slope, set_frames
 from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
 from ..legs.records import (
     ARM,
@@ -43,13 +43,11 @@ from ..legs.records import (
     Table,
 )
 from ..legs.rods import (
-    NOWHERE,
     carried,
     carried_foot,
     carrier_rate,
     carry,
     mark,
-    place_arm,
     read_rod,
     rod_rows,
     twist_rate,
@@ -74,7 +72,7 @@ class Now(NamedTuple):
 class View(NamedTuple):
     """What legs are like at a configuration."""
 
-    frames: Floats  # (2, 4, 4): see `set_frames`
+    frames: Floats  # (2 + arms, 7, 4): see `legs.frames`
     values: Floats  # (legs, N_VALUES)
     lines: Floats  # (legs, 3): of a rod, from foot to head
     rows: Floats  # (m,): the equations
@@ -93,8 +91,8 @@ def new_view(table: Table) -> View:
     """Memory for what is told of it."""
     legs, n = table.legs.shape[0], count_unknowns(table)
     m = table.task[0]["rows"] + count_carried(table)
-    frames, values, lines = np.zeros((2, 4, 4)), np.zeros((legs, N_VALUES)), np.zeros((legs, 3))
-    return View(frames, values, lines, np.zeros(m), np.zeros((m, n)), np.zeros(n))
+    values, lines = np.zeros((legs, N_VALUES)), np.zeros((legs, 3))
+    return View(new_frames(table.legs), values, lines, np.zeros(m), np.zeros((m, n)), np.zeros(n))
 
 
 @routine
@@ -141,16 +139,16 @@ def place_leg(table: Table, k: int, main: int, now: Now, view: View) -> None:
 
     Parameters
     ----------
-    main : the leg whose carrier it is on, or the arm, read before; itself if it is on none but its own.
+    main : the leg whose carrier it is on, read before; itself if it is on none but its own.
     """
     legs, values, lines, rows = table.legs, view.values, view.lines, view.rows
     leg, lead = legs[k], legs[main]
-    frame = view.frames[leg["reversed"]]
+    frame = view.frames[leg["frame"]]
     if leg["kind"] == PIVOT:
         place_pivot(leg, frame, now.sides[k], values[k])
         pivot_rows(leg, frame, view.rows)
     elif leg["kind"] == ARM:
-        place_arm(leg, now.q[k], values[k - leg["on_arm"]], values[k])
+        place_arm(leg, now.q[k], view.frames, values[k])
     elif leg["kind"] == ROD:
         if is_carried(leg):
             values[k, CARRIER] = now.q[k]
@@ -169,8 +167,10 @@ def close_rods(table: Table, now: Now, view: View) -> None:
     set_frames(now.pose, table.task[0], view.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
+        if leg["kind"] == ARM:
+            place_arm(leg, q[k], view.frames, own[k])
         if is_carried(leg):
-            head = move(view.frames[leg["reversed"]], vec(leg["head_point"]))
+            head = move(view.frames[leg["frame"]], vec(leg["head_point"]))
             if carry(leg, head, side_of(leg, head, q[k]), own[k]) > SURELY:
                 q[k] = wrap(own[k, CARRIER], q[k]) if leg["carrier"] == CRANK else own[k, CARRIER]
 
@@ -209,7 +209,9 @@ def put_leg_slopes(table: Table, k: int, main: int, view: View) -> None:
     """Fill the derivatives of one leg's equations, by the unknowns that they have."""
     leg, slopes = table.legs[k], view.slopes
     if leg["kind"] == PIVOT:
-        pivot_slopes(leg, view.frames[leg["reversed"]], view.slopes)
+        pivot_slopes(leg, view.frames[leg["frame"]], view.slopes)
+        for row in range(leg["first_row"], end_of_rows(table.legs, k, table.task[0]["rows"])):
+            put_arm_slopes(table, k, view, slopes[row])
     elif leg["kind"] == ROD:
         if is_carried(leg):
             put_rate(table, k, k, direction(view.lines[k]), NOWHERE, NOWHERE, view, slopes[own_row(table, k)])
@@ -227,23 +229,29 @@ def put_rate(table: Table, k: int, main: int, a: Vec, b: Vec, c: Vec, view: View
 
     Parameters
     ----------
-    main : the leg whose carrier it is on, or the arm, which may be on others; itself if on none.
+    main : the leg whose carrier it is on; itself if on none.
     """
-    rod, legs, columns = table.legs[k], table.legs, table.columns
-    put_pose_slope(rod, view.frames[rod["reversed"]], a, c, slope)
-    if columns[main] >= 0:
-        foot = carried_foot(rod, legs[main], view.values[main])
-        slope[columns[main]] = carrier_rate(legs[main], view.values[main], foot, a, b)
-        while legs[main]["on_arm"] == 1:
-            main -= 1
-            slope[columns[main]] = carrier_rate(legs[main], view.values[main], foot, a, b)
+    rod, carrier, column = table.legs[k], table.legs[main], table.columns[main]
+    put_pose_slope(rod, view.frames[rod["frame"]], a, c, slope)
+    if column >= 0:
+        slope[column] = carrier_rate(carrier, carried_foot(rod, carrier, view.values[main]), a, b)
+    put_arm_slopes(table, k, view, slope)
+
+
+@routine
+def put_arm_slopes(table: Table, k: int, view: View, slope: Floats) -> None:
+    """Derivatives by the arms that a leg is on, from those by the pose."""
+    arm = table.legs[k]["arm"]
+    while arm >= 0:
+        slope[table.columns[arm]] = by_arm(slope, view.values[arm])
+        arm = table.legs[arm]["arm"]
 
 
 @routine
 def put_rod_slopes(table: Table, k: int, main: int, view: View) -> None:
     """Fill the derivatives of the equations that `rod_rows` fills."""
     rod, carrier, lead, slopes = table.legs[k], table.legs[main], view.values[main], view.slopes
-    frame, n, span, u = view.frames[rod["reversed"]], rod["first_row"], vec(view.lines[k]), direction(view.lines[k])
+    frame, n, span, u = view.frames[rod["frame"]], rod["first_row"], vec(view.lines[k]), direction(view.lines[k])
     if rod["slides"] == 0 and not is_carried(rod):
         put_rate(table, k, main, u, NOWHERE, NOWHERE, view, slopes[n])
         n += 1
@@ -276,7 +284,7 @@ def seen(table: Table, k: int, main: int, end: int, v: Vec, view: View) -> Vec:
     """A direction that goes with the body which an end of a rod is on, as it is now."""
     if end == AT_FOOT:
         return carried(table.legs[main], view.values[main], v, 1.0)
-    return turn(view.frames[table.legs[k]["reversed"]], v)
+    return turn(view.frames[table.legs[k]["frame"]], v)
 
 
 @routine
@@ -287,7 +295,7 @@ def counts_turns(coordinate: Record) -> bool:
 
 @routine
 def main_of(table: Table, k: int) -> int:
-    """The leg whose carrier a leg is on, or the arm; itself if it is on none but its own."""
+    """The leg whose carrier a leg is on; itself if it is on none but its own."""
     while table.legs[k]["carrier"] == SHARED:
         k -= 1
     return k
@@ -301,7 +309,8 @@ def coordinate_slope(table: Table, coordinate: Record, view: View) -> float:
         slope[j] = 0.0
     leg = table.legs[k]
     if leg["kind"] == PIVOT:
-        put_pivot_slope(leg, view.frames[leg["reversed"]], view.values[k], spot, view.slope)
+        put_pivot_slope(leg, view.frames[leg["frame"]], view.values[k], spot, view.slope)
+        put_arm_slopes(table, k, view, view.slope)
     elif spot == CARRIER:
         slope[table.columns[k]] = 1.0
     elif spot == SLIDE:

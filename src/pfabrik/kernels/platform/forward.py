@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._jit import allocator, kernel, routine
-from ..legs.answer import KEPT, PENDING, REACHED, deviation, excess_of, make_exact
+from ..legs.answer import KEPT, PENDING, REACHED, deviation, excess_of
+from ..legs.poses import make_exact
 from ..legs.records import CARRIER, PIVOT, Floats, Record, Table
 from ..legs.table import open_table
 from ..linear import solve_spd

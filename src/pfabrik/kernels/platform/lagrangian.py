@@ -6,7 +6,8 @@ import math
 
 from .._jit import routine
 from ..free_motions import FreeMotions, put_multipliers
-from ..legs.answer import set_frames
+from ..legs.answer import end_of_rows
+from ..legs.frames import set_frames
 from ..legs.records import SHARED, Floats, Table
 from ..sqp import HOLDING, MOTIONS, PROBE, ROWS
 from .equations import (
@@ -73,9 +74,8 @@ def note_pulled(table: Table, aim: Aim, search: Search) -> None:
     ranges, n = table.limited.shape[0], legs.shape[0]
     first = 2 * ranges + table.cones.shape[0]
     for k in range(n):
-        end = legs[k + 1]["first_row"] if k + 1 < n else table.task[0]["rows"]
         most = multipliers[first + k]
-        for r in range(legs[k]["first_row"], end):
+        for r in range(legs[k]["first_row"], end_of_rows(legs, k, table.task[0]["rows"])):
             most = max(most, abs(balance[r]))
         if is_carried(legs[k]):
             most = max(most, abs(balance[own_row(table, k)]))
@@ -89,8 +89,11 @@ def note_pulled(table: Table, aim: Aim, search: Search) -> None:
     for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
         pulled[table.driven[i]["leg"]] = 1
     for k in range(n - 1, 0, -1):
-        if pulled[k] == 1 and (legs[k]["carrier"] == SHARED or legs[k]["on_arm"] == 1):
-            pulled[k - 1] = 1
+        if pulled[k] == 1:
+            if legs[k]["carrier"] == SHARED:
+                pulled[k - 1] = 1
+            if legs[k]["arm"] >= 0:
+                pulled[legs[k]["arm"]] = 1
 
 
 @routine

@@ -10,7 +10,8 @@ from .._jit import kernel, routine, search
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import turn_of_tilt
 from ..holding import balance
-from ..legs.answer import deviation, excess_of, make_exact
+from ..legs.answer import deviation, excess_of
+from ..legs.poses import make_exact
 from ..legs.records import ARM, PIVOT, SLIDE, Floats, Records, Table
 from ..legs.table import open_table
 from ..qp import new_qp

@@ -13,16 +13,17 @@ from ..legs.answer import (
     complete,
     cone_cosine,
     deviation,
-    load,
     new_completion,
     place_legs,
     put_rows,
-    set_frames,
     write_answer,
 )
 from ..legs.feasibility import largest_row
+from ..legs.frames import set_frames
+from ..legs.poses import load
 from ..legs.records import ARM, Floats, Table
 from ..legs.table import open_table
+from ..vectors import copy_row
 from .equations import main_of
 
 MOST_CHOICES = 8
@@ -80,7 +81,7 @@ def answer_otherwise(
         if sides[0, k] != 0.0 and legs[k]["kind"] != ARM:
             choosing[n_choices] = k
             n_choices += 1
-    together = own["unset"] > 0
+    together = own["unset"] + own["arms"] > 0
     tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if together else 1
     for row in range(targets.shape[0]):
         status[row], begin = PENDING, begins[row if begins.shape[0] > 1 else 0]
@@ -99,6 +100,7 @@ def answer_otherwise(
             if complete(table, sides[row], work):
                 status[row] = write_answer(table, work, poses[row], actuators[row], measures[row])
                 if status[row] == REACHED:
+                    copy_row(work.sides, sides[row])
                     break
         left += status[row]
     return left // PENDING

@@ -11,7 +11,7 @@ from .._jit import allocator, routine
 from ..closure.loops import BASE_AXES, LOCKED, Ints, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
-from ..legs.answer import turn_pose
+from ..legs.poses import turn_pose
 from ..legs.records import Floats, Table
 from ..qp import QP, new_qp
 from ..sqp import Hessian, StepControl, new_hessian, new_step_control

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 
 from .._jit import routine
-from ..closure.loops import BASE_AXES, LOCKED, SIGHT, TARGET_AXES, PoseObjective
+from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
-from ..legs.answer import column, is_pose, make_exact, set_frames, turn_pose
+from ..legs.frames import place_arm, set_frames
+from ..legs.poses import bring_yaw, column, is_pose, make_exact, turn_pose
 from ..legs.records import ARM, CARRIER, CRANK, Floats, Record, Table
 from ..legs.rods import carry
+from ..rotations import yaw_of
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
 from .equations import Now, View, is_carried
 from .records import STRETCHED, Starts
@@ -66,8 +68,10 @@ def put_carriers(table: Table, now: Now, look: View) -> None:
     for k in range(q.shape[0]):
         leg, own = table.legs[k], look.values[k]
         q[k] = sides[k] if leg["kind"] == ARM else 0.0
+        if leg["kind"] == ARM:
+            place_arm(leg, q[k], look.frames, own)
         if is_carried(leg):
-            head = move(look.frames[leg["reversed"]], vec(leg["head_point"]))
+            head = move(look.frames[leg["frame"]], vec(leg["head_point"]))
             carry(leg, head, -sides[k], own)
             other = own[CARRIER]
             carry(leg, head, sides[k], own)
@@ -89,11 +93,15 @@ def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, now: 
         sine = norm(axis)
         if sine > 0.0:
             turn_pose(now.pose, scale(math.atan2(sine, dot(column(now.pose, 2), column(target, 2))) / sine, axis))
+    if aim.frame == HALF_WAY and aim.platform[5] == LOCKED:
+        bring_yaw(now.pose, yaw_of(target))
     set_frames(now.pose, table.task[0], view.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
+        if leg["kind"] == ARM:
+            place_arm(leg, q[k], view.frames, view.values[k])
         if is_carried(leg):
-            q[k] = nearest_carrier(leg, view.frames[leg["reversed"]], q[k], view.values[k])
+            q[k] = nearest_carrier(leg, view.frames[leg["frame"]], q[k], view.values[k])
 
 
 @routine
@@ -119,8 +127,9 @@ def put_sides(table: Table, now: Now, look: View) -> None:
         leg = table.legs[k]
         if leg["kind"] == ARM:
             sides[k] = q[k]
+            place_arm(leg, q[k], look.frames, look.values[k])
         if is_carried(leg):
-            frame = look.frames[leg["reversed"]]
+            frame = look.frames[leg["frame"]]
             head = move(frame, vec(leg["head_point"]))
             off = (0.0, 0.0)
             for side in (-1.0, 1.0):

@@ -1,0 +1,130 @@
+"""Poses: targets read, completed with what they leave open, and made exact; platforms turned."""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import routine
+from ..rotations import UPSIDE_DOWN, turn_about_z, yaw_of
+from ..vectors import Vec, cross, dot, norm, scale, vec
+from .endings import SURE, turned
+from .records import Floats, Record
+
+# Deviation from an orthonormal matrix up to which a target is a pose, and from which on it is not made one.
+NOT_A_ROTATION, ROUNDED = 1e-6, 1e-14
+
+
+@routine
+def turn_pose(pose: Floats, spin: Vec) -> None:
+    """Turn the rotation of a pose by a rotation vector, in base coordinates."""
+    angle = norm(spin)
+    if angle == 0.0:
+        return
+    axis = scale(1.0 / angle, spin)
+    for j in range(3):
+        column = turned((pose[0, j], pose[1, j], pose[2, j]), axis, math.cos(angle), math.sin(angle))
+        for i in range(3):
+            pose[i, j] = column[i]
+
+
+@routine
+def load(target: Floats, begin: Floats, task: Record, pose: Floats) -> bool:
+    """A target [length] as a pose [L], what it does not set as in another; False where it is no pose, or turned over.
+
+    Of the rotation the nearest is taken: two steps of R <- R (3 - R^T R) / 2. Where the direction of the z axis is
+    all that is set of it, it is brought there by the shortest turn; where the yaw is, by a turn about z.
+    """
+    if not is_pose(target):
+        return False
+    rotations, yaw = task["rotations"], 0.0
+    for i in range(3):
+        pose[i, 3] = (target[i, 3] if task["axes"][i] == 1 else begin[i, 3]) / task["length"]
+        for j in range(3):
+            pose[i, j] = target[i, j] if rotations == 3 or rotations == 1 else begin[i, j]
+    if rotations == 3 or rotations == 1:
+        make_exact(pose)
+    if rotations == 2:
+        return lean_to(target, 1.0, pose)
+    if rotations == 1:
+        yaw = yaw_of(pose)
+        is_upright = 1.0 + min(pose[2, 2], begin[2, 2]) > UPSIDE_DOWN
+        for i in range(3):
+            for j in range(3):
+                pose[i, j] = begin[i, j]
+        bring_yaw(pose, yaw)
+        return is_upright
+    return True
+
+
+@routine
+def bring_yaw(pose: Floats, yaw: float) -> None:
+    """Turn a pose about the base's z axis until its yaw is this."""
+    turn_about_z(pose, yaw - yaw_of(pose))
+
+
+@routine
+def lean_to(target: Floats, share: float, pose: Floats) -> bool:
+    """Bring the z axis of a pose to a target's by the shortest turn, or a share of the way; False where turned over."""
+    now, wanted = (pose[0, 2], pose[1, 2], pose[2, 2]), (target[0, 2], target[1, 2], target[2, 2])
+    wanted = scale(1.0 / norm(wanted), wanted)
+    across = cross(now, wanted)
+    sine, cosine = norm(across), dot(now, wanted)
+    if sine > 0.0:
+        turn_pose(pose, scale(share * math.atan2(sine, cosine) / sine, across))
+    return cosine > SURE - 1.0
+
+
+@routine
+def is_pose(target: Floats) -> bool:
+    worst, finite = abs(target[3, 3] - 1.0), 0.0
+    for i in range(3):
+        worst += abs(target[3, i])
+        finite += target[i, 3]
+        for j in range(i, 3):
+            worst += abs(gram(target, i, j))
+    x, y, z = column(target, 0), column(target, 1), column(target, 2)
+    return worst <= NOT_A_ROTATION and dot(cross(x, y), z) > 0.0 and abs(finite) < math.inf
+
+
+@routine
+def column(T: Floats, i: int) -> Vec:
+    return T[0, i], T[1, i], T[2, i]
+
+
+@routine
+def gram(T: Floats, i: int, j: int) -> float:
+    """An entry of R^T R - 1."""
+    return T[0, i] * T[0, j] + T[1, i] * T[1, j] + T[2, i] * T[2, j] - (1.0 if i == j else 0.0)
+
+
+@routine
+def make_exact(pose: Floats) -> None:
+    """Make the rotation of a pose the nearest that is orthonormal."""
+    for _ in range(2):
+        xx, yy, zz = gram(pose, 0, 0), gram(pose, 1, 1), gram(pose, 2, 2)
+        xy, yz, zx = gram(pose, 0, 1), gram(pose, 1, 2), gram(pose, 2, 0)
+        if abs(xx) + abs(yy) + abs(zz) + abs(xy) + abs(yz) + abs(zx) <= ROUNDED:
+            return
+        for i in range(3):
+            row = vec(pose[i])
+            pose[i, 0] -= 0.5 * dot(row, (xx, xy, zx))
+            pose[i, 1] -= 0.5 * dot(row, (xy, yy, yz))
+            pose[i, 2] -= 0.5 * dot(row, (zx, yz, zz))
+
+
+@routine
+def load_pose(pose: Floats, length: float, to: Floats) -> None:
+    """A pose [length], as one [L]."""
+    for i in range(3):
+        to[i, 3] = pose[i, 3] / length
+        for j in range(3):
+            to[i, j] = pose[i, j]
+
+
+@routine
+def put_pose(pose: Floats, length: float, to: Floats) -> None:
+    """A pose [L], (4, 4), as one [length]."""
+    for i in range(3):
+        to[i, 3] = pose[i, 3] * length
+        for j in range(3):
+            to[i, j] = pose[i, j]
