@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from conftest import INTERPRETED
+from machines import closure
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
 from pfabrik.kernels.legs import records as K
@@ -20,9 +21,12 @@ from pfabrik.kernels.platform.records import Aim
 from pfabrik.kernels.platform.search import new_search
 from pfabrik.platform.table import kernel_table
 
-pytestmark = pytest.mark.skipif(not INTERPRETED, reason="routines are parts of compiled kernels")
+pytestmark = [
+    pytest.mark.skipif(not INTERPRETED, reason="routines are parts of compiled kernels"),
+    pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),
+]
 
-MACHINES = [name for name in pf.catalog() if isinstance(leg_table(pf.load(name)), LegTable)]
+MACHINES = [*pf.catalog(), *closure.ON_ARMS]
 STEP = 1e-6
 
 
@@ -40,7 +44,7 @@ def moved(now: E.Now, unknown: int, step: float, columns: np.ndarray) -> E.Now:
 
 def described_by_name(name: str) -> tuple[pf.Mechanism, LegTable, Table]:
     """A machine, its legs, and these as kernels take them."""
-    mechanism = pf.load(name)
+    mechanism = closure.ON_ARMS[name]() if name in closure.ON_ARMS else pf.load(name)
     described = leg_table(mechanism)
     assert isinstance(described, LegTable)
     return mechanism, described, kernel_table(described)

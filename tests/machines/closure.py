@@ -498,3 +498,47 @@ def h4(task: Sequence[str] = ("x", "y", "z", "yaw")) -> Mechanism:
         joint("R", "Q2", ("back", "platform"), (0, -90, -500), Z),
     ]
     return Mechanism("H4", joints, "platform", (0, 0, -500), task=tuple(task))
+
+
+def rrrs() -> Mechanism:
+    """Three legs like those of a walking robot: a hip that swings, a thigh, a shank, and a ball at the end."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        out, side = _out(angle), _tangent(angle)
+        hip, thigh, knee = 120 * out, 150 * out, 210 * out + [0, 0, 80]
+        joints += chain(
+            leg,
+            ("R*", hip, Z, {"range": (-0.7, 0.7)}),
+            ("R*", thigh, side, {"range": (-0.9, 0.9)}),
+            ("R", knee, side, {"range": (-1.2, 1.2)}),
+            ("S", 70 * out + [0, 0, 190], {"cone": Cone((0, 0, -1), 1.2, "platform")}),
+        )
+    return Mechanism("3-RRRS", joints, "platform", (0, 0, 190))
+
+
+def offset_cardans() -> Mechanism:
+    """A hexapod whose cardan joints at the base have axes that pass each other 12 mm apart."""
+    joints = []
+    feet, heads = ring(150, 0, (-8, 8, 112, 128, 232, 248)), ring(90, 200, (-40, 40, 80, 160, 200, 280))
+    for leg, (foot, head) in enumerate(zip(np.array(feet), np.array(heads), strict=True), 1):
+        out = np.array([foot[0], foot[1], 0.0]) / np.hypot(foot[0], foot[1])
+        below = foot - 12 * np.cross(Z, out) - [0.0, 0.0, 12.0]
+        inner = np.cross(out, head - foot)
+        joints += chain(
+            leg,
+            ("R", below, out, {"range": (-0.8, 0.8)}),
+            ("R", foot, inner, {"range": (-0.9, 0.9)}),
+            ("P*", None, (head - foot) / np.linalg.norm(head - foot), {"range": (-45, 60)}),
+            ("S", head),
+        )
+    return Mechanism("6-RRPS", joints, "platform", (0, 0, 200))
+
+
+ON_ARMS: dict[str, Callable[[], Mechanism]] = {
+    "H4": h4,
+    "SCARA": scara,
+    "3-CRU": cru,
+    "3-RRRS": rrrs,
+    "6-RRPS": offset_cardans,
+}
+"""Machines with legs on arms that follow from their poses."""

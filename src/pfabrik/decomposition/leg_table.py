@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ class LegTable:
 
     @property
     def home_sides(self) -> Floats:
-        """Which of two solutions each leg takes at home, and where arms are, (1, legs)."""
+        """Which of two solutions each leg takes at home, and where arms without are, (1, legs)."""
         return np.array(self.legs["side"], dtype=float)[None]
 
     @cached_property
@@ -73,10 +73,20 @@ class LegTable:
         arms["column"] = np.arange(len(arms))
         return arms
 
+    @cached_property
+    def led_arms(self) -> Records:
+        """The coordinates of those arms that stand in the place of a side."""
+        return np.asarray(self.arms[self.legs["by_plane"][self.arms["leg"]] == 0])
+
     @property
-    def arms_follow(self) -> bool:
-        """Whether arms follow from the pose, by what the legs on them ask for; else poses leave them open."""
-        return bool(self.task["arms"][0])
+    def has_free_arms(self) -> bool:
+        """Whether poses leave arms open; else they follow by what the legs on them ask for."""
+        return len(self.arms) > 0 and not self.task["arms"][0]
+
+    @property
+    def leads_arms(self) -> bool:
+        """Whether some arms follow from where they were."""
+        return bool(self.task["led"][0])
 
     @cached_property
     def is_for_blocks(self) -> bool:
@@ -106,7 +116,7 @@ def leg_table(mechanism: Mechanism) -> LegTable | str:
 def table_of_poses(mechanism: Mechanism) -> LegTable | str:
     """A mechanism's table of legs if a pose leaves none of their limits open, or the reason why it has none."""
     table = leg_table(mechanism)
-    if isinstance(table, str) or table.arms_follow or not len(table.arms):
+    if isinstance(table, str) or not table.has_free_arms:
         return table
     names = dict.fromkeys(item.joint.name for form in table.forms if isinstance(form, Arm) for item in form.items)
     return f"poses leave joints {', '.join(names)} open"
@@ -121,6 +131,7 @@ def _table(mechanism: Mechanism) -> LegTable:
     forms = _forms(mechanism)
     legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
     _put_frames(legs, forms)
+    _put_facing(legs, forms)
     counts = _row_counts(legs)
     legs["first_row"] = [0, *accumulate(counts)][:-1]
     legs["bears"] = _bear(legs, counts)
@@ -163,6 +174,16 @@ def _put_frames(legs: Records, forms: Sequence[LegForm]) -> None:
     arms = legs["kind"] == K.ARM
     legs["makes"][arms] = 2 + np.arange(arms.sum())
     legs["frame"] = np.where(legs["arm"] >= 0, legs["makes"][legs["arm"]], legs["reversed"])
+
+
+def _put_facing(legs: Records, forms: Sequence[LegForm]) -> None:
+    """Which arms have the rod after them face its head, and which of two solutions is home's."""
+    for k, (form, after) in enumerate(pairwise(forms)):
+        if isinstance(form, Arm) and form.faces and isinstance(after, Rod):
+            across = np.cross(form.item.axis, after.foot_ending.items[0].axis)
+            legs["by_plane"][k] = 1
+            if form.item.kind == "R":
+                legs["side"][k] = -math.copysign(1.0, across @ (after.head - form.item.point))
 
 
 def _forms(mechanism: Mechanism) -> list[LegForm]:
@@ -410,6 +431,7 @@ def _task(mechanism: Mechanism, legs: Records) -> Records:
     task["rows"], task["farthest"] = sum(_row_counts(legs)), COMPLETED_WITHIN
     arms = legs[legs["kind"] == K.ARM]
     task["arms"] = len(arms) if arms["bears"].any() else 0
+    task["led"] = bool((arms["bears"] & (arms["by_plane"] == 0)).any())
     return task
 
 

@@ -146,12 +146,14 @@ class Arm:
     ----------
     at_head : whether it moves the body that their heads are on.
     on : the arm that it is on.
+    faces : whether it has the hinge at the foot of the one rod on it face the rod's head.
     """
 
     item: Item
     is_reversed: bool
     at_head: bool = False
     on: Arm | None = None
+    faces: bool = False
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -341,7 +343,12 @@ def _area(a: Floats, b: Floats) -> float:
 
 def _leg(items: list[Item]) -> tuple[LegForm, ...]:
     """The simplest leg that items in series are: fewest carriers, then read from the base, then the largest endings;
-    rods on arms where it is none of these."""
+    rods on arms where it is none of these.
+
+    Raises
+    ------
+    NoLeg : why it is none with one carrier, read from the platform.
+    """
     reasons = []
     for n_carriers in (0, 1):
         for is_reversed in (False, True):
@@ -351,13 +358,36 @@ def _leg(items: list[Item]) -> tuple[LegForm, ...]:
                     return (make(own, n_carriers, is_reversed),)
                 except NoLeg as reason:
                     reasons.append(str(reason))
-    for n_arms, is_reversed in product(range(1, MOST_ARMS + 1), (False, True)):
-        own = [item.back for item in items[::-1]] if is_reversed else items
+    readings = [(items, False), ([item.back for item in items[::-1]], True)]
+    for own, is_reversed in readings:
+        for n_carriers in (0, 1):
+            try:
+                return _facing(own, n_carriers, is_reversed)
+            except NoLeg:
+                continue
+    for n_arms, (own, is_reversed) in product(range(1, MOST_ARMS + 1), readings):
         try:
             return _on_arms(own[:n_arms], [own[n_arms:]], is_reversed)
         except NoLeg:
             continue
     raise NoLeg(reasons[-1])
+
+
+def _facing(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm, ...]:
+    """A rod on an arm that turns, or shifts, the plane across the hinge at its foot to where the head is."""
+    arm, rod = items[0], _rod_on(items[1:], n_carriers, is_reversed)
+    if arm.kind == "S" or rod.foot_ending.kind != "hinge" or (rod.carrier is None and rod.slide is None):
+        raise NoLeg("several joints carry its rod")
+    axis = rod.foot_ending.items[0].axis
+    lean = abs(arm.axis @ axis) if arm.kind == "P" else _area(arm.axis, axis)
+    if lean <= TOLERANCES.alignment:
+        raise NoLeg("several joints carry its rod")
+    if rod.carrier is not None:
+        off = _area(rod.carrier.axis, axis) if rod.carrier.kind == "R" else abs(rod.carrier.axis @ axis)
+        if off > TOLERANCES.implied:
+            raise NoLeg("several joints carry its rod")
+    under = Arm(arm, is_reversed, faces=True)
+    return under, *_on(under, [rod])
 
 
 def _pivot(items: list[Item], n_carriers: int, is_reversed: bool) -> Pivot:

@@ -8,7 +8,8 @@ import numpy as np
 
 from ._jit import allocator, routine
 from .closure.loops import Floats, Ints
-from .sqp import CLOSING, MOTIONS, RANK, ROWS, Linearisation, new_linearisation
+from .qp import QP, factorise, solve_qp
+from .sqp import CLOSING, LIMITS, MOTIONS, RANK, ROWS, Linearisation, new_linearisation
 
 DEPENDENT = 1e-6
 """What is left of an equation that follows from the others: descriptions are typed with as many digits."""
@@ -146,3 +147,20 @@ def add_limit(k: int, h: float, number: int, slope: Floats, view: FreeMotions) -
             G[k, a] += slope[j] * basis[j, a]
     linear.h[k], linear.which[k] = h, number
     return k + 1
+
+
+@routine
+def restoring_step(view: FreeMotions, p: QP) -> bool:
+    """The shortest step that meets the equations within all limits, into `p.x`, besides `shift`; False where there is
+    none."""
+    linear, basis, shift = view.linear, view.basis, view.shift
+    motions, k = linear.counts[MOTIONS], linear.counts[LIMITS]
+    for a in range(motions):
+        p.g[a] = 0.0
+        for j in range(shift.shape[0]):
+            p.g[a] += shift[j] * basis[j, a]
+    for c in range(k):
+        p.h[c] = linear.h[c] + linear.drift[c]
+        for a in range(motions):
+            p.G[c, a] = linear.G[c, a]
+    return factorise(linear.metric, motions, 0.0, p.factor) and solve_qp(p, motions, k)

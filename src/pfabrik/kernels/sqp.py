@@ -53,6 +53,10 @@ PROBE = 1e-6
 RESTORING, CORRECTIONS = 8, 1
 """Steps to bring a configuration back within its limits; and to close what a step left open that did not lead down."""
 
+LEAST_WEIGHT = 0.3
+"""What the penalty counts a gap at least, in units of the gradient: where the objective has none along an equation, its
+multiplier says nothing of how much may be left open."""
+
 ENOUGH, GOOD, EXACT = 1e-4, 0.5, 0.1
 """Shares of what a step promised that make it worth keeping, and the model good enough for less damping; and by how
 much it may be off where the model, at the end of a whole step, is good enough for far less."""
@@ -164,19 +168,6 @@ def is_closed(linear: Linearisation, tolerance: float) -> bool:
 
 
 @routine
-def restoring_step(linear: Linearisation, p: QP) -> bool:
-    """The shortest step within all limits, into `p.x`; False where there is none."""
-    motions, k = linear.counts[MOTIONS], linear.counts[LIMITS]
-    for a in range(motions):
-        p.g[a] = 0.0
-    for c in range(k):
-        p.h[c] = linear.h[c] + linear.drift[c]
-        for a in range(motions):
-            p.G[c, a] = linear.G[c, a]
-    return factorise(linear.metric, motions, 0.0, p.factor) and solve_qp(p, motions, k)
-
-
-@routine
 def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: float, p: QP) -> tuple[float, float]:
     """The step that the damped programme asks for, into `p.x`: what it takes from the objective, and the damping.
 
@@ -268,7 +259,7 @@ def begin_descent(linear: Linearisation, hessian: Hessian, control: StepControl)
     for c in range(len(hessian.multipliers)):
         hessian.multipliers[c] = 0.0
     control.scalars[DAMPING] = AT_FIRST * longest(linear.g, linear.counts[MOTIONS]) / LONGEST_STEP
-    control.scalars[PROMISE] = math.inf
+    control.scalars[PROMISE], control.scalars[WEIGHT] = math.inf, 0.0
     control.counts[STEPS] = control.counts[DONE] = control.counts[REJECTED] = 0
 
 
@@ -292,7 +283,7 @@ def plan_step(linear: Linearisation, hessian: Hessian, control: StepControl, mos
     control.counts[STEPS] += 1
     scalars[BEFORE] = scalars[PROMISE]
     promise, damping = propose(linear, hessian, scalars[DAMPING], scalars[LARGEST], p)
-    scalars[WEIGHT] = 2.0 * (scalars[HOLDING] + sum_of(p.multipliers, linear.counts[LIMITS]))
+    scalars[WEIGHT] = max(LEAST_WEIGHT, 2.0 * (scalars[HOLDING] + sum_of(p.multipliers, linear.counts[LIMITS])))
     promise += scalars[WEIGHT] * openness(linear)
     scalars[PROMISE], scalars[DAMPING] = promise, damping
     if promise <= 0.0 or damping > STEEPEST * scalars[LARGEST] or control.counts[STEPS] > most_steps:

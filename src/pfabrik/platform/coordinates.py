@@ -146,9 +146,10 @@ def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Fl
     if isinstance(start, LegAnswers):
         return start.sides
     sides = np.repeat(table.home_sides, len(start), axis=0)
-    if len(table.arms):
-        columns = table.known["column"][table.legs["kind"][table.known["leg"]] == K.ARM]
-        sides[:, table.arms["leg"]] = table.arms["sense"] * start.coordinates[:, columns] / table.arms["unit"]
+    if len(table.led_arms):
+        arms = table.led_arms
+        columns = [table.known["column"][table.known["leg"] == k][0] for k in arms["leg"]]
+        sides[:, arms["leg"]] = arms["sense"] * start.coordinates[:, columns] / arms["unit"]
     choosing = np.flatnonzero(table.home_sides[0])
     if not len(choosing):
         return sides

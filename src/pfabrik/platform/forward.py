@@ -55,7 +55,7 @@ def assembled(
         _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
         near = rest[rows.measures[rest, P.ACTUATOR_ERROR] <= tolerance]
         rows.status[near[rows.status[near] == P.PROJECTED]] = P.REACHED
-    found.sides[:, table.arms["leg"]] = found.q[:, table.arms["leg"]]
+    found.sides[:, table.led_arms["leg"]] = found.q[:, table.led_arms["leg"]]
     return rows, found.q, found.sides
 
 

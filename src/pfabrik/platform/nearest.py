@@ -37,7 +37,7 @@ struts leave the platform all its freedoms, and have no two ways to bend; more w
 platform nearly has in many poses."""
 
 CORNERS_OF_ARMS, HITS_OF_ARMS = 32, 8
-"""The same where arms follow: between two bodies that legs meet on there are many more configurations."""
+"""The same where arms are led: between two bodies that legs meet on there are many more configurations."""
 
 DRAWS, DRAWN_STEPS = 240, 30
 """How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
@@ -199,7 +199,7 @@ def _approach(
     from ..kernels.platform.nearest import approach
 
     at_home = table.task[0]["rotations"] == 0 and objective.platform[3] == LOCKED and objective.max_iterations > 0
-    asked = without_idle_legs(table) if at_home and not table.arms_follow else machine(table)
+    asked = without_idle_legs(table) if at_home and not len(table.arms) else machine(table)
     asked = asked if driven is None else Handle(asked.record._replace(driven=driven))
     found, legs = _new_found(len(objective.targets), table), asked.record
     limits = 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)
@@ -219,7 +219,7 @@ def _approach(
 
 @lru_cache(maxsize=64)
 def _hits(table: LegTable) -> int:
-    if table.arms_follow:
+    if table.leads_arms:
         return HITS_OF_ARMS
     return HITS if table.task[0]["rows"] > 0 or len(_carriers(table)) else HITS_OF_STRUTS
 
@@ -288,7 +288,7 @@ def corners_of(mechanism: Mechanism) -> Starts:
     modes = np.unique(np.sign(every.sides), axis=0, return_inverse=True)[1].ravel()
     chosen: list[int] = []
     away = _apart(every, 0)
-    while len(chosen) < min(CORNERS_OF_ARMS if table.arms_follow else CORNERS, len(feasible)):
+    while len(chosen) < min(CORNERS_OF_ARMS if table.leads_arms else CORNERS, len(feasible)):
         rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < OF_A_MODE
         chosen.append(int(np.where(rare & (away > 0.0), away + SELDOM, away).argmax()))
         away = np.minimum(away, _apart(every, chosen[-1]))

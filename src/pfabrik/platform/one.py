@@ -26,7 +26,7 @@ class OneTarget:
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators = len(mechanism.actuator_names)
-        self._is_for_blocks, self._arms_follow = table.is_for_blocks, table.arms_follow
+        self._is_for_blocks, self._leads_arms = table.is_for_blocks, table.leads_arms
         self._anywhere, self._nearby = machine(table), machine_nearby(table)
         self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
 
@@ -68,7 +68,7 @@ class OneTarget:
         """`reach` with all that it takes, as long as this object is kept; arms begin anew each time."""
         asked, own = self._nearby if nearby else self._anywhere, sides.copy()
         call = partial(self._kernel, asked.address, target, begin, own, *_filled(rows))
-        if not self._arms_follow:
+        if not self._leads_arms:
             return call
 
         def call_anew() -> int:
@@ -98,7 +98,7 @@ class OneAssembly:
         )
         self._starts = Handle(home_start(mechanism, table)), Handle(no_starts(table))
         self._asked = turns, *(starts.address for starts in self._starts)
-        self._legs, self._arms = machine(table), table.arms["leg"]
+        self._legs, self._arms = machine(table), table.led_arms["leg"]
 
     @cached_property
     def _kernel(self) -> Callable[..., None]:

@@ -91,4 +91,4 @@ def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
     legs = machine(table)
     measure_rows(legs.address, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
     by_pose, by_arms = slopes[:, :, :6], slopes[:, :, 6:]
-    return rows, by_pose - by_arms @ (np.linalg.pinv(by_arms) @ by_pose) if table.arms_follow else by_pose
+    return rows, by_pose - by_arms @ (np.linalg.pinv(by_arms) @ by_pose) if table.task["arms"][0] else by_pose

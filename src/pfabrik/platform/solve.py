@@ -73,7 +73,7 @@ class LegsEngine:
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
         first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
         rows = self._one.new_rows() if is_one else new_rows(self.mechanism, len(targets))
-        ends = first.copy() if self._table.arms_follow else first
+        ends = first.copy() if self._table.leads_arms else first
         if is_one and self._reach_one(targets, start, ends, keep_mode, rows):
             begins = _begins(self.mechanism, self._table, start, first)
             told = rows.poses, rows.actuators, ends
@@ -264,12 +264,12 @@ class LegsEngine:
         """
         begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
         asked = machine_nearby(self._table) if keep_mode else machine(self._table)
-        if self._table.arms_follow:
+        if self._table.leads_arms:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
         left = 1 if tried else self._run(self._table.is_for_blocks, asked, targets, begins, sides, rows)
         if left and self._table.is_for_blocks and self._table.task["unset"][0]:
             left -= self._complete(asked, targets, begins, sides, rows)
-        if left and len(self._table.arms) and not self._table.arms_follow:
+        if left and self._table.has_free_arms:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
             left -= self._reach_by_arms(asked, targets, begins, sides, rows)
             if left and start is not None and not keep_mode:
@@ -295,7 +295,7 @@ class LegsEngine:
 
     def _reach_from_home(self, asked: Machine, targets: Floats, sides: Floats, rows: P.Rows) -> int:
         """The same, with arms that start at home: from where they are, limits may be in the way."""
-        away, home, arms = rows.status != P.REACHED, sides.copy(), self._table.arms["leg"]
+        away, home, arms = rows.status != P.REACHED, sides.copy(), self._table.led_arms["leg"]
         home[:, arms] = self._table.home_sides[:, arms]
         n = self._reach_by_arms(asked, targets, self._one.home, home, rows)
         found = away & (rows.status == P.REACHED)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from .._jit import routine, search
-from ..free_motions import FreeMotions, new_free_motions, put_multipliers
+from ..free_motions import FreeMotions, new_free_motions, put_multipliers, restoring_step
 from ..holding import balance
 from ..qp import QP, new_qp
 from ..rotations import turn_ball
@@ -35,7 +35,6 @@ from ..sqp import (
     longest,
     on_the_way,
     plan_step,
-    restoring_step,
     rests_open,
     scale_objective,
 )
@@ -155,7 +154,7 @@ def restore_feasibility(
     for _step in range(RESTORING):
         if is_closed(view.linear, tolerance):
             return True
-        if not restoring_step(view.linear, p):
+        if not restoring_step(view, p):
             return False
         take(loops, view, p.x, state, work)
         linearise(loops, row, objective, state, work, view)

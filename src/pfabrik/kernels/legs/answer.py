@@ -13,7 +13,7 @@ from ..linear import solve_spd
 from ..rotations import yaw_of
 from ..vectors import copy_row, cross, dot, norm, put, scale, vec, wrap_into
 from .endings import SURE
-from .frames import by_arm, new_frames, place_arm, set_frames
+from .frames import by_arm, facing, new_frames, place_arm, set_frames
 from .pivots import any_across, pivot_rows, pivot_slopes, place_pivot
 from .poses import bring_yaw, load, load_pose, turn_pose
 from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Floats, Record, Records, Table
@@ -37,7 +37,7 @@ class Completion(NamedTuple):
     """Scratch memory of one thread."""
 
     pose: Floats  # (4, 4) [L]
-    sides: Floats  # (legs,): which of its two solutions each leg takes; of an arm, its coordinate [L or rad]
+    sides: Floats  # (legs,): which of its two solutions each leg takes; of an arm that has none, its coordinate
     frames: Floats  # (2 + arms, 7, 4): see `frames`
     values: Floats  # (legs, N_VALUES)
     lines: Floats  # (legs, 3): of a rod, from foot to head
@@ -78,7 +78,10 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
         if leg["kind"] == PIVOT:
             found = place_pivot(leg, frame, sides[k], values[k])
         elif leg["kind"] == ARM:
-            place_arm(leg, sides[k], frames, values[k])
+            q = sides[k]
+            if leg["by_plane"] == 1:
+                q, found = facing(leg, legs[k + 1], frame, q)
+            place_arm(leg, q, frames, values[k])
         else:
             found = place_rod(leg, legs[main], frame, sides[k], values[main], values[k], lines[k])
         sure = min(sure, found)
@@ -201,8 +204,8 @@ def newton_step(table: Table, work: Completion) -> float:
     turn_pose(pose, scale(share, vec(twist[3:])))
     if task["rotations"] == 1:
         bring_yaw(pose, yaw)
-    for k in range(table.legs.shape[0] if task["arms"] > 0 else 0):
-        if table.legs[k]["kind"] == ARM:
+    for k in range(table.legs.shape[0] if task["led"] == 1 else 0):
+        if table.legs[k]["kind"] == ARM and table.legs[k]["by_plane"] == 0:
             work.sides[k] += share * normal[unset + column_of(table.legs[k]) - 6, n]
     return share * step
 
@@ -251,8 +254,8 @@ def answer(
     ----------
     machine : see `open_table`.
     begins : poses that targets are completed from, (n or 1, 4, 4) [length].
-    sides : which of its two solutions each leg takes, (n or 1, legs); of an arm, its coordinate [L or rad]. Where arms
-        bear there is a row for each target, and where the arms of those that are reached end is written into it.
+    sides : which of its two solutions each leg takes, (n or 1, legs); of an arm that takes none, its coordinate [L or
+        rad]. Where arms are led there is a row for each target, and where they end is written into those reached.
 
     Returns
     -------
@@ -266,7 +269,7 @@ def answer(
         side = sides[row if sides.shape[0] > 1 else 0]
         if load(targets[row], begin, table.task[0], work.pose) and complete(table, side, work):
             status[row] = write_answer(table, work, poses[row], actuators[row], measures[row])
-            if table.task[0]["arms"] > 0 and status[row] == REACHED:
+            if table.task[0]["led"] == 1 and status[row] == REACHED:
                 copy_row(work.sides, side)
         left += status[row]
     return left // PENDING
@@ -309,15 +312,15 @@ def complete(table: Table, sides: Floats, work: Completion) -> bool:
     legs, task, frames, values, lines = table.legs, table.task[0], work.frames, work.values, work.lines
     gone, before, is_set = 0.0, math.inf, task["unset"] == 0
     copy_row(sides, work.sides)
-    for _ in range(MOST_OF_ARMS if task["arms"] > 0 else MOST_STEPS):
+    for _ in range(MOST_OF_ARMS if task["led"] == 1 else MOST_STEPS):
         set_frames(work.pose, task, frames)
         sure, bearing = place_legs(legs, frames, work.sides, values, lines)
         if not bearing > SURE * SURE:
             return False
         worst = put_rows(legs, frames, values, lines, work.rows)
-        if worst <= CLOSED or (is_set and worst <= CLOSE and (task["arms"] == 0 or worst > 0.5 * before)):
+        if worst <= CLOSED or (is_set and worst <= CLOSE and (task["led"] == 0 or worst > 0.5 * before)):
             return sure > SURE * SURE
-        if is_set and task["arms"] == 0:
+        if is_set and task["led"] == 0:
             return False
         put_slopes(legs, frames, values, lines, work.follow, work.slopes)
         gone += newton_step(table, work)

@@ -17,7 +17,7 @@ import numpy as np
 
 from .._jit import allocator, routine
 from ..vectors import Vec, add, cross, dot, move, put, scale, sub, turn, vec
-from .endings import turned
+from .endings import either_angle, turned
 from .records import ARM, CARRIER, CRANK, RATE, Floats, Record, Records
 
 NOWHERE: Vec = (0.0, 0.0, 0.0)
@@ -49,6 +49,23 @@ def set_frames(pose: Floats, task: Record, frames: Floats) -> None:
         frames[FROM_BASE, i, 3] = frames[FROM_BASE, ABOUT, i] = p[i]
         frames[FROM_PLATFORM, i, 3] = reference[i] - (pose[0, i] * p[0] + pose[1, i] * p[1] + pose[2, i] * p[2])
         frames[FROM_PLATFORM, ABOUT, i] = reference[i]
+
+
+@routine
+def facing(arm: Record, rod: Record, frame: Floats, side: float) -> tuple[float, float]:
+    """The coordinate of an arm at which the plane across the hinge at a rod's foot holds the rod's head, and how sure.
+
+    The second number is as of `endings.either_angle`. With the hinge n through F, which the arm turns about a through
+    o, or shifts along a, and the head H: (Rot n) . (H - o) = n . (F - o), or n . (H - F - q a) = 0.
+    """
+    axis, at, n = vec(arm["carrier_axis"]), vec(arm["carrier_point"]), vec(rod["foot_axes"][0])
+    head, foot, lean = move(frame, vec(rod["head_point"])), vec(rod["foot_point"]), dot(axis, n)
+    if arm["carrier"] != CRANK:
+        return dot(n, sub(head, foot)) / lean, 1.0
+    x = sub(head, at)
+    rest = lean * dot(axis, x)
+    cosine, sine, sure = either_angle(dot(n, x) - rest, dot(cross(axis, n), x), dot(n, sub(foot, at)) - rest, side)
+    return math.atan2(sine, cosine), sure
 
 
 @routine

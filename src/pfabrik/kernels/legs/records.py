@@ -38,6 +38,7 @@ LEG = np.dtype(
         ("frame", "i8"),  # that it is read in, see `frames`
         ("makes", "i8"),  # of an arm: the frame that it makes
         ("at_head", "i8"),  # of an arm, 1: it moves the body that heads are on
+        ("by_plane", "i8"),  # of an arm, 1: it brings the hinge at the foot of the rod after it to face the head
         ("carrier", "i8"),
         ("slides", "i8"),  # 1: a rod that changes its length; of a pivot, how many slides there are
         ("twists", "i8"),  # 1: both endings hold the rod against spinning about itself
@@ -49,7 +50,7 @@ LEG = np.dtype(
         ("carrier_point", *_vector),  # of a crank: where on its axis the spoke stands
         ("spoke", *_vector),  # from there to the foot
         ("spoke_across", *_vector),  # the spoke a quarter turn on
-        ("side", "f8"),  # which of two solutions is home's: of the carrier, or of a pivot's three hinges
+        ("side", "f8"),  # which of two solutions is home's: of carrier, arm, or a pivot's three hinges
         ("foot_point", *_vector),
         ("head_point", *_vector),  # as `frames` map it: seen from the reference point, if not reversed
         ("length", "f8"),
@@ -110,7 +111,8 @@ TASK = np.dtype(
         ("axes", "i8", (3,)),  # 1: this coordinate of the position is set
         ("rotations", "i8"),  # 3: the rotation is set, 2: the direction of the z axis, 1: the yaw, 0: nothing
         ("unset", "i8"),  # how many coordinates of the pose are not
-        ("arms", "i8"),  # how many arms there are that bear: these are found with them
+        ("arms", "i8"),  # how many arms there are, if these follow from what the legs on them ask for
+        ("led", "i8"),  # 1: some of them by no closed form, but from where they were
         ("rows", "i8"),  # how many constraints the legs have
         ("farthest", "f8"),  # what is not set may not go farther from where it began [L or rad]
     ]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from .._jit import routine
-from ..free_motions import FreeMotions
+from ..free_motions import FreeMotions, restoring_step
 from ..legs.records import Floats, Table
 from ..sqp import (
     CLOSED,
@@ -29,7 +29,6 @@ from ..sqp import (
     judge_step,
     on_the_way,
     plan_step,
-    restoring_step,
     rests_open,
     scale_objective,
 )
@@ -79,7 +78,7 @@ def restore_feasibility(
     for _step in range(steps):
         if is_closed(view.linear, tolerance):
             return True
-        if not restoring_step(view.linear, search.p):
+        if not restoring_step(view, search.p):
             return False
         take(table, view, search.p.x, now, search)
         linearise(table, row, aim, now, search, view)

@@ -18,7 +18,8 @@ import numpy as np
 
 from .._jit import allocator, routine
 from ..legs.answer import deviation, end_of_rows
-from ..legs.frames import NOWHERE, by_arm, new_frames, place_arm, put_pose_slope, set_frames
+from ..legs.endings import turned
+from ..legs.frames import NOWHERE, by_arm, facing, new_frames, place_arm, put_pose_slope, set_frames
 from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
 from ..legs.records import (
     ARM,
@@ -167,6 +168,11 @@ def close_rods(table: Table, now: Now, view: View) -> None:
     set_frames(now.pose, table.task[0], view.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
+        if leg["by_plane"] == 1:
+            frame, rod = view.frames[leg["frame"]], table.legs[k + 1]
+            found, sure = facing(leg, rod, frame, side_of_arm(leg, rod, frame, q[k]))
+            if sure > SURELY:
+                q[k] = wrap(found, q[k]) if leg["carrier"] == CRANK else found
         if leg["kind"] == ARM:
             place_arm(leg, q[k], view.frames, own[k])
         if is_carried(leg):
@@ -184,6 +190,14 @@ def side_of(rod: Record, head: Vec, q: float) -> float:
             1.0, dot(vec(rod["spoke"]), x) * math.sin(q) - dot(vec(rod["spoke_across"]), x) * math.cos(q)
         )
     return math.copysign(1.0, q - dot(sub(head, vec(rod["foot_point"])), vec(rod["carrier_axis"])))
+
+
+@routine
+def side_of_arm(arm: Record, rod: Record, frame: Floats, q: float) -> float:
+    """The same of an arm that `facing` places: by which way the plane turns away from the head."""
+    axis, n = vec(arm["carrier_axis"]), vec(rod["foot_axes"][0])
+    x = sub(move(frame, vec(rod["head_point"])), vec(arm["carrier_point"]))
+    return math.copysign(1.0, dot(cross(turned(n, axis, math.cos(q), math.sin(q)), axis), x))
 
 
 @routine

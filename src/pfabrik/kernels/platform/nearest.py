@@ -135,7 +135,7 @@ def holds_all(aim: PoseObjective) -> bool:
 def is_other_mode(legs: Records, first: Floats, sides: Floats) -> bool:
     """Whether some leg takes its other solution."""
     for k in range(sides.shape[0]):
-        if legs[k]["kind"] != ARM and first[k] * sides[k] < 0.0:
+        if (legs[k]["kind"] != ARM or legs[k]["by_plane"] == 1) and first[k] * sides[k] < 0.0:
             return True
     return False
 

@@ -46,6 +46,9 @@ def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) ->
     for i in range(table.cones.shape[0]):
         if not cone_cosine(table.cones[i], values) >= table.cones[i]["least_cosine"]:
             misfits[main_of(table, table.cones[i]["leg"])] = 1.0
+    for k in range(misfits.shape[0]):
+        if table.legs[k]["by_plane"] == 1:
+            misfits[k] = misfits[k + 1] = max(misfits[k], misfits[k + 1])
 
 
 @kernel
@@ -61,7 +64,7 @@ def answer_otherwise(
 ) -> int:
     """Answer targets (n, 4, 4) [length] that legs reach on any sides within all limits; the others are PENDING.
 
-    Where a target sets the whole pose, every leg takes the side that suits it; where legs complete it together, their
+    Where a target sets the whole pose, every leg takes the sides that suit it; where legs complete it together, their
     sides are tried in all combinations.
 
     Parameters
@@ -76,24 +79,28 @@ def answer_otherwise(
     """
     table = open_table(machine)
     work, legs, n_legs, own, left = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
-    misfits, choosing, n_choices = np.zeros(n_legs), np.zeros(n_legs, np.int64), 0
+    misfits, choosing, n_choices, alone = np.zeros(n_legs), np.zeros(n_legs, np.int64), 0, 1
     for k in range(n_legs):
-        if sides[0, k] != 0.0 and legs[k]["kind"] != ARM:
+        if sides[0, k] != 0.0 and (legs[k]["kind"] != ARM or legs[k]["by_plane"] == 1):
             choosing[n_choices] = k
             n_choices += 1
-    together = own["unset"] + own["arms"] > 0
-    tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if together else 1
+        if legs[k]["by_plane"] == 1:
+            alone = 3
+    together = own["unset"] + own["led"] > 0
+    tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if together else alone
     for row in range(targets.shape[0]):
         status[row], begin = PENDING, begins[row if begins.shape[0] > 1 else 0]
-        if not together and load(targets[row], begin, own, work.pose):
-            set_frames(work.pose, own, work.frames)
-            place_legs(legs, work.frames, sides[row], work.values, work.lines)
-            put_rows(legs, work.frames, work.values, work.lines, work.rows)
-            note_misfits(table, work.values, work.rows, misfits)
         for attempt in range(1, tries + 1):
+            if not together and load(targets[row], begin, own, work.pose):
+                set_frames(work.pose, own, work.frames)
+                place_legs(legs, work.frames, sides[row], work.values, work.lines)
+                put_rows(legs, work.frames, work.values, work.lines, work.rows)
+                note_misfits(table, work.values, work.rows, misfits)
             for c in range(n_choices):
                 k = choosing[c]
-                flips = misfits[k] == 1.0 if not together else (attempt ^ (attempt - 1)) >> c & 1 == 1
+                flips = (attempt ^ (attempt - 1)) >> c & 1 == 1
+                if not together:  # a rod first, then the arm that it is on, then the rod again
+                    flips = misfits[k] == 1.0 and (legs[k]["by_plane"] == 1) == (attempt == 2)
                 sides[row, k] = -sides[row, k] if flips else sides[row, k]
             if not load(targets[row], begin, own, work.pose):
                 break

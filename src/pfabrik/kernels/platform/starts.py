@@ -7,13 +7,13 @@ import math
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
-from ..legs.frames import place_arm, set_frames
+from ..legs.frames import facing, place_arm, set_frames
 from ..legs.poses import bring_yaw, column, is_pose, make_exact, turn_pose
 from ..legs.records import ARM, CARRIER, CRANK, Floats, Record, Table
 from ..legs.rods import carry
 from ..rotations import yaw_of
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
-from .equations import Now, View, is_carried
+from .equations import Now, View, is_carried, side_of_arm
 from .records import STRETCHED, Starts
 from .search import Search
 
@@ -68,6 +68,8 @@ def put_carriers(table: Table, now: Now, look: View) -> None:
     for k in range(q.shape[0]):
         leg, own = table.legs[k], look.values[k]
         q[k] = sides[k] if leg["kind"] == ARM else 0.0
+        if leg["by_plane"] == 1:
+            q[k], _ = facing(leg, table.legs[k + 1], look.frames[leg["frame"]], sides[k])
         if leg["kind"] == ARM:
             place_arm(leg, q[k], look.frames, own)
         if is_carried(leg):
@@ -98,6 +100,8 @@ def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, now: 
     set_frames(now.pose, table.task[0], view.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
+        if leg["by_plane"] == 1:
+            q[k] = nearest_facing(leg, table.legs[k + 1], view.frames[leg["frame"]], q[k])
         if leg["kind"] == ARM:
             place_arm(leg, q[k], view.frames, view.values[k])
         if is_carried(leg):
@@ -119,6 +123,17 @@ def nearest_carrier(leg: Record, frame: Floats, present: float, own: Floats) -> 
 
 
 @routine
+def nearest_facing(arm: Record, rod: Record, frame: Floats, present: float) -> float:
+    """Of the coordinates at which an arm has its rod's plane hold the head, the one nearer to this."""
+    found, _ = facing(arm, rod, frame, 1.0)
+    if arm["carrier"] != CRANK:
+        return found
+    other, _ = facing(arm, rod, frame, -1.0)
+    found, other = wrap(found, present), wrap(other, present)
+    return found if abs(found - present) <= abs(other - present) else other
+
+
+@routine
 def put_sides(table: Table, now: Now, look: View) -> None:
     """Tell which of their two solutions legs take, and where arms are."""
     set_frames(now.pose, table.task[0], look.frames)
@@ -126,7 +141,10 @@ def put_sides(table: Table, now: Now, look: View) -> None:
     for k in range(q.shape[0]):
         leg = table.legs[k]
         if leg["kind"] == ARM:
-            sides[k] = q[k]
+            if leg["by_plane"] == 0:
+                sides[k] = q[k]
+            elif sides[k] != 0.0:
+                sides[k] = side_of_arm(leg, table.legs[k + 1], look.frames[leg["frame"]], q[k])
             place_arm(leg, q[k], look.frames, look.values[k])
         if is_carried(leg):
             frame = look.frames[leg["frame"]]
