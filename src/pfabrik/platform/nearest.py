@@ -36,8 +36,9 @@ CORNERS, HITS, HITS_OF_STRUTS, HITS_OF_VALUES = 16, 4, 3, 6
 struts leave the platform all its freedoms, and have no two ways to bend; more where actuators have values, which a
 platform nearly has in many poses."""
 
-CORNERS_OF_ARMS, HITS_OF_ARMS = 32, 8
-"""The same where arms are led: between two bodies that legs meet on there are many more configurations."""
+CORNERS_OF_MANY, HITS_OF_MANY = 32, 8
+"""Corners where arms are led, and hits there and where task and legs do not tell all of a pose: there are many more
+configurations."""
 
 DRAWS, DRAWN_STEPS = 240, 30
 """How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
@@ -219,8 +220,9 @@ def _approach(
 
 @lru_cache(maxsize=64)
 def _hits(table: LegTable) -> int:
-    if table.leads_arms:
-        return HITS_OF_ARMS
+    task = table.task[0]
+    if table.leads_arms or task["unset"] + task["arms"] > task["rows"]:
+        return HITS_OF_MANY
     return HITS if table.task[0]["rows"] > 0 or len(_carriers(table)) else HITS_OF_STRUTS
 
 
@@ -288,7 +290,7 @@ def corners_of(mechanism: Mechanism) -> Starts:
     modes = np.unique(np.sign(every.sides), axis=0, return_inverse=True)[1].ravel()
     chosen: list[int] = []
     away = _apart(every, 0)
-    while len(chosen) < min(CORNERS_OF_ARMS if table.leads_arms else CORNERS, len(feasible)):
+    while len(chosen) < min(CORNERS_OF_MANY if table.leads_arms else CORNERS, len(feasible)):
         rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < OF_A_MODE
         chosen.append(int(np.where(rare & (away > 0.0), away + SELDOM, away).argmax()))
         away = np.minimum(away, _apart(every, chosen[-1]))

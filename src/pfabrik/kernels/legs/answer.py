@@ -27,6 +27,8 @@ REACHED, PENDING = 0, 9
 CLOSED, CLOSE = 1e-13, 1e-10
 # Newton steps that complete a pose: they take one to five; with arms that follow, more where these are nearly singular.
 MOST_STEPS, MOST_OF_ARMS = 8, 16
+# What is added to the squares of unknowns, as a share of the largest: what constraints leave open stays where it is.
+LOOSE = 1e-12
 # Longest step [L or rad]: beyond, derivatives tell little.
 LONGEST_STEP = 0.5
 # Excess up to which a limit counts as kept [L or rad].
@@ -187,7 +189,7 @@ def newton_step(table: Table, work: Completion) -> float:
             normal[i, n] -= normal[n, i] * rows[k]
     for i in range(unset, n):
         normal[i, i] = normal[i, i] if normal[i, i] > 0.0 else 1.0  # an arm without constraints stays
-    if not solve_spd(normal, n, 0.0):
+    if not solve_spd(normal, n, LOOSE):
         return math.inf
     twist = motions[6]
     for c in range(6):
