@@ -73,6 +73,11 @@ class LegTable:
         arms["column"] = np.arange(len(arms))
         return arms
 
+    @property
+    def arm_joints(self) -> tuple[str, ...]:
+        """Names of the joints that are arms."""
+        return tuple(form.item.joint.name for form in self.forms if isinstance(form, Arm))
+
     @cached_property
     def led_arms(self) -> Records:
         """The coordinates of those arms that stand in the place of a side."""
@@ -118,8 +123,7 @@ def table_of_poses(mechanism: Mechanism) -> LegTable | str:
     table = leg_table(mechanism)
     if isinstance(table, str) or not table.has_free_arms:
         return table
-    names = dict.fromkeys(item.joint.name for form in table.forms if isinstance(form, Arm) for item in form.items)
-    return f"poses leave joints {', '.join(names)} open"
+    return f"poses leave joints {', '.join(table.arm_joints)} open"
 
 
 def legs_answer(mechanism: Mechanism) -> bool:

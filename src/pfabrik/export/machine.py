@@ -72,7 +72,8 @@ class Machine:
         if not isinstance(table, LegTable):
             raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"], "exported")
         if len(table.arms):
-            raise UnsupportedMechanism(mechanism.name, ["its poses do not tell all joints in closed form"], "exported")
+            reason = f"other legs are on joints {', '.join(table.arm_joints)}"
+            raise UnsupportedMechanism(mechanism.name, [reason], "exported")
         self.mechanism = mechanism
         self.table = table
         self.task: Task = task_of(mechanism)

@@ -146,15 +146,15 @@ def search_row(
 ) -> float:
     """The nearest configuration of a row, into `best`, and how far it is [L]; see `approach`.
 
-    What is held is put in its place at once where searches may start anywhere or nothing else has a place, and else
-    brought there step by step; the other way too, where that finds nothing.
+    What is held is put in its place at once where searches may start anywhere, and no arms would be left behind, or
+    nothing else has a place; and else brought there step by step. The other way too, where that finds nothing.
     """
     least, met, target, n = math.inf, 0, search.target, others.poses.shape[0]
     near = nearest_start(aim.pose, target, others, search.gradient)
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
     for k in range(kept.shape[0]):
         kept[k] = own.sides[first, k] if stays == 1 and is_carried(table.legs[k]) else 0.0
-    at_once = n > 0 or holds_all(aim.pose)
+    at_once = holds_all(aim.pose) or (n > 0 and table.task[0]["led"] == 0)
     for start in range(n + 2):
         if start == 0 or start == n + 1:
             begin(table, own, first, search)

@@ -1,0 +1,139 @@
+"""Legs on arms that follow from the pose: two carriers, stations between legs, tasks that leave more open."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from checks import excess_of_joints, gap_of_joints
+from machines import closure
+from pfabrik.closure.solve import ClosureEngine
+from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.engine import engine_of
+from pfabrik.errors import UnsupportedMechanism
+from pfabrik.options import Options
+from pfabrik.platform.solve import LegsEngine
+
+pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+
+TURNS = {"H4": (0, 0, 1), "SCARA": (0, 0, 1), "3-CRU": (0, 0, 0), "3-RRRS": (1, 1, 1), "6-RRPS": (1, 1, 1)}
+"""About which axes a platform can turn."""
+
+
+@lru_cache
+def machine(name: str) -> pf.Mechanism:
+    return closure.ON_ARMS[name]()
+
+
+def targets(mechanism: pf.Mechanism, n: int, shift: float, turn: float, about: tuple[int, ...]) -> np.ndarray:
+    """Poses (n, 4, 4) up to `shift` [L] and `turn` [rad] from home on each axis."""
+    rng, poses = np.random.default_rng(11), np.tile(mechanism.home_pose, (n, 1, 1))
+    poses[:, :3, 3] += rng.uniform(-shift, shift, (n, 3)) * mechanism.characteristic_length
+    poses[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-turn, turn, (n, 3)) * about).as_matrix() @ poses[:, :3, :3]
+    return poses
+
+
+def far(mechanism: pf.Mechanism, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    return np.hypot(position, mechanism.rotation_length * rotation) / mechanism.characteristic_length
+
+
+def assert_as_on_joint_coordinates(mechanism: pf.Mechanism, wanted: np.ndarray, answers: pf.Solution) -> None:
+    """Same statuses, and no projection farther than those of the engine that knows no legs; all of it kept exactly."""
+    assert isinstance(engine_of(mechanism), LegsEngine)
+    rows = ClosureEngine(mechanism).answer(wanted, None, Options(), keep_mode=False).rows
+    np.testing.assert_array_equal(np.asarray(answers.status), rows.status)
+    own = far(mechanism, np.asarray(answers.position_error), np.asarray(answers.rotation_error))
+    other = far(mechanism, rows.measures[:, 0], rows.measures[:, 1])
+    np.testing.assert_array_less(own, other + 1e-6)
+    assert gap_of_joints(mechanism, answers).max() <= 1e-9
+    assert excess_of_joints(mechanism, answers).max() <= 1e-9
+
+
+@pytest.mark.parametrize("name", TURNS)
+def test_answers_are_those_on_joint_coordinates(name: str) -> None:
+    mechanism = machine(name)
+    near, off = (
+        targets(mechanism, n, shift, turn, TURNS[name]) for n, shift, turn in ((40, 0.1, 0.2), (40, 0.25, 0.5))
+    )
+    wanted = np.concatenate([near, off])
+    answers = pf.solve_ik(mechanism, wanted)
+    assert (np.asarray(answers.status) == pf.Status.REACHED).sum() >= 30
+    assert_as_on_joint_coordinates(mechanism, wanted, answers)
+    alone = [pf.solve_ik(mechanism, each) for each in wanted[:5]]
+    np.testing.assert_array_equal([each.actuators for each in alone], answers.actuators[:5])
+    np.testing.assert_allclose([each.q for each in alone], answers.q[:5], atol=1e-12)
+
+
+LOOSE = (("H4", "xyz", (0, 0, 0)), ("stewart", "z tilt", (1, 1, 1)), ("servo_hexapod", "x y z yaw", (1, 1, 1)))
+
+
+@pytest.mark.parametrize(("name", "task", "about"), LOOSE, ids=[f"{name}, {task}" for name, task, _ in LOOSE])
+def test_what_neither_task_nor_legs_tell_stays_where_it_was(name: str, task: str, about: tuple[int, ...]) -> None:
+    plain = machine(name) if name in TURNS else pf.load(name)
+    mechanism = dataclasses.replace(plain, task=tuple(task.split()) if " " in task else tuple(task))
+    wanted = targets(mechanism, 40, 0.1, 0.2, about)
+    answers = pf.solve_ik(mechanism, wanted)
+    assert_as_on_joint_coordinates(mechanism, wanted, answers)
+    again = pf.solve_ik(mechanism, wanted[0], start=answers[0])
+    np.testing.assert_allclose(again.pose, answers[0].pose, atol=1e-9 * mechanism.characteristic_length)
+
+
+@pytest.mark.parametrize("name", TURNS)
+def test_forward_kinematics_returns_what_inverse_kinematics_was_given(name: str) -> None:
+    mechanism = machine(name)
+    answers = pf.solve_ik(mechanism, targets(mechanism, 40, 0.1, 0.2, TURNS[name]))
+    reached = [each for each in answers if each]
+    back = pf.solve_fk(mechanism, np.array([each.actuators for each in reached]))
+    assert (np.asarray(back.status) == pf.Status.REACHED).all()
+    assert gap_of_joints(mechanism, back).max() <= 1e-9
+    off = np.abs(back.pose - np.array([each.pose for each in reached])).max(axis=(1, 2))
+    assert (off <= 1e-7 * mechanism.characteristic_length).mean() >= 0.9  # others are assemblies of their own
+    for each in reached[:5]:
+        there = pf.solve_fk(mechanism, each.actuators, start=each)
+        np.testing.assert_allclose(there.pose, each.pose, atol=1e-7 * mechanism.characteristic_length)
+
+
+@pytest.mark.parametrize("name", TURNS)
+def test_along_a_path_nothing_leaps_and_a_start_may_be_a_joint_vector(name: str) -> None:
+    mechanism, length = machine(name), machine(name).characteristic_length
+    end = targets(mechanism, 1, 0.05, 0.15, TURNS[name])[0]
+    begin = pf.solve_ik(mechanism, mechanism.home_pose)
+    path = [pf.pose(*(share * (end - mechanism.home_pose)[:3, 3],)) @ mechanism.home_pose for share in (0.25, 0.5, 1.0)]
+    track = pf.track(mechanism, np.array(path), start=begin)
+    assert (np.asarray(track.status) == pf.Status.REACHED).all()
+    steps = np.abs(np.diff(np.concatenate([begin.q[None], np.asarray(track.q)]), axis=0))
+    assert steps.max() <= 0.5 * max(length, 1.0)
+    by_vector = pf.solve_ik(mechanism, path[-1], start=np.asarray(track.q)[-1])
+    np.testing.assert_allclose(by_vector.actuators, np.asarray(track.actuators)[-1], atol=1e-7 * max(length, 1.0))
+
+
+def test_legs_with_two_carriers_answer_in_all_four_of_their_ways() -> None:
+    """Without limits each leg of the 3-RRRS takes hip and knee as it likes; its answers follow where it starts."""
+    joints = [dataclasses.replace(each, range=None, cone=None) for each in closure.rrrs().joints]
+    mechanism = pf.Mechanism("3-RRRS", joints, "platform", (0, 0, 190))
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable) and not table.has_free_arms and not table.leads_arms
+    wanted = targets(mechanism, 1, 0.05, 0.1, (1, 1, 1))[0]
+    modes = pf.working_modes(mechanism, wanted)
+    assert modes.total == 4**3
+    for mode in list(modes)[:64:5]:
+        there = pf.solve_ik(mechanism, wanted, start=mode.q, options=Options(working_mode="keep"))
+        assert there.status == pf.Status.REACHED
+        turned = there.actuators - mode.actuators
+        np.testing.assert_allclose(np.cos(turned), 1.0, atol=1e-9)
+
+
+def test_maps_know_arms_that_follow_and_code_for_controllers_says_that_it_does_not(tmp_path: Path) -> None:
+    mechanism = machine("H4")
+    wanted = targets(mechanism, 200, 0.4, 0.8, (0, 0, 1))
+    margin = pf.feasibility(mechanism, wanted).margin
+    reached = np.asarray(pf.solve_ik(mechanism, wanted[margin > 0.0]).status) == pf.Status.REACHED
+    assert reached.all() and 20 < len(reached) < 200
+    with pytest.raises(UnsupportedMechanism, match="on joints Q1, Q2"):
+        pf.export_c(mechanism, tmp_path / "h4.c")
