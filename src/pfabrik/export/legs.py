@@ -13,7 +13,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ..arrays import Floats
-from ..decomposition.legs import Item, LegForm, Pivot, Rod, holds_spin
+from ..decomposition.items import Item
+from ..decomposition.legs import LegForm, Pivot, Rod, holds_spin
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 

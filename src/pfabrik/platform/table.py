@@ -20,8 +20,10 @@ def kernel_table(table: LegTable) -> K.Table:
     """The same records, with the unknown that the coordinate of each carrier, then of each arm, is."""
     columns = np.full(len(table.legs), -1)
     carried = (table.legs["kind"] == K.ROD) & np.isin(table.legs["carrier"], (K.CRANK, K.CARRIAGE))
-    own = np.concatenate([np.flatnonzero(carried), np.flatnonzero(table.legs["kind"] == K.ARM)])
+    arms, twins = ((table.legs["kind"] == K.ARM) & own for own in (table.legs["twin"] < 0, table.legs["twin"] >= 0))
+    own = np.concatenate([np.flatnonzero(carried), np.flatnonzero(arms)])
     columns[own] = 6 + np.arange(len(own))
+    columns[twins] = columns[table.legs["twin"][twins]]
     return K.Table(table.legs, table.limited, table.cones, table.driven, table.known, table.task, columns)
 
 

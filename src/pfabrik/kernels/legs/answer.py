@@ -13,7 +13,7 @@ from ..linear import solve_spd
 from ..rotations import yaw_of
 from ..vectors import copy_row, cross, dot, norm, put, scale, vec, wrap_into
 from .endings import SURE
-from .frames import by_arm, facing, new_frames, place_arm, set_frames
+from .frames import by_arm, coordinate_of, facing, new_frames, place_arm, set_frames
 from .pivots import any_across, pivot_rows, pivot_slopes, place_pivot
 from .poses import bring_yaw, load, load_pose, turn_pose
 from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Floats, Record, Records, Table
@@ -40,7 +40,7 @@ class Completion(NamedTuple):
 
     pose: Floats  # (4, 4) [L]
     sides: Floats  # (legs,): which of its two solutions each leg takes; of an arm that has none, its coordinate
-    frames: Floats  # (2 + arms, 7, 4): see `frames`
+    frames: Floats  # (n, 7, 4): see `frames`
     values: Floats  # (legs, N_VALUES)
     lines: Floats  # (legs, 3): of a rod, from foot to head
     follow: Floats  # (legs, 6): derivatives of carriers' coordinates
@@ -53,12 +53,11 @@ class Completion(NamedTuple):
 @allocator
 def new_completion(table: Table) -> Completion:
     """Scratch memory of one thread."""
-    legs, m, frames = table.legs.shape[0], table.task[0]["rows"], new_frames(table.legs)
-    arms = frames.shape[0] - 2
+    legs, m, arms = table.legs.shape[0], table.task[0]["rows"], table.task[0]["arms"]
     return Completion(
         np.zeros((4, 4)),
         np.zeros(legs),
-        frames,
+        new_frames(table.legs),
         np.zeros((legs, N_VALUES)),
         np.zeros((legs, 3)),
         np.zeros((legs, 6)),
@@ -80,7 +79,7 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
         if leg["kind"] == PIVOT:
             found = place_pivot(leg, frame, sides[k], values[k])
         elif leg["kind"] == ARM:
-            q = sides[k]
+            q = coordinate_of(legs, k, sides)
             if leg["by_plane"] == 1:
                 q, found = facing(leg, legs[k + 1], frame, q)
             place_arm(leg, q, frames, values[k])
@@ -122,23 +121,28 @@ def put_slopes(legs: Records, frames: Floats, values: Floats, lines: Floats, fol
             pivot_slopes(leg, frame, slopes)
         elif leg["kind"] == ROD:
             rod_slopes(leg, legs[main], frame, values[main], values[k], lines[k], follow[main], slopes)
-        arm = leg["arm"]
-        while arm >= 0:
-            for row in range(leg["first_row"], end_of_rows(legs, k, slopes.shape[0])):
-                slopes[row, column_of(legs[arm])] = by_arm(slopes[row], values[arm])
-            arm = legs[arm]["arm"]
+        for row in range(leg["first_row"], end_of_rows(legs, k, slopes.shape[0])):
+            put_arm_slopes(legs, k, values, slopes[row])
+
+
+@routine
+def put_arm_slopes(legs: Records, k: int, values: Floats, slope: Floats) -> None:
+    """Derivatives by the arms that a leg is on, from those by the pose."""
+    for j in range(6, slope.shape[0]):
+        slope[j] = 0.0
+    arm = legs[k]["arm"]
+    while arm >= 0:
+        slope[6 + legs[arm]["column"]] += by_arm(slope, values[arm])
+        arm = legs[arm]["arm"]
+    if legs[k]["inner"] == 1:
+        for j in range(6):
+            slope[j] = 0.0
 
 
 @routine
 def end_of_rows(legs: Records, k: int, rows: int) -> int:
     """The place after a leg's last constraint, of so many in all."""
     return int(legs[k + 1]["first_row"]) if k + 1 < legs.shape[0] else rows
-
-
-@routine
-def column_of(arm: Record) -> int:
-    """Where derivatives by an arm are."""
-    return int(4 + arm["makes"])
 
 
 @routine
@@ -207,8 +211,9 @@ def newton_step(table: Table, work: Completion) -> float:
     if task["rotations"] == 1:
         bring_yaw(pose, yaw)
     for k in range(table.legs.shape[0] if task["led"] == 1 else 0):
-        if table.legs[k]["kind"] == ARM and table.legs[k]["by_plane"] == 0:
-            work.sides[k] += share * normal[unset + column_of(table.legs[k]) - 6, n]
+        leg = table.legs[k]
+        if leg["kind"] == ARM and leg["by_plane"] == 0 and leg["twin"] < 0:
+            work.sides[k] += share * normal[unset + leg["column"], n]
     return share * step
 
 

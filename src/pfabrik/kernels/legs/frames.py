@@ -1,9 +1,12 @@
 """Frames that legs are read in: the body which a leg's head is on, as the body of its foot sees it.
 
-Frame 0 is the platform as seen from the base, frame 1 the base as seen from the platform. Each arm makes one more out
-of another: it moves the body that feet are on there, or the one that heads are on. With arms where they are, a leg is
-like any other in its frame; and where an arm moves, all in its frame changes as if the platform moved with it, if the
-arm is on the platform, or against it.
+Frame 0 is the platform as seen from the base, frame 1 the base as seen from the platform, frame 2 the platform as seen
+from itself. Each arm makes one more out of another: it moves the body that feet are on there, or the one that heads are
+on. With arms where they are, a leg is like any other in its frame; and where an arm moves, all in its frame changes as
+if the platform moved with it, if the arm is on the platform, or against it.
+
+A rod between two bodies that arms on the platform place is read in frames made out of the third, by twins of these arms
+which have their coordinates.
 
 Rows 0 to 2 of a frame map head points; row 3 is the point about which the platform turns, as the foot's body sees it;
 rows 4 to 6 turn directions of the foot's body to those of the base.
@@ -23,18 +26,18 @@ from .records import ARM, CARRIER, CRANK, RATE, Floats, Record, Records
 NOWHERE: Vec = (0.0, 0.0, 0.0)
 # Rows of a frame.
 ABOUT, AXES, N_ROWS = 3, 4, 7
-FROM_BASE, FROM_PLATFORM = 0, 1
+FROM_BASE, FROM_PLATFORM, FROM_ITSELF, FIXED = 0, 1, 2, 3  # and how many there are without arms
 
 
 @allocator
 def new_frames(legs: Records) -> Floats:
     """Memory for the frames of a machine."""
-    n = 2
+    n = FIXED
     for k in range(legs.shape[0]):
         n += 1 if legs[k]["kind"] == ARM else 0
     frames = np.zeros((n, N_ROWS, 4))
     for i in range(3):
-        frames[FROM_BASE, AXES + i, i] = 1.0
+        frames[FROM_BASE, AXES + i, i] = frames[FROM_ITSELF, i, i] = frames[FROM_ITSELF, AXES + i, i] = 1.0
     return frames
 
 
@@ -113,6 +116,12 @@ def put_rate_of_arm(arm: Record, before: Floats, own: Floats) -> None:
     sense = 1.0 if arm["at_head"] != arm["reversed"] else -1.0
     put(own[RATE : RATE + 3], scale(sense, turn(before[AXES:], velocity)))
     put(own[RATE + 3 : RATE + 6], scale(sense, turn(before[AXES:], spin)))
+
+
+@routine
+def coordinate_of(legs: Records, k: int, q: Floats) -> float:
+    """The coordinate of an arm, or of the one whose twin it is."""
+    return float(q[legs[k]["twin"] if legs[k]["twin"] >= 0 else k])
 
 
 @routine

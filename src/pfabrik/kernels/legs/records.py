@@ -37,6 +37,9 @@ LEG = np.dtype(
         ("arm", "i8"),  # the leg which is the arm that it is on; -1 if it is on none
         ("frame", "i8"),  # that it is read in, see `frames`
         ("makes", "i8"),  # of an arm: the frame that it makes
+        ("twin", "i8"),  # of an arm: the leg whose coordinate it has, -1 if its own; see `frames`
+        ("column", "i8"),  # of an arm: where derivatives by its coordinate are, after the six by the pose
+        ("inner", "i8"),  # 1: it is between bodies that arms on the platform place, and says nothing of the pose
         ("at_head", "i8"),  # of an arm, 1: it moves the body that heads are on
         ("by_plane", "i8"),  # of an arm, 1: it brings the hinge at the foot of the rod after it to face the head
         ("carrier", "i8"),

@@ -19,7 +19,7 @@ import numpy as np
 from .._jit import allocator, routine
 from ..legs.answer import deviation, end_of_rows
 from ..legs.endings import turned
-from ..legs.frames import NOWHERE, by_arm, facing, new_frames, place_arm, put_pose_slope, set_frames
+from ..legs.frames import NOWHERE, by_arm, coordinate_of, facing, new_frames, place_arm, put_pose_slope, set_frames
 from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
 from ..legs.records import (
     ARM,
@@ -73,7 +73,7 @@ class Now(NamedTuple):
 class View(NamedTuple):
     """What legs are like at a configuration."""
 
-    frames: Floats  # (2 + arms, 7, 4): see `legs.frames`
+    frames: Floats  # (n, 7, 4): see `legs.frames`
     values: Floats  # (legs, N_VALUES)
     lines: Floats  # (legs, 3): of a rod, from foot to head
     rows: Floats  # (m,): the equations
@@ -149,7 +149,7 @@ def place_leg(table: Table, k: int, main: int, now: Now, view: View) -> None:
         place_pivot(leg, frame, now.sides[k], values[k])
         pivot_rows(leg, frame, view.rows)
     elif leg["kind"] == ARM:
-        place_arm(leg, now.q[k], view.frames, values[k])
+        place_arm(leg, coordinate_of(legs, k, now.q), view.frames, values[k])
     elif leg["kind"] == ROD:
         if is_carried(leg):
             values[k, CARRIER] = now.q[k]
@@ -174,7 +174,7 @@ def close_rods(table: Table, now: Now, view: View) -> None:
             if sure > SURELY:
                 q[k] = wrap(found, q[k]) if leg["carrier"] == CRANK else found
         if leg["kind"] == ARM:
-            place_arm(leg, q[k], view.frames, own[k])
+            place_arm(leg, coordinate_of(table.legs, k, q), view.frames, own[k])
         if is_carried(leg):
             head = move(view.frames[leg["frame"]], vec(leg["head_point"]))
             if carry(leg, head, side_of(leg, head, q[k]), own[k]) > SURELY:
@@ -257,8 +257,15 @@ def put_arm_slopes(table: Table, k: int, view: View, slope: Floats) -> None:
     """Derivatives by the arms that a leg is on, from those by the pose."""
     arm = table.legs[k]["arm"]
     while arm >= 0:
-        slope[table.columns[arm]] = by_arm(slope, view.values[arm])
+        slope[table.columns[arm]] = 0.0
         arm = table.legs[arm]["arm"]
+    arm = table.legs[k]["arm"]
+    while arm >= 0:
+        slope[table.columns[arm]] += by_arm(slope, view.values[arm])
+        arm = table.legs[arm]["arm"]
+    if table.legs[k]["inner"] == 1:
+        for j in range(6):
+            slope[j] = 0.0
 
 
 @routine

@@ -7,7 +7,7 @@ import math
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
-from ..legs.frames import facing, place_arm, set_frames
+from ..legs.frames import coordinate_of, facing, place_arm, set_frames
 from ..legs.poses import bring_yaw, column, is_pose, make_exact, turn_pose
 from ..legs.records import ARM, CARRIER, CRANK, Floats, Record, Table
 from ..legs.rods import carry
@@ -67,7 +67,7 @@ def put_carriers(table: Table, now: Now, look: View) -> None:
     set_frames(now.pose, table.task[0], look.frames)
     for k in range(q.shape[0]):
         leg, own = table.legs[k], look.values[k]
-        q[k] = sides[k] if leg["kind"] == ARM else 0.0
+        q[k] = coordinate_of(table.legs, k, sides) if leg["kind"] == ARM else 0.0
         if leg["by_plane"] == 1:
             q[k], _ = facing(leg, table.legs[k + 1], look.frames[leg["frame"]], sides[k])
         if leg["kind"] == ARM:
@@ -103,7 +103,7 @@ def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, now: 
         if leg["by_plane"] == 1:
             q[k] = nearest_facing(leg, table.legs[k + 1], view.frames[leg["frame"]], q[k])
         if leg["kind"] == ARM:
-            place_arm(leg, q[k], view.frames, view.values[k])
+            place_arm(leg, coordinate_of(table.legs, k, q), view.frames, view.values[k])
         if is_carried(leg):
             q[k] = nearest_carrier(leg, view.frames[leg["frame"]], q[k], view.values[k])
 

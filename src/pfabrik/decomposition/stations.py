@@ -1,0 +1,130 @@
+"""Sub-chains whose legs meet before the platform: at stations, bodies that arms of the platform place.
+
+Stations are found from the platform: bodies that lead on to several legs, as far as hinges and slides alone reach. What
+is in series at the base carries all of it, as arms there. What is left between two of base, stations and platform is a
+leg, or a rod between stations, which is read as the platform sees these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..description.graph import Edge, Step, components
+from ..description.mechanism import Mechanism
+from .decompose import SubChain, parts_between
+from .items import HAS_LOOP, Item, NoLeg, items_of
+from .legs import MOST_ARMS, Arm, LegForm, legs_of_chain, put_on, rigid_rod
+from .stages import graph_of
+
+MEETING = 3
+"""Joints of a body where legs meet."""
+
+
+def legs_of_sub_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
+    """The legs that a sub-chain is, and the arms that those are on.
+
+    Raises
+    ------
+    NoLeg : with the reason.
+    """
+    try:
+        return legs_of_chain(mechanism, chain)
+    except NoLeg as reason:
+        if str(reason) != HAS_LOOP or mechanism.end_effector_is_joint:
+            raise
+    return _between_stations(mechanism, chain)
+
+
+def _between_stations(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
+    graph, names = graph_of(mechanism), frozenset(chain.joints)
+    edges = [edge for edge in graph.edges if edge.joint.name in names]
+    below, base, edges = _arms_in_series(mechanism, edges, graph.base)
+    above, edges = _stations(mechanism, edges, base, graph.end, below[-1] if below else None)
+    if not below and not above:
+        raise NoLeg(HAS_LOOP)
+    if len(below) + len(above) > MOST_ARMS:
+        raise NoLeg("more arms carry its legs than are answered for")
+    found: list[LegForm] = [*below, *above.values()]
+    for group in components(edges, base, graph.end, *above):
+        bodies = {body for edge in group for body in edge.bodies}
+        ends = [body for body in (base, graph.end, *above) if body in bodies]
+        if len(ends) != 2:
+            raise NoLeg(HAS_LOOP)
+        inner, outer = ends
+        between = SubChain(parts_between(mechanism, group, inner, outer), None)
+        if inner == base:
+            legs = legs_of_chain(mechanism, between)
+            if any(leg.is_reversed for leg in legs):
+                raise NoLeg("a leg between stations that is read from the platform")
+            found += put_on(above.get(outer, below[-1] if below else None), legs)
+        else:
+            found += _rod_between(above.get(inner), above[outer], items_of(mechanism, between.steps))
+    return tuple(found)
+
+
+def _arms_in_series(mechanism: Mechanism, edges: Sequence[Edge], base: str) -> tuple[list[Arm], str, list[Edge]]:
+    """The hinges and slides that all ways from the base pass first, the body beyond, and the edges that are left."""
+    arms: list[Arm] = []
+    left = list(edges)
+    while True:
+        own = [edge for edge in left if base in edge.bodies]
+        items = _passed(mechanism, own[0], base) if len(own) == 1 else []
+        if not _is_arm(items):
+            return arms, base, left
+        arms.append(Arm(items[0], is_reversed=False, on=arms[-1] if arms else None))
+        left.remove(own[0])
+        base = own[0].other(base)
+
+
+def _stations(
+    mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str, below: Arm | None
+) -> tuple[dict[str, Arm], list[Edge]]:
+    """The arms that place stations, and the bodies on the way to them, in order from the platform; the edges left."""
+    ways: dict[str, tuple[tuple[Edge, str], ...]] = {end: ()}
+    bodies = [end]
+    for body in bodies:  # grows while it is looked through
+        for edge in edges:
+            other = edge.other(body)
+            if body in edge.bodies and other != base and other not in ways and _is_arm(_passed(mechanism, edge, body)):
+                ways[other] = (*ways[body], (edge, other))
+                bodies.append(other)
+    arms: dict[str, Arm] = {}
+    left = list(edges)
+    for body in bodies[1:]:
+        if sum(body in edge.bodies for edge in edges) < MEETING:
+            continue
+        before, on = end, below
+        for edge, other in ways[body]:
+            if other not in arms:
+                item = _passed(mechanism, edge, before)[0]
+                arms[other] = Arm(item, is_reversed=False, at_head=True, on=on)
+                left.remove(edge)
+            before, on = other, arms[other]
+    return arms, left
+
+
+def _passed(mechanism: Mechanism, edge: Edge, body: str) -> list[Item]:
+    """An edge as passed from one of its bodies."""
+    return items_of(mechanism, [Step(edge.joint, edge.bodies[0] == body)])
+
+
+def _is_arm(items: Sequence[Item]) -> bool:
+    return len(items) == 1 and items[0].kind != "S"
+
+
+def _rod_between(inner: Arm | None, outer: Arm, items: list[Item]) -> tuple[LegForm, ...]:
+    """A rod between two bodies that arms place, the inner one maybe the platform, on twins of these arms."""
+    rod, twins = rigid_rod(items), list[Arm]()
+    for arm, at_head in (*((each, False) for each in _way_to(inner)), *((each, True) for each in _way_to(outer))):
+        twins.append(Arm(arm.item, is_reversed=True, at_head=at_head, on=twins[-1] if twins else None, twin=arm))
+    return *twins, replace(rod, on=twins[-1])
+
+
+def _way_to(arm: Arm | None) -> list[Arm]:
+    """The arms of the platform that place a body, in order from the platform."""
+    way: list[Arm] = []
+    while arm is not None and arm.at_head:
+        way.append(arm)
+        arm = arm.on
+    return way[::-1]
