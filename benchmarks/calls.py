@@ -98,29 +98,16 @@ def first_order(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     yield Row("6-UPS, margins of one answer", 20, margins / 20)
 
 
-def closure(rng: np.random.Generator, runs: int) -> Iterator[Row]:
-    """Machines without closed forms: what a call costs beside its share of a batch."""
-    for name, what in (("serial_arm", "serial arm"), ("orthoglide", "Orthoglide")):
-        mechanism = pf.load(name)
-        targets = near(mechanism, rng)
-        one, batch = best_times(
-            runs, each(partial(pf.solve_ik, mechanism), *targets), partial(pf.solve_ik, mechanism, np.array(targets))
-        )
-        n = len(targets)
-        yield Row(f"{what}, one solve_ik, reachable", n, one / n, "a pose of a batch", batch / n)
-
-
 def calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     mechanism = pf.load("stewart")
     struts, targets = Struts(mechanism), near(mechanism, rng)
     ours, theirs = best_times(runs, each(partial(pf.solve_ik, mechanism), *targets), each(struts.one, *targets))
     n, baseline = len(targets), "NumPy, lengths and strokes of one pose"
     yield Row("6-UPS, one call, reachable", n, ours / n, baseline, theirs / n)
-    for name, what in (("stewart", "6-UPS"), ("delta", "delta"), ("rps", "3-RPS")):
+    for name, what in (("stewart", "6-UPS"), ("delta", "delta"), ("rps", "3-RPS"), ("serial_arm", "serial arm")):
         yield from questions(name, what, rng, runs)
         yield from out_of_reach(name, what, rng, min(runs, 5))
     yield from first_order(rng, runs)
-    yield from closure(rng, runs)
 
 
 if __name__ == "__main__":
