@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from .answers.answer import Wanted
 from .answers.solution import Solution
 from .answers.starts import Start, start_of
@@ -48,7 +46,8 @@ def solve_ik(
     begin = start_of(mechanism, start, shape)
     found = inverse_engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keeps_mode(options, begin))
     refuse_invalid(targets, shape, found.rows.status, options)
-    is_missed = np.count_nonzero(found.rows.status != REACHED)
+    status = found.rows.status
+    is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
     wanted = Wanted(targets.copy(), options.hold, options.rotation_length) if is_missed else None
     return Solution(mechanism, found, shape, wanted)
 

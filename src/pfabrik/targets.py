@@ -15,7 +15,7 @@ from .errors import InvalidArgument
 from .kernels.reaching.plan import INVALID
 from .motion.displacements import columns, home_coordinates, joint_displacements
 from .options import Options
-from .poses import SupportsMatrix, as_floats, as_poses, what_is_wrong
+from .poses import DOUBLE, SupportsMatrix, as_floats, as_poses, what_is_wrong
 
 Target: TypeAlias = ArrayLike | SupportsMatrix | Mapping[str, ArrayLike]
 """Poses (..., 4, 4), positions (..., 3), a SciPy RigidTransform, or joint name -> coordinates."""
@@ -29,6 +29,8 @@ def as_targets(mechanism: Mechanism, target: Target) -> tuple[Floats, tuple[int,
     InvalidArgument : a wrong shape; joint coordinates of another joint than the one between base and end effector.
     """
     checked_mechanism(mechanism)
+    if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is DOUBLE and target.flags.carray:
+        return target[None], ()
     if isinstance(target, Mapping):
         return _from_joint(mechanism, target)
     poses, shape = as_poses(target)

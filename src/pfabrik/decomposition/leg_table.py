@@ -63,7 +63,7 @@ class LegTable:
     task: Records
     limits: tuple[tuple[str, str], ...]
 
-    @property
+    @cached_property
     def home_sides(self) -> Floats:
         """Which of two solutions each leg takes at home, and where arms without are, (1, legs)."""
         return np.array(self.legs["side"], dtype=float)[None]
@@ -85,12 +85,12 @@ class LegTable:
         """The coordinates of those arms that stand in the place of a side."""
         return np.asarray(self.arms[self.legs["by_plane"][self.arms["leg"]] == 0])
 
-    @property
+    @cached_property
     def has_free_arms(self) -> bool:
         """Whether poses leave arms open; else they follow by what the legs on them ask for."""
         return len(self.arms) > 0 and not self.task["arms"][0]
 
-    @property
+    @cached_property
     def leads_arms(self) -> bool:
         """Whether some arms follow from where they were."""
         return bool(self.task["led"][0])

@@ -14,11 +14,11 @@ from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism
 from .decompose import SubChain, parts_between
 from .items import HAS_LOOP, Item, NoLeg, items_of
-from .legs import MOST_ARMS, Arm, LegForm, legs_of_chain, put_on, rigid_rod
+from .legs import Arm, LegForm, legs_of_chain, put_on, rigid_rod
 from .stages import graph_of
 
-MEETING = 3
-"""Joints of a body where legs meet."""
+MEETING, MOST_ARMS = 3, 6
+"""Joints of a body where legs meet, and arms of a sub-chain: a body has no more freedoms."""
 
 
 def legs_of_sub_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
@@ -58,8 +58,10 @@ def _between_stations(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, .
             if any(leg.is_reversed for leg in legs):
                 raise NoLeg("a leg between stations that is read from the platform")
             found += put_on(above.get(outer, below[-1] if below else None), legs)
-        else:
+        elif all(isinstance(part, Step) for part in between.parts):
             found += _rod_between(above.get(inner), above[outer], items_of(mechanism, between.steps))
+        else:
+            raise NoLeg(HAS_LOOP)
     return tuple(found)
 
 
