@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 import oracles
 import pfabrik as pf
 from pfabrik.closure.solve import ClosureEngine
+from pfabrik.decomposition.leg_forms import Arm
 from pfabrik.decomposition.leg_table import LegTable, leg_table
-from pfabrik.decomposition.legs import Arm
 from pfabrik.engine import engine_of
 from pfabrik.errors import UnsupportedMechanism
 from pfabrik.files import loads

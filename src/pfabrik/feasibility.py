@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from .answers.starts import Start, start_of
 from .arrays import Floats, Ints
+from .decomposition.leg_forms import LegForm, Rod
 from .decomposition.leg_table import LegTable, table_of_poses
-from .decomposition.legs import LegForm, Rod
 from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism
 from .kernels.threads import in_blocks

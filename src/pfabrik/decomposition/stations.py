@@ -14,7 +14,8 @@ from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism
 from .decompose import SubChain, parts_between
 from .items import HAS_LOOP, Item, NoLeg, items_of
-from .legs import Arm, LegForm, legs_of_chain, put_on, rigid_rod
+from .leg_forms import Arm, LegForm
+from .legs import legs_of_chain, put_on, rigid_rod
 from .stages import graph_of
 
 MEETING, MOST_ARMS = 3, 6

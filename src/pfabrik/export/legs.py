@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..decomposition.items import Item
-from ..decomposition.legs import LegForm, Pivot, Rod, holds_spin
+from ..decomposition.leg_forms import LegForm, Pivot, Rod, holds_spin
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 

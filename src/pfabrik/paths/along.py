@@ -10,8 +10,8 @@ from ..answers.margins import margins
 from ..answers.solution import Solution
 from ..arrays import Floats
 from ..decomposition.items import Item
+from ..decomposition.leg_forms import Rod
 from ..decomposition.leg_table import LegTable, leg_table
-from ..decomposition.legs import Rod
 from ..description.mechanism import Mechanism
 from ..motion.displacements import displacements, home_coordinates
 

@@ -21,12 +21,23 @@ import numpy as np
 from .._jit import allocator, routine
 from ..vectors import Vec, add, cross, dot, move, put, scale, sub, turn, vec
 from .endings import either_angle, turned
-from .records import ARM, CARRIER, CRANK, RATE, Floats, Record, Records
+from .records import (
+    ARM,
+    CARRIER,
+    CRANK,
+    FIXED,
+    FROM_BASE,
+    FROM_ITSELF,
+    FROM_PLATFORM,
+    RATE,
+    Floats,
+    Record,
+    Records,
+)
 
 NOWHERE: Vec = (0.0, 0.0, 0.0)
 # Rows of a frame.
 ABOUT, AXES, N_ROWS = 3, 4, 7
-FROM_BASE, FROM_PLATFORM, FROM_ITSELF, FIXED = 0, 1, 2, 3  # and how many there are without arms
 
 
 @allocator

@@ -27,6 +27,8 @@ ROD, PIVOT, ARM, IDLE = 0, 1, 2, 3
 NO_CARRIER, CRANK, CARRIAGE, SHARED = 0, 1, 2, 3
 # Endings: a weld, a hinge, two hinges that cross, three hinges through one point, a ball.
 WELD, HINGE, CROSS, TRIPLE, BALL = 0, 1, 2, 3, 4
+# Frames that legs are read in, see `frames`, and how many there are without arms.
+FROM_BASE, FROM_PLATFORM, FROM_ITSELF, FIXED = 0, 1, 2, 3
 
 _vector = ("f8", (3,))
 

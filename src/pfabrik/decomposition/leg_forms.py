@@ -1,0 +1,115 @@
+"""What a leg may be: a rod, a pivot, an axis that is kept, or an arm that others are on; see `legs`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from .items import Floats, Item
+
+EndingKind = Literal["weld", "hinge", "cross", "triple", "ball"]
+
+
+@dataclass(frozen=True, eq=False)
+class Ending:
+    """Where a rod ends: its items, in the order in which the leg is read, and the point that all of them meet in.
+
+    Of a single hinge that is its joint's centre.
+    """
+
+    kind: EndingKind
+    items: tuple[Item, ...]
+    centre: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Rod:
+    """A rod and what carries it; see above.
+
+    Attributes
+    ----------
+    foot, head : its ends at home [L].
+    beside : of a parallelogram, the pins of the other rod: they turn as the last hinge at the foot does, and as the
+        first one at the head.
+    """
+
+    carrier: Item | None
+    foot_ending: Ending
+    slide: Item | None
+    twist: Item | None
+    head_ending: Ending
+    foot: Floats
+    head: Floats
+    is_reversed: bool
+    is_shared: bool = False
+    beside: tuple[Item, ...] = ()
+    on: Arm | None = None
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        between = tuple(item for item in (self.carrier, self.slide, self.twist) if item is not None)
+        return (*between, *self.foot_ending.items, *self.head_ending.items)
+
+
+@dataclass(frozen=True, eq=False)
+class Pivot:
+    """Slides and an ending of no length; see above."""
+
+    slides: tuple[Item, ...]
+    ending: Ending
+    is_reversed: bool
+    on: Arm | None = None
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        return (*self.slides, *self.ending.items)
+
+
+@dataclass(frozen=True, eq=False)
+class KeptAxis:
+    """A direction that is the same on the base and on the platform: that of a hinge on the platform."""
+
+    ending: Ending
+    is_reversed: bool = False
+    on: Arm | None = None
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        return self.ending.items
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A hinge or slide that legs are on; see above.
+
+    Attributes
+    ----------
+    at_head : whether it moves the body that their heads are on.
+    on : the arm that it is on.
+    faces : whether it has the hinge at the foot of the one rod on it face the rod's head.
+    twin : the arm whose coordinate it has: of the platform, for rods between bodies that those place.
+    """
+
+    item: Item
+    is_reversed: bool
+    at_head: bool = False
+    on: Arm | None = None
+    faces: bool = False
+    twin: Arm | None = None
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        return (self.item,)
+
+
+LegForm = Rod | Pivot | KeptAxis | Arm
+
+
+def keeps_from_spinning(rod: Rod) -> bool:
+    """Whether both ends keep a rod from spinning about itself, and nothing along it lets it: a constraint."""
+    return holds_spin(rod.foot_ending) and holds_spin(rod.head_ending) and rod.twist is None and not rod.beside
+
+
+def holds_spin(ending: Ending) -> bool:
+    """Whether an ending keeps a rod from spinning about itself."""
+    return ending.kind in ("hinge", "cross")
