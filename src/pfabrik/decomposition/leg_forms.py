@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from ..kernels.legs import records as K
 from .items import Floats, Item
 
 EndingKind = Literal["weld", "hinge", "cross", "triple", "ball"]
@@ -113,3 +115,30 @@ def keeps_from_spinning(rod: Rod) -> bool:
 def holds_spin(ending: Ending) -> bool:
     """Whether an ending keeps a rod from spinning about itself."""
     return ending.kind in ("hinge", "cross")
+
+
+def told_places(form: LegForm) -> Iterator[tuple[Item, int]]:
+    """Items whose coordinates a leg tells, each with its place in the leg's values."""
+    if isinstance(form, KeptAxis):
+        return
+    if isinstance(form, Arm):
+        if form.twin is None:
+            yield form.item, K.CARRIER
+        return
+    if isinstance(form, Pivot):
+        yield from ((item, K.HEAD + place) for place, item in enumerate(form.slides))
+        if form.ending.kind != "ball":
+            yield from ((item, K.FOOT + place) for place, item in enumerate(form.ending.items))
+        return
+    if form.carrier is not None:
+        yield form.carrier, K.CARRIER
+    if form.slide is not None:
+        yield form.slide, K.SLIDE
+    if holds_spin(form.foot_ending):
+        yield from ((item, K.FOOT + place) for place, item in enumerate(form.foot_ending.items))
+    if holds_spin(form.head_ending):
+        # as the body beyond sees the rod
+        yield from ((item.back, K.HEAD + place) for place, item in enumerate(form.head_ending.items[::-1]))
+    if form.beside:
+        inner, outer = form.beside
+        yield from ((inner, K.FOOT + 1), (outer.back, K.HEAD + 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -20,7 +20,7 @@ from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
 from .decompose import decompose
 from .items import Item, NoLeg
-from .leg_forms import Arm, KeptAxis, LegForm, Pivot, Rod, holds_spin
+from .leg_forms import Arm, LegForm, Rod, told_places
 from .leg_records import leg_records, row_counts
 from .stations import legs_of_sub_chain
 
@@ -134,7 +134,7 @@ def legs_answer(mechanism: Mechanism) -> bool:
 def _table(mechanism: Mechanism) -> LegTable:
     forms = _forms(mechanism)
     legs = leg_records(mechanism, forms)
-    told = [(leg, item, place) for leg, form in enumerate(forms) for item, place in _places(form)]
+    told = [(leg, item, place) for leg, form in enumerate(forms) for item, place in told_places(form)]
     _require_all(mechanism, {(item.joint.name, item.place) for _, item, _ in told})
     known = np.array([_coordinate(mechanism, *each) for each in told], K.COORDINATE)
     joints = [item.joint for _, item, _ in told]
@@ -190,33 +190,6 @@ def _require_all(mechanism: Mechanism, seen: set[tuple[str, int]]) -> None:
         for place in range(len(KINDS[joint.type].coordinates)):
             if (joint.range is not None or place in joint.driven) and (joint.name, place) not in seen:
                 raise NoLeg(f"joint {joint.name} has a motor or a limit that no closed form tells")
-
-
-def _places(form: LegForm) -> Iterator[tuple[Item, int]]:
-    """Items whose coordinates a leg tells, each with its place in the leg's values."""
-    if isinstance(form, KeptAxis):
-        return
-    if isinstance(form, Arm):
-        if form.twin is None:
-            yield form.item, K.CARRIER
-        return
-    if isinstance(form, Pivot):
-        yield from ((item, K.HEAD + place) for place, item in enumerate(form.slides))
-        if form.ending.kind != "ball":
-            yield from ((item, K.FOOT + place) for place, item in enumerate(form.ending.items))
-        return
-    if form.carrier is not None:
-        yield form.carrier, K.CARRIER
-    if form.slide is not None:
-        yield form.slide, K.SLIDE
-    if holds_spin(form.foot_ending):
-        yield from ((item, K.FOOT + place) for place, item in enumerate(form.foot_ending.items))
-    if holds_spin(form.head_ending):
-        # as the body beyond sees the rod
-        yield from ((item.back, K.HEAD + place) for place, item in enumerate(form.head_ending.items[::-1]))
-    if form.beside:
-        inner, outer = form.beside
-        yield from ((inner, K.FOOT + 1), (outer.back, K.HEAD + 1))
 
 
 def _coordinate(mechanism: Mechanism, leg: int, item: Item, place: int) -> tuple[float, ...]:

@@ -16,8 +16,9 @@ hinges is a rod between pairs of crossed hinges, and an axis that the platform k
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
@@ -27,7 +28,7 @@ from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .decompose import Part, Split, SubChain
 from .items import HAS_LOOP, NO_AXIS, Floats, Item, NoLeg, are_parallel, area, items_of
-from .leg_forms import Arm, Ending, EndingKind, KeptAxis, LegForm, Pivot, Rod, keeps_from_spinning
+from .leg_forms import Arm, Ending, EndingKind, KeptAxis, LegForm, Pivot, Rod, keeps_from_spinning, told_places
 
 MOST_HINGES, MOST_ARMS = 3, 3
 """Hinges of the largest ending, and arms of a chain."""
@@ -152,35 +153,45 @@ def _parallelogram_rod(
 
 
 def _leg(items: list[Item]) -> tuple[LegForm, ...]:
-    """The simplest leg that items in series are: fewest carriers, then read from the base, then the largest endings;
-    rods on arms where it is none of these.
+    """The simplest leg that items in series are and that tells all their motors and limits.
+
+    That is with the fewest carriers, then read from the base, then with the largest endings; then with arms.
 
     Raises
     ------
     NoLeg : why it is none with one carrier, read from the platform.
     """
-    reasons = []
-    for n_carriers in (0, 1):
-        for is_reversed in (False, True):
-            own = [item.back for item in items[::-1]] if is_reversed else items
-            for make in (_pivot, _rod_on):
-                try:
-                    return (make(own, n_carriers, is_reversed),)
-                except NoLeg as reason:
-                    reasons.append(str(reason))
-    readings = [(items, False), ([item.back for item in items[::-1]], True)]
-    for own, is_reversed in readings:
-        for n_carriers in (0, 1):
-            try:
-                return _facing(own, n_carriers, is_reversed)
-            except NoLeg:
-                continue
-    for n_arms, (own, is_reversed) in product(range(1, MOST_ARMS + 1), readings):
+    untold: tuple[LegForm, ...] | None = None
+    reasons: list[str] = []
+    for make in _readings(items):
         try:
-            return _on_arms(own[:n_arms], [own[n_arms:]], is_reversed)
-        except NoLeg:
+            legs = make()
+        except NoLeg as reason:
+            reasons.append(str(reason))
             continue
-    raise NoLeg(reasons[-1])
+        told = {(item.joint.name, item.place) for leg in legs for item, _ in told_places(leg)}
+        asked = [item for item in items if item.joint.range is not None or item.place in item.joint.driven]
+        if all((item.joint.name, item.place) in told for item in asked):
+            return legs
+        untold = untold or legs
+    if untold is None:
+        raise NoLeg(reasons[WITHOUT_ARMS - 1])
+    return untold
+
+
+WITHOUT_ARMS = 8
+"""Readings without arms."""
+
+
+def _readings(items: list[Item]) -> Iterator[Callable[[], tuple[LegForm, ...]]]:
+    """Ways to read items in series, the simplest first."""
+    ways = (items, False), ([item.back for item in items[::-1]], True)
+    for n_carriers, (own, is_reversed), make in product((0, 1), ways, (_pivot, _rod_alone)):
+        yield partial(make, own, n_carriers, is_reversed)
+    for make_on, (own, is_reversed), n_carriers in product((_facing, _led), ways, (0, 1)):
+        yield partial(make_on, own, n_carriers, is_reversed)
+    for n_arms, (own, is_reversed) in product(range(1, MOST_ARMS + 1), ways):
+        yield partial(_on_arms, own[:n_arms], [own[n_arms:]], is_reversed)
 
 
 def _facing(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm, ...]:
@@ -200,7 +211,17 @@ def _facing(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegF
     return under, *put_on(under, [rod])
 
 
-def _pivot(items: list[Item], n_carriers: int, is_reversed: bool) -> Pivot:
+def _led(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm, ...]:
+    """A rod that asks something of the arm that it is on: not to spin, or to face the other end."""
+    rod = _rod_on(items[1:], n_carriers, is_reversed)
+    hinges = [end for end in (rod.foot_ending, rod.head_ending) if end.kind == "hinge"]
+    if items[0].kind == "S" or not (hinges or keeps_from_spinning(rod)):
+        raise NoLeg("several joints carry its rod")
+    under = Arm(items[0], is_reversed)
+    return under, *put_on(under, [rod])
+
+
+def _pivot(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm]:
     """Slides and one ending; whatever `n_carriers` says, all slides at the foot count."""
     slides = tuple(item for item in items if item.kind == "P")
     ending = _ending(items[len(slides) :])
@@ -208,12 +229,16 @@ def _pivot(items: list[Item], n_carriers: int, is_reversed: bool) -> Pivot:
         raise NoLeg("no pivot")
     if len(slides) > 3 or (slides and np.linalg.svd([item.axis for item in slides])[1].min() < TOLERANCES.alignment):
         raise NoLeg("slides that are not independent")
-    return Pivot(slides, ending, is_reversed)
+    return (Pivot(slides, ending, is_reversed),)
 
 
 def rigid_rod(items: list[Item]) -> Rod:
     """A rod of items in series without a carrier, read as if from the platform."""
     return _rod(None, items, is_reversed=True)
+
+
+def _rod_alone(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm]:
+    return (_rod_on(items, n_carriers, is_reversed),)
 
 
 def _rod_on(items: list[Item], n_carriers: int, is_reversed: bool) -> Rod:

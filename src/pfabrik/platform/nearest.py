@@ -268,9 +268,10 @@ def corners_of(mechanism: Mechanism) -> Starts:
     rng, home = np.random.default_rng(0), home_start(mechanism, table)
     poses = np.repeat(home.poses, DRAWS, axis=0)
     twists = rng.uniform(-1.0, 1.0, (DRAWS, 6)) * np.repeat([FAR, TURNED], 3)
-    _, sizes, directions = np.linalg.svd(constraints_at(table, mechanism.home_pose[None])[1][0])
-    bound = directions[: (sizes > TOLERANCES.alignment).sum()]
-    twists -= twists @ bound.T @ bound  # what the legs do not allow at home they hardly do elsewhere
+    for slopes in constraints_at(table, mechanism.home_pose[None])[1]:
+        _, sizes, directions = np.linalg.svd(slopes)
+        bound = directions[: (sizes > TOLERANCES.alignment).sum()]
+        twists -= twists @ bound.T @ bound  # what the legs do not allow at home they hardly do elsewhere
     poses[:, :3, 3] += twists[:, :3]
     weights = np.array([1.0, 1.0, 1.0, TURNING, TURNING, TURNING])
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):

@@ -32,6 +32,8 @@ def keeps_rotation(mechanism: Mechanism) -> bool:
     if table.task[0]["rows"] < 3:
         return False
     rows, slopes = constraints_at(table, _shifted_about_home(table))
+    if not len(rows):
+        return False
     stays = np.abs(rows).max(initial=0.0) <= TOLERANCES.position
     return bool(stays and (np.linalg.svd(slopes[:, :, 3:])[1][:, -1] > TOLERANCES.nearly_implied).all())
 
@@ -45,6 +47,8 @@ def without_idle_legs(table: LegTable) -> Machine:
     """
     legs, rows = table.legs.copy(), table.task[0]["rows"]
     values, slopes = constraints_at(table, _shifted_about_home(table))
+    if not len(values):
+        return machine(table)
     quiet = np.maximum(np.abs(values), np.abs(slopes[:, :, :3]).max(axis=2)).max(axis=0) <= TOLERANCES.implied
     ends = np.append(legs["first_row"][1:], rows)
     limited = np.concatenate([table.limited["leg"], table.driven["leg"]])
@@ -82,7 +86,7 @@ def _shifted_about_home(table: LegTable) -> Floats:
 def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
     """The constraints of home's legs on poses (n, 4, 4) [length], (n, rows), and their derivatives, (n, rows, 6).
 
-    Where arms follow, without what these give way to.
+    Where arms follow, without what these give way to. Of the poses, those that legs reach short of dead points.
     """
     from ..kernels.legs.answer import measure_rows
 
@@ -90,5 +94,6 @@ def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
     rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6 + len(table.arms)))
     legs = machine(table)
     measure_rows(legs.address, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
-    by_pose, by_arms = slopes[:, :, :6], slopes[:, :, 6:]
+    known = np.isfinite(slopes).all(axis=(1, 2))
+    rows, by_pose, by_arms = rows[known], slopes[known, :, :6], slopes[known, :, 6:]
     return rows, by_pose - by_arms @ (np.linalg.pinv(by_arms) @ by_pose) if table.task["arms"][0] else by_pose

@@ -354,15 +354,17 @@ def read_coordinates(machine: int, poses: Floats, sides: Floats, found: Floats) 
 def measure_rows(machine: int, poses: Floats, sides: Floats, rows: Floats, slopes: Floats) -> None:
     """Fill the constraints (n, rows) of all legs at poses [length], and their derivatives [L, rad].
 
-    These are (n, rows, 6 + arms), by the pose and by arms.
+    These are (n, rows, 6 + arms), by the pose and by arms; NaN where a leg is at a dead point, or beyond.
     """
     table = open_table(machine)
     work, legs = new_completion(table), table.legs
     for row in range(poses.shape[0]):
         load_pose(poses[row], table.task[0]["length"], work.pose)
         set_frames(work.pose, table.task[0], work.frames)
-        place_legs(legs, work.frames, sides[row if sides.shape[0] > 1 else 0], work.values, work.lines)
+        side = sides[row if sides.shape[0] > 1 else 0]
+        _, bearing = place_legs(legs, work.frames, side, work.values, work.lines)
         put_rows(legs, work.frames, work.values, work.lines, rows[row])
         put_slopes(legs, work.frames, work.values, work.lines, work.follow, work.slopes)
         for i in range(rows.shape[1]):
-            copy_row(work.slopes[i], slopes[row, i])
+            for j in range(slopes.shape[2]):
+                slopes[row, i, j] = work.slopes[i, j] if bearing > SURE * SURE else math.nan
