@@ -27,6 +27,8 @@ TURNS = {
     "H4": ABOUT_Z,
     "Par4": ABOUT_Z,
     "R + 3-RPS + RR": ANY,
+    "delta with a shaft": ABOUT_Z,
+    "Tricept with a wrist": ANY,
     "SCARA": ABOUT_Z,
     "3-CRU": NONE,
     "3-RRRS": ANY,
@@ -52,14 +54,16 @@ def far(mechanism: pf.Mechanism, position: np.ndarray, rotation: np.ndarray) -> 
     return np.hypot(position, mechanism.rotation_length * rotation) / mechanism.characteristic_length
 
 
-def assert_as_on_joint_coordinates(mechanism: pf.Mechanism, wanted: np.ndarray, answers: pf.Solution) -> None:
+def assert_as_on_joint_coordinates(
+    mechanism: pf.Mechanism, wanted: np.ndarray, answers: pf.Solution, at_most: float = 1e-6
+) -> None:
     """Same statuses, and no projection farther than those of the engine that knows no legs; all of it kept exactly."""
     assert isinstance(engine_of(mechanism), LegsEngine)
     rows = ClosureEngine(mechanism).answer(wanted, None, Options(), keep_mode=False).rows
     np.testing.assert_array_equal(np.asarray(answers.status), rows.status)
     own = far(mechanism, np.asarray(answers.position_error), np.asarray(answers.rotation_error))
     other = far(mechanism, rows.measures[:, 0], rows.measures[:, 1])
-    np.testing.assert_array_less(own, other + 1e-6)
+    np.testing.assert_array_less(own, other + at_most)
     assert gap_of_joints(mechanism, answers).max() <= 1e-9
     assert excess_of_joints(mechanism, answers).max() <= 1e-9
 
@@ -136,6 +140,14 @@ def test_legs_with_two_carriers_answer_in_all_four_of_their_ways() -> None:
         assert there.status == pf.Status.REACHED
         turned = there.actuators - mode.actuators
         np.testing.assert_allclose(np.cos(turned), 1.0, atol=1e-9)
+
+
+def test_a_home_at_dead_points_is_one_to_search_from() -> None:
+    mechanism = closure.stretched_delta()
+    wanted = targets(mechanism, 60, 0.1, 0.0, NONE)
+    answers = pf.solve_ik(mechanism, wanted)
+    assert 10 < (np.asarray(answers.status) == pf.Status.REACHED).sum() < 50
+    assert_as_on_joint_coordinates(mechanism, wanted, answers, at_most=1e-4)
 
 
 def test_maps_know_arms_that_follow_and_code_for_controllers_says_that_it_does_not(tmp_path: Path) -> None:

@@ -580,10 +580,62 @@ def hybrid() -> Mechanism:
     return Mechanism("R + 3-RPS + RR", joints, "tool", (0, 0, 260))
 
 
+def picker() -> Mechanism:
+    """A delta whose tool a shaft turns: from a motor on the base, through cardan joints and a slide between them."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        out, across = _out(angle), _tangent(angle)
+        elbow, wrist = 535 * out - [0, 0, 105], 45 * out - [0, 0, 800]
+        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), 200 * out, across, range=(-1.2, 1.5)))
+        for side, name in ((-1, "L"), (1, "R")):
+            offset = side * 50 * across
+            joints += [
+                joint("S", f"B{name}{leg}", (f"arm{leg}", f"rod{name}{leg}"), elbow + offset),
+                joint("S", f"C{name}{leg}", (f"rod{name}{leg}", "plate"), wrist + offset),
+            ]
+    joints.append(joint("R", "bearing", ("plate", "tool"), (0, 0, -800), Z))
+    joints += chain(
+        "shaft",
+        ("R*", (0, 0, 0), Z, {"range": (-3.0, 3.0)}),
+        ("U", (0, 0, -20), (X, Y)),
+        ("P", None, (0, 0, -1), {"range": (-300, 300)}),
+        ("U", (0, 0, -780), (Y, X)),
+        end="tool",
+    )
+    return Mechanism("delta with a shaft", joints, "tool", (0, 0, -820), task=("x", "y", "z", "yaw"))
+
+
+def tricept_with_wrist() -> Mechanism:
+    """Three sliding legs and a guide that cardan joints hold, and beyond the plate a wrist of three hinges."""
+    joints = [*tricept().joints]
+    for k, (height, axis) in enumerate(((240, X), (260, Y), (280, Z))):
+        bodies = ("platform" if k == 0 else f"wrist{k}", f"wrist{k + 1}" if k < 2 else "tool")
+        joints.append(joint("R*", f"W{k}", bodies, (0, 0, height), axis, range=(-1.2, 1.2)))
+    return Mechanism("Tricept with a wrist", joints, "tool", (0, 0, 320))
+
+
+def stretched_delta() -> Mechanism:
+    """A delta whose cranks and rods are in line at home."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        out, across = _out(angle), _tangent(angle)
+        foot, wrist = 200 * out, 45 * out - [0, 0, 800]
+        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), foot, across, range=(-1.2, 1.5)))
+        for side, name in ((-1, "L"), (1, "R")):
+            offset = side * 50 * across
+            joints += [
+                joint("S", f"B{name}{leg}", (f"arm{leg}", f"rod{name}{leg}"), 0.65 * foot + 0.35 * wrist + offset),
+                joint("S", f"C{name}{leg}", (f"rod{name}{leg}", "plate"), wrist + offset),
+            ]
+    return Mechanism("stretched delta", joints, "plate", (0, 0, -800), task=("x", "y", "z"))
+
+
 ON_ARMS: dict[str, Callable[[], Mechanism]] = {
     "H4": h4,
     "Par4": par4,
     "R + 3-RPS + RR": hybrid,
+    "delta with a shaft": picker,
+    "Tricept with a wrist": tricept_with_wrist,
     "SCARA": scara,
     "3-CRU": cru,
     "3-RRRS": rrrs,

@@ -89,7 +89,8 @@ class Arm:
     at_head : whether it moves the body that their heads are on.
     on : the arm that it is on.
     faces : whether it has the hinge at the foot of the one rod on it face the rod's head.
-    twin : the arm whose coordinate it has: of the platform, for rods between bodies that those place.
+    twin : the arm whose coordinate it has, for legs that are read the other way, or as the platform sees them.
+    is_inner : whether it is for a rod between bodies that arms of the platform place.
     """
 
     item: Item
@@ -98,6 +99,7 @@ class Arm:
     on: Arm | None = None
     faces: bool = False
     twin: Arm | None = None
+    is_inner: bool = False
 
     @property
     def items(self) -> tuple[Item, ...]:

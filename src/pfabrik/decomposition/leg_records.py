@@ -69,8 +69,9 @@ def _put_frames(legs: Records, forms: Sequence[LegForm]) -> None:
     own = arms & (legs["twin"] < 0)
     legs["makes"][arms], legs["column"][own] = K.FIXED + np.arange(arms.sum()), np.arange(own.sum())
     legs["column"][arms & ~own] = legs["column"][legs["twin"][arms & ~own]]
-    for leg in legs:
-        leg["inner"] = leg["twin"] >= 0 or (leg["arm"] >= 0 and legs["inner"][leg["arm"]])
+    for leg, form in zip(legs, forms, strict=True):
+        own = isinstance(form, Arm) and form.is_inner
+        leg["inner"] = own or (leg["arm"] >= 0 and legs["inner"][leg["arm"]])
     legs["frame"] = np.where(
         legs["arm"] >= 0, legs["makes"][legs["arm"]], np.where(legs["inner"], K.FROM_ITSELF, legs["reversed"])
     )

@@ -2,7 +2,8 @@
 
 Stations are found from the platform: bodies that lead on to several legs, as far as hinges and slides alone reach. What
 is in series at the base carries all of it, as arms there. What is left between two of base, stations and platform is a
-leg, or a rod between stations, which is read as the platform sees these.
+leg, or a rod between stations, which is read as the platform sees these. Legs that are not read from the base are on
+twins of the arms, see `kernels.legs.frames`.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from .leg_forms import Arm, LegForm
 from .legs import legs_of_chain, put_on, rigid_rod
 from .stages import graph_of
 
-MEETING, MOST_ARMS = 3, 6
-"""Joints of a body where legs meet, and arms of a sub-chain: a body has no more freedoms."""
+MEETING, MOST_ARMS = 3, 4
+"""Joints of a body where legs meet, and arms of a sub-chain: one with more is a linkage, in which searches get lost."""
 
 
 def legs_of_sub_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
@@ -56,9 +57,8 @@ def _between_stations(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, .
         between = SubChain(parts_between(mechanism, group, inner, outer), None)
         if inner == base:
             legs = legs_of_chain(mechanism, between)
-            if any(leg.is_reversed for leg in legs):
-                raise NoLeg("a leg between stations that is read from the platform")
-            found += put_on(above.get(outer, below[-1] if below else None), legs)
+            found += _from_base(below, above.get(outer), [leg for leg in legs if not leg.is_reversed])
+            found += _from_platform(below, above.get(outer), [leg for leg in legs if leg.is_reversed])
         elif all(isinstance(part, Step) for part in between.parts):
             found += _rod_between(above.get(inner), above[outer], items_of(mechanism, between.steps))
         else:
@@ -116,12 +116,30 @@ def _is_arm(items: Sequence[Item]) -> bool:
     return len(items) == 1 and items[0].kind != "S"
 
 
+def _from_base(below: Sequence[Arm], outer: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
+    """Legs read from the base, or what arms have it carry, to the platform or a body that its arms place."""
+    return put_on(outer or (below[-1] if below else None), legs)
+
+
+def _from_platform(below: Sequence[Arm], outer: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
+    """The same read the other way, on twins of these arms."""
+    twins = _twins(_way_to(outer), below, is_inner=False) if legs else []
+    return *twins, *put_on(twins[-1] if twins else None, legs)
+
+
 def _rod_between(inner: Arm | None, outer: Arm, items: list[Item]) -> tuple[LegForm, ...]:
     """A rod between two bodies that arms place, the inner one maybe the platform, on twins of these arms."""
-    rod, twins = rigid_rod(items), list[Arm]()
-    for arm, at_head in (*((each, False) for each in _way_to(inner)), *((each, True) for each in _way_to(outer))):
-        twins.append(Arm(arm.item, is_reversed=True, at_head=at_head, on=twins[-1] if twins else None, twin=arm))
-    return *twins, replace(rod, on=twins[-1])
+    twins = _twins(_way_to(inner), _way_to(outer), is_inner=True)
+    return *twins, replace(rigid_rod(items), on=twins[-1])
+
+
+def _twins(feet: Sequence[Arm], heads: Sequence[Arm], is_inner: bool) -> list[Arm]:
+    """Arms with the coordinates of others, that move the body of the feet, then that of the heads."""
+    twins: list[Arm] = []
+    for arm, at_head in (*((each, False) for each in feet), *((each, True) for each in heads)):
+        on = twins[-1] if twins else None
+        twins.append(Arm(arm.item, is_reversed=True, at_head=at_head, on=on, twin=arm, is_inner=is_inner))
+    return twins
 
 
 def _way_to(arm: Arm | None) -> list[Arm]:

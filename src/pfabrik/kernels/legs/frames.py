@@ -6,7 +6,7 @@ on. With arms where they are, a leg is like any other in its frame; and where an
 if the platform moved with it, if the arm is on the platform, or against it.
 
 A rod between two bodies that arms on the platform place is read in frames made out of the third, by twins of these arms
-which have their coordinates.
+which have their coordinates; and legs read from the platform where arms are read from the base, out of the second.
 
 Rows 0 to 2 of a frame map head points; row 3 is the point about which the platform turns, as the foot's body sees it;
 rows 4 to 6 turn directions of the foot's body to those of the base.
