@@ -150,14 +150,17 @@ def add_limit(k: int, h: float, number: int, slope: Floats, view: FreeMotions) -
 
 
 @routine
-def restoring_step(view: FreeMotions, p: QP) -> bool:
-    """The shortest step that meets the equations within all limits, into `p.x`, besides `shift`; False where there is
-    none."""
+def restoring_step(view: FreeMotions, by_all: bool, p: QP) -> bool:
+    """The shortest step within all limits, into `p.x`, besides `shift`, which meets the equations; False where there is
+    none.
+
+    Shortest by itself; or, if equations are to be met by all unknowns and not by pivots alone, together with `shift`.
+    """
     linear, basis, shift = view.linear, view.basis, view.shift
     motions, k = linear.counts[MOTIONS], linear.counts[LIMITS]
     for a in range(motions):
         p.g[a] = 0.0
-        for j in range(shift.shape[0]):
+        for j in range(shift.shape[0] if by_all else 0):
             p.g[a] += shift[j] * basis[j, a]
     for c in range(k):
         p.h[c] = linear.h[c] + linear.drift[c]

@@ -154,7 +154,7 @@ def restore_feasibility(
     for _step in range(RESTORING):
         if is_closed(view.linear, tolerance):
             return True
-        if not restoring_step(view, p):
+        if not restoring_step(view, False, p):  # by all, steps leap over wrists' singularities
             return False
         take(loops, view, p.x, state, work)
         linearise(loops, row, objective, state, work, view)
