@@ -78,7 +78,7 @@ def restore_feasibility(
     for _step in range(steps):
         if is_closed(view.linear, tolerance):
             return True
-        if not restoring_step(view, True, search.p):
+        if not restoring_step(view, table.task[0]["arms"] > 0, search.p):
             return False
         take(table, view, search.p.x, now, search)
         linearise(table, row, aim, now, search, view)
