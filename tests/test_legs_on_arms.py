@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from checks import excess_of_joints, gap_of_joints
 from machines import closure
+from pfabrik.closure.close import closure_of
 from pfabrik.closure.solve import ClosureEngine
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.engine import engine_of
@@ -120,10 +121,13 @@ def test_along_a_path_nothing_leaps_and_a_start_may_be_a_joint_vector(name: str)
     path = [pf.pose(*(share * (end - mechanism.home_pose)[:3, 3],)) @ mechanism.home_pose for share in (0.25, 0.5, 1.0)]
     track = pf.track(mechanism, np.array(path), start=begin)
     assert (np.asarray(track.status) == pf.Status.REACHED).all()
-    steps = np.abs(np.diff(np.concatenate([begin.q[None], np.asarray(track.q)]), axis=0))
-    assert steps.max() <= 0.5 * max(length, 1.0)
+    unit = np.where(closure_of(mechanism, whole=False).turning > 0.0, 1.0, length)
+    steps = np.abs(np.diff(np.concatenate([begin.q[None], np.asarray(track.q)]), axis=0)) / unit
+    assert steps.max() <= 0.5
     by_vector = pf.solve_ik(mechanism, path[-1], start=np.asarray(track.q)[-1])
-    np.testing.assert_allclose(by_vector.actuators, np.asarray(track.actuators)[-1], atol=1e-7 * max(length, 1.0))
+    off = by_vector.q - np.asarray(track.q)[-1]
+    own = [mechanism.coordinate_names.index(name) for name in mechanism.actuator_names]
+    np.testing.assert_allclose((off / unit)[own], 0.0, atol=1e-7)
 
 
 def test_legs_with_two_carriers_answer_in_all_four_of_their_ways() -> None:
@@ -147,7 +151,8 @@ def test_a_home_at_dead_points_is_one_to_search_from() -> None:
     wanted = targets(mechanism, 60, 0.1, 0.0, NONE)
     answers = pf.solve_ik(mechanism, wanted)
     assert 10 < (np.asarray(answers.status) == pf.Status.REACHED).sum() < 50
-    assert_as_on_joint_coordinates(mechanism, wanted, answers, at_most=1e-4)
+    # at a dead point the distance changes with the square of a step: searches end some 1e-5 apart
+    assert_as_on_joint_coordinates(mechanism, wanted, answers, at_most=2e-5)
 
 
 def test_maps_know_arms_that_follow_and_code_for_controllers_says_that_it_does_not(tmp_path: Path) -> None:
