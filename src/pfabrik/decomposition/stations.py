@@ -57,7 +57,8 @@ def _between_stations(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, .
         between = SubChain(parts_between(mechanism, group, inner, outer), None)
         if inner == base:
             legs = legs_of_chain(mechanism, between)
-            found += _from_base(below, above.get(outer), [leg for leg in legs if not leg.is_reversed])
+            carries = above.get(outer, below[-1] if below else None)
+            found += put_on(carries, [leg for leg in legs if not leg.is_reversed])
             found += _from_platform(below, above.get(outer), [leg for leg in legs if leg.is_reversed])
         elif all(isinstance(part, Step) for part in between.parts):
             found += _rod_between(above.get(inner), above[outer], items_of(mechanism, between.steps))
@@ -116,13 +117,8 @@ def _is_arm(items: Sequence[Item]) -> bool:
     return len(items) == 1 and items[0].kind != "S"
 
 
-def _from_base(below: Sequence[Arm], outer: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
-    """Legs read from the base, or what arms have it carry, to the platform or a body that its arms place."""
-    return put_on(outer or (below[-1] if below else None), legs)
-
-
 def _from_platform(below: Sequence[Arm], outer: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
-    """The same read the other way, on twins of these arms."""
+    """Legs read from the platform, or a body that its arms place, on twins of these arms and of those below."""
     twins = _twins(_way_to(outer), below, is_inner=False) if legs else []
     return *twins, *put_on(twins[-1] if twins else None, legs)
 

@@ -6,6 +6,7 @@ import dataclasses
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -138,7 +139,7 @@ def _moved(opened: OpenMechanism, placed: Placed) -> list[Joint]:
     for joint in opened.joints:
         span = columns(tree)[joint.name]
         own, values = directions[span], placed.q[span]
-        changes: dict[str, object] = {"at": places[joint.name][0]} if joint.at is not None else {}
+        changes: dict[str, Any] = {"at": places[joint.name][0]} if joint.at is not None else {}
         kind = KINDS[joint.type]
         if kind.direction == "axis":
             changes["axis"] = own[0, 3:] if joint.type == "prismatic" else own[0, :3]
@@ -147,7 +148,7 @@ def _moved(opened: OpenMechanism, placed: Placed) -> list[Joint]:
         if kind.ranged and values.any():
             home = np.ravel(tree.home_coordinate(joint.name)) + values
             changes["home"] = home[0] if len(home) == 1 else home
-        moved.append(dataclasses.replace(joint, **changes))  # type: ignore[arg-type]
+        moved.append(dataclasses.replace(joint, **changes))
     return moved
 
 

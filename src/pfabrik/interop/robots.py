@@ -6,6 +6,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -196,11 +197,11 @@ def _not_called(tip: str, joints: list[Joint], loops: list[Loop], told: list[Not
 
 def _in_unit(joint: Joint, metres: float) -> Joint:
     """A joint in the unit of the mechanism."""
-    changes: dict[str, object] = {"at": None if joint.at is None else np.array(joint.at) / metres}
+    changes: dict[str, Any] = {"at": None if joint.at is None else np.array(joint.at) / metres}
     if joint.type != "prismatic":
-        return dataclasses.replace(joint, **changes)  # type: ignore[arg-type]
+        return dataclasses.replace(joint, **changes)
     changes |= {"home": np.divide(joint.home, metres)}
     for name in ("range", "max_speed"):
         value = getattr(joint, name)
         changes[name] = None if value is None else np.divide(value, metres)
-    return dataclasses.replace(joint, **changes)  # type: ignore[arg-type]
+    return dataclasses.replace(joint, **changes)
