@@ -20,7 +20,7 @@ from pfabrik.feasibility import _Asked, feasibility_on_grid
 from pfabrik.kernels.legs.answer import measure_rows, read_coordinates
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
-from pfabrik.platform.coordinates import sides_at
+from pfabrik.platform.answers import sides_at
 from pfabrik.platform.solve import LegsEngine
 from pfabrik.platform.table import machine as legs_of
 from pfabrik.platform.table import machine_aimed

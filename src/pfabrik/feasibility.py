@@ -15,7 +15,7 @@ from .decomposition.leg_table import LegTable, table_of_poses
 from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism
 from .kernels.threads import in_blocks
-from .platform.coordinates import sides_at
+from .platform.answers import sides_at
 from .platform.table import machine
 from .targets import Target, as_targets
 

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..closure.close import HELD, close, closure_of
-from ..closure.configurations import Configurations
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..kernels.legs import records as K
-from ..kernels.reaching import plan as P
 from ..motion.displacements import gaps
 from ..motion.limits import within_turns
 from ..motion.meeting import meeting_joints, put_meeting_joints
@@ -24,32 +18,6 @@ Floats = NDArray[np.float64]
 
 RESTARTS = 24
 """Random starts for joints that closed forms do not tell and that do not close from where they began."""
-
-
-class LegAnswers(Configurations):
-    """Configurations of legs that are told by their platforms.
-
-    Attributes
-    ----------
-    sides : which of its two solutions each leg takes, (n, legs).
-    carriers : coordinates of the legs' carriers, (n, legs) [L or rad], where closed forms tell them less exactly: near
-        dead points; NaN elsewhere, None where nowhere.
-    """
-
-    def __init__(
-        self, rows: P.Rows, coordinates: Floats | Callable[[], Floats], sides: Floats, carriers: Floats | None = None
-    ) -> None:
-        super().__init__(rows, coordinates)
-        self.sides, self.carriers = sides, carriers
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return LegAnswers, (self.rows, self.coordinates, self.sides, self.carriers)
-
-    def at(self, places: NDArray[np.intp]) -> Configurations:
-        """The configurations at some places, copied."""
-        rows = super().at(places).rows
-        carriers = None if self.carriers is None else self.carriers[places]
-        return LegAnswers(rows, lambda: self.coordinates[places], self.sides[places], carriers)
 
 
 def settled(
@@ -138,35 +106,3 @@ def _read_with(
     legs = machine_aimed(table)
     read_configurations(legs.address, scaled, carriers, sides, found)
     return found
-
-
-def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Floats:
-    """Which of its two solutions each leg takes in configurations, (n, legs), 0 where it has but one; of arms, where
-    they are."""
-    if isinstance(start, LegAnswers):
-        return start.sides
-    sides = np.repeat(table.home_sides, len(start), axis=0)
-    if len(table.led_arms):
-        arms = table.led_arms
-        columns = [table.known["column"][table.known["leg"] == k][0] for k in arms["leg"]]
-        sides[:, arms["leg"]] = arms["sense"] * start.coordinates[:, columns] / arms["unit"]
-    choosing = np.flatnonzero(table.home_sides[0])
-    if not len(choosing):
-        return sides
-    closure = closure_of(mechanism, whole=False)
-    places = np.where(table.legs["kind"] == K.PIVOT, K.FOOT, K.CARRIER)
-    own = [table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in choosing]
-    if set(own) <= set(closure.actuated.tolist()):
-        present = np.zeros((len(start), len(closure.scale)))
-        closure.put_actuators(present, start.rows.actuators)
-    else:
-        present = start.coordinates
-    turning = closure.turning[own] > 0.0
-    off = []
-    for factor in (1.0, -1.0):
-        found = np.zeros_like(present)
-        read_into(table, start.rows.poses, factor * sides, found)
-        away = found[:, own] - present[:, own]
-        off.append(np.abs(np.where(turning, np.remainder(away + np.pi, 2.0 * np.pi) - np.pi, away)))
-    sides[:, choosing] *= np.where(off[0] <= off[1], 1.0, -1.0)
-    return sides

@@ -21,7 +21,8 @@ from ..kernels.threads import in_blocks
 from ..motion.displacements import centres_at
 from ..options import Options
 from ..poses import are_poses
-from .coordinates import LegAnswers, settled, sides_at
+from .answers import LegAnswers, begins_of, coordinates_of, sides_at
+from .coordinates import settled
 from .forward import assembled
 from .nearest import in_lengths, weighed_limits
 from .one import OneAssembly, OneTarget
@@ -75,7 +76,7 @@ class LegsEngine:
         rows = self._one.new_rows() if is_one else new_rows(self.mechanism, len(targets))
         ends = first.copy() if self._table.leads_arms else first
         if is_one and self._reach_one(targets, start, ends, keep_mode, rows):
-            begins = _begins(self.mechanism, self._table, start, first)
+            begins = begins_of(self.mechanism, self._table, start, first)
             told = rows.poses, rows.actuators, ends
             return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins()), ends)
         left, sides = self._reach(targets, start, first, keep_mode, rows, tried=is_one)
@@ -158,8 +159,8 @@ class LegsEngine:
         others: Configurations | None,
     ) -> LegAnswers:
         """Rows as answers, from a start on sides `first`; those at `rest` are the other engine's."""
-        begins = _begins(self.mechanism, self._table, start, first)
-        coordinates = partial(_coordinates, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
+        begins = begins_of(self.mechanism, self._table, start, first)
+        coordinates = partial(coordinates_of, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
         every = sides if len(sides) == len(rows.status) else np.repeat(sides, len(rows.status), axis=0)
         return LegAnswers(rows, coordinates, every, carriers)
 
@@ -351,50 +352,3 @@ def _part(array: Floats, block: slice) -> Floats:
     """One for all rows, or those of a block; writable, as kernels are compiled for."""
     own = array if len(array) == 1 else array[block]
     return np.require(own, requirements=["C", "W"])
-
-
-def _begins(
-    mechanism: Mechanism, table: LegTable, start: Configurations | None, sides: Floats
-) -> Callable[[], Floats | None]:
-    """Gives the joint coordinates of a start, None for home.
-
-    Of a start that knows its coordinates no other way, the pose and the actuators are kept, not how it was found:
-    answers that start from each other would all stay in memory.
-    """
-    if start is None:
-        return lambda: None
-    if start.were_given:
-        given = start.coordinates
-        return lambda: given
-    return partial(settled, mechanism, table, start.rows.poses, start.rows.actuators, sides, None)
-
-
-def _coordinates(
-    mechanism: Mechanism,
-    table: LegTable,
-    rows: P.Rows,
-    sides: Floats,
-    carriers: Floats | None,
-    begins: Callable[[], Floats | None],
-    rest: NDArray[np.intp],
-    others: Configurations | None,
-) -> Floats:
-    """Joint coordinates (n, columns) of answers, those of the other engine (`rest`) as it has them."""
-    own = np.setdiff1d(np.arange(len(rows.status)), rest)
-    begin = begins()
-    if begin is not None and len(begin) > 1:
-        begin = begin[own]
-    found = settled(
-        mechanism,
-        table,
-        rows.poses[own],
-        rows.actuators[own],
-        sides if len(sides) == 1 else sides[own],
-        begin,
-        None if carriers is None else carriers[own],
-    )
-    if others is None:
-        return found
-    every = np.empty((len(rows.status), found.shape[1]))
-    every[own], every[rest] = found, others.coordinates
-    return every

@@ -1,12 +1,9 @@
-"""Legs in the pose of the platform and the coordinates of what carries their rods: equations, limits, derivatives.
+"""Legs in the pose of the platform and the coordinates of what carries their rods: equations and their derivatives.
 
 Nothing is eliminated here, so that all of it is smooth where rods are stretched out over what carries them, and both
 working modes are one set. Unknowns, n of them: the twist of the platform (velocity of its reference point, angular
 velocity), then one for each crank and carriage, then one for each arm. Equations, besides those that `legs` leave on
 the pose: each rod on a crank or carriage has its length.
-
-Whatever is told of a rod follows from y = du - B x u, the rate at which its line u turns as seen by the body that an
-end of it is on, with angular velocity B: hinges and cones at that end change by t . y, each with a vector t of its own.
 """
 
 from __future__ import annotations
@@ -17,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import allocator, routine
-from ..legs.answer import deviation, end_of_rows
+from ..legs.answer import end_of_rows
 from ..legs.endings import turned
 from ..legs.frames import NOWHERE, by_arm, coordinate_of, facing, new_frames, place_arm, put_pose_slope, set_frames
 from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
@@ -27,10 +24,6 @@ from ..legs.records import (
     CARRIER,
     COSINE,
     CRANK,
-    CROSS,
-    FOOT,
-    FOOT_LINE,
-    HEAD,
     HINGE,
     N_VALUES,
     PIVOT,
@@ -38,7 +31,6 @@ from ..legs.records import (
     SHARED,
     SINE,
     SLIDE,
-    TRIPLE,
     Floats,
     Record,
     Table,
@@ -48,16 +40,12 @@ from ..legs.rods import (
     carried_foot,
     carrier_rate,
     carry,
-    mark,
     read_rod,
     rod_rows,
     twist_rate,
 )
-from ..vectors import Vec, along, angle_between, cross, dot, move, norm, scale, sub, turn, vec, wrap
+from ..vectors import Vec, along, cross, dot, move, norm, scale, sub, turn, vec, wrap
 
-AT_FOOT, AT_HEAD = 0, 1
-# Sine below which a line is straight along the axis of its cone: no direction leads in or out.
-ALIGNED = 1e-12
 # How far from a dead point, as `carry` says, a carrier must be to be put where its rod has its length.
 SURELY = 1e-2
 
@@ -117,6 +105,14 @@ def count_carried(table: Table) -> int:
 def is_carried(leg: Record) -> bool:
     """Whether a leg is a rod with a carrier of its own."""
     return bool(leg["kind"] == ROD and (leg["carrier"] == CRANK or leg["carrier"] == CARRIAGE))
+
+
+@routine
+def main_of(table: Table, k: int) -> int:
+    """The leg whose carrier a leg is on; itself if it is on none but its own."""
+    while table.legs[k]["carrier"] == SHARED:
+        k -= 1
+    return k
 
 
 @routine
@@ -288,135 +284,3 @@ def put_rod_slopes(table: Table, k: int, main: int, view: View) -> None:
         by_line, b, c = twist_rate(rod, carrier, frame, lead, view.values[k], u)
         by_line = scale(1.0 / norm(span), along(by_line, -dot(by_line, u), u))
         put_rate(table, k, main, by_line, b, c, view, slopes[n])
-
-
-@routine
-def put_turning(table: Table, k: int, main: int, end: int, t: Vec, view: View) -> None:
-    """Derivative, into `view.slope`, of what changes by t . y at an end of a rod."""
-    u = direction(view.lines[k])
-    flat = along(t, -dot(t, u), u)
-    a, spin = scale(1.0 / norm(vec(view.lines[k])), flat), scale(-1.0, cross(u, t))
-    b, c = (spin, NOWHERE) if end == AT_FOOT else (NOWHERE, spin)
-    put_rate(table, k, main, a, b, c, view, view.slope)
-
-
-@routine
-def seen(table: Table, k: int, main: int, end: int, v: Vec, view: View) -> Vec:
-    """A direction that goes with the body which an end of a rod is on, as it is now."""
-    if end == AT_FOOT:
-        return carried(table.legs[main], view.values[main], v, 1.0)
-    return turn(view.frames[table.legs[k]["frame"]], v)
-
-
-@routine
-def counts_turns(coordinate: Record) -> bool:
-    """Whether an angle may be a full turn from where it is."""
-    return bool(coordinate["turns"] == 1 and coordinate["hi"] - coordinate["lo"] > 2.0 * math.pi)
-
-
-@routine
-def main_of(table: Table, k: int) -> int:
-    """The leg whose carrier a leg is on; itself if it is on none but its own."""
-    while table.legs[k]["carrier"] == SHARED:
-        k -= 1
-    return k
-
-
-@routine
-def coordinate_slope(table: Table, coordinate: Record, view: View) -> float:
-    """A coordinate's deviation from home, its derivative into `view.slope`."""
-    slope, k, spot = view.slope, coordinate["leg"], coordinate["place"]
-    for j in range(slope.shape[0]):
-        slope[j] = 0.0
-    leg = table.legs[k]
-    if leg["kind"] == PIVOT:
-        put_pivot_slope(leg, view.frames[leg["frame"]], view.values[k], spot, view.slope)
-        put_arm_slopes(table, k, view, view.slope)
-    elif spot == CARRIER:
-        slope[table.columns[k]] = 1.0
-    elif spot == SLIDE:
-        put_rate(table, k, main_of(table, k), direction(view.lines[k]), NOWHERE, NOWHERE, view, view.slope)
-    else:
-        put_hinge_slope(table, k, spot, view)
-    for j in range(slope.shape[0]):
-        slope[j] *= coordinate["sense"]
-    return deviation(coordinate, view.values)
-
-
-@routine
-def put_hinge_slope(table: Table, k: int, spot: int, view: View) -> None:
-    """Derivative of the angle of a hinge at an end of a rod.
-
-    One hinge n: (n x u) . y / |n x u|^2. Two, a on the body and b on the rod: q1' = b . y / D, q2' = - a . y / D,
-    D = (a x u) . b.
-    """
-    leg, main, u = table.legs[k], main_of(table, k), direction(view.lines[k])
-    end = AT_FOOT if spot < HEAD else AT_HEAD
-    ending, axes = (leg["foot"], leg["foot_axes"]) if end == AT_FOOT else (leg["head"], leg["head_axes"])
-    first = seen(table, k, main, end, vec(axes[0]), view)
-    if ending == HINGE:
-        across = cross(first, u)
-        t = scale(1.0 / dot(across, across), across)
-    else:
-        place = FOOT if end == AT_FOOT else HEAD
-        last = seen(table, k, main, end, mark(ending, axes, view.values[k, place:]), view)
-        D = dot(cross(first, u), last)
-        t = scale(1.0 / D, last) if spot == place else scale(-1.0 / D, first)
-    put_turning(table, k, main, end, t, view)
-
-
-@routine
-def put_pivot_slope(pivot: Record, frame: Floats, own: Floats, spot: int, slope: Floats) -> None:
-    """Derivative of a coordinate of a pivot: a slide, or one of up to three hinges that add up to its turn w."""
-    if spot >= HEAD:
-        put_pose_slope(pivot, frame, vec(pivot["slide_rows"][spot - HEAD]), NOWHERE, slope)
-        return
-    axes, which = pivot["foot_axes"], spot - FOOT
-    first = vec(axes[0])
-    if pivot["foot"] == HINGE:
-        put_pose_slope(pivot, frame, NOWHERE, first, slope)
-        return
-    second = mark(CROSS, axes, own[FOOT:])
-    if pivot["foot"] == TRIPLE:
-        third = turn(frame, vec(axes[2]))
-        others = cross(second, third) if which == 0 else (cross(third, first) if which == 1 else cross(first, second))
-        D = dot(first, cross(second, third))
-        put_pose_slope(pivot, frame, NOWHERE, scale(1.0 / D, others), slope)
-        return
-    lean = dot(first, second)
-    own_axis, other = (first, second) if which == 0 else (second, first)
-    rate = scale(1.0 / (1.0 - lean * lean), along(own_axis, -lean, other))
-    put_pose_slope(pivot, frame, NOWHERE, rate, slope)
-
-
-@routine
-def cone_slope(table: Table, cone: Record, view: View) -> float:
-    """The angle of a rod's line from the axis of its cone, its derivative into `view.slope`."""
-    slope, k = view.slope, cone["leg"]
-    end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
-    main = main_of(table, k)
-    axis, u = seen(table, k, main, end, vec(cone["axis"]), view), direction(view.lines[k])
-    for j in range(slope.shape[0]):
-        slope[j] = 0.0
-    sine = norm(cross(axis, u))
-    if sine > ALIGNED:
-        put_turning(table, k, main, end, scale(-1.0 / sine, axis), view)
-    return angle_between(axis, u)
-
-
-@routine
-def dead_point_slope(table: Table, k: int, view: View) -> float:
-    """The rate at which a carrier shortens its rod, zero where the rod is stretched out over it; its derivative into
-    `view.slope`.
-
-    With the foot's rate f by the carrier, which goes with the carrier, and the rod's line u: f . u. Its sign tells the
-    two solutions of the leg apart.
-    """
-    slope, leg, own = view.slope, table.legs[k], view.values[k]
-    for j in range(slope.shape[0]):
-        slope[j] = 0.0
-    axis = vec(leg["carrier_axis"])
-    if leg["carrier"] == CRANK:
-        axis = cross(axis, sub(carried_foot(leg, leg, own), vec(leg["carrier_point"])))
-    put_turning(table, k, k, AT_FOOT, axis, view)
-    return dot(axis, direction(view.lines[k]))

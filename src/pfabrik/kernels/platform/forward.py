@@ -22,17 +22,8 @@ from ..linear import solve_spd
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..references import opener
 from ..vectors import copy_row, copy_table, wrap
-from .equations import (
-    Now,
-    View,
-    coordinate_slope,
-    count_unknowns,
-    counts_turns,
-    new_now,
-    new_view,
-    place,
-    put_slopes,
-)
+from .equations import Now, View, count_unknowns, new_now, new_view, place, put_slopes
+from .limits import coordinate_slope, counts_turns
 from .records import Starts
 from .search import copy_now, move
 from .starts import put_carriers

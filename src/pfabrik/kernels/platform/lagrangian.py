@@ -10,16 +10,8 @@ from ..legs.answer import end_of_rows
 from ..legs.frames import set_frames
 from ..legs.records import SHARED, Floats, Table
 from ..sqp import HOLDING, MOTIONS, PROBE, ROWS
-from .equations import (
-    Now,
-    cone_slope,
-    coordinate_slope,
-    dead_point_slope,
-    is_carried,
-    own_row,
-    place_leg,
-    put_leg_slopes,
-)
+from .equations import Now, is_carried, own_row, place_leg, put_leg_slopes
+from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .records import Aim
 from .search import Search, copy_now, move, put_objective
 

@@ -10,7 +10,8 @@ from ..legs.answer import deviation
 from ..legs.records import Table
 from ..sqp import EXCESS, GAP, LIMITS, VALUE
 from ..vectors import dot, vec
-from .equations import Now, cone_slope, coordinate_slope, dead_point_slope, place, put_slopes
+from .equations import Now, place, put_slopes
+from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .records import Aim
 from .search import NEAR, Search, put_objective
 

@@ -16,7 +16,8 @@ from ..legs.records import Floats, Table
 from ..qp import QP, new_qp
 from ..sqp import Hessian, StepControl, new_hessian, new_step_control
 from ..vectors import copy_row, copy_table, wrap
-from .equations import Now, View, coordinate_slope, count_unknowns, counts_turns, new_now, new_view
+from .equations import Now, View, count_unknowns, new_now, new_view
+from .limits import coordinate_slope, counts_turns
 from .records import Aim
 
 NEAR = 0.3
