@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,9 @@ from .coordinates import read_into, settled
 class LegAnswers(Configurations):
     """Configurations of legs that are told by their platforms.
 
-    Attributes
+    Parameters
     ----------
-    sides : which of its two solutions each leg takes, (n, legs).
+    sides : which of its two solutions each leg takes, (n or 1, legs).
     carriers : coordinates of the legs' carriers, (n, legs) [L or rad], where closed forms tell them less exactly: near
         dead points; NaN elsewhere, None where nowhere.
     """
@@ -33,10 +33,15 @@ class LegAnswers(Configurations):
         self, rows: P.Rows, coordinates: Floats | Callable[[], Floats], sides: Floats, carriers: Floats | None = None
     ) -> None:
         super().__init__(rows, coordinates)
-        self.sides, self.carriers = sides, carriers
+        self._sides, self.carriers = sides, carriers
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return LegAnswers, (self.rows, self.coordinates, self.sides, self.carriers)
+        return LegAnswers, (self.rows, self.coordinates, self._sides, self.carriers)
+
+    @cached_property
+    def sides(self) -> Floats:
+        """Which of its two solutions each leg takes, (n, legs)."""
+        return self._sides if len(self._sides) == len(self) else np.repeat(self._sides, len(self), axis=0)
 
     def at(self, places: NDArray[np.intp]) -> Configurations:
         """The configurations at some places, copied."""

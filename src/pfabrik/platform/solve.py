@@ -161,8 +161,7 @@ class LegsEngine:
         """Rows as answers, from a start on sides `first`; those at `rest` are the other engine's."""
         begins = begins_of(self.mechanism, self._table, start, first)
         coordinates = partial(coordinates_of, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
-        every = sides if len(sides) == len(rows.status) else np.repeat(sides, len(rows.status), axis=0)
-        return LegAnswers(rows, coordinates, every, carriers)
+        return LegAnswers(rows, coordinates, sides, carriers)
 
     def advance(self, targets: Floats, start: Configurations, options: Options) -> Configurations:
         """Go on to targets (n, 4, 4) in the working mode of as many configurations; PENDING where not reached.
