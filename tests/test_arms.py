@@ -129,6 +129,19 @@ def test_what_can_be_reached_is_reached_with_arms_moved_no_farther_than_needed(n
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_where_arms_rest_an_answer_from_home_is_that_from_an_answer_at_home(name: str) -> None:
+    mechanism = machine(name)
+    wanted = targets(mechanism, 60, 0.1, 0.1)
+    answers = pf.solve_ik(mechanism, wanted)
+    started = pf.solve_ik(mechanism, wanted, start=pf.solve_ik(mechanism, mechanism.home_pose))
+    rest = moved(mechanism, answers.actuators, pf.solve_ik(mechanism, mechanism.home_pose).actuators) == 0.0
+    assert np.count_nonzero(rest & (answers.status == pf.Status.REACHED)) > 10
+    for field in ("actuators", "pose", "q", "limit_excess"):
+        own, other = getattr(answers, field)[rest], getattr(started, field)[rest]
+        np.testing.assert_allclose(own, other, atol=1e-12 * mechanism.characteristic_length)
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_arms_that_need_not_move_stay_where_the_start_has_them(name: str) -> None:
     mechanism = machine(name)
     first = pf.solve_ik(mechanism, targets(mechanism, 60, 0.25, 0.3))

@@ -16,6 +16,7 @@ from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
 from pfabrik.closure.projection import ways_of
 from pfabrik.closure.solve import ClosureEngine
+from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.platform.solve import LegsEngine
 
@@ -39,6 +40,8 @@ CASES = [
 ]
 """Machines, and what is to be held; a 5-bar's tip and a delta's platform have no orientation to give up."""
 QUICK = ("five_bar", "stewart")
+SIZES = ((0.3, 0.3), (1.0, 0.8), (2.0, 1.2))
+"""How far from home targets are drawn [L], and how far they are turned [rad]."""
 NAMES = tuple(dict.fromkeys(name for name, _ in CASES))
 
 
@@ -453,3 +456,47 @@ def test_a_working_mode_with_a_small_room_of_its_own_is_searched() -> None:
     assert (answers.status == Status.PROJECTED).all()
     assert (answers.pose[:, 2, 3] > 0.0).all()
     assert (answers.position_error < 0.35 * mechanism.characteristic_length).all()
+
+
+def test_a_foot_that_is_asked_to_tilt_too_far_tilts_as_far_as_it_can() -> None:
+    """An ankle's motors pass their dead points on the way: no search may be lost there. Of all tilts, every third of a
+    degree, that the foot can have, none is nearer."""
+    mechanism = pf.load("g1_ankle")
+
+    def tilted(angles: np.ndarray) -> np.ndarray:
+        return np.array([pf.pose(mechanism.reference_point, rpy=(roll, pitch, 0.0)) for pitch, roll in angles])
+
+    grid = np.stack(np.meshgrid(np.linspace(-0.87, 0.5235, 240), np.linspace(-0.2617, 0.2617, 90)), axis=-1)
+    every = tilted(grid.reshape(-1, 2))
+    upright = every[pf.solve_ik(mechanism, every).status == Status.REACHED][:, :3, 2]
+    targets = tilted(np.random.default_rng(0).uniform((-1.4, -0.6), (1.1, 0.6), (300, 2)))
+    answers = pf.solve_ik(mechanism, targets)
+    nearest = np.arccos(np.clip(targets[:, :3, 2] @ upright.T, -1.0, 1.0)).min(axis=1)
+    assert np.count_nonzero(answers.status == Status.PROJECTED) > 200
+    np.testing.assert_array_less(answers.rotation_error, nearest + 1e-9)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", pf.catalog())
+def test_hardly_any_answer_to_another_target_is_nearer(name: str) -> None:
+    """Every answer is a feasible pose: of 6,000 none may be nearer to a target than its own, but for one in a hundred."""
+    mechanism, rng, wide = pf.load(name), np.random.default_rng(2), Options(hold=None)
+    task, length = task_of(mechanism), mechanism.characteristic_length
+    turning = 0.0 if mechanism.end_effector_is_joint else mechanism.rotation_length
+
+    def drawn(n: int, shift: float, turn: float) -> np.ndarray:
+        poses = np.tile(mechanism.home_pose, (n, 1, 1))
+        poses[:, :3, 3] += rng.uniform(-shift, shift, (n, 3)) * length * np.array(task.axes)
+        if turning:
+            poses[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-turn, turn, (n, 3))).as_matrix() @ poses[:, :3, :3]
+        return poses
+
+    others = np.concatenate([pf.solve_ik(mechanism, drawn(2000, *size), options=wide).pose for size in SIZES])
+    targets = drawn(300, *SIZES[-1])
+    answers = pf.solve_ik(mechanism, targets, options=wide)
+    far = np.hypot(answers.position_error, turning * answers.rotation_error)
+    beaten = 0
+    for target, own in zip(targets, far, strict=True):
+        position, rotation = task.errors(others, np.repeat(target[None], len(others), axis=0))
+        beaten += np.hypot(position, turning * rotation).min() < own - 1e-6 * length
+    assert beaten <= 0.01 * len(targets)

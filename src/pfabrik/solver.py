@@ -59,9 +59,8 @@ class Solver:
         warm_up(mechanism)
         self._engine = inverse_engine_of(mechanism, self.options)
         self._rows, self._target = new_rows(mechanism, 1), np.eye(4)[None]
-        self._values = np.zeros((1, len(mechanism.actuator_names)))
         self._reach: Callable[[], int] | None = None
-        self._assemble: Callable[[Floats], bool] | None = None
+        self._assemble: Callable[[], int] | None = None
         if isinstance(self._engine, LegsEngine):
             keep_mode = keeps_mode(self.options, start)
             self._reach = self._engine.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
@@ -101,8 +100,8 @@ class Solver:
         InvalidArgument : as of `solve_fk`; then `status` is INVALID.
         """
         if type(actuators) is np.ndarray and actuators.shape == self.actuators.shape and actuators.dtype is DOUBLE:
-            self._values[0] = actuators
-            if self._assemble is not None and self._assemble(self._values):
+            self._rows.actuators[0] = actuators
+            if self._assemble is not None and not self._assemble():
                 self._found, self._was_forward, self.status = None, True, Status.REACHED
                 return Status.REACHED
         self._clear()
@@ -131,7 +130,7 @@ class Solver:
             if self.status is Status.INVALID:
                 raise InvalidArgument("solution", "no answer", "a question before that is not refused")
             if self._was_forward:
-                self._found = solve_fk(self.mechanism, self._values[0], options=self.options)
+                self._found = solve_fk(self.mechanism, self._rows.actuators[0], options=self.options)
             else:
                 self._found = solve_ik(self.mechanism, self._target[0], start=self._start, options=self.options)
         return self._found

@@ -44,3 +44,32 @@ def solve_spd(A: Floats, n: int, damping: float) -> bool:
             entry -= A[k, j] * A[k, n]
         A[j, n] = entry * A[j, j]
     return True
+
+
+@routine
+def solve_square(A: Floats, n: int) -> bool:
+    """Solve A[:n, :n] x = A[:n, n] by elimination with pivots from each column; x replaces A[:n, n].
+
+    False where a column has no pivot. A is overwritten.
+    """
+    for j in range(n):
+        best = j
+        for i in range(j + 1, n):
+            if abs(A[i, j]) > abs(A[best, j]):
+                best = i
+        if not abs(A[best, j]) > 0.0:
+            return False
+        if best != j:
+            for k in range(j, n + 1):
+                A[j, k], A[best, k] = A[best, k], A[j, k]
+        inverse = 1.0 / A[j, j]
+        for i in range(j + 1, n):
+            factor = A[i, j] * inverse
+            for k in range(j + 1, n + 1):
+                A[i, k] -= factor * A[j, k]
+    for j in range(n - 1, -1, -1):
+        entry = A[j, n]
+        for k in range(j + 1, n):
+            entry -= A[j, k] * A[k, n]
+        A[j, n] = entry / A[j, j]
+    return True

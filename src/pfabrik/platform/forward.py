@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,9 +20,6 @@ from .nearest import corners_of, home_start, nearest_actuators, no_starts, start
 from .table import machine
 
 ROWS_A_BLOCK = 256
-
-SIGHT = 1e3
-"""How far off values are looked for: no search could tell those that are farther from others there [L or rad]."""
 
 
 def assembled(
@@ -40,16 +40,15 @@ def assembled(
     own = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
     rows, n = new_rows(mechanism, len(values)), len(values)
     found = Starts(rows.poses, np.zeros((n, len(table.legs))), np.zeros((n, len(table.legs))))
-    wanted = np.zeros_like(values)
-    for driven in table.driven:
-        off = (values[:, driven["column"]] - driven["home"]) / driven["unit"]
-        is_endless = driven["turns"] == 1 and np.isinf(driven["hi"] - driven["lo"])
-        wanted[:, driven["column"]] = np.remainder(off, 2.0 * np.pi) if is_endless else np.clip(off, -SIGHT, SIGHT)
-    rows.actuators[:] = values
-    _assemble(mechanism, table, wanted, own, no_starts(table), np.arange(n), rows, found)
+    rows.actuators[:], wanted = values, np.zeros_like(values)
+    _assemble(mechanism, table, own, no_starts(table), (rows.actuators, rows.status, wanted, *found, rows.measures))
     rest = np.flatnonzero(rows.status == P.PENDING)
     if start is None and len(rest):
-        _assemble(mechanism, table, wanted, own, corners_of(mechanism), rest, rows, found)
+        filled = rows.status, wanted, *found, rows.measures
+        parts = [array[rest] for array in (rows.actuators, *filled)]
+        _assemble(mechanism, table, own, corners_of(mechanism), parts)
+        for array, part in zip(filled, parts[1:], strict=True):
+            array[rest] = part
         rest = np.flatnonzero(rows.status == P.PENDING)
     if len(rest):
         _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
@@ -93,28 +92,15 @@ def _project(
 
 
 def _assemble(
-    mechanism: Mechanism,
-    table: LegTable,
-    values: Floats,
-    own: Starts,
-    others: Starts,
-    places: NDArray[np.intp],
-    rows: P.Rows,
-    found: Starts,
+    mechanism: Mechanism, table: LegTable, own: Starts, others: Starts, arrays: Sequence[NDArray[Any]]
 ) -> None:
-    """Assemble the rows at some places."""
+    """Assemble rows on all cores; the arrays are the actuators, then what is filled: see the kernel."""
     from ..kernels.platform.forward import assemble
 
-    legs, turns, wanted = machine(table), not mechanism.end_effector_is_joint, values[places]
-    status, filled, elsewhere = rows.status[places], (*found, rows.measures), Handle(others)
-    parts = [array[places] for array in filled]
+    legs, turns, elsewhere = machine(table), not mechanism.end_effector_is_joint, Handle(others)
 
     def run(block: slice) -> None:
-        first = Handle(own if len(own.poses) == 1 else own.at(places[block]))
-        into = [part[block] for part in parts]
-        assemble(legs.address, wanted[block], turns, first.address, elsewhere.address, status[block], *into)
+        first, (values, *filled) = Handle(own if len(own.poses) == 1 else own.at(block)), (a[block] for a in arrays)
+        assemble(legs.address, values, turns, first.address, elsewhere.address, *filled)
 
-    in_blocks(run, len(places), ROWS_A_BLOCK)
-    rows.status[places] = status
-    for array, part in zip(filled, parts, strict=True):
-        array[places] = part
+    in_blocks(run, len(arrays[0]), ROWS_A_BLOCK)

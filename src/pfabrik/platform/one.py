@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..decomposition.leg_table import LegTable
+from ..decomposition.resting import Resting
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
 from ..kernels.reaching import plan as P
 from .nearest import home_start, no_starts
-from .table import machine, machine_nearby
+from .table import machine, machine_nearby, resting_at_home
 
 
 class OneTarget:
@@ -29,16 +30,22 @@ class OneTarget:
         self._is_for_blocks, self._leads_arms = table.is_for_blocks, table.leads_arms
         self._anywhere, self._nearby = machine(table), machine_nearby(table)
         self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
+        self._resting = resting_at_home(table)
+        self._at_rest = machine(table if self._resting is None else self._resting.table)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
         if self._is_for_blocks:
-            from ..kernels.legs.blocks import answer_blocks
-
-            return answer_blocks
+            return self._blocks
         from ..kernels.legs.answer import answer
 
         return answer
+
+    @cached_property
+    def _blocks(self) -> Callable[..., int]:
+        from ..kernels.legs.blocks import answer_blocks
+
+        return answer_blocks
 
     def new_rows(self) -> P.Rows:
         """Room for one answer."""
@@ -58,14 +65,18 @@ class OneTarget:
         Parameters
         ----------
         sides : where arms follow, they end here.
-        begin : the pose from which it is completed, (1, 4, 4); only `nearby`, if so asked.
+        begin : the pose from which it is completed, (1, 4, 4), `home` if from there; only `nearby`, if so asked.
         """
+        if begin is self.home and self._resting is not None:
+            return self._reach_at_rest(self._resting, target, rows)
         return self._kernel((self._nearby if nearby else self._anywhere).address, target, begin, sides, *_filled(rows))
 
     def prepared(
         self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool
     ) -> Callable[[], int]:
         """`reach` with all that it takes, as long as this object is kept; arms begin anew each time."""
+        if begin is self.home and self._resting is not None:
+            return partial(self._reach_at_rest, self._resting, target, rows)
         asked, own = self._nearby if nearby else self._anywhere, sides.copy()
         call = partial(self._kernel, asked.address, target, begin, own, *_filled(rows))
         if not self._leads_arms:
@@ -76,6 +87,11 @@ class OneTarget:
             return call()
 
         return call_anew
+
+    def _reach_at_rest(self, resting: Resting, target: Floats, rows: P.Rows) -> int:
+        """`reach` from home with arms that stay there."""
+        rows.actuators[:] = resting.actuators
+        return self._blocks(self._at_rest.address, target, self.home, resting.table.home_sides, *_filled(rows))
 
 
 class Ends(NamedTuple):
@@ -89,19 +105,14 @@ class OneAssembly:
     """Forward kinematics of a machine of legs from home, one row after the other, prepared likewise."""
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
-        n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
+        self._n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
         turns = not mechanism.end_effector_is_joint
-        self._home, self._units = np.zeros(n_actuators), np.ones(n_actuators)
-        self._home[table.driven["column"]], self._units[table.driven["column"]] = (
-            table.driven["home"],
-            table.driven["unit"],
-        )
         self._starts = Handle(home_start(mechanism, table)), Handle(no_starts(table))
         self._asked = turns, *(starts.address for starts in self._starts)
         self._legs, self._arms = machine(table), table.led_arms["leg"]
 
     @cached_property
-    def _kernel(self) -> Callable[..., None]:
+    def _kernel(self) -> Callable[..., int]:
         from ..kernels.platform.forward import assemble
 
         return assemble
@@ -110,15 +121,18 @@ class OneAssembly:
         """Room for where carriers and legs are in the end."""
         return Ends(np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
 
-    def assemble(self, values: Floats, rows: P.Rows, ends: Ends) -> bool:
-        """Answer actuated values (1, n_a) if they assemble from home within all limits; whether they do."""
-        wanted = (values - self._home) / self._units
-        self._kernel(self._legs.address, wanted, *self._asked, rows.status, rows.poses, *ends, rows.measures)
-        if rows.status[0] != P.REACHED:
+    def prepared(self, rows: P.Rows, ends: Ends) -> Callable[[], int]:
+        """A call that assembles what stands in `rows.actuators` from home within all limits, as long as this object is
+        kept; it returns 0 where it does."""
+        wanted = np.empty((1, self._n_actuators))
+        into = rows.status, wanted, rows.poses, *ends, rows.measures
+        return partial(self._kernel, self._legs.address, rows.actuators, *self._asked, *into)
+
+    def assemble(self, rows: P.Rows, ends: Ends) -> bool:
+        """The same, at once; whether it does."""
+        if self.prepared(rows, ends)():
             return False
-        if len(self._arms):
-            ends.sides[:, self._arms] = ends.q[:, self._arms]
-        rows.actuators[:] = values
+        ends.sides[:, self._arms] = ends.q[:, self._arms]
         return True
 
 

@@ -26,7 +26,7 @@ from .coordinates import settled
 from .forward import assembled
 from .nearest import in_lengths, weighed_limits
 from .one import OneAssembly, OneTarget
-from .table import Machine, machine, machine_nearby
+from .table import Machine, machine, machine_nearby, resting_at_home
 from .unreached import Question, answer_unreached
 
 Floats = NDArray[np.float64]
@@ -225,14 +225,15 @@ class LegsEngine:
             put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
         return self._answers(rows, sides, carriers, start, first, rest, others)
 
-    def prepared_forward(self, rows: P.Rows) -> Callable[[Floats], bool]:
-        """A call that answers actuated values (1, n_a) from home into `rows`; whether they assemble."""
-        return partial(self._one_forward.assemble, rows=rows, ends=self._one_forward.new_ends())
+    def prepared_forward(self, rows: P.Rows) -> Callable[[], int]:
+        """A call that answers `rows.actuators` from home into the rest of one row; it returns 0 where they assemble."""
+        return self._one_forward.prepared(rows, self._one_forward.new_ends())
 
     def _assemble_one(self, values: Floats) -> Configurations | None:
         """Forward kinematics of one row from home, if it assembles there."""
         rows, ends = self._one.new_rows(), self._one_forward.new_ends()
-        if not self._one_forward.assemble(values, rows, ends):
+        rows.actuators[:] = values
+        if not self._one_forward.assemble(rows, ends):
             return None
         end = rows.poses, rows.actuators, ends.sides, None, ends.q
         return LegAnswers(rows, partial(settled, self.mechanism, self._table, *end), ends.sides, ends.q)
@@ -266,7 +267,7 @@ class LegsEngine:
         asked = machine_nearby(self._table) if keep_mode else machine(self._table)
         if self._table.leads_arms:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
-        left = 1 if tried else self._run(self._table.is_for_blocks, asked, targets, begins, sides, rows)
+        left = 1 if tried else self._reach_as_they_are(start is None, asked, targets, begins, sides, rows)
         if left and self._table.is_for_blocks and self._table.task["unset"][0]:
             left -= self._complete(asked, targets, begins, sides, rows)
         if left and self._table.has_free_arms:
@@ -277,6 +278,16 @@ class LegsEngine:
         if start is not None:
             self._count_turns(start.rows.actuators, rows)
         return left, sides
+
+    def _reach_as_they_are(
+        self, from_home: bool, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows
+    ) -> int:
+        """Answer the rows that legs reach with arms that are not led where they are; how many they do not."""
+        resting = resting_at_home(self._table) if from_home else None
+        if resting is None:
+            return self._run(self._table.is_for_blocks, asked, targets, begins, sides, rows)
+        rows.actuators[:] = resting.actuators
+        return self._run(True, machine(resting.table), targets, begins, resting.table.home_sides, rows)
 
     def _reach_by_arms(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
         """Answer rows whose legs reach once arms have moved, and note where; how many these are."""

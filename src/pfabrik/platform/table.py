@@ -9,6 +9,7 @@ import numpy as np
 
 from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable
+from ..decomposition.resting import Resting, at_rest
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 
@@ -43,3 +44,9 @@ def machine_nearby(table: LegTable) -> Machine:
 def machine_aimed(table: LegTable) -> Machine:
     """The same with the angles of all endings asked for."""
     return Handle(kernel_table(table)._replace(legs=table.aimed))
+
+
+@lru_cache(maxsize=64)
+def resting_at_home(table: LegTable) -> Resting | None:
+    """Legs as they stand while the arms that they are on are where they are at home."""
+    return at_rest(table, table.home_sides[0]) if table.has_free_arms else None

@@ -15,6 +15,7 @@ from ..sqp import (
     CLOSED,
     CORRECTIONS,
     DONE,
+    GAP,
     LARGEST,
     LONGEST_STEP,
     MOTIONS,
@@ -45,6 +46,9 @@ HOPELESS = 20.0
 OF_CARRIERS = 0.6
 """What the steps of carriers count beside those of the platform: they end where rods have their lengths."""
 
+STUCK = 0.5
+"""Share of a gap that a step which closes it leaves at most."""
+
 BY = 0.03
 """A search that comes so near to the nearest configuration met yet [rad or L] would end there."""
 
@@ -73,13 +77,17 @@ def restore_feasibility(
 ) -> bool:
     """Bring a configuration, at which `view` is, onto its equations and within its limits, by the shortest way.
 
-    Both to a tolerance; where rounding keeps it from that, to what counts as closed.
+    Both to a tolerance; where rounding keeps it from that, to what counts as closed. Equations are met by all unknowns
+    where arms have a say in them, or pivots alone do not close them: a rod that does not reach needs the platform.
     """
+    before = math.inf
     for _step in range(steps):
         if is_closed(view.linear, tolerance):
             return True
-        if not restoring_step(view, table.task[0]["arms"] > 0, search.p):
+        gap = view.linear.scalars[GAP]
+        if not restoring_step(view, table.task[0]["arms"] > 0 or gap > STUCK * before, search.p):
             return False
+        before = gap
         take(table, view, search.p.x, now, search)
         linearise(table, row, aim, now, search, view)
     return is_closed(view.linear, max(tolerance, NEARLY_CLOSED))

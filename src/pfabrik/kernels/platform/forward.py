@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._jit import allocator, kernel, routine
-from ..legs.answer import KEPT, PENDING, REACHED, deviation, excess_of
+from ..legs.answer import KEPT, PENDING, REACHED, deviation, excess_of, worst_of
 from ..legs.poses import make_exact
 from ..legs.records import CARRIER, PIVOT, Floats, Record, Table
 from ..legs.table import open_table
-from ..linear import solve_spd
+from ..linear import solve_spd, solve_square
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..references import opener
 from ..vectors import copy_row, copy_table, wrap
-from .equations import Now, View, count_unknowns, new_now, new_view, place, put_slopes
+from .equations import Now, View, count_carried, count_unknowns, new_now, new_view, place, put_slopes
 from .limits import coordinate_slope, counts_turns
 from .records import Starts
 from .search import copy_now, move
@@ -38,6 +38,9 @@ STEPS, LED_STEPS = 24, 8
 STRIDES = 8
 """In how many strides they are led where one does not assemble."""
 
+SIGHT = 1e3
+"""How far off values are looked for: no search could tell those that are farther from others there [L or rad]."""
+
 FAR_STEP = 0.5
 """Longest step of Newton's method [L or rad]."""
 
@@ -51,8 +54,8 @@ class Newton(NamedTuple):
 
     look: View
     free: NDArray[np.int64]  # (m,): the unknowns that are free
-    normal: Floats  # (m, m + 1): normal equations, right-hand side last
-    slope: Floats  # (m,): of an equation
+    equations: Floats  # (e, m + 1): by these, right-hand side last
+    normal: Floats  # (m, m + 1): normal equations
     step: Floats  # (n,)
     values: Floats  # (n_a,): deviations from home that the actuators are led to
     begin: Floats  # (n_a,)
@@ -75,8 +78,8 @@ def new_newton(table: Table, turns: bool) -> Newton:
     return Newton(
         new_view(table),
         free,
+        np.zeros((count_equations(table), m + 1)),
         np.zeros((m, m + 1)),
-        np.zeros(m),
         np.zeros(n),
         np.zeros(n_driven),
         np.zeros(n_driven),
@@ -102,16 +105,21 @@ def put_drivers(table: Table, work: Newton) -> None:
 
 
 @routine
-def add_equation(residual: float, slope: Floats, work: Newton) -> None:
-    """Add an equation to the normal equations."""
-    free, normal, own = work.free, work.normal, work.slope
+def count_equations(table: Table) -> int:
+    """How many equations there are: those of the legs, and one for each actuator that is no carrier."""
+    e = table.task[0]["rows"] + count_carried(table)
+    for i in range(table.driven.shape[0]):
+        e += 0 if drives_carrier(table, i) else 1
+    return int(e)
+
+
+@routine
+def put_equation(e: int, residual: float, slope: Floats, work: Newton) -> None:
+    free, own = work.free, work.equations[e]
     m = free.shape[0]
     for a in range(m):
         own[a] = slope[free[a]]
-    for a in range(m):
-        for b in range(a + 1):
-            normal[a, b] += own[a] * own[b]
-        normal[a, m] -= own[a] * residual
+    own[m] = -residual
 
 
 @routine
@@ -133,19 +141,35 @@ def largest_residual(table: Table, work: Newton) -> float:
 
 
 @routine
-def put_normal(table: Table, work: Newton) -> None:
-    """Fill the normal equations where the legs have been read."""
-    normal, rows, slopes, look = work.normal, work.look.rows, work.look.slopes, work.look
-    for i in range(normal.shape[0]):
-        for j in range(normal.shape[1]):
-            normal[i, j] = 0.0
+def put_equations(table: Table, work: Newton) -> None:
+    """Fill the equations where the legs have been read."""
+    rows, slopes, look = work.look.rows, work.look.slopes, work.look
     put_slopes(table, look)
-    for r in range(rows.shape[0]):
-        add_equation(rows[r], slopes[r], work)
+    e = rows.shape[0]
+    for r in range(e):
+        put_equation(r, rows[r], slopes[r], work)
     for i in range(table.driven.shape[0]):
         if not drives_carrier(table, i):
             driven = table.driven[i]
-            add_equation(off_by(driven, coordinate_slope(table, driven, look), work), look.slope, work)
+            put_equation(e, off_by(driven, coordinate_slope(table, driven, look), work), look.slope, work)
+            e += 1
+
+
+@routine
+def solve(work: Newton) -> bool:
+    """Solve the equations, by least squares if they are not as many as the unknowns, into the last column of `normal`;
+    whether they have a solution."""
+    equations, normal = work.equations, work.normal
+    m = normal.shape[0]
+    if equations.shape[0] == m:
+        copy_table(equations, normal)
+        return solve_square(normal, m)
+    for a in range(m):
+        for b in range(m + 1):
+            normal[a, b] = 0.0
+            for e in range(equations.shape[0]):
+                normal[a, b] += equations[e, a] * equations[e, b]
+    return solve_spd(normal, m, 0.0)
 
 
 @routine
@@ -158,8 +182,8 @@ def newton(table: Table, steps: int, work: Newton) -> float:
         worst = largest_residual(table, work)
         if not worst < math.inf or worst <= ASSEMBLED or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * before):
             return worst
-        put_normal(table, work)
-        if not solve_spd(normal, m, 0.0):
+        put_equations(table, work)
+        if not solve(work):
             return math.inf
         before, most = worst, 0.0
         for a in range(m):
@@ -220,7 +244,7 @@ def apart(one: Floats, other: Floats) -> float:
 
 @routine
 def assemble_row(table: Table, values: Floats, own: Starts, row: int, others: Starts, work: Newton) -> bool:
-    """Assemble one row, into `work.now`, within all limits; see `assemble`."""
+    """Assemble one row, into `work.now`, within all limits, and read the legs there; see `assemble`."""
     first = row if own.poses.shape[0] > 1 else 0
     for attempt in range(2):
         load_start(table, own, first, work)
@@ -241,7 +265,22 @@ def assemble_row(table: Table, values: Floats, own: Starts, row: int, others: St
                 copy_now(work.now, work.first)
     if nearest < math.inf:
         copy_now(work.first, work.now)
+        place(table, work.now, work.look)
     return nearest < math.inf
+
+
+@routine
+def put_deviations(table: Table, values: Floats, wanted: Floats) -> None:
+    """Fill the deviations from home [L or rad] that actuators have at given values (n_a,) [length or rad].
+
+    Those of angles without bounds within a turn, and no farther off than anything is looked for.
+    """
+    for i in range(table.driven.shape[0]):
+        driven = table.driven[i]
+        off = (values[driven["column"]] - driven["home"]) / driven["unit"]
+        if driven["turns"] == 1 and driven["hi"] - driven["lo"] == math.inf:
+            off -= 2.0 * math.pi * math.floor(off / (2.0 * math.pi))
+        wanted[driven["column"]] = min(max(off, -SIGHT), SIGHT)
 
 
 @kernel
@@ -252,11 +291,12 @@ def assemble(
     own: int,
     others: int,
     status: NDArray[np.int64],
+    wanted: Floats,
     poses: Floats,
     q: Floats,
     sides: Floats,
     measures: Floats,
-) -> None:
+) -> int:
     """Assemble legs at given actuators, within all limits; rows for which none is found are PENDING.
 
     Newton's method from each row's start; where it strays, the actuators are led to their values in strides.
@@ -264,24 +304,32 @@ def assemble(
     Parameters
     ----------
     machine : see `open_table`.
-    values : (n, n_a), deviations from home [L or rad].
+    values : (n, n_a) [length or rad].
     turns : whether the platform turns; a point that is an end effector does not.
     own : where each row starts, or all of them; as `others` the address of `Starts`.
     others : starts that follow; of the configurations that they find, the one nearest to the row's start is taken.
+    wanted : of the values, see `put_deviations`.
     poses : of the configurations, (n, 4, 4) [length].
     q, sides : as of `Starts`.
+
+    Returns
+    -------
+    How many are PENDING.
     """
-    table, first, rest = open_table(machine), open_starts(own), open_starts(others)
+    table, first, rest, left = open_table(machine), open_starts(own), open_starts(others), 0
     work, length = new_newton(table, turns), table.task[0]["length"]
     for row in range(values.shape[0]):
         status[row] = PENDING
-        if assemble_row(table, values[row], first, row, rest, work):
+        put_deviations(table, values[row], wanted[row])
+        if assemble_row(table, wanted[row], first, row, rest, work):
             status[row] = REACHED
             make_exact(work.now.pose)
-            measures[row, RESIDUAL] = place(table, work.now, work.look) * length
+            measures[row, RESIDUAL] = worst_of(work.look.rows) * length
             measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, work.look.values), 0.0)
             copy_table(work.now.pose, poses[row])
             for i in range(3):
                 poses[row, i, 3] *= length
             copy_row(work.now.q, q[row])
             copy_row(work.now.sides, sides[row])
+        left += status[row]
+    return left // PENDING

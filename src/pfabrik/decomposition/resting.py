@@ -1,0 +1,88 @@
+"""Legs on arms that stay where they are: as good as legs on the base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..kernels.legs import records as K
+from ..rotations import from_rotvec
+from .leg_table import Floats, LegTable, Records
+
+
+@dataclass(frozen=True)
+class Resting:
+    """A table of legs without the arms that they are on.
+
+    Attributes
+    ----------
+    table : the other legs, as they stand while the arms are where they are.
+    actuators : the values of those that move arms, NaN for the others, (n_a,) [length or rad].
+    """
+
+    table: LegTable
+    actuators: Floats
+
+
+def at_rest(table: LegTable, sides: Floats) -> Resting | None:
+    """Legs on arms of the base which are where `sides` (legs,) say.
+
+    None if they are not all such legs, a task leaves something open, or an arm is beyond its range.
+    """
+    legs = table.legs
+    arms = legs["kind"] == K.ARM
+    is_otherwise = (legs["frame"] != K.FROM_BASE) & (legs["arm"] < 0) & ~arms
+    is_otherwise |= (legs["at_head"] == 1) | (legs["by_plane"] == 1) | (legs["reversed"] == 1) | (legs["inner"] == 1)
+    if table.task["unset"][0] or is_otherwise.any() or legs["head_aimed"].any() or not _are_within(table, sides):
+        return None
+    moved = _moved(legs, sides)
+    of_arms = {name: arms[getattr(table, name)["leg"]] for name in ("limited", "cones", "driven", "known")}
+    numbers = np.cumsum(~arms) - 1
+    parts = {name: getattr(table, name)[~own] for name, own in of_arms.items()}
+    cones = parts["cones"]
+    axes = np.einsum("nij,nj->ni", moved[cones["leg"], :3, :3], cones["axis"])
+    cones["axis"] = np.where((cones["place"] == K.FOOT_LINE)[:, None], axes, cones["axis"])
+    for part in parts.values():
+        part["leg"] = numbers[part["leg"]]
+    standing = _standing(legs, moved)[~arms]
+    forms = tuple(form for form, is_arm in zip(table.forms, arms, strict=True) if not is_arm)
+    resting = replace(table, forms=forms, legs=standing, aimed=standing, limits=(), **parts)
+    if not resting.is_for_blocks:
+        return None
+    driven, actuators = table.driven[of_arms["driven"]], np.full(len(table.driven), np.nan)
+    actuators[driven["column"]] = driven["home"] + driven["sense"] * sides[driven["leg"]] * driven["unit"]
+    return Resting(resting, actuators)
+
+
+def _are_within(table: LegTable, sides: Floats) -> bool:
+    """Whether arms are within their ranges."""
+    own = table.limited[table.legs["kind"][table.limited["leg"]] == K.ARM]
+    values = own["sense"] * sides[own["leg"]]
+    return bool(((own["lo"] <= values) & (values <= own["hi"])).all())
+
+
+def _moved(legs: Records, sides: Floats) -> Floats:
+    """How the bodies that legs stand on, or that arms make move, are displaced from home, (legs, 4, 4) [L]."""
+    moved = np.repeat(np.eye(4)[None], len(legs), axis=0)
+    for k, leg in enumerate(legs):
+        own = np.eye(4)
+        if leg["kind"] == K.ARM and leg["carrier"] == K.CRANK:
+            own[:3, :3] = from_rotvec(sides[k] * leg["carrier_axis"])
+            own[:3, 3] = leg["carrier_point"] - own[:3, :3] @ leg["carrier_point"]
+        elif leg["kind"] == K.ARM:
+            own[:3, 3] = sides[k] * leg["carrier_axis"]
+        moved[k] = moved[leg["arm"]] @ own if leg["arm"] >= 0 else own
+    return moved
+
+
+def _standing(legs: Records, moved: Floats) -> Records:
+    """Legs with what they stand on as displaced."""
+    legs, rotations = legs.copy(), moved[:, :3, :3]
+    for name in ("foot_point", "carrier_point"):
+        legs[name] = np.einsum("nij,nj->ni", rotations, legs[name]) + moved[:, :3, 3]
+    for name in ("carrier_axis", "spoke", "spoke_across", "line"):
+        legs[name] = np.einsum("nij,nj->ni", rotations, legs[name])
+    legs["foot_axes"] = np.einsum("nij,nkj->nki", rotations, legs["foot_axes"])
+    legs["arm"], legs["frame"] = -1, K.FROM_BASE
+    return legs
