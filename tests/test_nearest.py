@@ -479,7 +479,7 @@ def test_a_foot_that_is_asked_to_tilt_too_far_tilts_as_far_as_it_can() -> None:
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", pf.catalog())
 def test_hardly_any_answer_to_another_target_is_nearer(name: str) -> None:
-    """Every answer is a feasible pose: of 6,000 none may be nearer to a target than its own, but for one in a hundred."""
+    """Every answer is a feasible pose: of 6,000 none may be nearer to a target than its own, but for 1 %."""
     mechanism, rng, wide = pf.load(name), np.random.default_rng(2), Options(hold=None)
     task, length = task_of(mechanism), mechanism.characteristic_length
     turning = 0.0 if mechanism.end_effector_is_joint else mechanism.rotation_length
