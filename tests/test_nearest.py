@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -12,10 +13,12 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from checks import excess_of_points, gap_of_points
+from machines import closure, positions
 from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
 from pfabrik.closure.projection import ways_of
 from pfabrik.closure.solve import ClosureEngine
+from pfabrik.decomposition.leg_table import leg_table
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.platform.solve import LegsEngine
@@ -42,6 +45,11 @@ CASES = [
 QUICK = ("five_bar", "stewart")
 SIZES = ((0.3, 0.3), (1.0, 0.8), (2.0, 1.2))
 """How far from home targets are drawn [L], and how far they are turned [rad]."""
+MANY_ROOMS = {
+    f"closure.{name}"
+    for name in ("Par4", "H4", "exechon", "wandering_upu", "3-RRRS", "pinned_delta", "delta_uu", "delta with a shaft")
+}
+"""Machines whose poses fall into many parts: searches miss the nearest now and then."""
 NAMES = tuple(dict.fromkeys(name for name, _ in CASES))
 
 
@@ -476,27 +484,56 @@ def test_a_foot_that_is_asked_to_tilt_too_far_tilts_as_far_as_it_can() -> None:
     np.testing.assert_array_less(answers.rotation_error, nearest + 1e-9)
 
 
+EVERY = {
+    **{name: partial(pf.load, name) for name in pf.catalog()},
+    **{f"closure.{name}": make for name, make in (closure.MACHINES | closure.ON_ARMS).items()},
+    **{f"positions.{name}": make for name, make in positions.MACHINES.items()},
+}
+
+
+def drawn(mechanism: Mechanism, rng: np.random.Generator, n: int, shift: float, turn: float) -> np.ndarray:
+    """Poses (n, 4, 4) up to so far from home on each axis that counts [L and rad]."""
+    poses, counting = np.tile(mechanism.home_pose, (n, 1, 1)), np.array(task_of(mechanism).axes)
+    poses[:, :3, 3] += rng.uniform(-shift, shift, (n, 3)) * mechanism.characteristic_length * counting
+    if not mechanism.end_effector_is_joint:
+        poses[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-turn, turn, (n, 3))).as_matrix() @ poses[:, :3, :3]
+    return poses
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.parametrize("count", [1 if INTERPRETED else 40, pytest.param(1500, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("name", EVERY)
+def test_a_pose_that_is_answered_is_reached_when_it_is_asked_for(name: str, count: int) -> None:
+    """In whatever working mode it is, and at a dead point if it is at one: what was answered once is not refused.
+
+    But now and then where arms are to be searched for, which at a border have but one place.
+    """
+    mechanism, table = EVERY[name](), leg_table(EVERY[name]())
+    count, has_arms = (1 + count // 20, False) if isinstance(table, str) else (count, len(table.arms) > 0)
+    targets = drawn(mechanism, np.random.default_rng(2), count, *SIZES[-1])
+    answers = pf.solve_ik(mechanism, targets, options=Options(hold=None))
+    again = pf.solve_ik(mechanism, answers.pose)
+    off = again.position_error / mechanism.characteristic_length + again.rotation_error
+    assert np.mean(off > 1e-6) <= (0.1 if has_arms else 0.0)
+
+
 @pytest.mark.campaign
-@pytest.mark.parametrize("name", pf.catalog())
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.parametrize("name", EVERY)
 def test_hardly_any_answer_to_another_target_is_nearer(name: str) -> None:
-    """Every answer is a feasible pose: of 6,000 none may be nearer to a target than its own, but for 1 %."""
-    mechanism, rng, wide = pf.load(name), np.random.default_rng(2), Options(hold=None)
-    task, length = task_of(mechanism), mechanism.characteristic_length
+    """Every answer is a feasible pose: of 6,000 none may be nearer to a target than its own, but for a few."""
+    mechanism, rng, wide = EVERY[name](), np.random.default_rng(2), Options(hold=None)
+    engine, length = engine_of(mechanism), mechanism.characteristic_length
     turning = 0.0 if mechanism.end_effector_is_joint else mechanism.rotation_length
-
-    def drawn(n: int, shift: float, turn: float) -> np.ndarray:
-        poses = np.tile(mechanism.home_pose, (n, 1, 1))
-        poses[:, :3, 3] += rng.uniform(-shift, shift, (n, 3)) * length * np.array(task.axes)
-        if turning:
-            poses[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-turn, turn, (n, 3))).as_matrix() @ poses[:, :3, :3]
-        return poses
-
-    others = np.concatenate([pf.solve_ik(mechanism, drawn(2000, *size), options=wide).pose for size in SIZES])
-    targets = drawn(300, *SIZES[-1])
+    many, few, most = (2000, 300, 0.01) if isinstance(engine, LegsEngine) else (60, 40, 0.05)
+    if name in MANY_ROOMS:
+        most = 0.1
+    others = np.concatenate([drawn(mechanism, rng, many, *size) for size in SIZES])
+    others = pf.solve_ik(mechanism, others, options=wide).pose
+    targets = drawn(mechanism, rng, few, *SIZES[-1])
     answers = pf.solve_ik(mechanism, targets, options=wide)
-    far = np.hypot(answers.position_error, turning * answers.rotation_error)
-    beaten = 0
+    far, beaten = np.hypot(answers.position_error, turning * answers.rotation_error), 0
     for target, own in zip(targets, far, strict=True):
-        position, rotation = task.errors(others, np.repeat(target[None], len(others), axis=0))
+        position, rotation = task_of(mechanism).errors(others, np.repeat(target[None], len(others), axis=0))
         beaten += np.hypot(position, turning * rotation).min() < own - 1e-6 * length
-    assert beaten <= 0.01 * len(targets)
+    assert beaten <= most * few

@@ -40,11 +40,12 @@ CORNERS_OF_MANY, HITS_OF_MANY = 32, 8
 """Corners where arms are led, and hits there and where task and legs do not tell all of a pose: there are many more
 configurations."""
 
-DRAWS, DRAWN_STEPS = 240, 30
+DRAWS, DRAWS_OF_MANY, DRAWN_STEPS = 240, 480, 30
 """How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
 
-FAR, TURNED = 1.0, 1.5
-"""How far from home they are [L], and how far they are turned [rad]."""
+FAR, FARTHER, TURNED = 1.0, 2.5, 1.5
+"""How far from home they are, and every other one [L]: beyond the base is another room. And how far they are turned
+[rad]."""
 
 TURNING = 0.2
 """What the square of a rotation counts beside that of a distance where corners are to be far apart [L^2]."""
@@ -266,8 +267,10 @@ def corners_of(mechanism: Mechanism) -> Starts:
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
     rng, home = np.random.default_rng(0), home_start(mechanism, table)
-    poses = np.repeat(home.poses, DRAWS, axis=0)
-    twists = rng.uniform(-1.0, 1.0, (DRAWS, 6)) * np.repeat([FAR, TURNED], 3)
+    n, most = (DRAWS_OF_MANY, CORNERS_OF_MANY) if table.leads_arms else (DRAWS, CORNERS)
+    poses = np.repeat(home.poses, n, axis=0)
+    twists = rng.uniform(-1.0, 1.0, (n, 6)) * np.repeat([FAR, TURNED], 3)
+    twists[::2, :3] *= FARTHER / FAR
     for slopes in constraints_at(table, mechanism.home_pose[None])[1]:
         _, sizes, directions = np.linalg.svd(slopes)
         bound = directions[: (sizes > TOLERANCES.alignment).sum()]
@@ -278,20 +281,20 @@ def corners_of(mechanism: Mechanism) -> Starts:
         weights[3:] = LOCKED
     else:
         poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
-    q = np.zeros((DRAWS, len(table.legs)))
+    q = np.zeros((n, len(table.legs)))
     for carrier in (*_carriers(table), *table.arms):
         lo, hi = max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi)
-        q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, DRAWS)
+        q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, n)
     targets = in_lengths(poses, mechanism.characteristic_length)
     objective = PoseObjective(targets, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
-    drawn = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, DRAWS, axis=0)), no_starts(table))[0]
+    drawn = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, n, axis=0)), no_starts(table))[0]
     feasible = np.flatnonzero(np.isfinite(drawn.distances))
     drawn.poses[:] = in_lengths(drawn.poses, 1.0 / mechanism.characteristic_length)
     every = Starts(*(np.concatenate([first, array[feasible]]) for first, array in zip(home, drawn[1:4], strict=True)))
     modes = np.unique(np.sign(every.sides), axis=0, return_inverse=True)[1].ravel()
     chosen: list[int] = []
     away = _apart(every, 0)
-    while len(chosen) < min(CORNERS_OF_MANY if table.leads_arms else CORNERS, len(feasible)):
+    while len(chosen) < min(most, len(feasible)):
         rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < OF_A_MODE
         chosen.append(int(np.where(rare & (away > 0.0), away + SELDOM, away).argmax()))
         away = np.minimum(away, _apart(every, chosen[-1]))

@@ -78,8 +78,9 @@ def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, 
 
 
 def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, rows: P.Rows) -> NDArray[np.intp]:
-    """Answer rows in other working modes; which are left."""
-    from ..kernels.platform.otherwise import answer_otherwise
+    """Answer rows in other working modes; which are left, but for those that wait for another engine: closed forms tell
+    too little of a leg at a dead point."""
+    from ..kernels.platform.otherwise import UNSURE, answer_otherwise
 
     begins, own, tried = question.begins, rows_at(rows, rest), sides[rest]
     first = begins if len(begins) == 1 else begins[rest]
@@ -102,8 +103,7 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
     if reached.any():
         put_rows(rows, rest[reached], rows_at(own, reached))
         sides[rest[reached]] = tried[reached]
-        rest = rest[~reached]
-    return rest
+    return rest[~reached & (own.status != UNSURE)]
 
 
 def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: P.Rows) -> NDArray[np.bool_]:

@@ -24,6 +24,7 @@ from .records import (
     CARRIER,
     COSINE,
     CRANK,
+    CROSS,
     FOOT,
     FOOT_LINE,
     HEAD,
@@ -101,7 +102,11 @@ def place_rod(
 
 @routine
 def read_rod(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, line: Floats) -> float:
-    """The same, with the carrier where its values say."""
+    """The same, with the carrier where its values say.
+
+    Two crossed hinges aim a rod in either of two ways, half a turn about it apart: those of home, unless the two ends
+    then hold the rod the other way around.
+    """
     span = sub(move(frame, vec(rod["head_point"])), carried_foot(rod, carrier, lead))
     length, sure = norm(span), 1.0
     u, home = scale(1.0 / length, span), vec(rod["line"])
@@ -114,6 +119,12 @@ def read_rod(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Flo
         sure = min(sure, aim_end(rod["foot"], rod["foot_axes"], home, foot_line, rod["foot_side"], own[FOOT:SLIDE]))
     if rod["head_aimed"] == 1:
         sure = min(sure, aim_end(rod["head"], rod["head_axes"], home, head_line, rod["head_side"], own[HEAD:FOOT_LINE]))
+    is_crossed = rod["foot"] == CROSS or rod["head"] == CROSS
+    if rod["twists"] == 1 and is_crossed and abs(twist_of(rod, carrier, frame, lead, own, u)) > 0.5 * math.pi:
+        if rod["head"] == CROSS:
+            aim_end(CROSS, rod["head_axes"], home, head_line, -rod["head_side"], own[HEAD:FOOT_LINE])
+        else:
+            aim_end(CROSS, rod["foot_axes"], home, foot_line, -rod["foot_side"], own[FOOT:SLIDE])
     return sure
 
 
@@ -133,6 +144,14 @@ def mark(ending: int, axes: Floats, angles: Floats) -> Vec:
     if ending == HINGE:
         return first
     return turned((axes[1, 0], axes[1, 1], axes[1, 2]), first, math.cos(angles[0]), math.sin(angles[0]))
+
+
+@routine
+def twist_of(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, u: Vec) -> float:
+    """The angle about a rod's line between marks that go with its ends, less home's."""
+    foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
+    head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
+    return wrap(angle_to(u, foot, head) - rod["twist"], 0.0)
 
 
 @routine
@@ -215,9 +234,7 @@ def rod_rows(
         rows[n] = norm(span) * dot(vec(rod["head_axes"][0]), vec(own[HEAD_LINE:COSINE]))
         n += 1
     if rod["twists"] == 1:
-        foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
-        head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
-        rows[n] = wrap(angle_to(scale(1.0 / norm(span), span), foot, head) - rod["twist"], 0.0)
+        rows[n] = twist_of(rod, carrier, frame, lead, own, scale(1.0 / norm(span), span))
 
 
 @routine

@@ -10,14 +10,17 @@ from ..legs.answer import (
     KEPT,
     PENDING,
     REACHED,
+    Completion,
     complete,
     cone_cosine,
     deviation,
+    excess_of,
     new_completion,
     place_legs,
     put_rows,
     write_answer,
 )
+from ..legs.endings import SURE
 from ..legs.feasibility import largest_row
 from ..legs.frames import set_frames
 from ..legs.poses import load
@@ -25,6 +28,10 @@ from ..legs.records import ARM, Floats, Table
 from ..legs.table import open_table
 from ..vectors import copy_row
 from .equations import main_of
+
+UNSURE, NEARLY = 10, 1e-6
+"""Status of a row that some leg at a dead point reaches; and by how much legs may be off there, where closed forms tell
+half their digits [rad or L]."""
 
 MOST_CHOICES = 8
 """Legs with two solutions beyond which not every combination of them is tried, where a pose is completed by all."""
@@ -51,6 +58,17 @@ def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) ->
             misfits[k] = misfits[k + 1] = max(misfits[k], misfits[k + 1])
 
 
+@routine
+def is_unsure(table: Table, sides: Floats, work: Completion) -> bool:
+    """Whether legs on other sides than home's reach a pose, as far as can be told at a dead point."""
+    set_frames(work.pose, table.task[0], work.frames)
+    sure, _ = place_legs(table.legs, work.frames, sides, work.values, work.lines)
+    if sure > SURE * SURE or sure < -NEARLY * NEARLY:
+        return False
+    worst = put_rows(table.legs, work.frames, work.values, work.lines, work.rows)
+    return bool(worst <= NEARLY and excess_of(table.limited, table.cones, work.values) <= NEARLY)
+
+
 @kernel
 def answer_otherwise(
     machine: int,
@@ -62,7 +80,7 @@ def answer_otherwise(
     actuators: Floats,
     measures: Floats,
 ) -> int:
-    """Answer targets (n, 4, 4) [length] that legs reach on any sides within all limits; the others are PENDING.
+    """Answer targets (n, 4, 4) [length] that legs reach on any sides within all limits; others are PENDING, or UNSURE.
 
     Where a target sets the whole pose, every leg takes the sides that suit it; where legs complete it together, their
     sides are tried in all combinations.
@@ -75,7 +93,7 @@ def answer_otherwise(
 
     Returns
     -------
-    How many are PENDING.
+    How many are not reached.
     """
     table = open_table(machine)
     work, legs, n_legs, own, left = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
@@ -109,5 +127,7 @@ def answer_otherwise(
                 if status[row] == REACHED:
                     copy_row(work.sides, sides[row])
                     break
-        left += status[row]
-    return left // PENDING
+            elif own["unset"] == 0 and is_unsure(table, sides[row], work):
+                status[row] = UNSURE
+        left += 0 if status[row] == REACHED else 1
+    return left
