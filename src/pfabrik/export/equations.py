@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 from .legs import PivotShape, RodShape
-from .placing import function_name, parameters
+from .placing import carried, function_name, marks, parameters
 
 Unit = Literal["length", "angle"]
 
@@ -94,7 +94,7 @@ def _rod_rows(shape: RodShape) -> Iterator[str]:
         yield from _slope(shape, 0, "leg->u", "zero", "zero")
         row += 1
     if shape.foot == "hinge":
-        yield from _carried(shape, "rod->foot_axes[0]", "n")
+        yield from carried(shape, "rod->foot_axes[0]", "n")
         yield f"    row[{row}] = pfk_dot(n, leg->span);"
         yield "    pfk_cross(n, leg->span, across);"
         yield from _slope(shape, row, "n", "across", "zero")
@@ -114,22 +114,11 @@ def _rod_rows(shape: RodShape) -> Iterator[str]:
 
 
 def _twist(shape: RodShape, row: int) -> Iterator[str]:
-    for end, kind in (("foot", shape.foot), ("head", shape.head)):
-        axes, mark, first = f"rod->{end}_axes", f"{end}_mark", f"{end}_first"
-        if kind == "cross":
-            yield f"    pfk_about_angle({axes}[1], {axes}[0], leg->{end}_angle[0], {first});"
-        else:
-            yield f"    pfk_along({axes}[0], 0.0, {axes}[0], {first});"
-        if end == "foot":
-            yield from _carried(shape, first, mark)
-            yield from _carried(shape, f"{axes}[0]", first)
-        else:
-            yield f"    pfk_rotate(frame, {first}, {mark});"
-            yield f"    pfk_rotate(frame, {axes}[0], {first});"
+    yield from marks(shape)
     yield f"    row[{row}] = pfk_wrap(pfk_angle(leg->u, foot_mark, head_mark) - rod->twist, 0.0);"
     for end, kind in (("foot", shape.foot), ("head", shape.head)):
-        marks = f"{end}_first, {end}_mark" if kind == "cross" else f"{end}_first"
-        yield f"    pfk_{kind}_spin({marks}, leg->u, by_{end}, {end}_body);"
+        directions = f"{end}_first, {end}_mark" if kind == "cross" else f"{end}_first"
+        yield f"    pfk_{kind}_spin({directions}, leg->u, by_{end}, {end}_body);"
     yield "    for (i = 0; i < 3; ++i) {"
     yield "        by_head[i] -= by_foot[i];"
     yield "        foot_body[i] = -foot_body[i];"
@@ -158,15 +147,6 @@ def _rate(shape: RodShape, a: str, b: str) -> str:
     )
 
 
-def _carried(shape: RodShape, axis: str, to: str) -> Iterator[str]:
-    """A direction of what the foot is on, as it is now."""
-    rod, leg = ("main", "lead") if shape.is_shared else ("rod", "leg")
-    if shape.carrier == "crank":
-        yield f"    pfk_about({axis}, {rod}->axis, {leg}->cosine, {leg}->sine, {to});"
-    else:
-        yield f"    pfk_along({axis}, 0.0, {axis}, {to});"
-
-
 def _rod_drive(shape: RodShape, drive: Drive) -> Iterator[str]:
     """Of a slide |l| = length + given; of hinges kept . u = value, kept a direction of what they are on.
 
@@ -191,7 +171,7 @@ def _rod_drive(shape: RodShape, drive: Drive) -> Iterator[str]:
         yield f"    pfk_along({axes}[0], 0.0, {axes}[0], own);"
         yield "    value = pfk_dot(own, across);"
     if end == "foot":
-        yield from _carried(shape, "own", "kept")
+        yield from carried(shape, "own", "kept")
     else:
         yield "    pfk_rotate(frame, own, kept);"
     yield "    *row = pfk_dot(kept, leg->span) - value * leg->length;"

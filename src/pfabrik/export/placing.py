@@ -137,7 +137,44 @@ def _place_rod(shape: RodShape, needs: Needs) -> Iterator[str]:
             arguments = f"rod->{end}_axes, rod->line, leg->{end}_line, rod->{end}_side, leg->{end}_angle"
             yield f"    sure = pfk_aim({arguments});"
             yield "    gap = -sure > gap ? -sure : gap;"
+    if shape.twists and aimed:
+        yield from _aim_otherwise(shape, aimed[-1])
     yield "    return gap;"
+
+
+def _aim_otherwise(shape: RodShape, end: str) -> Iterator[str]:
+    """The other way to aim two crossed hinges, where the two ends hold the rod the other way around."""
+    yield "    {"
+    yield "        pfk_real foot_mark[3], head_mark[3], foot_first[3], head_first[3];"
+    yield from (f"    {line}" for line in marks(shape))
+    yield "        if (fabs(pfk_wrap(pfk_angle(leg->u, foot_mark, head_mark) - rod->twist, 0.0)) > 0.25 * PFK_TURN)"
+    yield f"            pfk_aim(rod->{end}_axes, rod->line, leg->{end}_line, -rod->{end}_side, leg->{end}_angle);"
+    yield "    }"
+
+
+def marks(shape: RodShape) -> Iterator[str]:
+    """Directions that go with the ends of a rod, the last hinge of each, and the first hinges, as they are now."""
+    for end, kind in (("foot", shape.foot), ("head", shape.head)):
+        axes, mark, first = f"rod->{end}_axes", f"{end}_mark", f"{end}_first"
+        if kind == "cross":
+            yield f"    pfk_about_angle({axes}[1], {axes}[0], leg->{end}_angle[0], {first});"
+        else:
+            yield f"    pfk_along({axes}[0], 0.0, {axes}[0], {first});"
+        if end == "foot":
+            yield from carried(shape, first, mark)
+            yield from carried(shape, f"{axes}[0]", first)
+        else:
+            yield f"    pfk_rotate(frame, {first}, {mark});"
+            yield f"    pfk_rotate(frame, {axes}[0], {first});"
+
+
+def carried(shape: RodShape, axis: str, to: str) -> Iterator[str]:
+    """A direction of what the foot is on, as it is now."""
+    rod, leg = ("main", "lead") if shape.is_shared else ("rod", "leg")
+    if shape.carrier == "crank":
+        yield f"    pfk_about({axis}, {rod}->axis, {leg}->cosine, {leg}->sine, {to});"
+    else:
+        yield f"    pfk_along({axis}, 0.0, {axis}, {to});"
 
 
 def _place_pivot(shape: PivotShape, needs: Needs) -> Iterator[str]:
