@@ -40,12 +40,15 @@ CORNERS_OF_MANY, HITS_OF_MANY = 32, 8
 """Corners where arms are led, and hits there and where task and legs do not tell all of a pose: there are many more
 configurations."""
 
-DRAWS, DRAWS_OF_MANY, DRAWN_STEPS = 240, 480, 30
-"""How many random poses corners are chosen from, and the steps that bring each to a feasible one."""
+BEYOND, BEYOND_OF_MANY = 8, 16
+"""How many more start farther away, where rooms beyond the base may be."""
+
+DRAWS, DRAWN_STEPS = 240, 30
+"""How many random poses either are chosen from, and the steps that bring each to a feasible one."""
 
 FAR, FARTHER, TURNED = 1.0, 2.5, 1.5
-"""How far from home they are, and every other one [L]: beyond the base is another room. And how far they are turned
-[rad]."""
+"""How far from home they are, and the other ones [L]: the mirror image of a room is twice as far away as the base. And
+how far they are turned [rad]."""
 
 TURNING = 0.2
 """What the square of a rotation counts beside that of a distance where corners are to be far apart [L^2]."""
@@ -263,14 +266,23 @@ def home_start(mechanism: Mechanism, table: LegTable) -> Starts:
 
 @lru_cache(maxsize=64)
 def corners_of(mechanism: Mechanism) -> Starts:
-    """Feasible configurations far from home and from each other: the nearest to random poses, chosen one by one."""
+    """Feasible configurations far from home and from each other; every third may be in a room beyond the base."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    rng, home = np.random.default_rng(0), home_start(mechanism, table)
-    n, most = (DRAWS_OF_MANY, CORNERS_OF_MANY) if table.leads_arms else (DRAWS, CORNERS)
+    rng = np.random.default_rng(0)
+    near, beyond = (CORNERS_OF_MANY, BEYOND_OF_MANY) if table.leads_arms else (CORNERS, BEYOND)
+    corners = _far_apart(home_start(mechanism, table), _drawn(mechanism, table, rng, DRAWS, FAR), near)
+    others = _far_apart(corners, _drawn(mechanism, table, rng, DRAWS, FARTHER), beyond)
+    turns = np.concatenate([np.arange(len(corners.poses)), 2.0 * np.arange(len(others.poses)) + 0.5])
+    in_turn = np.argsort(turns)
+    return Starts(*(np.concatenate(both)[in_turn] for both in zip(corners, others, strict=True)))
+
+
+def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: int, far: float) -> Starts:
+    """Feasible configurations, the nearest to n random poses up to so far from home [L]."""
+    home = home_start(mechanism, table)
     poses = np.repeat(home.poses, n, axis=0)
-    twists = rng.uniform(-1.0, 1.0, (n, 6)) * np.repeat([FAR, TURNED], 3)
-    twists[::2, :3] *= FARTHER / FAR
+    twists = rng.uniform(-1.0, 1.0, (n, 6)) * np.repeat([far, TURNED], 3)
     for slopes in constraints_at(table, mechanism.home_pose[None])[1]:
         _, sizes, directions = np.linalg.svd(slopes)
         bound = directions[: (sizes > TOLERANCES.alignment).sum()]
@@ -287,14 +299,18 @@ def corners_of(mechanism: Mechanism) -> Starts:
         q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, n)
     targets = in_lengths(poses, mechanism.characteristic_length)
     objective = PoseObjective(targets, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
-    drawn = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, n, axis=0)), no_starts(table))[0]
-    feasible = np.flatnonzero(np.isfinite(drawn.distances))
-    drawn.poses[:] = in_lengths(drawn.poses, 1.0 / mechanism.characteristic_length)
-    every = Starts(*(np.concatenate([first, array[feasible]]) for first, array in zip(home, drawn[1:4], strict=True)))
+    found = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, n, axis=0)), no_starts(table))[0]
+    found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
+    return Starts(*found[1:4]).at(np.flatnonzero(np.isfinite(found.distances)))
+
+
+def _far_apart(first: Starts, drawn: Starts, most: int) -> Starts:
+    """Configurations drawn that are far from the first and from each other, chosen one by one."""
+    every = Starts(*(np.concatenate(both) for both in zip(first, drawn, strict=True)))
     modes = np.unique(np.sign(every.sides), axis=0, return_inverse=True)[1].ravel()
     chosen: list[int] = []
-    away = _apart(every, 0)
-    while len(chosen) < min(most, len(feasible)):
+    away = np.min([_apart(every, k) for k in range(len(first.poses))], axis=0)
+    while len(chosen) < min(most, len(drawn.poses)):
         rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < OF_A_MODE
         chosen.append(int(np.where(rare & (away > 0.0), away + SELDOM, away).argmax()))
         away = np.minimum(away, _apart(every, chosen[-1]))

@@ -103,7 +103,8 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
     if reached.any():
         put_rows(rows, rest[reached], rows_at(own, reached))
         sides[rest[reached]] = tried[reached]
-    return rest[~reached & (own.status != UNSURE)]
+    left: NDArray[np.intp] = rest[~reached & (own.status != UNSURE)]
+    return left
 
 
 def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: P.Rows) -> NDArray[np.bool_]:
