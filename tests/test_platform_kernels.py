@@ -16,6 +16,7 @@ from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
 from pfabrik.kernels.legs import records as K
 from pfabrik.kernels.legs.records import Table
 from pfabrik.kernels.platform import equations as E
+from pfabrik.kernels.platform import limits
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
 from pfabrik.kernels.platform.records import Aim
 from pfabrik.kernels.platform.search import new_search
@@ -77,9 +78,9 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
         return np.array(
             [
                 *look.rows,
-                *(E.coordinate_slope(table, each, look) for each in told),
-                *(E.cone_slope(table, cone, look) for cone in table.cones),
-                *(E.dead_point_slope(table, leg, look) for leg in on_carriers),
+                *(limits.coordinate_slope(table, each, look) for each in told),
+                *(limits.cone_slope(table, cone, look) for cone in table.cones),
+                *(limits.dead_point_slope(table, leg, look) for leg in on_carriers),
             ]
         )
 
@@ -94,8 +95,12 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
         now = somewhere(mechanism, described, rng)
         E.place(table, now, look)
         E.put_slopes(table, look)
-        told_by = [*look.slopes.copy(), *slopes(E.coordinate_slope, told), *slopes(E.cone_slope, list(table.cones))]
-        told_by += slopes(E.dead_point_slope, on_carriers)
+        told_by = [
+            *look.slopes.copy(),
+            *slopes(limits.coordinate_slope, told),
+            *slopes(limits.cone_slope, list(table.cones)),
+        ]
+        told_by += slopes(limits.dead_point_slope, on_carriers)
         for unknown in range(n):
             ends = [values(moved(now, unknown, sign * STEP, table.columns)) for sign in (1.0, -1.0)]
             difference = (ends[0] - ends[1]) / (2.0 * STEP)
