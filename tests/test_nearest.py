@@ -514,7 +514,7 @@ def test_a_pose_that_is_answered_is_reached_when_it_is_asked_for(name: str, coun
     answers = pf.solve_ik(mechanism, targets, options=Options(hold=None))
     again = pf.solve_ik(mechanism, answers.pose)
     off = again.position_error / mechanism.characteristic_length + again.rotation_error
-    assert np.mean(off > 1e-6) <= (0.1 if has_arms else 0.0)
+    assert np.mean(off > 1e-6) <= (0.15 if has_arms else 0.0)
 
 
 @pytest.mark.campaign

@@ -31,7 +31,7 @@ from .table import machine
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
-CORNERS, HITS, HITS_OF_STRUTS, HITS_OF_VALUES = 16, 4, 3, 6
+CORNERS, HITS, HITS_OF_STRUTS, HITS_OF_VALUES = 16, 4, 3, 8
 """How many configurations searches start from at most, and how many of them must end at the nearest one: fewer where
 struts leave the platform all its freedoms, and have no two ways to bend; more where actuators have values, which a
 platform nearly has in many poses."""
@@ -309,7 +309,9 @@ def _far_apart(first: Starts, drawn: Starts, most: int) -> Starts:
     every = Starts(*(np.concatenate(both) for both in zip(first, drawn, strict=True)))
     modes = np.unique(np.sign(every.sides), axis=0, return_inverse=True)[1].ravel()
     chosen: list[int] = []
-    away = np.min([_apart(every, k) for k in range(len(first.poses))], axis=0)
+    away = np.full(len(every.poses), np.inf)
+    for k in range(len(first.poses)):
+        away = np.minimum(away, _apart(every, k))
     while len(chosen) < min(most, len(drawn.poses)):
         rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < OF_A_MODE
         chosen.append(int(np.where(rare & (away > 0.0), away + SELDOM, away).argmax()))
