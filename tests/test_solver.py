@@ -164,3 +164,16 @@ def test_what_kernels_are_given_is_kept_as_long_as_a_solver() -> None:
     assert given() is not None
     assert solver.ik(home) == Status.REACHED and solver.fk(solver.actuators.copy()) == Status.REACHED
     np.testing.assert_allclose(solver.pose, home, atol=1e-9 * mechanism.characteristic_length)
+
+
+@pytest.mark.parametrize("started", [False, True])
+def test_an_answer_may_be_asked_back_as_it_stands(started: bool) -> None:
+    """What it answered in are views, which the next question clears before it looks."""
+    mechanism = pf.load("stewart")
+    solver = pf.Solver(mechanism, start=pf.solve_ik(mechanism, mechanism.home_pose) if started else None)
+    wanted = pf.pose(mechanism.reference_point + np.array([4.0, -3.0, 5.0]), rotvec=(0.02, 0.01, -0.03))
+    assert solver.ik(wanted) is pf.Status.REACHED
+    assert solver.fk(solver.actuators) is pf.Status.REACHED
+    np.testing.assert_allclose(solver.pose, wanted, atol=1e-9 * mechanism.characteristic_length)
+    assert solver.ik(solver.pose[:3, 3]) is pf.Status.REACHED
+    np.testing.assert_allclose(solver.pose[:3, 3], wanted[:3, 3], atol=1e-9 * mechanism.characteristic_length)

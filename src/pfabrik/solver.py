@@ -89,8 +89,9 @@ class Solver:
             if self._reach is not None and not self._reach():
                 self._found, self._was_forward, self.status = None, False, Status.REACHED
                 return Status.REACHED
+        asked = target.copy() if isinstance(target, np.ndarray) else target
         self._clear()
-        return self._take(solve_ik(self.mechanism, target, start=self._start, options=self.options), "target")
+        return self._take(solve_ik(self.mechanism, asked, start=self._start, options=self.options), "target")
 
     def fk(self, actuators: Actuators) -> Status:
         """Answer actuator values (n_a,) [length or rad] as `solve_fk` does; the status.
@@ -104,8 +105,9 @@ class Solver:
             if self._assemble is not None and not self._assemble():
                 self._found, self._was_forward, self.status = None, True, Status.REACHED
                 return Status.REACHED
+        asked = actuators.copy() if isinstance(actuators, np.ndarray) else actuators
         self._clear()
-        found = solve_fk(self.mechanism, actuators, start=self._start, options=self.options)
+        found = solve_fk(self.mechanism, asked, start=self._start, options=self.options)
         return self._take(found, "actuators")
 
     def jacobian(self) -> Floats:
