@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
 import pfabrik as pf
 
@@ -147,12 +148,9 @@ def limits(joint: Joint, unit: str) -> str:
     return "; ".join(parts)
 
 
-def ranges(joint: Joint) -> list[Sequence[float]]:
+def ranges(joint: Joint) -> Sequence[Sequence[float]]:
     """The joint's ranges, one pair for each limited coordinate."""
-    if joint.range is None:
-        return []
-    first = joint.range[0]
-    return [joint.range] if isinstance(first, int | float) else list(joint.range)  # type: ignore[list-item, arg-type]
+    return [] if joint.range is None else np.reshape(joint.range, (-1, 2)).tolist()
 
 
 def interval(pair: Sequence[float], unit: str, is_angle: bool) -> str:

@@ -127,6 +127,6 @@ def stem_of(joint: Joint) -> str | None:
 
 def _cross(first: Joint, second: Joint) -> bool:
     """Whether two hinges are at one place and not nearly parallel."""
-    apart = float(np.linalg.norm(np.subtract(first.at, second.at)))  # type: ignore[arg-type]
-    sine = float(np.linalg.norm(np.cross(first.axis, second.axis)))  # type: ignore[arg-type]
-    return apart <= TOLERANCES.alignment * float(np.abs(first.at).max()) and sine >= SKEW  # type: ignore[arg-type]
+    points, axes = np.array([first.at, second.at]), np.array([first.axis, second.axis])
+    apart, sine = np.linalg.norm(points[1] - points[0]), np.linalg.norm(np.cross(*axes))
+    return bool(apart <= TOLERANCES.alignment * np.abs(points[0]).max() and sine >= SKEW)

@@ -22,7 +22,7 @@ from ..linear import solve_spd, solve_square
 from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..references import opener
 from ..vectors import copy_row, copy_table, wrap
-from .equations import Now, View, count_carried, count_unknowns, new_now, new_view, place, put_slopes
+from .equations import Now, View, count_unknowns, new_now, new_view, place, put_slopes
 from .limits import coordinate_slope, counts_turns
 from .records import Starts
 from .search import copy_now, move
@@ -67,18 +67,21 @@ class Newton(NamedTuple):
 def new_newton(table: Table, turns: bool) -> Newton:
     """Scratch memory of one thread; without `turns` the platform does not turn."""
     n, legs, n_driven = count_unknowns(table), table.legs.shape[0], table.driven.shape[0]
-    kept = np.zeros(n, np.int64)
+    look, kept = new_view(table), np.zeros(n, np.int64)
+    equations = look.rows.shape[0]
     for j in range(3, 6):
         kept[j] = 0 if turns else 1
     for i in range(n_driven):
         if drives_carrier(table, i):
             kept[table.columns[table.driven[i]["leg"]]] = 1
+        else:
+            equations += 1
     free = np.flatnonzero(kept == 0)
     m = free.shape[0]
     return Newton(
-        new_view(table),
+        look,
         free,
-        np.zeros((count_equations(table), m + 1)),
+        np.zeros((equations, m + 1)),
         np.zeros((m, m + 1)),
         np.zeros(n),
         np.zeros(n_driven),
@@ -102,15 +105,6 @@ def put_drivers(table: Table, work: Newton) -> None:
     for i in range(table.driven.shape[0]):
         if drives_carrier(table, i):
             q[table.driven[i]["leg"]] = table.driven[i]["sense"] * work.values[table.driven[i]["column"]]
-
-
-@routine
-def count_equations(table: Table) -> int:
-    """How many equations there are: those of the legs, and one for each actuator that is no carrier."""
-    e = table.task[0]["rows"] + count_carried(table)
-    for i in range(table.driven.shape[0]):
-        e += 0 if drives_carrier(table, i) else 1
-    return int(e)
 
 
 @routine

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._jit import kernel, routine
+from ..closure.loops import Ints
 from ..legs.answer import (
     KEPT,
     PENDING,
@@ -60,13 +61,24 @@ def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) ->
 
 @routine
 def is_unsure(table: Table, sides: Floats, work: Completion) -> bool:
-    """Whether legs on other sides than home's reach a pose, as far as can be told at a dead point."""
+    """Whether legs on these sides reach a pose, as far as can be told where one of them is at a dead point."""
     set_frames(work.pose, table.task[0], work.frames)
     sure, _ = place_legs(table.legs, work.frames, sides, work.values, work.lines)
     if sure > SURE * SURE or sure < -NEARLY * NEARLY:
         return False
     worst = put_rows(table.legs, work.frames, work.values, work.lines, work.rows)
     return bool(worst <= NEARLY and excess_of(table.limited, table.cones, work.values) <= NEARLY)
+
+
+@routine
+def note_choices(table: Table, sides: Floats, choosing: Ints) -> int:
+    """Note the legs that take one of two solutions; how many these are."""
+    legs, n = table.legs, 0
+    for k in range(legs.shape[0]):
+        if sides[k] != 0.0 and (legs[k]["kind"] != ARM or legs[k]["by_plane"] == 1):
+            choosing[n] = k
+            n += 1
+    return n
 
 
 @kernel
@@ -97,13 +109,10 @@ def answer_otherwise(
     """
     table = open_table(machine)
     work, legs, n_legs, own, left = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
-    misfits, choosing, n_choices, alone = np.zeros(n_legs), np.zeros(n_legs, np.int64), 0, 1
+    misfits, choosing, alone = np.zeros(n_legs), np.zeros(n_legs, np.int64), 1
     for k in range(n_legs):
-        if sides[0, k] != 0.0 and (legs[k]["kind"] != ARM or legs[k]["by_plane"] == 1):
-            choosing[n_choices] = k
-            n_choices += 1
-        if legs[k]["by_plane"] == 1:
-            alone = 3
+        alone = 3 if legs[k]["by_plane"] == 1 else alone
+    n_choices = note_choices(table, sides[0], choosing) if sides.shape[0] > 0 else 0
     together = own["unset"] + own["led"] > 0
     tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if together else alone
     for row in range(targets.shape[0]):
@@ -123,8 +132,8 @@ def answer_otherwise(
             if not load(targets[row], begin, own, work.pose):
                 break
             if complete(table, sides[row], work):
-                status[row] = write_answer(table, work, poses[row], actuators[row], measures[row])
-                if status[row] == REACHED:
+                if write_answer(table, work, poses[row], actuators[row], measures[row]) == REACHED:
+                    status[row] = REACHED
                     copy_row(work.sides, sides[row])
                     break
             elif own["unset"] == 0 and is_unsure(table, sides[row], work):
