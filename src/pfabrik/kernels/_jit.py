@@ -33,6 +33,7 @@ _Cache: Any = FunctionCache
 _config: Any = numba.config
 _typeof: Any = numba.typeof
 _Library: Any = getattr(codegen, "JITCodeLibrary", object)
+_Codegen: Any = getattr(codegen, "CPUCodegen", object)
 _Compiler: Any = getattr(compiler, "Compiler", object)
 _Flags: Any = getattr(compiler, "Flags", object)
 _types: Any = types
@@ -233,14 +234,16 @@ class _PartLibrary(_Library):  # type: ignore[misc]  # a class only at run time
 class _KernelLibrary(_Library):  # type: ignore[misc]  # a class only at run time
     """The code of a kernel with all its parts; nobody else can call them, so arguments that go unused are dropped.
 
-    A mechanism by value is more than fifty arguments, of which most parts use a few.
+    A mechanism by value is more than fifty arguments, of which most parts use a few. Optimised once: Numba does it
+    twice, for the sake of counts of references, of which there are hardly any here; that is a sixth of all its time.
     """
 
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage.name == "linkonce_odr":
                 function.linkage = "internal"
-        super()._optimize_final_module()
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
 
 
 class _SearchLibrary(_KernelLibrary):
@@ -310,6 +313,7 @@ class _PartCompiler(_KernelCompiler):
 # Numba promises these to nobody: with a version that has others, all is compiled in its own way, which takes longer.
 _HOOKS = (
     (_Library, "_optimize_functions _optimize_final_module _finalize_final_module codegen"),
+    (_Codegen, "_function_pass_manager _module_pass_manager"),
     (_Compiler, "define_pipelines"),
     (_Flags, "summary copy"),
 )
