@@ -15,7 +15,7 @@ import oracles
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.errors import InvalidArgument
-from pfabrik.kernels.reaching import rows as kernels
+from pfabrik.kernels.legs.poses import NOT_A_ROTATION
 from pfabrik.tolerances import TOLERANCES
 
 CATALOGUE = ("five_bar", "stewart", "nrpm")
@@ -282,7 +282,7 @@ def test_rotations_are_accepted_up_to_the_stated_deviation() -> None:
 
 
 def test_the_kernels_and_the_library_agree_on_what_a_rotation_is() -> None:
-    assert TOLERANCES.rotation_matrix == kernels.NOT_A_ROTATION
+    assert TOLERANCES.rotation_matrix == NOT_A_ROTATION
 
 
 def test_seeds_that_do_not_fit_are_refused() -> None:

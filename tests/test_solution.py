@@ -12,8 +12,7 @@ import pfabrik as pf
 from machines import ring
 from pfabrik import Joint, Mechanism, Options, Solution, Status
 from pfabrik.decomposition.plan import compile_plan
-from pfabrik.kernels.reaching import plan as P
-from pfabrik.reaching.points import joint_points
+from pfabrik.reaching.positions import joint_points, new_reached
 
 FIELDS = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
 
@@ -186,11 +185,8 @@ def test_centres_along_a_trunk_move_with_the_joints_before_them() -> None:
     machine = Mechanism("arm with elbow", joints, "platform", (0, 0, 150))
     compiled = compile_plan(machine)
     values = np.array([[0.3, 12.0, -0.5]])
-    rows = P.Rows(
-        np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.eye(4)[None], compiled.home_seed.nodes,
-        values, np.zeros((1, compiled.n_actuators)), np.zeros((1, 5)),
-    )  # fmt: skip
-    points = joint_points(compiled, rows)
+    reached = new_reached(compiled, 1)._replace(poses=np.eye(4)[None], nodes=compiled.home_seed.nodes, trunks=values)
+    points = joint_points(compiled, reached)
     shoulder = Rotation.from_rotvec([0, 0.3, 0])
     at = np.array((100.0, 0, 0)) + shoulder.apply((90.0 - 100, 0, 40) - 12.0 * np.array((-1, 0, 3)) / np.sqrt(10))
     np.testing.assert_allclose(points["shoulder"][0], (100, 0, 0), atol=1e-12)

@@ -8,7 +8,7 @@ from .answers.starts import Start, start_of
 from .description.mechanism import Mechanism
 from .engine import inverse_engine_of
 from .errors import InvalidArgument
-from .kernels.reaching.plan import REACHED
+from .kernels.rows import REACHED
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
 

@@ -29,8 +29,7 @@ class Options:
         characteristic length.
     rotation_tolerance : the same for the orientation [rad].
     max_iterations : K, forward and backward passes a chain may take for one target; of the paper's method alone.
-    max_rounds : how often its projection may revise a target before exact steps take over, which more would bring to
-        the same answer.
+    max_rounds : how often its projection may revise a target.
     working_mode : "keep" stays in the start's working mode (home's without a start), "any" may change it to reach;
         None keeps it if there is a start.
     hold : what a projection keeps: "orientation" (the paper's choice) or "position" if any feasible pose has it, None
@@ -40,8 +39,8 @@ class Options:
         express the mechanism.
     rotation_length : how a rotation counts beside a distance: by the angle times this [length per rad], in
         sqrt(distance^2 + (rotation_length angle)^2). None is `Mechanism.rotation_length`.
-    exact : True for answers as exact as can be; False for the paper's passes alone, which end within `tolerance` and
-        then only close the loops, where joint positions express the mechanism.
+    exact : True for answers as exact as can be; False for the paper's passes and projection alone, which end within
+        `tolerance`; then the loops are closed. Where joint positions do not express the mechanism it changes nothing.
     actuator_tolerance : how close actuated coordinates must come to the asked values to be REACHED [L or rad]. Readings
         of more encoders than the mechanism has freedoms never agree better than they are exact.
     on_invalid : what a row of a batch that is no pose does: "raise", or "mark" the row INVALID.

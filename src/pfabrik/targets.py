@@ -12,7 +12,7 @@ from .arrays import Floats
 from .description.mechanism import Mechanism, checked_mechanism
 from .description.task import task_of
 from .errors import InvalidArgument
-from .kernels.reaching.plan import INVALID
+from .kernels.rows import INVALID
 from .motion.displacements import columns, home_coordinates, joint_displacements
 from .options import Options
 from .poses import DOUBLE, SupportsMatrix, as_floats, as_poses, what_is_wrong

@@ -16,7 +16,7 @@ from .answers.tracked import Track, pace_of
 from .description.mechanism import Mechanism
 from .engine import inverse_engine_of
 from .errors import InvalidArgument
-from .kernels.reaching.plan import Rows
+from .kernels.rows import Rows
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
 from .tolerances import TOLERANCES

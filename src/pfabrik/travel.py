@@ -20,7 +20,7 @@ from .description.notebook import card
 from .description.task import task_of
 from .engine import engine_of
 from .errors import InvalidArgument
-from .kernels.reaching.plan import REACHED
+from .kernels.rows import REACHED
 from .options import Options, checked_options
 from .poses import as_floats
 from .rotations import from_rotvec

@@ -15,7 +15,18 @@ from ..closure.configurations import Configurations
 from ..closure.projection import ways_of
 from ..description.mechanism import Mechanism
 from ..engine import engine_of
-from ..kernels.reaching import plan as P
+from ..kernels.rows import (
+    ACTUATOR_ERROR,
+    HOLD,
+    HOLD_NOTHING,
+    ITERATIONS,
+    LIMIT_EXCESS,
+    POSITION_ERROR,
+    RESIDUAL,
+    ROTATION_ERROR,
+    ROUNDS,
+    Rows,
+)
 from ..motion.displacements import columns, home_coordinates
 from .limits import ActiveLimit, active_limits, binding_limits, holding_limits
 from .status import Status
@@ -54,7 +65,7 @@ class Answer:
         Answer.__init__(self, *state)
 
     @property
-    def _rows(self) -> P.Rows:
+    def _rows(self) -> Rows:
         return self._found.rows
 
     @property
@@ -80,37 +91,37 @@ class Answer:
 
     @property
     def position_error(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, P.POSITION_ERROR]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, POSITION_ERROR]))
 
     @property
     def rotation_error(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, P.ROTATION_ERROR]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, ROTATION_ERROR]))
 
     @property
     def residual(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, P.RESIDUAL]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, RESIDUAL]))
 
     @property
     def limit_excess(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, P.LIMIT_EXCESS]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, LIMIT_EXCESS]))
 
     @property
     def iterations(self) -> int | Integers:
-        return cast(int | Integers, self._shaped(self._rows.counters[:, P.ITERATIONS]))
+        return cast(int | Integers, self._shaped(self._rows.counters[:, ITERATIONS]))
 
     @property
     def rounds(self) -> int | Integers:
-        return cast(int | Integers, self._shaped(self._rows.counters[:, P.ROUNDS]))
+        return cast(int | Integers, self._shaped(self._rows.counters[:, ROUNDS]))
 
     @property
     def held(self) -> Held | NDArray[np.object_]:
         names = np.array([None, "orientation", "position"], dtype=object)
-        held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, P.HELD], P.HOLD_NOTHING)]
+        held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, HOLD], HOLD_NOTHING)]
         return held[0] if self.shape == () else held.reshape(self.shape)
 
     @property
     def actuator_error(self) -> float | Floats:
-        return cast(float | Floats, self._shaped(self._rows.measures[:, P.ACTUATOR_ERROR]))
+        return cast(float | Floats, self._shaped(self._rows.measures[:, ACTUATOR_ERROR]))
 
     @cached_property
     def q(self) -> Floats:
@@ -163,7 +174,7 @@ class Answer:
         found: dict[int, tuple[ActiveLimit, ...]] = {}
         engine = engine_of(self.mechanism)
         holds, ways = (
-            self._rows.counters[projected, P.HELD],
+            self._rows.counters[projected, HOLD],
             ways_of(self.mechanism, wanted.hold, wanted.rotation_length),
         )
         for way in ways:

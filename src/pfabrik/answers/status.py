@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from ..kernels.reaching import plan as P
+from ..kernels import rows
 
 NUMBERS = tuple("bdoxXneEfFgG%")
 """Types of format specifications by which a status is written as the number it is."""
@@ -20,11 +20,11 @@ class Status(IntEnum):
     INVALID : what was asked for is no pose, or not finite; only where such rows are to be marked.
     """
 
-    REACHED = P.REACHED
-    PROJECTED = P.PROJECTED
-    EXCEEDED = P.EXCEEDED
-    FAILED = P.FAILED
-    INVALID = P.INVALID
+    REACHED = rows.REACHED
+    PROJECTED = rows.PROJECTED
+    EXCEEDED = rows.EXCEEDED
+    FAILED = rows.FAILED
+    INVALID = rows.INVALID
 
     def __str__(self) -> str:
         return self.name

@@ -47,7 +47,7 @@ def as_sentence(answer: Answer, asked: Floats | None = None) -> str:
 def given_up(answer: Answer) -> list[str]:
     """What a projected answer was to hold of its target and does not: one phrase, or none."""
     from ..closure.projection import ways_of
-    from ..kernels.reaching.plan import HOLD_NOTHING
+    from ..kernels.rows import HOLD_NOTHING
 
     wanted = answer._wanted
     if wanted is None or answer.held is not None:

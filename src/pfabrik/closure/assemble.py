@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
-from ..kernels.reaching import plan as P
+from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of, platform_poses
@@ -184,8 +184,8 @@ def judged(
 ) -> Configurations:
     """Configurations as answers to actuated values (n, n_a): which are what was asked for, and which are feasible."""
     error = np.abs(actuator_errors(closure_of(mechanism), closing.coordinates, values)).max(axis=1, initial=0.0)
-    found.rows.measures[:, P.ACTUATOR_ERROR] = error
+    found.rows.measures[:, ACTUATOR_ERROR] = error
     asked, feasible = error <= tolerance, closing.feasible
-    open_or_beyond = np.where((closing.gap <= TOLERANCES.position) & asked, P.EXCEEDED, P.FAILED)
-    found.rows.status[:] = np.where(feasible, np.where(asked, P.REACHED, P.PROJECTED), open_or_beyond)
+    open_or_beyond = np.where((closing.gap <= TOLERANCES.position) & asked, EXCEEDED, FAILED)
+    found.rows.status[:] = np.where(feasible, np.where(asked, REACHED, PROJECTED), open_or_beyond)
     return found

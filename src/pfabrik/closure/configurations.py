@@ -11,35 +11,33 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
-from ..kernels.reaching import plan as P
+from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, PENDING, RESIDUAL, Rows
 from .close import Closing, Closure, closure_of
 
 
-def new_rows(mechanism: Mechanism, n: int, nodes: int = 0, trunks: int = 0) -> P.Rows:
-    """Room for n answers; `nodes` and `trunks` are how many positions and trunk joints are stored of each."""
-    return P.Rows(
-        status=np.full(n, P.PENDING),
+def new_rows(mechanism: Mechanism, n: int) -> Rows:
+    """Room for n answers."""
+    return Rows(
+        status=np.full(n, PENDING),
         counters=np.zeros((n, 3), np.int64),
         poses=np.empty((n, 4, 4)),
-        nodes=np.zeros((n, nodes, 3)),
-        trunks=np.zeros((n, trunks)),
         actuators=np.empty((n, len(mechanism.actuator_names))),
         measures=np.zeros((n, 5)),
     )
 
 
-def rows_at(rows: P.Rows, places: Any) -> P.Rows:
+def rows_at(rows: Rows, places: Any) -> Rows:
     """The rows at some places: an integer array (copied), a mask (copied) or a slice (shared)."""
-    return P.Rows._make(array[places] for array in rows)
+    return Rows._make(array[places] for array in rows)
 
 
-def put_rows(rows: P.Rows, places: Any, others: P.Rows) -> None:
+def put_rows(rows: Rows, places: Any, others: Rows) -> None:
     """Write other rows at some places."""
     for array, own in zip(rows, others, strict=True):
         array[places] = own
 
 
-def write_closing(closure: Closure, closing: Closing, rows: P.Rows) -> None:
+def write_closing(closure: Closure, closing: Closing, rows: Rows) -> None:
     """Pose, actuators, loop gaps, limit excesses and iterations of closed configurations, into as many rows.
 
     A joint end effector has no orientation: home's is written.
@@ -50,10 +48,10 @@ def write_closing(closure: Closure, closing: Closing, rows: P.Rows) -> None:
         rows.poses[:, :3, :3] = np.eye(3)
     rows.actuators[:] = closure.actuators(closing.coordinates)
     rows.counters[:] = 0
-    rows.counters[:, P.ITERATIONS] = closing.iterations
+    rows.counters[:, ITERATIONS] = closing.iterations
     rows.measures[:] = 0.0
-    rows.measures[:, P.RESIDUAL] = closing.gap * mechanism.characteristic_length
-    rows.measures[:, P.LIMIT_EXCESS] = np.maximum(closing.excess, 0.0)
+    rows.measures[:, RESIDUAL] = closing.gap * mechanism.characteristic_length
+    rows.measures[:, LIMIT_EXCESS] = np.maximum(closing.excess, 0.0)
 
 
 class Configurations:
@@ -66,7 +64,7 @@ class Configurations:
     were_given : whether the coordinates were what was searched for; else they follow from the rows when asked for.
     """
 
-    def __init__(self, rows: P.Rows, coordinates: Floats | Callable[[], Floats]) -> None:
+    def __init__(self, rows: Rows, coordinates: Floats | Callable[[], Floats]) -> None:
         self.rows = rows
         self.were_given = not callable(coordinates)
         self._coordinates = coordinates
@@ -84,7 +82,7 @@ class Configurations:
 
     def at(self, places: NDArray[np.intp]) -> Configurations:
         """The configurations at some places, copied."""
-        rows = P.Rows._make(np.ascontiguousarray(array[places]) for array in self.rows)
+        rows = Rows._make(np.ascontiguousarray(array[places]) for array in self.rows)
         if self.were_given:
             return Configurations(rows, self.coordinates[places])
         return Configurations(rows, lambda: self.coordinates[places])
@@ -100,8 +98,8 @@ class Configurations:
         if known.all():
             return self
         n = len(known)
-        rows = P.Rows._make(_blank(array, n) for array in self.rows)
-        rows.status[:] = P.INVALID
+        rows = Rows._make(_blank(array, n) for array in self.rows)
+        rows.status[:] = INVALID
         put_rows(rows, known, self.rows)
         coordinates = _blank(self.coordinates, n)
         coordinates[known] = self.coordinates

@@ -13,7 +13,7 @@ from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
-from ..kernels.reaching import plan as P
+from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of
@@ -55,12 +55,12 @@ def ways_of(mechanism: Mechanism, hold: str | None, rotation_length: float | Non
     """The ways to project, in the order in which they are tried: what is to be held, then everything free."""
     task = task_of(mechanism)
     turning = ((rotation_length or mechanism.rotation_length) / mechanism.characteristic_length) ** 2
-    free = Way(task.weights(1.0, turning), P.HOLD_NOTHING)
+    free = Way(task.weights(1.0, turning), HOLD_NOTHING)
     if hold is None or not any(task.axes) or task.rotations == 0:
         return (free,)  # nothing is to be held, or nothing else could give way
     if hold == "orientation":
-        return Way(task.weights(1.0, LOCKED), P.HOLD_ORIENTATION), free
-    return Way(task.weights(LOCKED, turning), P.HOLD_POSITION), free
+        return Way(task.weights(1.0, LOCKED), HOLD_ORIENTATION), free
+    return Way(task.weights(LOCKED, turning), HOLD_POSITION), free
 
 
 def held_back(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: Way) -> Floats:
@@ -72,9 +72,9 @@ def held_back(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: W
 def kept(mechanism: Mechanism, holds: NDArray[np.int64], position: Floats, rotation: Floats) -> NDArray[np.int64]:
     """What poses have of their targets, of what they were to hold, by how far they are: targets out of sight were not
     sought."""
-    turned = (holds == P.HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
-    moved = (holds == P.HOLD_POSITION) & (position > TOLERANCES.held * mechanism.characteristic_length)
-    return np.where(turned | moved, P.HOLD_NOTHING, holds)
+    turned = (holds == HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
+    moved = (holds == HOLD_POSITION) & (position > TOLERANCES.held * mechanism.characteristic_length)
+    return np.where(turned | moved, HOLD_NOTHING, holds)
 
 
 def project(
@@ -90,9 +90,7 @@ def project(
     corners : search from the corners of the workspace too. Without, the search stays about where it starts.
     """
     n, frame = len(targets), task_of(closure.mechanism).frame
-    best = Projected(
-        close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, P.HOLD_NOTHING)
-    )
+    best = Projected(close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, HOLD_NOTHING))
     elsewhere = corners_of(closure.mechanism) if corners else ()
     everywhere = [*starts, *(np.where(closure.idle, starts[0], corner) for corner in elsewhere)]
     for way in ways:

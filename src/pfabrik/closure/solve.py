@@ -12,7 +12,7 @@ from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import BASE_AXES
-from ..kernels.reaching import plan as P
+from ..kernels.rows import FAILED, HOLD, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from ..motion.displacements import centres
 from ..motion.limits import within_turns
 from ..options import Options
@@ -62,7 +62,7 @@ class ClosureEngine:
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        known, begin = are_poses(targets), self._begin(start)
+        known, begin = are_poses(targets), begin_of(self.mechanism, start)
         begin = begin[known] if len(begin) > 1 else np.repeat(begin, known.sum(), axis=0)
         return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode).among(known)
 
@@ -74,7 +74,7 @@ class ClosureEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        known, begin = are_poses(targets), self._begin(start)
+        known, begin = are_poses(targets), begin_of(self.mechanism, start)
         found = [np.zeros((0, begin.shape[1]))]
         rows, bends = new_rows(self.mechanism, int(known.sum())), Bends(self.mechanism, options)
         for i, target in enumerate(targets):
@@ -86,18 +86,6 @@ class ClosureEngine:
             if on_progress is not None:
                 on_progress(i + 1, len(targets))
         return Configurations(rows, np.concatenate(found)).among(known)
-
-    def _begin(self, start: Configurations | None) -> Floats:
-        """Joint coordinates to start from; loops beside the way to the end effector, which will rest, are closed."""
-        begin = joint_coordinates(self.mechanism, start)
-        if not _has_loops_aside(self.mechanism):
-            return begin
-        present = measured(self.mechanism, begin)
-        away = np.flatnonzero(~present.feasible)
-        if len(away):
-            closure, poses = closure_of(self.mechanism), present.poses[away]
-            present.take(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=MARGIN))
-        return present.coordinates
 
     def _follow_one(self, target: Floats, begin: Floats, options: Options, bends: Bends) -> Configurations:
         answer = _answer(self._closure, target, begin, options, keep_mode=True)
@@ -113,7 +101,7 @@ class ClosureEngine:
         found = _reach(self._closure, targets, begin, platform_poses(self.mechanism, begin), keep_mode=True)
         rows = new_rows(self.mechanism, len(targets))
         write_closing(self._closure, found, rows)
-        rows.status[:] = np.where(found.feasible, P.REACHED, P.FAILED)
+        rows.status[:] = np.where(found.feasible, REACHED, FAILED)
         return Configurations(rows, found.coordinates)
 
     def at(self, closing: Closing) -> Configurations:
@@ -137,11 +125,25 @@ class ClosureEngine:
         return judged(self.mechanism, self.at(closing), closing, values, tolerance)
 
 
+def begin_of(mechanism: Mechanism, start: Configurations | None) -> Floats:
+    """Joint coordinates to start from, (n, columns) or (1, columns); loops beside the way to the end effector, which
+    will rest, are closed."""
+    begin = joint_coordinates(mechanism, start)
+    if not _has_loops_aside(mechanism):
+        return begin
+    present = measured(mechanism, begin)
+    away = np.flatnonzero(~present.feasible)
+    if len(away):
+        closure, poses = closure_of(mechanism), present.poses[away]
+        present.take(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=MARGIN))
+    return present.coordinates
+
+
 def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, keep_mode: bool) -> Configurations:
     """Answer poses (n, 4, 4) from joint coordinates (n, columns): reached, or projected."""
     mechanism = closure.mechanism
     found = _reach(closure, wanted, start, platform_poses(mechanism, start), keep_mode)
-    holds = np.full(len(wanted), P.HOLD_NOTHING)
+    holds = np.full(len(wanted), HOLD_NOTHING)
     away = np.flatnonzero(~found.feasible)
     if len(away):
         stays = keep_mode or follows_task(mechanism)
@@ -152,18 +154,26 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
         )
         holds[away] = kept(mechanism, answers.holds, *task_of(mechanism).errors(answers.closing.poses, wanted[away]))
         found.take(away, answers.closing)
+    return told(closure, found, wanted, holds, options)
+
+
+def told(
+    closure: Closure, found: Closing, wanted: Floats, holds: NDArray[np.int64], options: Options
+) -> Configurations:
+    """Configurations found for poses (n, 4, 4), as answers: with what they hold, their errors, and their status."""
+    mechanism = closure.mechanism
     within_turns(mechanism, found.coordinates)
     if _has_loops_aside(mechanism):
         found = measured(mechanism, found.coordinates)._replace(iterations=found.iterations)
     rows = new_rows(mechanism, len(wanted))
     write_closing(closure, found, rows)
     position, rotation = task_of(mechanism).errors(rows.poses, wanted)
-    rows.measures[:, P.POSITION_ERROR], rows.measures[:, P.ROTATION_ERROR] = position, rotation
-    rows.counters[:, P.HELD] = holds
+    rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR] = position, rotation
+    rows.counters[:, HOLD] = holds
     near = (position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)) & (
         rotation <= options.rotation_tolerance
     )
-    rows.status[:] = np.where(found.feasible, np.where(near, P.REACHED, P.PROJECTED), P.FAILED)
+    rows.status[:] = np.where(found.feasible, np.where(near, REACHED, PROJECTED), FAILED)
     return Configurations(rows, found.coordinates)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
-from ..kernels.reaching import plan as P
+from ..kernels.rows import HOLD, PROJECTED, REACHED, Rows
 from ..options import Options
 from .close import closure_of
 from .first_order import are_stretched
@@ -33,12 +33,12 @@ class Bends:
 
     def note(self, status: int, start: Floats, found: Floats) -> None:
         """Remember what came of one target, by joint coordinates (1, columns) before and after."""
-        if status == P.REACHED and self.before is None:
+        if status == REACHED and self.before is None:
             return  # inside the workspace links are hardly ever stretched out, and it would take time to see
         is_stretched = bool(are_stretched(self._mechanism, found)[0])
         self.before = (start if self.before is None else self.before) if is_stretched else None
 
-    def prefer(self, target: Floats, found: P.Rows, other: P.Rows) -> bool:
+    def prefer(self, target: Floats, found: Rows, other: Rows) -> bool:
         """Whether an answer to a target (1, 4, 4) that was found from `before` is to replace the one found.
 
         It is if it is reached or nearer, where the one found is not, or if it has the same pose, and so is bent as
@@ -46,17 +46,17 @@ class Bends:
         """
         return self._is_alike(found, other) or self._is_better(target, found, other)
 
-    def _is_alike(self, found: P.Rows, other: P.Rows) -> bool:
+    def _is_alike(self, found: Rows, other: Rows) -> bool:
         apart = differences(closure_of(self._mechanism), other.poses, found.poses)[0]
         return bool(other.status[0] == found.status[0] and apart <= SAME_POSE)
 
-    def _is_better(self, target: Floats, found: P.Rows, other: P.Rows) -> bool:
+    def _is_better(self, target: Floats, found: Rows, other: Rows) -> bool:
         if other.status[0] != found.status[0]:
             return bool(other.status[0] < found.status[0])
-        if found.status[0] != P.PROJECTED:
+        if found.status[0] != PROJECTED:
             return False
         holds = [way.hold for way in self._ways]
-        ours, theirs = (holds.index(rows.counters[0, P.HELD]) for rows in (found, other))
+        ours, theirs = (holds.index(rows.counters[0, HOLD]) for rows in (found, other))
         if ours != theirs:
             return theirs < ours
         closure, way = closure_of(self._mechanism), self._ways[ours]

@@ -186,7 +186,7 @@ def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
     chains = decompose(mechanism)
     reasons = tuple(f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None)
     forms = (form for chain in chains for form in (chain.trunk_form, *chain.branch_forms) if form is not None)
-    known = {coordinate.joint for form in forms for coordinate in form.coordinates}
+    known = {joint for form in forms for joint in form.told}
     driven = dict.fromkeys(drive.joint.name for drive in mechanism.drives)
     missing = (f"actuated joint {name} is in no sub-chain" for name in driven if name not in known)
     return reasons or tuple(missing)

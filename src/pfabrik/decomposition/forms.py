@@ -1,4 +1,4 @@
-"""What is known of a sub-chain once it is expressed in positions: nodes, strokes, hinges, cones, coordinates."""
+"""What is known of a sub-chain once it is expressed in positions: nodes, strokes, hinges, cones."""
 
 from __future__ import annotations
 
@@ -16,18 +16,6 @@ FREE: Interval = (-math.inf, math.inf)
 
 class NotExpressible(Exception):
     """Positions alone cannot express this chain; the text says why."""
-
-
-@dataclass(frozen=True)
-class Coordinate:
-    """Where the coordinate of a joint is read: value = offset + sign * reading."""
-
-    joint: str
-    kind: Literal["stroke", "rail", "hinge", "end_hinge", "trunk"]
-    index: int  # node of the branch, or joint of the trunk
-    sign: float
-    offset: float
-    limits: Interval
 
 
 @dataclass(frozen=True)
@@ -64,18 +52,18 @@ class ConeForm:
 
 @dataclass(frozen=True)
 class TrunkForm:
-    """The joints between the base and the body that carries several branches."""
+    """The joints between the base and the body that carries several branches; `told` are their names."""
 
     points: tuple[Array, ...]
     axes: tuple[Array, ...]
     slides: tuple[bool, ...]
     ranges: tuple[Interval, ...]
-    coordinates: tuple[Coordinate, ...]
+    told: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class BranchForm:
-    """One branch as nodes and restrictions, at home, in base coordinates."""
+    """One branch as nodes and restrictions, at home, in base coordinates; `told` are joints whose value follows."""
 
     nodes: tuple[NodeForm, ...]
     planar: int
@@ -86,5 +74,4 @@ class BranchForm:
     rail: Array | None
     rail_range: Interval
     cones: tuple[ConeForm, ...]
-    coordinates: tuple[Coordinate, ...]
-    kind: Literal["passes", "strut", "dyad", "rail_rod"]
+    told: tuple[str, ...]

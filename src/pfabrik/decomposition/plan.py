@@ -13,11 +13,9 @@ from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.reaching import plan as P
 from .decompose import SubChain, beyond_positions, decompose
-from .forms import BranchForm, Coordinate, TrunkForm
+from .forms import BranchForm, TrunkForm
 
-_BRANCH_KINDS = {"passes": P.PASSES, "strut": P.STRUT, "dyad": P.DYAD, "rail_rod": P.RAIL_ROD}
 _CONE_KINDS = {"carrier": P.CARRIER_CONE, "link": P.LINK_CONE, "platform": P.PLATFORM_CONE}
-_COORDINATE_KINDS = {"stroke": P.STROKE, "rail": P.RAIL, "hinge": P.HINGE, "end_hinge": P.END_HINGE, "trunk": P.TRUNK}
 
 
 @dataclass(frozen=True)
@@ -38,18 +36,17 @@ class CompiledPlan:
     Attributes
     ----------
     plan : the arrays.
-    coordinates : joint name of each coordinate of the plan; the actuated ones come first, in order.
-    cones : joint name of each cone.
     points : how the centres of joints follow from nodes.
+    trunk_joints : names of the plan's trunk joints.
+    trunk_points : those of them that have a centre, with their places among the plan's.
+    home_seed : where home is, (1, ...).
     """
 
     plan: P.Plan
-    coordinates: tuple[str, ...]
-    cones: tuple[str, ...]
     points: tuple[JointPoint, ...]
+    trunk_joints: tuple[str, ...]
     trunk_points: tuple[tuple[str, int], ...]
     home_seed: P.Seeds
-    n_actuators: int
 
 
 @lru_cache(maxsize=64)
@@ -74,11 +71,10 @@ class _Builder:
         self.branches: list[dict[str, Any]] = []
         self.chains: list[dict[str, Any]] = []
         self.cones: list[dict[str, Any]] = []
-        self.cone_names: list[str] = []
         self.trunks: list[dict[str, Any]] = []
         self.trunk_joints: list[dict[str, Any]] = []
-        self.coordinates: list[tuple[Coordinate, dict[str, Any]]] = []
         self.points: list[JointPoint] = []
+        self.trunk_names: list[str] = []
         self.trunk_points: list[tuple[str, int]] = []
 
     def add_chain(self, chain: SubChain) -> None:
@@ -86,39 +82,25 @@ class _Builder:
         first = len(self.branches)
         if chain.trunk_form is not None:
             trunk = len(self.trunks)
-            self._add_trunk(chain.trunk_form, first)
+            self._add_trunk(chain.trunk_form)
         for form in chain.branch_forms:
             self._add_branch(form, carrier=trunk + 1 if trunk >= 0 else 0)
         self.chains.append({"first": first, "last": len(self.branches), "trunk": trunk})
 
-    def _add_trunk(self, form: TrunkForm, branch: int) -> None:
+    def _add_trunk(self, form: TrunkForm) -> None:
         first = len(self.trunk_joints)
-        for coordinate, point, axis, slides, limits in zip(
-            form.coordinates, form.points, form.axes, form.slides, form.ranges, strict=True
+        for name, point, axis, slides, limits in zip(
+            form.told, form.points, form.axes, form.slides, form.ranges, strict=True
         ):
-            if self.mechanism.joint(coordinate.joint).at is not None:
-                self.trunk_points.append((coordinate.joint, len(self.trunk_joints)))
+            if self.mechanism.joint(name).at is not None:
+                self.trunk_points.append((name, len(self.trunk_joints)))
             kind = P.SLIDE if slides else P.TURN
             self.trunk_joints.append({"kind": kind, "point": point, "axis": axis, "lo": limits[0], "hi": limits[1]})
-            self._add_coordinate(coordinate, first + coordinate.index, branch)
+            self.trunk_names.append(name)
         self.trunks.append({"first": first, "last": len(self.trunk_joints)})
 
-    def _add_coordinate(self, coordinate: Coordinate, index: int, branch: int) -> None:
-        slides = self.mechanism.joint(coordinate.joint).type == "prismatic"
-        record = {
-            "kind": _COORDINATE_KINDS[coordinate.kind],
-            "index": index,
-            "branch": branch,
-            "sign": coordinate.sign,
-            "offset": coordinate.offset,
-            "lo": coordinate.limits[0],
-            "hi": coordinate.limits[1],
-            "scale": 1.0 / self.mechanism.characteristic_length if slides else 1.0,
-        }
-        self.coordinates.append((coordinate, record))
-
     def _add_branch(self, form: BranchForm, carrier: int) -> None:
-        first, number = len(self.nodes), len(self.branches)
+        first = len(self.nodes)
         for k, node in enumerate(form.nodes):
             self.nodes.append(
                 {
@@ -133,18 +115,14 @@ class _Builder:
                     "angle_hi": node.turn[1],
                 }
             )
-        for coordinate in form.coordinates:
-            self._add_coordinate(coordinate, first + coordinate.index, number)
         cone_first = len(self.cones)
         for cone in form.cones:
-            self.cone_names.append(cone.joint)
             self.cones.append(
                 {
                     "kind": _CONE_KINDS[cone.kind],
                     "node": first + cone.node,
                     "axis": cone.axis,
                     "half_angle": cone.half_angle,
-                    "cosine": np.cos(cone.half_angle),
                 }
             )
         self._add_points(form, first, carrier)
@@ -167,7 +145,6 @@ class _Builder:
             "first": first,
             "last": first + len(nodes) - 1,
             "carrier": carrier,
-            "kind": _BRANCH_KINDS[form.kind],
             "planar": form.planar,
             "normal": form.normal,
             "reference": reference,
@@ -193,8 +170,6 @@ class _Builder:
             self.points += [JointPoint(name, first + k, node.shift, axis, turning) for name in node.joints]
 
     def build(self) -> CompiledPlan:
-        order = {name: number for number, name in enumerate(self.mechanism.actuator_names)}
-        coordinates = sorted(self.coordinates, key=lambda pair: order.get(pair[0].joint, len(order)))
         plan = P.Plan(
             nodes=_records(self.nodes, P.NODE),
             branches=_records(self.branches, P.BRANCH),
@@ -202,32 +177,14 @@ class _Builder:
             cones=_records(self.cones, P.CONE),
             trunks=_records(self.trunks, P.TRUNK_SPAN),
             trunk_joints=_records(self.trunk_joints, P.TRUNK_JOINT),
-            coordinates=_records([record for _, record in coordinates], P.COORDINATE),
-            scalars=self._scalars(),
+            length=self.mechanism.characteristic_length,
         )
-        names = tuple(coordinate.joint for coordinate, _ in coordinates)
         home = P.Seeds(
             self.mechanism.home_pose[None].copy(),
             plan.nodes["home"][plan.nodes["stored"] >= 0][None],
             np.zeros((1, len(self.trunk_joints))),
         )
-        return CompiledPlan(
-            plan,
-            names,
-            tuple(self.cone_names),
-            tuple(self.points),
-            tuple(self.trunk_points),
-            home,
-            len(self.mechanism.actuator_names),
-        )
-
-    def _scalars(self) -> NDArray[np.float64]:
-        length = self.mechanism.characteristic_length
-        ends = np.array([branch["end"] for branch in self.branches])
-        span = float(np.sqrt(((ends - ends.mean(axis=0)) ** 2).sum(axis=1).mean()))
-        is_point = float(self.mechanism.end_effector_is_joint)
-        span = span if span > 0.0 else length
-        return np.array([length, span, is_point, *self.mechanism.reference_point])
+        return CompiledPlan(plan, tuple(self.points), tuple(self.trunk_names), tuple(self.trunk_points), home)
 
 
 def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,14 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 
 from ..description.graph import Step
 from ..description.mechanism import Joint, Mechanism
 from ..tolerances import TOLERANCES
-from .forms import FREE, Array, BranchForm, ConeForm, Coordinate, Interval, NodeForm, NotExpressible, TrunkForm
+from .forms import FREE, Array, BranchForm, ConeForm, Interval, NodeForm, NotExpressible, TrunkForm
 from .spots import Spot, spots_along
 
 
@@ -32,13 +31,13 @@ class _Draft:
     normal: Array = field(default_factory=lambda: np.zeros(3))
     ends_in_plane: bool = False
     align: bool = False
-    coordinates: list[Coordinate] = field(default_factory=list)
+    told: list[str] = field(default_factory=list)
 
 
 def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> TrunkForm:
     """The trunk of a branched chain: revolute and prismatic joints in any order."""
-    points, axes, slides, ranges, coordinates = [], [], [], [], []
-    for index, step in enumerate(steps):
+    points, axes, slides, ranges = [], [], [], []
+    for step in steps:
         joint = step.joint
         if joint.type not in ("revolute", "prismatic"):
             raise NotExpressible(f"joint {joint.name}, below a branching body, is {joint.type}")
@@ -48,8 +47,8 @@ def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> TrunkForm:
         home = _home(mechanism, joint)
         limits = _limits(joint, home)
         ranges.append((limits[0] - home, limits[1] - home))
-        coordinates.append(Coordinate(joint.name, "trunk", index, 1.0, home, limits))
-    return TrunkForm(tuple(points), tuple(axes), tuple(slides), tuple(ranges), tuple(coordinates))
+    names = tuple(step.joint.name for step in steps)
+    return TrunkForm(tuple(points), tuple(axes), tuple(slides), tuple(ranges), names)
 
 
 def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -> BranchForm:
@@ -80,8 +79,7 @@ def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -
         rail=rail,
         rail_range=rail_range,
         cones=cones,
-        coordinates=tuple(draft.coordinates),
-        kind=_kind(draft, nodes, rail),
+        told=tuple(draft.told),
     )
 
 
@@ -180,7 +178,7 @@ def _stroke(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: int) 
             raise NotExpressible(f"prismatic joint {joint.name} is measured along joints that are not its neighbours")
         sign = 1.0
     offset = home - sign * length
-    draft.coordinates.append(Coordinate(joint.name, "stroke", k, sign, offset, limits))
+    draft.told.append(joint.name)
     lo, hi = sorted(((limits[0] - offset) * sign, (limits[1] - offset) * sign))
     return max(lo, 0.0), hi
 
@@ -191,7 +189,7 @@ def _range_hinge(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: 
     sense = _sense(step, draft.normal)
     home = _home(mechanism, step.joint)
     limits = _limits(step.joint, home)
-    draft.coordinates.append(Coordinate(step.joint.name, "hinge", k, sense, home, limits))
+    draft.told.append(step.joint.name)
     lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
     before = nodes[k].at - nodes[k - 1].at if k > 0 else None
     angle_home = _angle_about(draft.normal, before, nodes[k + 1].at - nodes[k].at) if before is not None else 0.0
@@ -218,8 +216,7 @@ def _end_turn(mechanism: Mechanism, draft: _Draft) -> Interval:
     joint = spot.steps[0].joint
     home = _home(mechanism, joint)
     limits = _limits(joint, home)
-    last = len(draft.spots) - 1
-    draft.coordinates.append(Coordinate(joint.name, "end_hinge", last, sense, home, limits))
+    draft.told.append(joint.name)
     lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
     return lo, hi
 
@@ -231,7 +228,7 @@ def _rail(mechanism: Mechanism, draft: _Draft) -> tuple[Array | None, Interval]:
     axis = np.array(mechanism.home_axis(joint.name)) * draft.rail.sign
     home = _home(mechanism, joint)
     limits = _limits(joint, home)
-    draft.coordinates.append(Coordinate(joint.name, "rail", 0, 1.0, home, limits))
+    draft.told.append(joint.name)
     return axis, (limits[0] - home, limits[1] - home)
 
 
@@ -265,16 +262,3 @@ def _cone(draft: _Draft, nodes: list[NodeForm], k: int, step: Step, near: float)
         parts = np.array([math.copysign(1.0, float(axis @ link)), 0.0, 0.0])
         return ConeForm(name, "link", k, parts, cone.half_angle)
     raise NotExpressible(f"the cone of joint {name} turns with a link whose twist positions do not show")
-
-
-def _kind(draft: _Draft, nodes: list[NodeForm], rail: Array | None) -> Literal["passes", "strut", "dyad", "rail_rod"]:
-    """Which closed form the branch has, if any."""
-    rigid = [node.stroke[0] == node.stroke[1] for node in nodes[1:]]
-    if rail is None and len(nodes) <= 2:
-        return "strut"
-    if rail is None and len(nodes) == 3 and all(rigid) and draft.planar >= 1:
-        return "dyad"
-    across = draft.planar == 0 or (rail is not None and abs(float(rail @ draft.normal)) <= TOLERANCES.alignment)
-    if rail is not None and len(nodes) == 2 and all(rigid) and across:
-        return "rail_rod"
-    return "passes"

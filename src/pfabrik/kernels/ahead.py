@@ -25,11 +25,11 @@ from .platform.nearest import read_configurations
 from .platform.otherwise import answer_otherwise
 from .platform.records import Aim, Found, Starts
 from .reaching import plan as P
-from .reaching.solve import solve_by_iteration
+from .reaching.solve import solve_by_passes
 
 _typeof: Any = numba.typeof
 
-_PLAN_RECORDS = (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT, P.COORDINATE)
+_PLAN_RECORDS = (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT)
 
 
 def _values(codes: str) -> list[Any]:
@@ -38,17 +38,16 @@ def _values(codes: str) -> list[Any]:
     return [numbers[c] if len(c) == 1 else np.zeros((0,) * int(c[1]), c[0] + "8") for c in codes.split()]
 
 
-_PLAN = P.Plan._make([*(np.zeros(0, record) for record in _PLAN_RECORDS), np.zeros(0)])
 _LOOPS = Loops(*_values("i1 f2 f2 i1 i2 i1 i1 i1 i1 i1 i1 f1 f1 f1 i2 f2 f2 f1 i1 i2 i1 f2 i2 i1"))
 _LAYOUT = Layout(*_values("i1 i1"))
 _CLOSED = Closed(*_values("f2 f3 f2 f2 f2 i1"))
 _F2, _FIRST_ORDER = np.zeros((0, 0)), FirstOrder(*_values("f3 f3 f2 f2 f2"))
-_ROWS = (
-    _PLAN,
+_PASSES = (
+    P.Plan._make([*(np.zeros(0, record) for record in _PLAN_RECORDS), 0.0]),
     np.zeros((0, 4, 4)),
     P.Seeds(*_values("f3 f3 f2")),
-    P.Settings(*_values("f f f f i i i i")),
-    P.Rows(*_values("i1 i2 f3 f3 f2 f2 f2")),
+    P.Settings(*_values("f f i i i")),
+    P.Reached(*_values("f3 f3 f2 f1 i1 i1")),
 )
 
 _STARTS = Starts(*_values("f3 f2 f2"))
@@ -59,7 +58,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, _ANSWERS),
     (answer, _ANSWERS),
     (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
-    (solve_by_iteration, _ROWS),
+    (solve_by_passes, _PASSES),
     (approach, (_LOOPS, _LAYOUT, _POSE_OBJECTIVE, _CLOSED, np.zeros((0, 0)))),
     (read_coordinates, tuple(_values("i f3 f2 f2"))),
     (first_order, (_LOOPS, _LAYOUT, FirstOrderPlan(*_values("f2 f1 f2 i1 i i i i f i")), _F2, _FIRST_ORDER)),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..arrays import Floats
 from ._jit import routine
-from .reaching.plan import Floats
 
 
 @routine

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
+from ..arrays import Floats
 from ._jit import routine
-from .reaching.plan import Floats
 
 Vec: TypeAlias = tuple[float, float, float]
 # An angle beyond the end of its range by no more than this [rad] is on it, not a turn away.

@@ -15,7 +15,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..engine import engine_of
 from ..errors import InvalidArgument
-from ..kernels.reaching.plan import POSITION_ERROR, ROTATION_ERROR
+from ..kernels.rows import POSITION_ERROR, ROTATION_ERROR
 from ..poses import are_poses, made_exact, what_is_wrong
 from ..targets import Target, as_targets
 from .branches import BranchSearch, Listed

@@ -15,7 +15,7 @@ from ..closure.configurations import Configurations
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.legs import records as K
-from ..kernels.reaching import plan as P
+from ..kernels.rows import Rows
 from .coordinates import read_into, settled
 
 
@@ -30,7 +30,7 @@ class LegAnswers(Configurations):
     """
 
     def __init__(
-        self, rows: P.Rows, coordinates: Floats | Callable[[], Floats], sides: Floats, carriers: Floats | None = None
+        self, rows: Rows, coordinates: Floats | Callable[[], Floats], sides: Floats, carriers: Floats | None = None
     ) -> None:
         super().__init__(rows, coordinates)
         self._sides, self.carriers = sides, carriers
@@ -101,7 +101,7 @@ def begins_of(
 def coordinates_of(
     mechanism: Mechanism,
     table: LegTable,
-    rows: P.Rows,
+    rows: Rows,
     sides: Floats,
     carriers: Floats | None,
     begins: Callable[[], Floats | None],

@@ -14,7 +14,7 @@ from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
 from ..kernels.platform.records import Found, Starts
-from ..kernels.reaching import plan as P
+from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
 from .nearest import corners_of, home_start, nearest_actuators, no_starts, starts_at
 from .table import machine
@@ -24,7 +24,7 @@ ROWS_A_BLOCK = 256
 
 def assembled(
     mechanism: Mechanism, table: LegTable, values: Floats, start: Configurations | None, sides: Floats, tolerance: float
-) -> tuple[P.Rows, Floats, Floats]:
+) -> tuple[Rows, Floats, Floats]:
     """Configurations that have actuated values (n, n_a), within all limits; rows without one are PENDING.
 
     Without a start, the row's own configuration is looked for from elsewhere too.
@@ -42,18 +42,18 @@ def assembled(
     found = Starts(rows.poses, np.zeros((n, len(table.legs))), np.zeros((n, len(table.legs))))
     rows.actuators[:], wanted = values, np.zeros_like(values)
     _assemble(mechanism, table, own, no_starts(table), (rows.actuators, rows.status, wanted, *found, rows.measures))
-    rest = np.flatnonzero(rows.status == P.PENDING)
+    rest = np.flatnonzero(rows.status == PENDING)
     if start is None and len(rest):
         filled = rows.status, wanted, *found, rows.measures
         parts = [array[rest] for array in (rows.actuators, *filled)]
         _assemble(mechanism, table, own, corners_of(mechanism), parts)
         for array, part in zip(filled, parts[1:], strict=True):
             array[rest] = part
-        rest = np.flatnonzero(rows.status == P.PENDING)
+        rest = np.flatnonzero(rows.status == PENDING)
     if len(rest):
         _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
-        near = rest[rows.measures[rest, P.ACTUATOR_ERROR] <= tolerance]
-        rows.status[near[rows.status[near] == P.PROJECTED]] = P.REACHED
+        near = rest[rows.measures[rest, ACTUATOR_ERROR] <= tolerance]
+        rows.status[near[rows.status[near] == PROJECTED]] = REACHED
     found.sides[:, table.led_arms["leg"]] = found.q[:, table.led_arms["leg"]]
     return rows, found.q, found.sides
 
@@ -64,7 +64,7 @@ def _project(
     values: Floats,
     own: Starts,
     places: NDArray[np.intp],
-    rows: P.Rows,
+    rows: Rows,
     found: Starts,
     *,
     anywhere: bool,
@@ -75,7 +75,7 @@ def _project(
     near = np.flatnonzero(np.isfinite(ended.distances))
     ended, places = Found._make(array[near] for array in ended), places[near]
     asked, actuators, measures = rows.actuators[places], ended.actuators, ended.measures
-    measures[:, [P.POSITION_ERROR, P.ROTATION_ERROR]] = 0.0
+    measures[:, [POSITION_ERROR, ROTATION_ERROR]] = 0.0
     for driven in table.driven:
         column = driven["column"]
         now = actuators[:, column]  # a view
@@ -84,10 +84,10 @@ def _project(
             inside = (counted >= driven["home"] + driven["lo"]) & (counted <= driven["home"] + driven["hi"])
             now[:] = np.where(inside, counted, now)
         off = np.abs(now - asked[:, column]) / driven["unit"]
-        measures[:, P.ACTUATOR_ERROR] = np.maximum(measures[:, P.ACTUATOR_ERROR], off)
+        measures[:, ACTUATOR_ERROR] = np.maximum(measures[:, ACTUATOR_ERROR], off)
     rows.actuators[places], rows.measures[places] = actuators, measures
-    rows.status[places] = P.PROJECTED
-    rows.counters[places, P.ITERATIONS] = ended.steps
+    rows.status[places] = PROJECTED
+    rows.counters[places, ITERATIONS] = ended.steps
     rows.poses[places], found.q[places], found.sides[places] = ended.poses, ended.q, ended.sides
 
 

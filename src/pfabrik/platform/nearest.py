@@ -21,7 +21,7 @@ from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Aim, Found, Starts
-from ..kernels.reaching import plan as P
+from ..kernels.rows import HOLD_NOTHING
 from ..kernels.threads import in_blocks
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
@@ -149,7 +149,7 @@ def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: St
 
     Searches start there alone: what they miss, projections from elsewhere find.
     """
-    way, n = Way(task_of(mechanism).weights(LOCKED, LOCKED), P.HOLD_NOTHING), len(targets)
+    way, n = Way(task_of(mechanism).weights(LOCKED, LOCKED), HOLD_NOTHING), len(targets)
     objective, best = _objective(mechanism, targets, way, MOST_STEPS), _new_found(n, table)
     best.distances[:], best.sides[:] = 0.0, own.sides
     for part, legs in _apart_by_arms(table):

@@ -14,7 +14,7 @@ from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
-from ..kernels.reaching import plan as P
+from ..kernels.rows import Rows
 from .nearest import home_start, no_starts
 from .table import machine, machine_nearby, resting_at_home
 
@@ -47,19 +47,17 @@ class OneTarget:
 
         return answer_blocks
 
-    def new_rows(self) -> P.Rows:
+    def new_rows(self) -> Rows:
         """Room for one answer."""
-        return P.Rows(
+        return Rows(
             np.empty(1, np.int64),
             np.zeros((1, 3), np.int64),
             np.empty((1, 4, 4)),
-            np.empty((1, 0, 3)),
-            np.empty((1, 0)),
             np.empty((1, self._n_actuators)),
             np.zeros((1, 5)),
         )
 
-    def reach(self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool) -> int:
+    def reach(self, target: Floats, begin: Floats, sides: Floats, rows: Rows, *, nearby: bool) -> int:
         """Answer a target (1, 4, 4) if legs on these sides (1, legs) reach it at once; 0 where they do.
 
         Parameters
@@ -71,9 +69,7 @@ class OneTarget:
             return self._reach_at_rest(self._resting, target, rows)
         return self._kernel((self._nearby if nearby else self._anywhere).address, target, begin, sides, *_filled(rows))
 
-    def prepared(
-        self, target: Floats, begin: Floats, sides: Floats, rows: P.Rows, *, nearby: bool
-    ) -> Callable[[], int]:
+    def prepared(self, target: Floats, begin: Floats, sides: Floats, rows: Rows, *, nearby: bool) -> Callable[[], int]:
         """`reach` with all that it takes, as long as this object is kept; arms begin anew each time."""
         if begin is self.home and self._resting is not None:
             return partial(self._reach_at_rest, self._resting, target, rows)
@@ -88,7 +84,7 @@ class OneTarget:
 
         return call_anew
 
-    def _reach_at_rest(self, resting: Resting, target: Floats, rows: P.Rows) -> int:
+    def _reach_at_rest(self, resting: Resting, target: Floats, rows: Rows) -> int:
         """`reach` from home with arms that stay there."""
         rows.actuators[:] = resting.actuators
         return self._blocks(self._at_rest.address, target, self.home, resting.table.home_sides, *_filled(rows))
@@ -121,14 +117,14 @@ class OneAssembly:
         """Room for where carriers and legs are in the end."""
         return Ends(np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
 
-    def prepared(self, rows: P.Rows, ends: Ends) -> Callable[[], int]:
+    def prepared(self, rows: Rows, ends: Ends) -> Callable[[], int]:
         """A call that assembles what stands in `rows.actuators` from home within all limits, as long as this object is
         kept; it returns 0 where it does."""
         wanted = np.empty((1, self._n_actuators))
         into = rows.status, wanted, rows.poses, *ends, rows.measures
         return partial(self._kernel, self._legs.address, rows.actuators, *self._asked, *into)
 
-    def assemble(self, rows: P.Rows, ends: Ends) -> bool:
+    def assemble(self, rows: Rows, ends: Ends) -> bool:
         """The same, at once; whether it does."""
         if self.prepared(rows, ends)():
             return False
@@ -136,6 +132,6 @@ class OneAssembly:
         return True
 
 
-def _filled(rows: P.Rows) -> tuple[NDArray[Any], ...]:
+def _filled(rows: Rows) -> tuple[NDArray[Any], ...]:
     """What the kernel fills of an answer."""
     return rows.status, rows.poses, rows.actuators, rows.measures

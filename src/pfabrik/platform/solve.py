@@ -16,7 +16,7 @@ from ..closure.solve import ClosureEngine
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Starts
-from ..kernels.reaching import plan as P
+from ..kernels.rows import PENDING, REACHED, Rows
 from ..kernels.threads import in_blocks
 from ..motion.displacements import centres_at
 from ..options import Options
@@ -80,13 +80,13 @@ class LegsEngine:
             told = rows.poses, rows.actuators, ends
             return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins()), ends)
         left, sides = self._reach(targets, start, first, keep_mode, rows, tried=is_one)
-        carriers, others, rest = None, None, np.flatnonzero(rows.status != P.REACHED)
+        carriers, others, rest = None, None, np.flatnonzero(rows.status != REACHED)
         if left and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
             poses = self._one.home if start is None else start.rows.poses
             question = Question(self.mechanism, self._table, targets, poses, options, keep_mode, nearby)
             carriers = answer_unreached(question, rest, sides, rows)
-            rest = np.flatnonzero(rows.status == P.PENDING)
+            rest = np.flatnonzero(rows.status == PENDING)
             if start is not None:
                 self._count_turns(start.rows.actuators, rows)
         if len(rest) == len(targets):
@@ -94,11 +94,11 @@ class LegsEngine:
         if len(rest):
             begin = start if start is None or len(start) == 1 else start.at(rest)
             others = self._inner.answer(targets[rest], begin, options, keep_mode=keep_mode)
-            put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
+            put_rows(rows, rest, others.rows)
         return self._answers(rows, sides, carriers, start, first, rest, others)
 
     def prepared(
-        self, target: Floats, start: Configurations | None, rows: P.Rows, *, keep_mode: bool
+        self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool
     ) -> Callable[[], int] | None:
         """A call that answers what stands in `target`, (1, 4, 4), into `rows`; it returns 0 where legs reach it.
 
@@ -137,7 +137,7 @@ class LegsEngine:
         rest = np.array([i for i, each in enumerate(found) if not isinstance(each, LegAnswers)], dtype=np.intp)
         for i, each in enumerate(found):
             own = slice(i, i + 1)
-            put_rows(rows, own, each.rows._replace(nodes=rows.nodes[own], trunks=rows.trunks[own]))
+            put_rows(rows, own, each.rows)
             if isinstance(each, LegAnswers):
                 sides[i] = each.sides
                 if each.carriers is not None:
@@ -150,7 +150,7 @@ class LegsEngine:
 
     def _answers(
         self,
-        rows: P.Rows,
+        rows: Rows,
         sides: Floats,
         carriers: Floats | None,
         start: Configurations | None,
@@ -172,13 +172,13 @@ class LegsEngine:
         rows, present = (new_rows(mechanism, len(targets)) for _ in range(2))
         coordinates = start.coordinates.copy()
         _, sides = self._reach(targets, start, first, True, rows)
-        own = np.flatnonzero(rows.status == P.REACHED)
+        own = np.flatnonzero(rows.status == REACHED)
         coordinates[own] = settled(mechanism, table, rows.poses[own], rows.actuators[own], sides[own], coordinates[own])
         if len(own) < len(targets):
             self._reach(start.rows.poses, start, first, True, present)
-            rest = np.flatnonzero((rows.status != P.REACHED) & (present.status != P.REACHED))
+            rest = np.flatnonzero((rows.status != REACHED) & (present.status != REACHED))
             others = self._inner.advance(targets[rest], start.at(rest), options)
-            put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
+            put_rows(rows, rest, others.rows)
             coordinates[rest] = others.coordinates
         return Configurations(rows, coordinates)
 
@@ -216,16 +216,16 @@ class LegsEngine:
                 return found
         first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
         rows, carriers, sides = assembled(self.mechanism, self._table, values, start, first, tolerance)
-        rest, others = np.flatnonzero(rows.status == P.PENDING), None
+        rest, others = np.flatnonzero(rows.status == PENDING), None
         if len(rest) == len(values):
             return self._inner.forward(values, start, tolerance)
         if len(rest):
             begin = start if start is None or len(start) == 1 else start.at(rest)
             others = self._inner.forward(values[rest], begin, tolerance)
-            put_rows(rows, rest, others.rows._replace(nodes=rows.nodes[rest], trunks=rows.trunks[rest]))
+            put_rows(rows, rest, others.rows)
         return self._answers(rows, sides, carriers, start, first, rest, others)
 
-    def prepared_forward(self, rows: P.Rows) -> Callable[[], int]:
+    def prepared_forward(self, rows: Rows) -> Callable[[], int]:
         """A call that answers `rows.actuators` from home into the rest of one row; it returns 0 where they assemble."""
         return self._one_forward.prepared(rows, self._one_forward.new_ends())
 
@@ -239,7 +239,7 @@ class LegsEngine:
         return LegAnswers(rows, partial(settled, self.mechanism, self._table, *end), ends.sides, ends.q)
 
     def _reach_one(
-        self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: P.Rows
+        self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows
     ) -> bool:
         """Answer one target from home or from one answer before; whether legs reach it as they are."""
         begin = self._one.home if start is None else start.rows.poses
@@ -255,7 +255,7 @@ class LegsEngine:
         start: Configurations | None,
         sides: Floats,
         keep_mode: bool,
-        rows: P.Rows,
+        rows: Rows,
         *,
         tried: bool = False,
     ) -> tuple[int, Floats]:
@@ -280,7 +280,7 @@ class LegsEngine:
         return left, sides
 
     def _reach_as_they_are(
-        self, from_home: bool, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows
+        self, from_home: bool, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows
     ) -> int:
         """Answer the rows that legs reach with arms that are not led where they are; how many they do not."""
         resting = resting_at_home(self._table) if from_home else None
@@ -289,33 +289,31 @@ class LegsEngine:
         rows.actuators[:] = resting.actuators
         return self._run(True, machine(resting.table), targets, begins, resting.table.home_sides, rows)
 
-    def _reach_by_arms(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _reach_by_arms(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
         """Answer rows whose legs reach once arms have moved, and note where; how many these are."""
         from .arms import move_arms
 
-        before, rest = sides.copy(), np.flatnonzero(rows.status != P.REACHED)
+        before, rest = sides.copy(), np.flatnonzero(rows.status != REACHED)
         some, poses = move_arms(self.mechanism, self._table, targets, begins, sides, rest)
         if not len(some):
             return 0
         own, begins = rows_at(rows, some), poses
         left = self._run(False, asked, targets[some], begins, sides[some], own)
         put_rows(rows, some, own)
-        lost = some[own.status != P.REACHED]
+        lost = some[own.status != REACHED]
         sides[lost] = before[lost]
         return len(some) - left
 
-    def _reach_from_home(self, asked: Machine, targets: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _reach_from_home(self, asked: Machine, targets: Floats, sides: Floats, rows: Rows) -> int:
         """The same, with arms that start at home: from where they are, limits may be in the way."""
-        away, home, arms = rows.status != P.REACHED, sides.copy(), self._table.led_arms["leg"]
+        away, home, arms = rows.status != REACHED, sides.copy(), self._table.led_arms["leg"]
         home[:, arms] = self._table.home_sides[:, arms]
         n = self._reach_by_arms(asked, targets, self._one.home, home, rows)
-        found = away & (rows.status == P.REACHED)
+        found = away & (rows.status == REACHED)
         sides[found] = home[found]
         return n
 
-    def _run(
-        self, by_blocks: bool, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows
-    ) -> int:
+    def _run(self, by_blocks: bool, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
         """Answer targets on all cores, in blocks of poses or one by one; how many are not reached."""
         if by_blocks:
             from ..kernels.legs.blocks import answer_blocks as answer
@@ -336,7 +334,7 @@ class LegsEngine:
 
         return sum(in_blocks(run, len(targets), ROWS_A_RUN if by_blocks else ROWS_A_BLOCK))
 
-    def _complete(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: P.Rows) -> int:
+    def _complete(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
         """Answer the rows that blocks left OPEN, whose poses are to be completed; how many of them are reached."""
         from ..kernels.legs.blocks import OPEN
 
@@ -349,7 +347,7 @@ class LegsEngine:
         put_rows(rows, some, own)
         return len(some) - left
 
-    def _count_turns(self, begin: Floats, rows: P.Rows) -> None:
+    def _count_turns(self, begin: Floats, rows: Rows) -> None:
         """Count the angles of actuators that may turn more than once from those of a start (n or 1, n_a)."""
         for driven in self._turning:
             values = rows.actuators[:, driven["column"]]  # a view

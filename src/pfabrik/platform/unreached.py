@@ -13,7 +13,7 @@ from ..closure.projection import kept, ways_of
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Found
-from ..kernels.reaching import plan as P
+from ..kernels.rows import HOLD, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options
 from ..tolerances import TOLERANCES
@@ -41,7 +41,7 @@ class Question(NamedTuple):
     nearby: bool
 
 
-def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, rows: P.Rows) -> Floats:
+def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, rows: Rows) -> Floats:
     """Answer the rows `rest` in other working modes, or by the nearest feasible poses; some may stay PENDING.
 
     Parameters
@@ -73,11 +73,11 @@ def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, 
         left = _reach_again(question, rest[again], sides, rows)
         carriers[rest[again[~left]]] = np.nan
         lost = rest[again[left & is_near[again]]]
-        rows.status[lost], carriers[lost] = P.PENDING, np.nan
+        rows.status[lost], carriers[lost] = PENDING, np.nan
     return carriers
 
 
-def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, rows: P.Rows) -> NDArray[np.intp]:
+def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, rows: Rows) -> NDArray[np.intp]:
     """Answer rows in other working modes; which are left, but for those that wait for another engine: closed forms tell
     too little of a leg at a dead point."""
     from ..kernels.platform.otherwise import UNSURE, answer_otherwise
@@ -99,7 +99,7 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
         )
 
     in_blocks(run, len(rest), ROWS_A_BLOCK)
-    reached = own.status == P.REACHED
+    reached = own.status == REACHED
     if reached.any():
         put_rows(rows, rest[reached], rows_at(own, reached))
         sides[rest[reached]] = tried[reached]
@@ -107,7 +107,7 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
     return left
 
 
-def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: P.Rows) -> NDArray[np.bool_]:
+def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: Rows) -> NDArray[np.bool_]:
     """Answer rows exactly from where their projections ended; which stay as they are."""
     from ..kernels.legs.answer import answer
 
@@ -124,8 +124,8 @@ def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, row
         own.actuators,
         own.measures,
     )
-    own.measures[:, [P.POSITION_ERROR, P.ROTATION_ERROR]] = 0.0
-    left = own.status != P.REACHED
+    own.measures[:, [POSITION_ERROR, ROTATION_ERROR]] = 0.0
+    left = own.status != REACHED
     if not left.all():
         put_rows(rows, again[~left], rows_at(own, ~left))
         sides[again[~left]] = ends[~left]
@@ -133,13 +133,13 @@ def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, row
 
 
 def _put_projected(
-    question: Question, rest: NDArray[np.intp], found: Found, holds: NDArray[np.int64], rows: P.Rows
+    question: Question, rest: NDArray[np.intp], found: Found, holds: NDArray[np.int64], rows: Rows
 ) -> None:
     """Write configurations found for rows `rest`."""
     mechanism, options = question.mechanism, question.options
-    position, rotation = found.measures[:, P.POSITION_ERROR], found.measures[:, P.ROTATION_ERROR]
+    position, rotation = found.measures[:, POSITION_ERROR], found.measures[:, ROTATION_ERROR]
     is_near = position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)
-    rows.status[rest] = np.where(is_near & (rotation <= options.rotation_tolerance), P.REACHED, P.PROJECTED)
+    rows.status[rest] = np.where(is_near & (rotation <= options.rotation_tolerance), REACHED, PROJECTED)
     rows.poses[rest], rows.actuators[rest], rows.measures[rest] = found.poses, found.actuators, found.measures
-    rows.counters[rest, P.ITERATIONS] = found.steps
-    rows.counters[rest, P.HELD] = kept(mechanism, holds, position, rotation)
+    rows.counters[rest, ITERATIONS] = found.steps
+    rows.counters[rest, HOLD] = kept(mechanism, holds, position, rotation)

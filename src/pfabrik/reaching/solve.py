@@ -2,64 +2,80 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.close import closure_of, measured
-from ..closure.configurations import (
-    Configurations,
-    new_rows,
-    put_rows,
-    rows_at,
-    write_closing,
-)
-from ..closure.solve import ClosureEngine
+from ..closure.close import MARGIN, close, closure_of
+from ..closure.configurations import Configurations, new_rows, put_rows
+from ..closure.descend import within_sight
+from ..closure.projection import Way, kept, ways_of
+from ..closure.solve import ClosureEngine, begin_of, told
+from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
+from ..description.task import task_of
+from ..kernels.closure.loops import LOCKED
 from ..kernels.reaching import plan as P
+from ..kernels.rows import FAILED, ITERATIONS, REACHED, ROUNDS
 from ..kernels.threads import in_blocks
 from ..options import Options
+from ..platform.answers import sides_at
 from ..platform.solve import LegsEngine
+from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
-from .completion import coordinates_of, positions_of
+from .positions import new_reached, place, positions_of
 
 NEAR = 1e-3
-"""Share of L within which passes bring the ends of chains where exact steps follow."""
+"""Share of L within which passes bring the ends of chains where exact answers are asked for: loops close from there."""
+
+GAIN = 0.999
+"""Share of the gap beyond which what a pass leaves is no gain, where exact answers are asked for."""
 
 ROWS_A_BLOCK = 64
 
 STEPS_A_REPORT = 16
 """Steps along a path between two reports of progress."""
 
-_HOLDS = {None: P.HOLD_NOTHING, "orientation": P.HOLD_ORIENTATION, "position": P.HOLD_POSITION}
-
 
 class ReachingEngine:
     """The paper's method on joint positions, for mechanisms whose chains these express.
 
-    With `Options.exact`, what another engine reaches is that one's answer, and all else is projected as in the paper.
+    Passes bring the ends of chains near, and move the target where they do not; from there the loops are closed
+    exactly. With `Options.exact`, what another engine reaches is that one's answer; that engine also answers what the
+    passes leave no feasible configuration for.
     """
 
     def __init__(self, mechanism: Mechanism, exact: LegsEngine | ClosureEngine) -> None:
         self.mechanism, self._exact = mechanism, exact
-        self._compiled = compile_plan(mechanism)
+        self._compiled, self._table = compile_plan(mechanism), leg_table(mechanism)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        rows = self._new_rows(len(targets))
+        known = are_poses(targets)
         if options.exact:
             found = self._exact.answer(targets, start, options, keep_mode=keep_mode)
-            reached = np.flatnonzero(found.rows.status == P.REACHED)
-            own, told = self._positioned(found.at(reached)), rows_at(found.rows, reached)
-            own = own._replace(status=told.status, counters=told.counters, measures=told.measures)
-            put_rows(rows, reached, own)
-        self._solve(targets, self._seeds(start), settings_of(self.mechanism, options), rows)
-        return self._found(rows, start)
+            away = np.flatnonzero(known & (found.rows.status != REACHED))
+            if not len(away):
+                return found
+            found = Configurations(found.rows, found.coordinates)
+            tried = self._by_passes(made_exact(targets[away]), _at(start, away), options, keep_mode)
+            good = tried.rows.status != FAILED
+            found.replace(away[good], tried, good)
+            return found
+        own = _at(start, np.flatnonzero(known))
+        found = self._by_passes(made_exact(targets[known]), own, options, keep_mode)
+        away = np.flatnonzero(found.rows.status == FAILED)
+        if len(away):
+            others = self._exact.answer(targets[known][away], _at(own, away), options, keep_mode=keep_mode)
+            found.replace(away, others, np.ones(len(away), bool))
+        return found.among(known)
 
     def follow(
         self,
@@ -69,95 +85,89 @@ class ReachingEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        rows, before = self._new_rows(len(targets)), start
+        known, before = are_poses(targets), start
+        rows = new_rows(self.mechanism, len(targets))
+        coordinates = np.full((len(targets), begin_of(self.mechanism, start).shape[1]), np.nan)
         for i in range(len(targets)):
             found = self.answer(targets[i : i + 1], before, options, keep_mode=True)
             put_rows(rows, slice(i, i + 1), found.rows)
-            if found.rows.status[0] != P.INVALID:
-                before = Configurations(found.rows, partial(coordinates_of, self.mechanism, found.rows))
+            if known[i]:
+                coordinates[i] = found.coordinates[0]
+                before = Configurations(found.rows, found.coordinates)
             if on_progress is not None and ((i + 1) % STEPS_A_REPORT == 0 or i + 1 == len(targets)):
                 on_progress(i + 1, len(targets))
-        found = self._found(rows, start, chained=True)
-        self._count_turns(rows)
+        return Configurations(rows, coordinates)
+
+    def _by_passes(
+        self, wanted: Floats, start: Configurations | None, options: Options, keep_mode: bool
+    ) -> Configurations:
+        """Answer poses by passes; FAILED where these end in nothing feasible, or leave the mode to be kept."""
+        begin = begin_of(self.mechanism, start)
+        begin = np.repeat(begin, len(wanted), axis=0) if len(begin) == 1 else begin
+        sides = self._sides(start) if keep_mode else None
+        found, away = Configurations(new_rows(self.mechanism, len(wanted)), begin.copy()), np.arange(len(wanted))
+        for way in ways_of(self.mechanism, options.hold, options.rotation_length):
+            tried = self._tried(wanted[away], begin[away], options, way)
+            if sides is not None:
+                strayed = (self._sides(tried) != (sides if len(sides) == 1 else sides[away])).any(axis=1)
+                tried.rows.status[strayed] = FAILED
+            found.replace(away, tried, np.ones(len(away), bool))
+            away = np.flatnonzero(found.rows.status == FAILED)
+            if not len(away):
+                break
         return found
 
-    def _new_rows(self, n: int) -> P.Rows:
-        home = self._compiled.home_seed
-        return new_rows(self.mechanism, n, home.nodes.shape[1], home.trunks.shape[1])
+    def _sides(self, found: Configurations | None) -> Floats:
+        """The working mode of configurations, home's for None: which of its two solutions each leg takes, (n, legs)."""
+        if not isinstance(self._table, LegTable):
+            return np.zeros((1, 0))
+        return self._table.home_sides if found is None else sides_at(self.mechanism, self._table, found)
 
-    def _seeds(self, start: Configurations | None) -> P.Seeds:
-        """Where rows start, in positions."""
-        if start is None:
-            return self._compiled.home_seed
-        rows = self._positioned(start)
-        return P.Seeds(rows.poses, rows.nodes, rows.trunks)
+    def _tried(self, wanted: Floats, begin: Floats, options: Options, way: Way) -> Configurations:
+        """Answer poses by passes one way, from joint coordinates (n, columns); FAILED where the loops do not close."""
+        closure = closure_of(self.mechanism, whole=False)
+        reached = self._run(within_sight(self.mechanism, wanted), begin, settings_of(self.mechanism, options, way))
+        placed = place(self.mechanism, self._compiled, begin, reached)
+        free = tuple(LOCKED if weight == LOCKED else 0.0 for weight in way.weights)
+        closed = close(closure, placed.coordinates, placed.poses, platform=free, limits=True, margin=MARGIN)
+        errors = task_of(self.mechanism).errors(closed.poses, wanted)
+        holds = kept(self.mechanism, np.full(len(wanted), way.hold), *errors)
+        found = told(closure, closed, wanted, holds, options)
+        found.rows.counters[:, ITERATIONS], found.rows.counters[:, ROUNDS] = reached.iterations, reached.rounds
+        return found
 
-    def _positioned(self, found: Configurations) -> P.Rows:
-        """Configurations with positions, as they are or, where another engine found them, from joint coordinates."""
-        own, rows = self._new_rows(0), found.rows
-        if rows.nodes.shape[1:] == own.nodes.shape[1:] and rows.trunks.shape[1:] == own.trunks.shape[1:]:
-            return rows
-        placed, rows = measured(self.mechanism, found.coordinates), self._new_rows(len(found))
-        write_closing(closure_of(self.mechanism), placed, rows)
-        positions_of(self.mechanism, self._compiled, placed.coordinates, rows)
-        return rows
+    def _run(self, wanted: Floats, begin: Floats, settings: P.Settings) -> P.Reached:
+        """The kernel over all rows, on all cores."""
+        from ..kernels.reaching.solve import solve_by_passes
 
-    def _found(self, rows: P.Rows, start: Configurations | None, chained: bool = False) -> Configurations:
-        """Rows that were answered; joint coordinates, when asked for, are those nearest to the start's.
+        if self.mechanism.end_effector_is_joint:  # a point has no orientation: home's
+            wanted[:, :3, :3] = np.eye(3)
+        seeds = positions_of(self.mechanism, self._compiled, begin)
+        reached = new_reached(self._compiled, len(wanted))
 
-        Of a start only the positions are kept, not how it was found itself: answers that start from each other would
-        all stay in memory.
-        """
-        unknown = rows.status == P.INVALID
-        if unknown.any():
-            for array in (rows.poses, rows.nodes, rows.trunks, rows.actuators, rows.measures):
-                array[unknown] = np.nan
-            rows.counters[unknown] = 0
-        if start is None:
-            return Configurations(rows, partial(coordinates_of, self.mechanism, rows, None, chained))
-        positioned = start.rows if start.were_given else self._positioned(start)
-        own = start.coordinates if start.were_given else partial(coordinates_of, self.mechanism, positioned)
-        return Configurations(rows, partial(_nearest_to, self.mechanism, rows, own, chained))
+        def run(block: slice) -> None:
+            own = P.Seeds._make(array[block] for array in seeds)
+            ends = P.Reached._make(array[block] for array in reached)
+            solve_by_passes(self._compiled.plan, wanted[block], own, settings, ends)
 
-    def _solve(self, targets: Floats, seeds: P.Seeds, settings: P.Settings, rows: P.Rows) -> None:
-        """Answer the rows that are pending, each for itself."""
-        from ..kernels.reaching.solve import solve_by_iteration
-
-        def run(block: slice) -> int:
-            own = seeds if len(seeds.poses) == 1 else P.Seeds._make(array[block] for array in seeds)
-            return solve_by_iteration(self._compiled.plan, targets[block], own, settings, rows_at(rows, block))
-
-        in_blocks(run, len(targets), ROWS_A_BLOCK)
-
-    def _count_turns(self, rows: P.Rows) -> None:
-        """Make the angles of revolute actuators that may turn more than once continuous along a path."""
-        known = rows.status != P.INVALID
-        for j in range(self._compiled.n_actuators):
-            coordinate = self._compiled.plan.coordinates[j]
-            lo, hi = coordinate["lo"], coordinate["hi"]
-            if coordinate["kind"] in (P.HINGE, P.END_HINGE) and hi - lo > 2 * np.pi:
-                counted = np.unwrap(rows.actuators[known, j])
-                if (counted >= lo - TOLERANCES.limit).all() and (counted <= hi + TOLERANCES.limit).all():
-                    rows.actuators[known, j] = counted
+        in_blocks(run, len(wanted), ROWS_A_BLOCK)
+        return reached
 
 
-def _nearest_to(mechanism: Mechanism, rows: P.Rows, start: Floats | Callable[[], Floats], chained: bool) -> Floats:
-    """Joint coordinates of answers, nearest to those they started from."""
-    return coordinates_of(mechanism, rows, start() if callable(start) else start, chained)
+def _at(start: Configurations | None, places: NDArray[np.intp]) -> Configurations | None:
+    """Where rows start: one configuration for all stays one."""
+    return start if start is None or len(start) == 1 else start.at(places)
 
 
 @lru_cache(maxsize=256)
-def settings_of(mechanism: Mechanism, options: Options) -> P.Settings:
-    """Options as the kernel takes them; exact steps take over sooner than passes alone may end."""
-    length = mechanism.characteristic_length
+def settings_of(mechanism: Mechanism, options: Options, way: Way) -> P.Settings:
+    """Options as the kernel takes them; where exact steps follow, passes end sooner."""
+    length, free = mechanism.characteristic_length, [weight != LOCKED and weight > 0.0 for weight in way.weights]
     tolerance = float(options.tolerance or TOLERANCES.position * length)
     return P.Settings(
-        tolerance=tolerance,
         enough=max(tolerance, NEAR * length) if options.exact else tolerance,
-        rotation_tolerance=float(options.rotation_tolerance),
-        slack=0.1 * TOLERANCES.limit * length,
-        exact=int(options.exact),
+        gain=GAIN if options.exact else math.inf,
         max_iterations=int(options.max_iterations),
         max_rounds=int(options.max_rounds),
-        hold=_HOLDS[options.hold],
+        free=P.TRANSLATES * any(free[:3]) + P.TURNS * any(free[3:]),
     )

@@ -15,16 +15,17 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats
 from ..closure.configurations import new_rows, rows_at
+from ..closure.projection import ways_of
 from ..decomposition.leg_table import LegTable, leg_table
-from ..decomposition.plan import CompiledPlan, compile_plan
+from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
 from ..engine import inverse_engine_of
 from ..geometric.topologies import closed_form
 from ..ik import solve_ik
-from ..kernels.reaching.plan import Rows, Seeds
 from ..platform.arms import move_arms
 from ..platform.table import machine
 from ..poses import pose
+from ..reaching.positions import new_reached, positions_of
 from ..reaching.solve import settings_of
 from .checking import Feasibility, feasibility
 from .efficacy import rms
@@ -177,13 +178,13 @@ def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str
 def _single_passes(mechanism: Mechanism, targets: Floats, warm: bool) -> Callable[[], object]:
     """One kernel call of the paper's method a target."""
     compiled, options = compile_plan(mechanism), ANY_MODE["paper"]
-    settings = settings_of(mechanism, options)
+    settings = settings_of(mechanism, options, ways_of(mechanism, options.hold, options.rotation_length)[0])
     seeds = compiled.home_seed
-    rows = new_rows(mechanism, len(targets), seeds.nodes.shape[1], seeds.trunks.shape[1])
     if warm:
         answers = inverse_engine_of(mechanism, options).answer(targets, None, options, keep_mode=False)
-        seeds = _answers_before(compiled, answers.rows)
-    return partial(p_fabrik_one_by_one, compiled.plan, targets, seeds, settings, rows)
+        before = np.concatenate([np.zeros((1, answers.coordinates.shape[1])), answers.coordinates[:-1]])
+        seeds = positions_of(mechanism, compiled, before)
+    return partial(p_fabrik_one_by_one, compiled.plan, targets, seeds, settings, new_reached(compiled, len(targets)))
 
 
 def _single_legs(mechanism: Mechanism, table: LegTable, targets: Floats, warm: bool) -> Callable[[], object]:
@@ -203,12 +204,6 @@ def _single_legs(mechanism: Mechanism, table: LegTable, targets: Floats, warm: b
             )
 
     return answer
-
-
-def _answers_before(compiled: CompiledPlan, rows: Rows) -> Seeds:
-    """For each target the answer to the one before it; home for the first."""
-    pairs = zip(compiled.home_seed, (rows.poses, rows.nodes, rows.trunks), strict=True)
-    return Seeds(*(np.concatenate([home, own[:-1]]) for home, own in pairs))
 
 
 def _single_closed(mechanism: Mechanism, targets: Floats, warm: bool) -> Callable[[], object]:

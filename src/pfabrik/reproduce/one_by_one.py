@@ -12,33 +12,31 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..kernels._jit import kernel
 from ..kernels.legs.answer import answer
-from ..kernels.reaching.plan import PENDING, Floats, Plan, Rows, Seeds, Settings
-from ..kernels.reaching.solve import solve_by_iteration
+from ..kernels.reaching.plan import Plan, Reached, Seeds, Settings
+from ..kernels.reaching.solve import solve_by_passes
+from ..kernels.rows import Rows
 
 _njit: Any = numba.njit(nogil=True, error_model="numpy")
 
 
 @kernel
-def p_fabrik_one_by_one(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, rows: Rows) -> int:
-    """Answer every target by a call of its own; returns how many it answered."""
-    answered = 0
+def p_fabrik_one_by_one(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, reached: Reached) -> None:
+    """Let chains reach for every target by a call of its own."""
     for i in range(targets.shape[0]):
         k = i if seeds.poses.shape[0] > 1 else 0
-        rows.status[i] = PENDING  # they hold the answers of the repeat before
-        own_seeds = Seeds(seeds.poses[k : k + 1], seeds.nodes[k : k + 1], seeds.trunks[k : k + 1])
-        own = Rows(
-            rows.status[i : i + 1],
-            rows.counters[i : i + 1],
-            rows.poses[i : i + 1],
-            rows.nodes[i : i + 1],
-            rows.trunks[i : i + 1],
-            rows.actuators[i : i + 1],
-            rows.measures[i : i + 1],
+        own = Reached(
+            reached.poses[i : i + 1],
+            reached.nodes[i : i + 1],
+            reached.trunks[i : i + 1],
+            reached.gaps[i : i + 1],
+            reached.iterations[i : i + 1],
+            reached.rounds[i : i + 1],
         )
-        answered += solve_by_iteration(plan, targets[i : i + 1], own_seeds, settings, own)
-    return answered
+        own_seeds = Seeds(seeds.poses[k : k + 1], seeds.nodes[k : k + 1], seeds.trunks[k : k + 1])
+        solve_by_passes(plan, targets[i : i + 1], own_seeds, settings, own)
 
 
 @kernel

@@ -19,8 +19,8 @@ from ..legs.poses import make_exact
 from ..legs.records import CARRIER, PIVOT, Floats, Record, Table
 from ..legs.table import open_table
 from ..linear import solve_spd, solve_square
-from ..reaching.plan import LIMIT_EXCESS, RESIDUAL
 from ..references import opener
+from ..rows import LIMIT_EXCESS, RESIDUAL
 from ..vectors import copy_row, copy_table, wrap
 from .equations import Now, View, count_unknowns, new_now, new_view, place, put_slopes
 from .limits import coordinate_slope, counts_turns

@@ -15,8 +15,8 @@ from ..legs.poses import make_exact
 from ..legs.records import ARM, PIVOT, SLIDE, Floats, Records, Table
 from ..legs.table import open_table
 from ..qp import new_qp
-from ..reaching.plan import LIMIT_EXCESS, POSITION_ERROR, RESIDUAL, ROTATION_ERROR
 from ..rotations import difference, yaw_difference
+from ..rows import LIMIT_EXCESS, POSITION_ERROR, RESIDUAL, ROTATION_ERROR
 from ..sqp import STEPS, scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .descend import descend

@@ -1,15 +1,12 @@
-"""What moves together: carriers (the bodies branches hang on), the platform's points, and small rotations."""
+"""What moves together: carriers, the bodies branches hang on, and the ends of branches."""
 
 from __future__ import annotations
 
-import math
-
+from ...arrays import Floats
 from .._jit import routine
-from ..vectors import Vec, add, along, cross, dot, move, norm, put, rotate, scale, sub, turn, vec
-from .plan import TURN, Configuration, Floats, Plan
-
-# Above this sine of its angle a rotation shows its axis to twelve digits; below it, the limits at 0 and pi serve.
-SURE_SINE = 1e-4
+from ..legs.poses import turn_pose
+from ..vectors import Vec, add, along, move, put, rotate, scale, sub, turn, vec
+from .plan import TURN, Configuration, Plan
 
 
 @routine
@@ -33,7 +30,7 @@ def move_carriers(plan: Plan, now: Configuration) -> None:
             put(screws[j, 0], point)
             put(screws[j, 1], axis)
             if plan.trunk_joints[j]["kind"] == TURN:
-                turn_pose(T, axis, trunk_values[j])
+                turn_pose(T, scale(trunk_values[j], axis))
                 moved = rotate(sub((T[0, 3], T[1, 3], T[2, 3]), point), axis, trunk_values[j])
                 set_position(T, add(point, moved))
             else:
@@ -45,72 +42,6 @@ def set_position(T: Floats, p: Vec) -> None:
     T[0, 3] = p[0]
     T[1, 3] = p[1]
     T[2, 3] = p[2]
-
-
-@routine
-def turn_pose(T: Floats, axis: Vec, angle: float) -> None:
-    """Turn the rotation of the pose `T` about `axis` (base coordinates); its position stays."""
-    for j in range(3):
-        column = rotate((T[0, j], T[1, j], T[2, j]), axis, angle)
-        T[0, j] = column[0]
-        T[1, j] = column[1]
-        T[2, j] = column[2]
-
-
-@routine
-def turn_pose_by_vector(T: Floats, w: Vec) -> None:
-    """Turn the rotation of `T` by the rotation vector `w` and make it orthonormal again to machine precision."""
-    angle = norm(w)
-    if angle > 0.0:
-        turn_pose(T, scale(1.0 / angle, w), angle)
-        orthonormalise(T)
-
-
-@routine
-def orthonormalise(T: Floats) -> None:
-    x = (T[0, 0], T[1, 0], T[2, 0])
-    y = (T[0, 1], T[1, 1], T[2, 1])
-    x = scale(1.0 / norm(x), x)
-    y = along(y, -dot(x, y), x)
-    y = scale(1.0 / norm(y), y)
-    z = cross(x, y)
-    for i in range(3):
-        T[i, 0] = x[i]
-        T[i, 1] = y[i]
-        T[i, 2] = z[i]
-
-
-@routine
-def rotation_between(A: Floats, B: Floats) -> Vec:
-    """Rotation vector w with exp(w) A = B, |w| in [0, pi]; base coordinates."""
-    # M = B A^T, entry by entry
-    xx = B[0, 0] * A[0, 0] + B[0, 1] * A[0, 1] + B[0, 2] * A[0, 2]
-    xy = B[0, 0] * A[1, 0] + B[0, 1] * A[1, 1] + B[0, 2] * A[1, 2]
-    xz = B[0, 0] * A[2, 0] + B[0, 1] * A[2, 1] + B[0, 2] * A[2, 2]
-    yx = B[1, 0] * A[0, 0] + B[1, 1] * A[0, 1] + B[1, 2] * A[0, 2]
-    yy = B[1, 0] * A[1, 0] + B[1, 1] * A[1, 1] + B[1, 2] * A[1, 2]
-    yz = B[1, 0] * A[2, 0] + B[1, 1] * A[2, 1] + B[1, 2] * A[2, 2]
-    zx = B[2, 0] * A[0, 0] + B[2, 1] * A[0, 1] + B[2, 2] * A[0, 2]
-    zy = B[2, 0] * A[1, 0] + B[2, 1] * A[1, 1] + B[2, 2] * A[1, 2]
-    zz = B[2, 0] * A[2, 0] + B[2, 1] * A[2, 1] + B[2, 2] * A[2, 2]
-    twice_sine = (zy - yz, xz - zx, yx - xy)
-    sine = 0.5 * norm(twice_sine)
-    cosine = 0.5 * (xx + yy + zz - 1.0)
-    angle = math.atan2(sine, cosine)
-    if sine > SURE_SINE:
-        return scale(0.5 * angle / sine, twice_sine)
-    if cosine > 0.0:  # a small rotation: angle / sine is 1 to machine precision
-        return scale(0.5, twice_sine)
-    # near half a turn the axis is the largest column of the symmetric part, M + M^T = 2 cos I + 2 (1 - cos) a a^T
-    xy, xz, yz = 0.5 * (xy + yx), 0.5 * (xz + zx), 0.5 * (yz + zy)
-    axis = (xx - cosine, xy, xz)
-    if yy > xx and yy >= zz:
-        axis = (xy, yy - cosine, yz)
-    elif zz > xx and zz > yy:
-        axis = (xz, yz, zz - cosine)
-    if dot(axis, twice_sine) < 0.0:
-        axis = scale(-1.0, axis)
-    return scale(angle / norm(axis), axis)
 
 
 @routine

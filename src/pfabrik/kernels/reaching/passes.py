@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from .._jit import routine
-from ..linear import solve_spd
-from ..vectors import Vec, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec
-from .frames import move_carriers
-from .plan import LENGTH, PLATFORM_CONE, SLIDE, TURN, Configuration, Floats, Plan, Records, Settings
+from ..vectors import Vec, along, dot, flatten, move, norm, put, sub, turn, vec
+from .fit import fit_trunk
+from .plan import PLATFORM_CONE, Configuration, Plan, Records, Settings
 from .restrict import NO_LENGTH, clamp_cone, clamp_stroke, cone_axis, restrict_step
 
 # A rail that leaves the plane of its branch by more than this sine moves the plane along.
 OBLIQUE = 1e-6
-# Two Gauss-Newton steps fit a trunk well enough for one pass; damped where a joint moves no branch joint.
-FIT_STEPS, FIT_DAMPING = 2, 1e-12
 
 
 @routine
@@ -84,14 +81,14 @@ def end_gap(plan: Plan, b: int, now: Configuration) -> float:
 
 
 @routine
-def pass_over_chain(plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats) -> float:
+def pass_over_chain(plan: Plan, c: int, now: Configuration) -> float:
     """One iteration, forward and backward, of all branches of a chain; the largest end gap it leaves."""
     chain = plan.chains[c]
     for b in range(chain["first"], chain["last"]):
         reach_forward(plan, b, now)
-        put(wanted[b], vec(now.nodes[plan.branches[b]["first"]]))
+        put(now.wanted[b], vec(now.nodes[plan.branches[b]["first"]]))
     if chain["trunk"] >= 0:
-        fit_trunk(plan, c, now, wanted, system)
+        fit_trunk(plan, c, now)
     gap = 0.0
     for b in range(chain["first"], chain["last"]):
         reach_backward(plan, b, now)
@@ -100,56 +97,14 @@ def pass_over_chain(plan: Plan, c: int, now: Configuration, wanted: Floats, syst
 
 
 @routine
-def reach_by_passes(
-    plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats, settings: Settings
-) -> tuple[float, int]:
-    """Forward and backward passes until the ends are within E or K iterations are spent; the gap left, and how many."""
-    gap = pass_over_chain(plan, c, now, wanted, system)
+def reach_by_passes(plan: Plan, c: int, now: Configuration, settings: Settings) -> tuple[float, int]:
+    """Forward and backward passes until the ends are within E, K iterations are spent, or passes gain too little; the
+    gap left, and how many."""
+    gap = pass_over_chain(plan, c, now)
     for iteration in range(1, settings.max_iterations):
         if gap <= settings.enough:
             return gap, iteration
-        gap = pass_over_chain(plan, c, now, wanted, system)
+        before, gap = gap, pass_over_chain(plan, c, now)
+        if gap > settings.gain * before:
+            return gap, iteration + 1
     return gap, settings.max_iterations
-
-
-@routine
-def fit_trunk(plan: Plan, c: int, now: Configuration, wanted: Floats, system: Floats) -> None:
-    """Give the common body the pose, within its joints' ranges, that fits its branch joints best.
-
-    Gauss-Newton on the trunk's joint values; `wanted` holds where each branch would have its first node.
-    """
-    trunk = plan.chains[c]["trunk"]
-    first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    n = last - first
-    for _step in range(FIT_STEPS):
-        for i in range(n):
-            for j in range(n + 1):
-                system[i, j] = 0.0
-        for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-            present = move(now.carriers[trunk + 1], vec(plan.nodes[plan.branches[b]["first"]]["home"]))
-            miss = sub(vec(wanted[b]), present)
-            for i in range(n):
-                rate = scale(trunk_unit(plan, first + i), point_rate(plan, now, first + i, present))
-                system[i, n] += dot(rate, miss)
-                for j in range(n):
-                    other = scale(trunk_unit(plan, first + j), point_rate(plan, now, first + j, present))
-                    system[i, j] += dot(rate, other)
-        solve_spd(system, n, FIT_DAMPING)
-        for i in range(n):
-            joint = plan.trunk_joints[first + i]
-            value = now.trunks[first + i] + system[i, n] * trunk_unit(plan, first + i)
-            now.trunks[first + i] = min(max(value, joint["lo"]), joint["hi"])
-        move_carriers(plan, now)
-
-
-@routine
-def trunk_unit(plan: Plan, j: int) -> float:
-    """Size of one unit step of a trunk joint's unknown: unknowns are lengths."""
-    return 1.0 / plan.scalars[LENGTH] if plan.trunk_joints[j]["kind"] == TURN else 1.0
-
-
-@routine
-def point_rate(plan: Plan, now: Configuration, j: int, p: Vec) -> Vec:
-    """Velocity of the point `p` of a carrier per unit rate of its trunk joint `j`."""
-    axis = vec(now.screws[j, 1])
-    return axis if plan.trunk_joints[j]["kind"] == SLIDE else cross(axis, sub(p, vec(now.screws[j, 0])))

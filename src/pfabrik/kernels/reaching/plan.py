@@ -1,4 +1,4 @@
-"""What the kernels are given and what they fill: the mechanism as flat records, and the rows of a batch.
+"""What the passes are given and what they fill: the mechanism as flat records, and the configurations of a batch.
 
 Lengths are divided by nothing: every array is in the mechanism's own unit, angles in radians. Vectors named `home` are
 in base coordinates at home; a branch that hangs on a trunk moves rigidly with it (its carrier); what is fixed to the
@@ -12,26 +12,21 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Floats: TypeAlias = NDArray[np.float64]
+from ...arrays import Floats, Ints
+
 Records: TypeAlias = NDArray[np.void]
 
-# How a branch is reached: by passes, or by closed form (a strut's direct check, a dyad's two circles, a rail and rod).
-PASSES, STRUT, DYAD, RAIL_ROD = 0, 1, 2, 3
 # What the axis of a cone is fixed to: the branch's carrier, the previous link, the platform.
 CARRIER_CONE, LINK_CONE, PLATFORM_CONE = 0, 1, 2
-# Where a coordinate is read: a segment's length, a rail, a hinge, the hinge on the platform, a trunk joint.
-STROKE, RAIL, HINGE, END_HINGE, TRUNK = 0, 1, 2, 3, 4
 # Trunk joints.
 TURN, SLIDE = 0, 1
-# Status of a row; the same numbers as the public Status.
-REACHED, PROJECTED, EXCEEDED, FAILED, INVALID, PENDING = 0, 1, 2, 3, 4, 9
 
 _vector = ("f8", (3,))
 
 NODE = np.dtype(
     [
         ("home", *_vector),
-        ("stored", "i8"),  # its place in Rows.nodes; -1 if it follows from the pose and the trunks
+        ("stored", "i8"),  # its place in Reached.nodes; -1 if it follows from the pose and the trunks
         ("lo", "f8"),  # length of the segment from the previous node
         ("hi", "f8"),
         ("hinge", "i8"),  # 1: the next segment stays in the branch's plane
@@ -46,7 +41,6 @@ BRANCH = np.dtype(
         ("first", "i8"),  # nodes first ... last
         ("last", "i8"),
         ("carrier", "i8"),  # 0: the base; k + 1: trunk k
-        ("kind", "i8"),
         ("planar", "i8"),  # how many leading hinges
         ("normal", *_vector),
         ("reference", *_vector),  # direction of the first segment at home, in the plane
@@ -67,25 +61,17 @@ BRANCH = np.dtype(
     ]
 )
 CHAIN = np.dtype([("first", "i8"), ("last", "i8"), ("trunk", "i8")])  # branches first ... last - 1; trunk or -1
-CONE = np.dtype([("kind", "i8"), ("node", "i8"), ("axis", *_vector), ("half_angle", "f8"), ("cosine", "f8")])
+CONE = np.dtype([("kind", "i8"), ("node", "i8"), ("axis", *_vector), ("half_angle", "f8")])
 TRUNK_SPAN = np.dtype([("first", "i8"), ("last", "i8")])
 TRUNK_JOINT = np.dtype([("kind", "i8"), ("point", *_vector), ("axis", *_vector), ("lo", "f8"), ("hi", "f8")])
-COORDINATE = np.dtype(
-    [
-        ("kind", "i8"),
-        ("index", "i8"),  # node, branch or trunk joint, after `kind`
-        ("branch", "i8"),
-        ("sign", "f8"),
-        ("offset", "f8"),  # coordinate = offset + sign * what is read
-        ("lo", "f8"),
-        ("hi", "f8"),
-        ("scale", "f8"),  # 1 / L for lengths, 1 for angles
-    ]
-)
+
+
+# What a revised target may do: bits of Settings.free.
+TRANSLATES, TURNS = 1, 2
 
 
 class Plan(NamedTuple):
-    """A mechanism, flattened. `coordinates` begins with the actuated ones, in order."""
+    """A mechanism, flattened."""
 
     nodes: Records
     branches: Records
@@ -93,29 +79,7 @@ class Plan(NamedTuple):
     cones: Records
     trunks: Records
     trunk_joints: Records
-    coordinates: Records
-    scalars: Floats  # indexed by the names below
-
-
-# Plan.scalars
-LENGTH, SPAN, POINT_END, HOME_X = 0, 1, 2, 3  # HOME_X and the two behind it: the reference point at home
-
-
-# Columns of Rows.counters, and of Rows.measures.
-ITERATIONS, ROUNDS, HELD = 0, 1, 2
-POSITION_ERROR, ROTATION_ERROR, RESIDUAL, LIMIT_EXCESS, ACTUATOR_ERROR = 0, 1, 2, 3, 4
-
-
-class Rows(NamedTuple):
-    """The answers of a batch, row by row."""
-
-    status: NDArray[np.int64]  # (n,)
-    counters: NDArray[np.int64]  # (n, 3): iterations, rounds, what a projection held (HOLD_...)
-    poses: Floats  # (n, 4, 4)
-    nodes: Floats  # (n, n_stored, 3): the nodes that do not follow from the pose and the trunks
-    trunks: Floats  # (n, n_trunk_joints): deviation from home
-    actuators: Floats  # (n, n_actuators)
-    measures: Floats  # (n, 5): position error, rotation error, residual, limit excess, actuator error
+    length: float  # L
 
 
 class Configuration(NamedTuple):
@@ -126,25 +90,8 @@ class Configuration(NamedTuple):
     trunks: Floats  # (n_trunk_joints,): deviation from home
     carriers: Floats  # (n_trunks + 1, 3, 4); the first is the base
     screws: Floats  # (n_trunk_joints, 2, 3): present point and axis
-
-
-class Work(NamedTuple):
-    """Scratch memory of one thread; nothing in it outlives a row."""
-
-    pose: Floats  # a configuration to fall back on
-    nodes: Floats
-    trunks: Floats
-    seed_nodes: Floats  # where the row began
-    seed_trunks: Floats
-    modes: Floats  # (n_branches,)
     wanted: Floats  # (n_branches, 3): where each branch would have its first node
-    normal: Floats  # (n + 1, n + 1): the normal equations, right-hand side in the last column
-    system: Floats  # the same, being solved
-    row: Floats  # (n,)
-    weights: Floats  # (n,)
-    totals: Floats  # (3,): sum of squares, largest and number of the violations noted
-    violations: Floats  # (many, 16): see `violations.enter`
-    columns: NDArray[np.int64]  # (n_nodes + n_branches + n_trunk_joints,): first unknown of each, or -1
+    system: Floats  # (n, n + 1): the normal equations of a fit, right-hand side in the last column
 
 
 class Seeds(NamedTuple):
@@ -158,14 +105,19 @@ class Seeds(NamedTuple):
 class Settings(NamedTuple):
     """Options, as numbers; lengths in the mechanism's unit."""
 
-    tolerance: float  # how near a target counts as reached
     enough: float  # E: passes end where the chains' ends are this close to their targets
-    rotation_tolerance: float
-    slack: float  # length by which a closed form may exceed a limit and count as on it
-    exact: int  # 1: chains come as near as they can by exact steps; 0: by the paper's passes alone
+    gain: float  # passes end, too, where one leaves more than this share of the gap
     max_iterations: int  # K
     max_rounds: int
-    hold: int  # 0 nothing, 1 orientation, 2 position
+    free: int  # what a target that is not reached may do: TRANSLATES, TURNS, or both
 
 
-HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION = 0, 1, 2
+class Reached(NamedTuple):
+    """Where chains and targets end, row by row: configurations whose loops are closed but for the gap."""
+
+    poses: Floats  # (n, 4, 4)
+    nodes: Floats  # (n, n_stored, 3): the nodes that do not follow from the pose and the trunks
+    trunks: Floats  # (n, n_trunk_joints): deviation from home
+    gaps: Floats  # (n,): largest distance of a chain's end from its place on the platform
+    iterations: Ints  # (n,)
+    rounds: Ints  # (n,): how often the target was revised

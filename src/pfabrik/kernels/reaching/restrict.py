@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats
 from .._jit import inlined, routine
 from ..vectors import (
     Vec,
@@ -21,7 +22,7 @@ from ..vectors import (
     wrap,
     wrap_into,
 )
-from .plan import CARRIER_CONE, PLATFORM_CONE, Floats, Plan, Records
+from .plan import CARRIER_CONE, PLATFORM_CONE, Plan, Records
 
 # Below this a vector has no direction; far under any length of a machine, far over the smallest normal number.
 NO_LENGTH = 1e-150

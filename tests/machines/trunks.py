@@ -1,0 +1,96 @@
+"""Trees that positions express: a shoulder, a slide and an elbow that carry two branches of many kinds, and a ball."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from pfabrik import Cone, Joint, Mechanism
+
+from .positions import ring
+
+
+def arm_with_elbow(leg: Callable[[str, Any, Any], list[Joint]]) -> Mechanism:
+    """A trunk of shoulder, slide and elbow that carries two branches; four struts more hold the platform."""
+    joints = [
+        Joint("shoulder", "revolute", ("base", "arm"), at=(100, 0, 0), axis=(0, 1, 0), actuated=True, range=(-1, 1))
+    ]
+    joints += [
+        Joint("slide", "prismatic", ("slider", "arm"), axis=(-1, 0, 3), actuated=True, range=(-20, 20)),
+        Joint("elbow", "revolute", ("bar", "slider"), at=(90, 0, 40), axis=(1, 1, 0), actuated=True, range=(-1, 1)),
+    ]
+    joints += leg("1", (80, 20, 60), (50, 30, 150)) + leg("2", (80, -20, 60), (50, -30, 150))
+    for i, (foot, head) in enumerate(
+        zip(ring(100, 0, (80, 120, 200, 260)), ring(50, 150, (90, 140, 180, 270)), strict=True)
+    ):
+        joints += _strut(f"s{i}", "base", foot, head)
+    return Mechanism("arm with elbow", joints, "platform", (0, 0, 150))
+
+
+def _strut(name: str, body: str, foot: Any, head: Any) -> list[Joint]:
+    line = np.subtract(head, foot)
+    return [
+        Joint(f"C{name}", "universal", (body, f"c{name}"), at=foot, cone=Cone(line, 0.3, body)),
+        Joint(
+            f"D{name}", "prismatic", (f"c{name}", f"r{name}"), along=(f"C{name}", f"E{name}"), actuated=True,
+            range=(0.95 * np.linalg.norm(line), 1.05 * np.linalg.norm(line)),
+        ),
+        Joint(f"E{name}", "spherical", (f"r{name}", "platform"), at=head, cone=Cone(-line, 0.3, "platform")),
+    ]  # fmt: skip
+
+
+def bar_strut(name: str, foot: Any, head: Any) -> list[Joint]:
+    return _strut(name, "bar", foot, head)
+
+
+def bar_dyad(name: str, foot: Any, head: Any) -> list[Joint]:
+    """Crank, rod and ball joint, with a cone that is fixed to the crank."""
+    knee = np.add(foot, (0, 30, 50))
+    aside = np.subtract(head, knee) + (3, 2, 1)
+    return [
+        Joint(f"C{name}", "revolute", ("bar", f"c{name}"), at=foot, axis=(1, 0, 0), range=(-0.2, 0.2)),
+        Joint(f"D{name}", "spherical", (f"c{name}", f"r{name}"), at=knee, cone=Cone(aside, 0.3, f"c{name}")),
+        Joint(f"E{name}", "spherical", (f"r{name}", "platform"), at=head),
+    ]
+
+
+def bar_ball(name: str, foot: Any, head: Any) -> list[Joint]:
+    """A strut, and on the other side the platform's ball joint on the crossbar itself."""
+    if name == "1":
+        return [Joint("ball", "spherical", ("bar", "platform"), at=head)]
+    return bar_strut(name, foot, head)
+
+
+def bar_planar(name: str, foot: Any, head: Any) -> list[Joint]:
+    knee = np.add(foot, (0, 30, 50))
+    return [
+        Joint(f"C{name}", "revolute", ("bar", f"c{name}"), at=foot, axis=(1, 0, 0)),
+        Joint(f"D{name}", "revolute", (f"c{name}", f"r{name}"), at=knee, axis=(1, 0, 0)),
+        Joint(f"E{name}", "revolute", (f"r{name}", "platform"), at=head, axis=(1, 0, 0)),
+    ]
+
+
+def pivoted() -> Mechanism:
+    """A platform on a ball joint that is fixed to the base, with three struts."""
+    struts = [
+        _strut(f"{i}", "base", a, c)
+        for i, (a, c) in enumerate(zip(ring(100, 0, (0, 120, 240)), ring(60, 150, (10, 120, 250)), strict=True))
+    ]
+    return Mechanism(
+        "pivoted",
+        [Joint("pivot", "spherical", ("base", "platform"), at=(0, 0, 140)), *chain.from_iterable(struts)],
+        "platform",
+        (0, 0, 150),
+    )
+
+
+TRUNKS: dict[str, Callable[[], Mechanism]] = {
+    "pivoted": pivoted,
+    "trunk with struts": lambda: arm_with_elbow(bar_strut),
+    "trunk with cranks": lambda: arm_with_elbow(bar_dyad),
+    "trunk with a ball joint": lambda: arm_with_elbow(bar_ball),
+    "trunk with planar legs": lambda: arm_with_elbow(bar_planar),
+}

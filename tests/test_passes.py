@@ -1,0 +1,69 @@
+"""The paper's method, as `Options.paper()` and `projection="centroid"` give it: as honest as all else."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from checks import excess_of_joints, gap_of_joints
+from machines import MACHINES
+from machines.trunks import TRUNKS
+from pfabrik import Mechanism, Options, Status
+
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+
+EVERY: dict[str, Callable[[], Mechanism]] = {
+    **{name: (lambda name=name: pf.load(name)) for name in ("five_bar", "stewart", "nrpm")},
+    **MACHINES,
+    **TRUNKS,
+}
+WAYS = {
+    "paper": Options(tolerance=1e-2, max_rounds=50, exact=False, projection="centroid"),
+    "centroid": Options(projection="centroid"),
+    "nothing held": Options(projection="centroid", hold=None),
+    "position held": Options(projection="centroid", hold="position"),
+}
+
+
+def any_targets(machine: Mechanism, n: int) -> np.ndarray:
+    """Poses (n, 4, 4) from home to some L away, turned by any angle; the last is a million L away."""
+    rng, home = np.random.default_rng(1), machine.home_pose
+    targets = np.repeat(home[None], n, axis=0)
+    reach = np.geomspace(0.02, 3.0, n)[:, None]
+    targets[:, :3, 3] += reach * rng.normal(size=(n, 3)) * machine.characteristic_length
+    turns = Rotation.from_rotvec(np.minimum(reach, 1.0) * rng.normal(size=(n, 3)))
+    targets[:, :3, :3] = turns.as_matrix() @ home[:3, :3]
+    targets[-1, :3, 3] *= 1e6
+    return targets
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", EVERY)
+def test_limits_are_kept_and_loops_closed_for_any_target(name: str, way: str) -> None:
+    machine, options = EVERY[name](), WAYS[way]
+    targets = any_targets(machine, 4 if INTERPRETED else 16)
+    answer = pf.solve_ik(machine, targets, options=options)
+    assert np.isin(answer.status, (Status.REACHED, Status.PROJECTED)).all()
+    assert gap_of_joints(machine, answer).max() <= 1e-9
+    assert excess_of_joints(machine, answer).max() <= 1e-9
+    reached = answer.status == Status.REACHED
+    assert (answer.position_error[reached] <= (options.tolerance or 1e-9 * machine.characteristic_length)).all()
+
+
+@pytest.mark.parametrize("name", ["stewart", "hexapod_rus", "planar_rrr"])
+def test_a_path_keeps_its_working_mode_and_goes_on_from_answer_to_answer(name: str) -> None:
+    """Out of the workspace and back: the coordinates of all joints end where they began."""
+    machine = EVERY[name]()
+    way = np.sin(np.linspace(0.0, np.pi, 9 if INTERPRETED else 41))
+    targets = np.repeat(machine.home_pose[None], len(way), axis=0)
+    targets[:, 0, 3] += 1.2 * way * machine.characteristic_length
+    for options in (Options.paper(), Options(projection="centroid")):
+        found = pf.track(machine, targets, options=options)
+        assert (found.status == Status.PROJECTED).any()
+        np.testing.assert_allclose(found.actuators[-1], found.actuators[0], atol=0.02 * machine.characteristic_length)
