@@ -53,7 +53,7 @@ PROBE = 1e-6
 RESTORING, CORRECTIONS = 8, 1
 """Steps to bring a configuration back within its limits; and to close what a step left open that did not lead down."""
 
-LEAST_WEIGHT = 0.3
+LEAST_WEIGHT = 1.0
 """What the penalty counts a gap at least, in units of the gradient: where the objective has none along an equation, its
 multiplier says nothing of how much may be left open."""
 

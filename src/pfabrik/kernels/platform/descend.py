@@ -29,6 +29,7 @@ from ..sqp import (
     is_to_close,
     judge_step,
     on_the_way,
+    openness,
     plan_step,
     rests_open,
     scale_objective,
@@ -46,7 +47,7 @@ HOPELESS = 20.0
 OF_CARRIERS = 0.6
 """What the steps of carriers count beside those of the platform: they end where rods have their lengths."""
 
-STUCK = 0.5
+STUCK = 0.2
 """Share of a gap that a step which closes it leaves at most."""
 
 BY = 0.03
@@ -134,11 +135,12 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
                 copy_now(search.best, search.trial)
                 share = take(table, view, search.p.x, search.trial, search)
                 linearise(table, row, aim, search.trial, search, other)
+                closes = True
                 if is_to_close(view.linear, other.linear, share, control):
-                    restore_feasibility(
-                        table, row, aim, search.trial, on_the_way(control, share), search, other, CORRECTIONS
-                    )
-                led_down = judge_step(view.linear, other.linear, True, share, control)
+                    tolerance = on_the_way(control, share)
+                    closes = restore_feasibility(table, row, aim, search.trial, tolerance, search, other, CORRECTIONS)
+                closes = closes or openness(other.linear) <= openness(view.linear)
+                led_down = judge_step(view.linear, other.linear, closes, share, control)
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view
