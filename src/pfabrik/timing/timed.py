@@ -112,7 +112,7 @@ class Timed:
 
     def plot(self) -> Figure:
         """Actuators, their rates and accelerations over time, one curve each; a Matplotlib figure."""
-        require("pictures", "matplotlib", "view")
+        require("pictures", "matplotlib", "plot")
         from matplotlib.figure import Figure
 
         shown = readouts(self.mechanism)
