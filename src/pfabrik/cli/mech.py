@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 STANDARD_INPUT = "-"
 
 
-class MechanismName(click.ParamType):  # type: ignore[type-arg]  # generic in new versions only
+class MechanismName(click.types.StringParamType):
     """A text that completes to names of the catalogue, and to files."""
 
     name = "mech"

@@ -14,21 +14,13 @@ from .mech import MECH
 from .whole import whole_file
 
 
-class Kind(click.ParamType):  # type: ignore[type-arg]  # generic in new versions only
-    """A text that completes to the kinds there are."""
-
-    name = "kind"
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Kinds that begin so."""
-        return [CompletionItem(name) for name in templates() if name.lower().startswith(incomplete.lower())]
-
-
-KIND = Kind()
+def kinds_completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """The kinds that begin so."""
+    return [CompletionItem(name) for name in templates() if name.lower().startswith(incomplete.lower())]
 
 
 @click.command()
-@click.argument("kind", required=False, type=KIND)
+@click.argument("kind", required=False, shell_complete=kinds_completed)
 @click.option("--from", "machine", type=MECH, metavar="NAME", help="A machine of the catalogue, in place of a KIND.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write. Default: print it.")
 @click.option("--force", is_flag=True, help="Replace the file if it exists.")

@@ -222,7 +222,8 @@ class LegMaker:
         if fixed_to not in bodies:
             fixed_to = bodies[1 if last else 0]
         axes = self._cone_axes(index, cone.get("axis"), f"{place}.axis", outward=fixed_to != bodies[1])
-        return [Cone(axis, cone.get("half_angle"), fixed_to) for axis in axes]  # type: ignore[arg-type]
+        half_angle: Any = cone.get("half_angle")
+        return [Cone(axis, half_angle, fixed_to) for axis in axes]
 
     def _cone_axes(self, index: int, axis: Any, place: str, outward: bool) -> list[Vector]:
         """The axes of a joint's cones; by default the lines to the next joint, outward or inward, at home."""

@@ -32,11 +32,11 @@ class Structure:
     name: str
     joints: tuple[Joint, ...]
     end_effector: str
-    reference_point: Vector = None  # type: ignore[assignment]  # never None once constructed
+    reference_point: Vector = field(default=cast(Any, None))  # never None once constructed
     base: str = "base"
     length_unit: str = "mm"
     angle_unit: Literal["deg", "rad"] = field(default="deg", compare=False)
-    task: tuple[str, ...] = None  # type: ignore[assignment]  # never None once constructed
+    task: tuple[str, ...] = field(default=cast(Any, None))  # never None once constructed
 
     def __post_init__(self) -> None:
         set_fields(self, joints=items(self.joints), reference_point=numbers(self.reference_point))

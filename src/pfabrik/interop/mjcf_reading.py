@@ -17,7 +17,7 @@ from .assembling import Imported
 from .cuts import unique
 from .mjcf_plain import plain_model
 from .mjcf_writing import NOTE
-from .opened import Loop, Note
+from .opened import Loop, LoopType, Note
 from .robots import Robot, Wanted, mechanism_of
 from .xml_reading import fault, read_xml
 
@@ -166,8 +166,8 @@ class _Model:
                 continue
             bodies, points, frames = self._sides(index, weld)
             only_point = not weld or model.eq_data[index, 10] == 0.0
-            kind = "spherical" if only_point else "fixed"
-            yield Loop(name, kind, bodies, points, None if only_point else frames)  # type: ignore[arg-type]
+            kind: LoopType = "spherical" if only_point else "fixed"
+            yield Loop(name, kind, bodies, points, None if only_point else frames)
         if resting:
             told.append(Note("an equality that is not active is left out", tuple(resting)))
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
+from ..description.joint_types import JointType
 from ..description.joints import Cone, Joint
 from ..tolerances import TOLERANCES
 from .opened import Note
@@ -44,10 +46,10 @@ def _hinged(joints: Sequence[Joint]) -> list[Joint]:
         directions = int((spread > TOLERANCES.alignment * max(1e-300, float(np.abs(points).max()))).sum())
         if directions == 0:
             continue
-        kind = "revolute" if directions == 1 else "fixed"
+        kind: JointType = "revolute" if directions == 1 else "fixed"
         axis = axes[0] if directions == 1 else None
         replaced |= {ball.name: None for ball in balls}
-        replaced[balls[0].name] = dataclasses.replace(balls[0], type=kind, axis=axis)  # type: ignore[arg-type]
+        replaced[balls[0].name] = dataclasses.replace(balls[0], type=kind, axis=axis)
     left = [replaced.get(joint.name, joint) for joint in joints]
     return [joint for joint in left if joint is not None]
 
@@ -108,16 +110,17 @@ def _one(first: Joint, second: Joint, between: str) -> Joint | None:
     signs = (1.0 if first.connects[1] == between else -1.0), (1.0 if second.connects[0] == between else -1.0)
     axes = np.array([first.axis, second.axis]) * np.reshape(signs, (2, 1))
     ends = [next(body for body in joint.connects if body != between) for joint in (first, second)]
-    stem, ours = stem_of(first), stem_of(first) == stem_of(second) is not None
-    both = {"home": (first.home, second.home), "range": None if first.range is None else ranges}
+    ours = stem_of(first) if stem_of(first) == stem_of(second) else None
+    both: dict[str, Any] = {"home": (first.home, second.home), "range": None if first.range is None else ranges}
     driven = (first.actuated is True, second.actuated is True)
     if kinds[1] == "prismatic":
         along = np.linalg.norm(np.cross(*axes)) < TOLERANCES.alignment and axes[0] @ axes[1] > 0.0
-        return Joint(stem, "cylindrical", ends, first.at, axes[0], actuated=driven, **both) if ours and along else None  # type: ignore[arg-type]
-    if any(driven) or (not ours and (stem_of(first) or stem_of(second) or not _cross(first, second))):
+        if ours is None or not along:
+            return None
+        return Joint(ours, "cylindrical", ends, first.at, axes[0], actuated=driven, **both)
+    if any(driven) or (ours is None and (stem_of(first) or stem_of(second) or not _cross(first, second))):
         return None
-    name = stem if stem and ours else f"{first.name}+{second.name}"
-    return Joint(name, "universal", ends, first.at, axes=axes, **both)  # type: ignore[arg-type]
+    return Joint(ours or f"{first.name}+{second.name}", "universal", ends, first.at, axes=axes, **both)
 
 
 def stem_of(joint: Joint) -> str | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -28,8 +29,8 @@ def straightened(
     """The joints, with their axes put straight where the loops all but lock without, and not with it."""
 
     def locks(made: Sequence[Joint]) -> float:
-        point = None if reference is None else tuple(reference)
-        return inexactness(Structure(opened.name, tuple(made), opened.end_effector, point, opened.base))  # type: ignore[arg-type]
+        point: Any = None if reference is None else tuple(reference)
+        return inexactness(Structure(opened.name, tuple(made), opened.end_effector, point, opened.base))
 
     before = locks(joints)
     if before == 0.0:

@@ -168,11 +168,12 @@ def _faults(root: ET.Element) -> Iterator[Fault]:
         if _link(joint, "child") in children:
             yield Fault(f"{place}.child", f"'{_link(joint, 'child')}', which hangs on another joint too", "a tree")
         children.add(_link(joint, "child"))
-        for element in (joint.find("origin"), joint.find("axis"), joint.find("limit")):
-            for key, text in {} if element is None else element.attrib.items():
+        found = (joint.find("origin"), joint.find("axis"), joint.find("limit"))
+        for element in (each for each in found if each is not None):
+            for key, text in element.attrib.items():
                 count = 3 if key in ("xyz", "rpy") else 1
                 if not _is_numbers(text, count):
-                    yield Fault(f"{place}.{element.tag}.{key}", f"'{text}'", f"{count} numbers; xacro files want xacro")  # type: ignore[union-attr]
+                    yield Fault(f"{place}.{element.tag}.{key}", f"'{text}'", f"{count} numbers; xacro files want xacro")
         if joint.get("type") not in ("fixed", "floating") and not _axis(joint).any():
             yield Fault(f"{place}.axis", "no direction", "three numbers, not all zero")
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import cast
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..answers.solution import Solution
 from ..arrays import Floats
 from ..decomposition.decompose import decompose
 from ..description.graph import Step
-from ..description.mechanism import Cone, Joint, Mechanism
+from ..description.mechanism import Cone, Joint, Mechanism, Range
 from ..rotations import from_rotvec
 
 ROOM = 4.0
@@ -78,9 +79,8 @@ def _at(joint: Joint) -> Floats:
     return np.array(joint.at, dtype=float)
 
 
-def _range(joint: Joint) -> tuple[float, float]:
-    low, high = joint.range or (-np.inf, np.inf)
-    return float(low), float(high)  # type: ignore[arg-type]
+def _range(joint: Joint) -> Range:
+    return cast(Range, joint.range or (-np.inf, np.inf))
 
 
 class Struts(Model):

@@ -73,7 +73,7 @@ class Canvas:
     def face(self, points: Floats, **style: Any) -> Any:
         """A filled polygon of corners (n, 3)."""
         if self.plane is None:
-            from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+            from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
             return self.axes.add_collection3d(Poly3DCollection([points], linewidth=0, **style))
         from matplotlib.patches import Polygon
@@ -147,7 +147,7 @@ class Canvas:
         """Points (n, 3), or points of the axes themselves, in pixels, (n, 2)."""
         seen = self.seen(places) if places.shape[1] == 3 else places
         if self.plane is None:
-            from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
+            from mpl_toolkits.mplot3d.proj3d import proj_transform
 
             seen = np.transpose(proj_transform(*seen.T, self.axes.get_proj()))[:, :2]
         return np.asarray(self.axes.transData.transform(seen))

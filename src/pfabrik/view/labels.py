@@ -86,7 +86,7 @@ def _move(canvas: Canvas, text: Any, centre: Floats) -> None:
     if canvas.plane is not None:
         text.set_position(flat)
         return
-    from mpl_toolkits.mplot3d.proj3d import inv_transform, proj_transform  # type: ignore[import-untyped]
+    from mpl_toolkits.mplot3d.proj3d import inv_transform, proj_transform
 
     projection = canvas.axes.get_proj()
     depth = proj_transform(*_place(canvas, text), projection)[2]

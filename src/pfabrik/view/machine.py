@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..answers.solution import Solution
+from ..description.joint_types import JointType
 from ..description.mechanism import Mechanism
 from .canvas import SMALL, Canvas, canvas_on
 from .labels import place_names
@@ -91,7 +92,7 @@ def _body(canvas: Canvas, part: Part, is_held: bool) -> list[Artist]:
 
 def _joints(canvas: Canvas, marks: Sequence[Mark]) -> list[Artist]:
     """A marker for every joint, those of a kind together, slides behind the others."""
-    kinds: dict[tuple[str, bool, bool], list[Mark]] = {}
+    kinds: dict[tuple[JointType, bool, bool], list[Mark]] = {}
     for mark in marks:
         kinds.setdefault((mark.joint.type, bool(mark.joint.actuated), bool(mark.held_by)), []).append(mark)
     return [
@@ -101,10 +102,10 @@ def _joints(canvas: Canvas, marks: Sequence[Mark]) -> list[Artist]:
     ]
 
 
-def look(kind: str, actuated: bool, held: bool) -> dict[str, Any]:
+def look(kind: JointType, actuated: bool, held: bool) -> dict[str, Any]:
     """How the marker of a joint looks: shape by type, filled where it is actuated, orange where a limit holds it."""
     return {
-        "marker": MARKERS[kind],  # type: ignore[index]
+        "marker": MARKERS[kind],
         "s": SLIDE_SIZE if kind == "prismatic" else SIZE,
         "facecolor": (HELD if held else ACTUATED) if actuated else PASSIVE,
         "edgecolor": HELD if held else EDGE,

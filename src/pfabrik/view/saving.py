@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 PICTURES, FILMS = (".png", ".svg", ".pdf"), (".gif", ".mp4")
 
-SETTINGS = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "pfabrik"}
+SETTINGS: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "pfabrik"}
 """Letters of a PDF as TrueType, those of an SVG as outlines, which look the same everywhere."""
 
 WITHOUT_DATES: dict[str, dict[str, str | None]] = {
@@ -39,7 +39,7 @@ def save_picture(figure: Figure, path: str | os.PathLike[str], *, tight: bool = 
 
     suffix = checked_ending(path, PICTURES)
     box: dict[str, Any] = {"bbox_inches": "tight", "pad_inches": ROOM} if tight else {}
-    with whole_path(path) as part, rc_context(SETTINGS):  # type: ignore[arg-type]
+    with whole_path(path) as part, rc_context(SETTINGS):
         figure.savefig(part, metadata=WITHOUT_DATES[suffix], **box)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InvalidArgument
 from ..extras import require
@@ -33,9 +33,8 @@ def axes_for(ax: Axes | None, d: int) -> Axes:
         from matplotlib import pyplot
 
         figure = pyplot.figure(figsize=SIZE, dpi=150, layout="constrained")
-        ax = figure.add_subplot(projection="3d" if d == 3 else None)
-        if d == 3:
-            ax.view_init(ELEVATION, AZIMUTH)  # type: ignore[attr-defined]
+        space: dict[str, Any] = {"projection": "3d", "elev": ELEVATION, "azim": AZIMUTH}
+        ax = figure.add_subplot(**(space if d == 3 else {}))
     elif d == 3 and not hasattr(ax, "get_zlim"):
         expected = "three-dimensional ones, as of figure.add_subplot(projection='3d')"
         raise InvalidArgument("ax", "two-dimensional axes for a workspace of three coordinates", expected)

@@ -115,7 +115,7 @@ def _draw_plane(axes: Any, found: Region, groups: list[Group]) -> None:
 
 def _draw_solid(axes: Any, found: Region, groups: list[Group]) -> None:
     from matplotlib.colors import to_rgb
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     vertices, faces, limits = _thinned(shown(found, found.vertices), found.faces, found.face_limit)
     spans = np.ptp(vertices, axis=0) if len(vertices) else np.ones(3)

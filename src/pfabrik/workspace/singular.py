@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, overload
+from itertools import chain
+from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 
@@ -230,6 +231,7 @@ def _joined(blocks: list[Singularity]) -> Singularity:
     def every(name: str) -> Floats:
         return np.concatenate([np.asarray(getattr(block, name)) for block in blocks])
 
+    kinds = [cast(list[tuple[str, ...]], block.kinds) for block in blocks]
     return Singularity(
         serial=every("serial"),
         parallel=every("parallel"),
@@ -237,7 +239,7 @@ def _joined(blocks: list[Singularity]) -> Singularity:
         passive=every("passive"),
         lost=every("lost"),
         gained=every("gained"),
-        kinds=[kinds for block in blocks for kinds in block.kinds],  # type: ignore[misc]
+        kinds=list(chain(*kinds)),
     )
 
 

@@ -43,7 +43,7 @@ def plot_map(
         if len(set(space.units)) == 1:
             axes.set_aspect("equal")
     else:
-        from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
         solid: Any = axes
         drawn = solid.scatter(*points.T, c=parallel, s=FINE, linewidths=0, cmap="cividis", vmin=0.0, alpha=FAINT)

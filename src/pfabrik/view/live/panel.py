@@ -172,11 +172,14 @@ class Panel:
 
     def _add_modes(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("Modes", expand_by_default=False):
-            for kind, hint in (("working", "of this pose"), ("assembly", "of these actuator values")):
-                button = gui.add_button(f"{kind.capitalize()} modes", hint=f"All configurations {hint}")
-                button.on_click(lambda _, kind=kind: self._actions.find_modes(kind))  # type: ignore[misc]
+            self._add_search(gui, "working", "of this pose")
+            self._add_search(gui, "assembly", "of these actuator values")
             self._modes = gui.add_dropdown("mode", ("none",), visible=False)
             self._modes.on_update(_of_users(self._chosen))
+
+    def _add_search(self, gui: viser.GuiApi, kind: str, hint: str) -> None:
+        button = gui.add_button(f"{kind.capitalize()} modes", hint=f"All configurations {hint}")
+        button.on_click(lambda _: self._actions.find_modes(kind))
 
     def _chosen(self, event: Any) -> None:
         place = self._modes.options.index(event.target.value)

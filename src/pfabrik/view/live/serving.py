@@ -30,14 +30,12 @@ def serve(host: str, port: int) -> viser.ViserServer:
     """A server at an address, and at the next free port; it opens no way in from elsewhere."""
     import viser
 
+    class Local(viser.ViserServer):
+        def request_share_url(self, verbose: bool = True) -> None:
+            """A page could ask for a tunnel to the outside; this one is of this computer alone."""
+
     with quietly():
-        server = viser.ViserServer(host=host, port=port, verbose=False)
-
-    def refuse(verbose: bool = True) -> None:
-        """A page could ask for a tunnel to the outside; this one is of this computer alone."""
-
-    server.request_share_url = refuse  # type: ignore[method-assign]
-    return server
+        return Local(host=host, port=port, verbose=False)
 
 
 def aim_camera(server: viser.ViserServer, mechanism: Mechanism, points: Floats) -> None:
