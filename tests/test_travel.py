@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import oracles_by_leg as by_leg
 import pfabrik as pf
 from machines import closure, tripod_rps
-from pfabrik import Joint, Mechanism, Options, Solution, Status
+from pfabrik import Joint, Mechanism, Solution, Status
 from pfabrik.errors import InvalidArgument
 from pfabrik.tolerances import TOLERANCES
 
@@ -288,7 +288,6 @@ def test_a_travel_is_a_sequence_that_becomes_json() -> None:
         ("agile_eye", None, {"along": (0, 0, 1)}, "along.*within the task, rotation"),
         ("rps", None, {"along": [(0, 0, 1), (0, 1, 1)]}, r"along.*within the task, z tilt.*rows?: 1"),
         ("delta", None, {"about": (0, 0, 1)}, "about.*within the task, x y z"),
-        ("stewart", (0, 0, 195), {"options": {"tolerance": 1}}, "options"),
     ],
 )
 def test_wrong_arguments_are_named(name: str, target: Any, asked: dict[str, Any], named: str) -> None:
@@ -317,9 +316,3 @@ def test_a_projected_answer_is_a_start_like_any_other() -> None:
     from_home = pf.travel(home_of(machine), along=-Z).distances[0]
     height = top.pose[2, 3] - machine.reference_point[2]
     assert down.distance == pytest.approx(height + from_home, abs=1e-6 * machine.characteristic_length)
-
-
-def test_tolerances_count() -> None:
-    home = home_of(pf.load("stewart"))
-    coarse = pf.travel(home, along=Z, options=Options(tolerance=1e-6)).distances
-    np.testing.assert_allclose(coarse, pf.travel(home, along=Z).distances, rtol=0, atol=1e-4)

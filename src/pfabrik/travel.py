@@ -21,7 +21,6 @@ from .description.task import task_of
 from .engine import engine_of
 from .errors import InvalidArgument
 from .kernels.rows import REACHED
-from .options import Options, checked_options
 from .poses import as_floats
 from .rotations import from_rotvec
 from .tolerances import TOLERANCES
@@ -133,7 +132,6 @@ def travel(
     along: ArrayLike | None = None,
     about: ArrayLike | None = None,
     pivot: ArrayLike | None = None,
-    options: Options | None = None,
 ) -> Travel:
     """How far the end effector can go from a configuration, in its working mode, until a limit or a link stops it.
 
@@ -150,7 +148,6 @@ def travel(
         tilt, about the base's z axis, which alone is then allowed, where it has a yaw.
     pivot : point (3,) in the base frame that stays where it is as the end effector turns [length]; default: its
         reference point.
-    options : of these, the tolerances.
 
     Returns
     -------
@@ -162,7 +159,7 @@ def travel(
     InvalidArgument : a batch, or a configuration that is not feasible; directions that are none or that the task
         leaves out.
     """
-    mechanism, options = checked_solution(solution).mechanism, checked_options(options)
+    mechanism = checked_solution(solution).mechanism
     if solution.shape != () or solution.status > Status.PROJECTED:
         found = f"batch shape {solution.shape}" if solution.shape else f"an answer that is {solution.status}"
         raise InvalidArgument("solution", found, "one feasible configuration")
@@ -170,7 +167,7 @@ def travel(
     lines = _lines(mechanism, along, default)
     axes = _axes(mechanism, solution, about, default)
     centre = solution.pose[:3, 3] if pivot is None else _vector("pivot", pivot)
-    search = _Search(solution, lines, axes, centre, options)
+    search = _Search(solution, lines, axes, centre)
     distances = search.run()
     ends = Solution(mechanism, search.best, (len(distances),))
     named = active_limits(mechanism, ends._coordinates)
@@ -249,15 +246,15 @@ class _Search:
     best : the farthest configurations, (n,).
     """
 
-    def __init__(self, solution: Solution, lines: Floats, axes: Floats, pivot: Floats, options: Options) -> None:
+    def __init__(self, solution: Solution, lines: Floats, axes: Floats, pivot: Floats) -> None:
         self.directions = np.concatenate([lines, axes]) + 0.0  # no negative zeros
         self._turns = np.arange(len(self.directions)) >= len(lines)
-        self._pose, self._pivot, self._options = solution.pose, pivot, options
+        self._pose, self._pivot = solution.pose, pivot
         self._engine = engine_of(solution.mechanism)
         self._length = solution.mechanism.characteristic_length
         every = np.arange(len(self.directions))
         start = solution._found.at(0 * every)
-        self.best = self._engine.advance(self._targets(every, np.zeros(len(every))), start, options)
+        self.best = self._engine.advance(self._targets(every, np.zeros(len(every))), start)
 
     def run(self) -> Floats:
         """How far each goes, (n,) [length or rad]: ahead until something stops it, then by bisection."""
@@ -284,7 +281,7 @@ class _Search:
 
     def _go_on(self, which: NDArray[np.intp], distances: Floats) -> NDArray[np.bool_]:
         """Whether poses so far out in some directions are reached; where they are, the next go on from them."""
-        found = self._engine.advance(self._targets(which, distances), self.best.at(which), self._options)
+        found = self._engine.advance(self._targets(which, distances), self.best.at(which))
         reached = np.asarray(found.rows.status == REACHED)
         self.best.replace(which[reached], found, reached)
         return reached

@@ -95,7 +95,7 @@ class ClosureEngine:
         bends.note(int(answer.rows.status[0]), begin, answer.coordinates)
         return answer
 
-    def advance(self, targets: Floats, start: Configurations, options: Options) -> Configurations:
+    def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Go on to targets (n, 4, 4) in the working mode of as many configurations; FAILED where not reached."""
         begin = start.coordinates
         found = _reach(self._closure, targets, begin, platform_poses(self.mechanism, begin), keep_mode=True)

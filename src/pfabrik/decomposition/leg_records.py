@@ -198,10 +198,6 @@ def _put_carrier(record: Records, carrier: Item, foot: Floats, line: Floats) -> 
         point = carrier.point + axis * (axis @ (foot - carrier.point))
         record["carrier_point"], record["spoke"] = point, foot - point
         record["spoke_across"] = motion = np.cross(axis, foot - point)
-    # the solution at which the foot leaves the line forward, or backward
-    record["side"] = _carrier_side(carrier.kind, float(line @ motion))
-
-
-def _carrier_side(kind: str, forward: float) -> float:
-    """Side of home's solution: of a carriage q = middle +- root, of a crank q = atan2(B, A) +- acos."""
-    return -1.0 if forward >= 0.0 else 1.0
+    # home's solution, of a carriage q = middle +- root, of a crank q = atan2(B, A) +- acos: the foot leaves the line
+    # forward, or backward
+    record["side"] = -1.0 if line @ motion >= 0.0 else 1.0

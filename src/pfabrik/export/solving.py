@@ -15,7 +15,7 @@ def solving(machine: Machine, forward: bool, solves: bool, completes: bool) -> s
     if solves:
         lines += _equations(machine, forward)
     if forward or completes:
-        lines += [*_motions(machine, forward), *_settle(machine, forward)]
+        lines += [*_motions(machine, forward), *_settle(forward)]
     return "\n".join([*lines, ""])
 
 
@@ -145,7 +145,7 @@ def _motions(machine: Machine, forward: bool) -> Iterator[str]:
     yield ""
 
 
-def _settle(machine: Machine, forward: bool) -> Iterator[str]:
+def _settle(forward: bool) -> Iterator[str]:
     bound = "(!given && gone > PFK_FARTHEST)" if forward else "gone > PFK_FARTHEST"
     given = ", given" if forward else ""
     rows = "given ? PFK_ROWS : PFK_OWN_ROWS" if forward else "PFK_OWN_ROWS"

@@ -204,10 +204,8 @@ def _unit(vectors: Floats) -> Floats:
     return vectors / np.where(norms == 0.0, np.nan, norms)
 
 
-def _pseudo_inverse(matrices: Floats, most: int | None = None) -> Floats:
-    """Pseudo-inverses of (n, a, b) at no more than the rank `most`, without singular values that are lost."""
+def _pseudo_inverse(matrices: Floats) -> Floats:
+    """Pseudo-inverses of (n, a, b), without singular values that are lost."""
     left, values, right = np.linalg.svd(matrices, full_matrices=False)
-    kept = values > TOLERANCES.rank
-    kept[:, most:] = False if most is not None else kept[:, most:]
-    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
+    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=values > TOLERANCES.rank)
     return np.asarray(np.swapaxes(right, -1, -2) @ (inverse[..., None] * np.swapaxes(left, -1, -2)))

@@ -163,7 +163,7 @@ class LegsEngine:
         coordinates = partial(coordinates_of, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
         return LegAnswers(rows, coordinates, sides, carriers)
 
-    def advance(self, targets: Floats, start: Configurations, options: Options) -> Configurations:
+    def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Go on to targets (n, 4, 4) in the working mode of as many configurations; PENDING where not reached.
 
         Where legs can be as they are at the start, they decide; joint coordinates do where they are at dead points.
@@ -177,7 +177,7 @@ class LegsEngine:
         if len(own) < len(targets):
             self._reach(start.rows.poses, start, first, True, present)
             rest = np.flatnonzero((rows.status != REACHED) & (present.status != REACHED))
-            others = self._inner.advance(targets[rest], start.at(rest), options)
+            others = self._inner.advance(targets[rest], start.at(rest))
             put_rows(rows, rest, others.rows)
             coordinates[rest] = others.coordinates
         return Configurations(rows, coordinates)

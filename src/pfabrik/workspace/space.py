@@ -105,7 +105,7 @@ def space_of(
         rotation, or that the task has no place for.
     """
     joint = _carrying_joint(mechanism)
-    known = (*POSITIONS, *TURNS, *(_coordinate_names(mechanism, joint) if joint else ()))
+    known = (*POSITIONS, *TURNS, *(_coordinate_names(joint) if joint else ()))
     fixed = _checked_fixed(fixed, known)
     asked = _checked_over(over, known, fixed)
     if joint is not None and _is_about(joint, asked, fixed, orientation):
@@ -213,7 +213,7 @@ def _carrying_joint(mechanism: Mechanism) -> str | None:
     return name if mechanism.joint(name).type == "universal" else None
 
 
-def _coordinate_names(mechanism: Mechanism, joint: str) -> tuple[str, ...]:
+def _coordinate_names(joint: str) -> tuple[str, ...]:
     return tuple(f"{joint}[{place}]" for place in range(2))
 
 
@@ -225,7 +225,7 @@ def _is_about(joint: str, asked: Sequence[str] | None, fixed: Mapping[str, float
 
 
 def _of_joint(mechanism: Mechanism, joint: str, asked: Sequence[str] | None, fixed: Mapping[str, float]) -> Space:
-    names = _coordinate_names(mechanism, joint)
+    names = _coordinate_names(joint)
     if fixed or (asked is not None and set(asked) != set(names)):
         raise InvalidArgument("over", ", ".join(asked or fixed), f"all coordinates of '{joint}': {', '.join(names)}")
     home = home_coordinates(mechanism)[columns(mechanism)[joint]]
