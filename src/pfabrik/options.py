@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-import reprlib
 from dataclasses import dataclass
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Literal
 
+from .checks import require_positive
 from .errors import InvalidArgument, UnknownName
 from .tolerances import TOLERANCES
 
@@ -72,31 +71,17 @@ class Options:
             raise InvalidArgument("options.exact", repr(self.exact), "True or False")
         for name in ("tolerance", "rotation_tolerance", "rotation_length", "actuator_tolerance"):
             value = getattr(self, name)
-            optional = name in ("tolerance", "rotation_length") and value is None
-            if not optional and not (_is_a(Real, value) and _is_positive(value)):
-                raise InvalidArgument(f"options.{name}", reprlib.repr(value), "a positive number")
+            if value is not None or name in ("rotation_tolerance", "actuator_tolerance"):
+                require_positive(f"options.{name}", value)
         for name in ("max_iterations", "max_rounds"):
             value = getattr(self, name)
-            if not (_is_a(Integral, value) and 1 <= value <= 1_000_000):
+            if isinstance(value, bool) or not (isinstance(value, Integral) and 1 <= int(value) <= 1_000_000):
                 raise InvalidArgument(f"options.{name}", repr(value), "an integer from 1 to 1000000")
 
     @classmethod
     def paper(cls) -> Options:
         """The paper's K = 100 and E = 1e-2 [length], by passes alone."""
         return cls(tolerance=1e-2, max_iterations=100, max_rounds=1000, exact=False, projection="centroid")
-
-
-def _is_a(kind: type, value: object) -> bool:
-    """Whether a value is such a number; a truth value is none."""
-    return isinstance(value, kind) and not isinstance(value, bool)
-
-
-def _is_positive(value: float) -> bool:
-    """Whether a number of any type is positive and, as a float, finite."""
-    try:
-        return 0.0 < float(value) < math.inf
-    except OverflowError:  # an integer or a fraction too large for a float
-        return False
 
 
 def checked_options(options: Options | None) -> Options:

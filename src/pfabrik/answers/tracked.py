@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats
+from ..checks import put_limits, require_positive
 from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..errors import InvalidArgument, UnknownName
+from ..errors import InvalidArgument
 from ..poses import as_floats, between
 from ..tolerances import TOLERANCES
 from .answer import Integers, Wanted
@@ -206,24 +207,15 @@ def pace_of(
             raise InvalidArgument("sample_time", "None beside speed limits", expected)
         return None
     if sample_time is not None:
-        _require_positive("sample_time", sample_time)
+        sample_time = require_positive("sample_time", sample_time)
         if times is not None:
             raise InvalidArgument("times", "times beside a sample time", "one of them")
-        sample_time = float(sample_time)
         when = sample_time * np.arange(count, dtype=np.float64)
     else:
         when = _checked_times(times, count)
         sample_time = _even_step(when)
     limits = np.full(len(names), np.inf)
-    if isinstance(speed_limits, Mapping):
-        for name, limit in speed_limits.items():
-            if name not in names:
-                raise UnknownName("actuator", name, names)
-            _require_positive(f"speed_limits['{name}']", limit)
-            limits[names.index(name)] = limit
-    elif speed_limits is not None:
-        _require_positive("speed_limits", speed_limits)
-        limits[:] = speed_limits
+    put_limits(limits, "speed_limits", speed_limits, names)
     return Pace(when, sample_time, limits)
 
 
@@ -248,11 +240,6 @@ def _even_step(times: Floats) -> float | None:
 def _passed(steps: Floats) -> Floats:
     """Durations as a column to divide by, NaN where there are none."""
     return np.where(steps > 0.0, steps, np.nan)[:, None]
-
-
-def _require_positive(name: str, value: Any) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < np.inf:
-        raise InvalidArgument(name, repr(value), "a positive number")
 
 
 def _moves(mechanism: Mechanism, poses: Floats) -> Floats:

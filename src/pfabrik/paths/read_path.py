@@ -14,6 +14,7 @@ from typing import TextIO
 import numpy as np
 
 from ..arrays import Floats
+from ..checks import require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..poses import pose
@@ -116,13 +117,6 @@ def path_blocks(
         raise InvalidArgument(name, found, expected or "CSV or G-code that can be followed") from None
     except UnicodeDecodeError:
         raise InvalidArgument(name, "a file that is no text", "CSV or G-code") from None
-
-
-def require_positive(name: str, value: float) -> float:
-    """A number above zero."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < np.inf:
-        raise InvalidArgument(name, repr(value), "a positive number")
-    return float(value)
 
 
 def _opened(path: str | PathLike[str]) -> AbstractContextManager[TextIO]:

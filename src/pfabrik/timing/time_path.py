@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats
+from ..checks import put_limits, require_positive
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument, UnknownName
+from ..errors import InvalidArgument
 from ..kernels.timing import fastest
 from .crossings import refuse_crossings
 from .curve import Curve, curve_of
@@ -68,28 +68,14 @@ def time_path(
 
 def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
     """The highest speed or acceleration of every actuator, (n_a,); infinite where there is none."""
-    names = mechanism.actuator_names
     own = [getattr(drive.joint, f"max_{what}") for drive in mechanism.drives]
     told = [
         value[drive.place] if isinstance(value, tuple) else value
         for value, drive in zip(own, mechanism.drives, strict=True)
     ]
     limits = np.array([np.inf if value is None else value for value in told], dtype=float)
-    if isinstance(given, Mapping):
-        for name, value in given.items():
-            if name not in names:
-                raise UnknownName("actuator", name, names)
-            limits[names.index(name)] = require_positive(f"{what}['{name}']", value)
-    elif given is not None:
-        limits[:] = require_positive(what, given)
+    put_limits(limits, what, given, mechanism.actuator_names)
     return limits
-
-
-def require_positive(name: str, value: Any) -> float:
-    """A number above zero."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < np.inf:
-        raise InvalidArgument(name, repr(value), "a positive number")
-    return float(value)
 
 
 def refuse_leaps(track: Track) -> None:

@@ -13,7 +13,8 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
-from ..errors import InvalidArgument, MissingLibrary
+from ..checks import require_positive
+from ..errors import MissingLibrary
 from ..extras import require
 from ..telling import OnProgress, telling
 from ..writing import whole_path
@@ -79,8 +80,8 @@ def _steps(track: Track, known: NDArray[np.intp], seconds: float | None) -> NDAr
     """The step that every frame shows."""
     if seconds is None:
         seconds = len(known) / FRAMES_A_SECOND if track.sample_time is None else len(known) * track.sample_time
-    elif isinstance(seconds, bool) or not np.isreal(seconds) or not 0.0 < seconds < np.inf:
-        raise InvalidArgument("seconds", repr(seconds), "a positive number")
+    else:
+        seconds = require_positive("seconds", seconds)
     frames = int(np.clip(round(seconds * FRAMES_A_SECOND), 1, MOST_FRAMES))
     return known[np.linspace(0, len(known) - 1, frames).round().astype(np.intp)]
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..arrays import Floats
+from ..checks import require_positive
 from ..errors import InvalidArgument
 from ..telling import telling
 from .blocks import Measure
@@ -47,10 +48,7 @@ def step_of(question: Question, resolution: float | None) -> Floats:
     if resolution is None:
         many = len(question.turns) > 1
         return unit * (FINENESS_ONE_BY_ONE if not question.has_margins else FINENESS_OF_SETS if many else FINENESS)
-    if isinstance(resolution, bool) or not isinstance(resolution, int | float | np.number):
-        raise InvalidArgument("resolution", repr(resolution), "a positive number")
-    if not 0.0 < resolution < np.inf:
-        raise InvalidArgument("resolution", repr(resolution), "a positive number")
+    resolution = require_positive("resolution", resolution)
     relative = resolution if all(space.is_angle) else resolution / length
     if not 1e-4 <= relative <= 0.5:
         expected = "between 1e-4 and 0.5 of the characteristic length, or rad"

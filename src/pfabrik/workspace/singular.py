@@ -13,6 +13,7 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats, Ints
+from ..checks import require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..ik import solve_ik
@@ -185,13 +186,7 @@ def _step(over: Workspace, resolution: float | None) -> Floats:
     if resolution is None:
         cells = over.size / float(np.prod(over.resolution))
         return np.asarray(over.resolution * max(1.0, (cells / POINTS) ** (1.0 / d)))
-    if (
-        isinstance(resolution, bool)
-        or not isinstance(resolution, int | float | np.number)
-        or not 0.0 < resolution < np.inf
-    ):
-        raise InvalidArgument("resolution", repr(resolution), "a positive number")
-    return np.asarray(over.resolution * resolution / over.resolution[_leading(over)])
+    return np.asarray(over.resolution * require_positive("resolution", resolution) / over.resolution[_leading(over)])
 
 
 def _leading(over: Workspace) -> int:
