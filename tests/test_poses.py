@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from pfabrik.errors import InvalidArgument
 from pfabrik.poses import as_poses, is_rotation
+from pfabrik.rotations import angles_between, from_rotvec, square_to
 
 ANGLES = [0.0, 1e-300, 1e-16, 1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.1, 1.0, 3.0, np.pi, 4.0, 100.0]
 
@@ -189,3 +190,16 @@ def test_rigid_transforms_are_targets() -> None:
     near_home = transform.RigidTransform.from_matrix(pf.pose([1, 2, 196], rotvec=[0.05, 0, 0]))
     expected = pf.solve_ik(machine, near_home.as_matrix())
     np.testing.assert_array_equal(pf.solve_ik(machine, near_home).actuators, expected.actuators)
+
+
+def test_angles_between_orientations_are_exact_where_they_are_tiny() -> None:
+    for angle in (1e-14, 1e-7, 1.0, 3.0):
+        turned = from_rotvec(np.array([0.6, 0.0, 0.8]) * angle)
+        assert angles_between(turned, np.eye(3)) == pytest.approx(angle, rel=1e-2 if angle < 1e-10 else 1e-8)
+
+
+def test_what_is_square_to_an_axis_of_any_length_are_unit_vectors() -> None:
+    for axis in np.random.default_rng(0).normal(size=(20, 3)) * 10.0 ** np.arange(-10, 10)[:, None]:
+        across = square_to(axis)
+        np.testing.assert_allclose(across @ across.T, np.eye(2), atol=1e-14)
+        np.testing.assert_allclose(across @ axis, 0.0, atol=1e-14 * np.linalg.norm(axis))

@@ -91,6 +91,12 @@ def angles_and_sines(rotations: Floats) -> tuple[Floats, Floats]:
     return np.asarray(np.arctan2(np.linalg.norm(sines, axis=-1), cosine)), sines
 
 
+def angles_between(one: Floats, other: Floats) -> Floats:
+    """Angles (...,) [rad] from rotations to others, matrices (..., 3, 3): by their chord, exact also where tiny."""
+    half_sine = np.sqrt(((one - other) ** 2).sum(axis=(-2, -1)) / 8.0)
+    return np.asarray(2.0 * np.arcsin(np.minimum(half_sine, 1.0)))
+
+
 def to_rotvec(rotations: Floats) -> Floats:
     """Rotation vectors (..., 3) [rad] of matrices (..., 3, 3), of at most half a turn."""
     angles, sines = angles_and_sines(rotations)
@@ -132,6 +138,11 @@ def shortest_turns(a: Floats, b: Floats) -> Floats:
 
 OPPOSITE = 1e-9
 """Length of the sum of two unit vectors below which they are opposite, and any axis across will do."""
+
+
+def square_to(axis: Floats) -> Floats:
+    """Two directions square to an axis (3,) of any length but zero, and to each other, unit vectors (2, 3)."""
+    return np.asarray(np.linalg.svd(axis[None])[2][1:])
 
 
 def yaws(rotations: Floats) -> Floats:

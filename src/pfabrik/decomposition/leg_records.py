@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..description.mechanism import Mechanism
 from ..kernels.legs import records as K
+from ..rotations import square_to
 from .items import Floats, Item
 from .leg_forms import Arm, KeptAxis, LegForm, Pivot, Rod, keeps_from_spinning
 
@@ -158,7 +159,7 @@ def _axis_pairs(kind: str, axes: Floats) -> list[tuple[Floats, Floats]]:
     if kind == "cross":
         return [(x, y)]
     if kind == "hinge":
-        return [(across, x) for across in np.linalg.svd(x[None])[2][1:]]
+        return [(across, x) for across in square_to(x)]
     return [(x, y), (y, z), (z, x)] if kind == "weld" else []
 
 

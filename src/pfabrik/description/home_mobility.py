@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..rotations import square_to
 from ..tolerances import TOLERANCES
 from .graph import next_joints, steps_from_base, tree_of
 from .joint_types import KINDS
@@ -145,7 +146,7 @@ def universal_axes(mechanism: Structure, joint: Joint) -> NDArray[np.float64]:
     lines = [
         np.asarray(ends[0].at) - np.asarray(joint.at) for ends in sides if len(ends) == 1 and ends[0].at != joint.at
     ]
-    normals = np.linalg.svd(lines[0].reshape(1, 3))[2][1:] if lines else np.eye(3)[:2]
+    normals = square_to(lines[0]) if lines else np.eye(3)[:2]
     return np.asarray(normals if joint.connects[0] == inward else normals[::-1])
 
 

@@ -21,7 +21,7 @@ RADIUS, HALF_SIDE = 3.5, 5.0
 """Sizes of a joint's circle, and of a slide's square, which is to be seen behind a joint in the same place [pixels]."""
 
 VIEWER = np.array([1.0, -1.0, 1.0]) / math.sqrt(3.0)
-"""Where a machine in space is seen from: x to the right, y to the back, z up, all at one scale."""
+"""Where a machine in space, or a plane, is seen from: x to the right, y to the back, z up, all at one scale."""
 
 BASE, END_EFFECTOR, LINK, ACTUATED, PASSIVE = "#9a9a9a", "#0072b2", "#6a6a6a", "#d55e00", "#ffffff"
 
@@ -63,11 +63,16 @@ def _plane_of_view(places: Floats) -> Floats:
     """The directions that are drawn to the right and up, unit vectors as rows (2, 3)."""
     spreads, axes = np.linalg.svd(places - places.mean(axis=0))[1:]
     is_planar = len(places) >= 3 and spreads[2] <= TOLERANCES.alignment * spreads[0] < spreads[1]
-    normal = axes[2] * np.copysign(1.0, axes[2] @ VIEWER) if is_planar else VIEWER
+    return seen_along(axes[2] if is_planar else VIEWER)
+
+
+def seen_along(normal: Floats) -> Floats:
+    """The directions to the right and up, unit vectors (2, 3), as one looks along a line from the viewer's side."""
+    normal = normal * np.copysign(1.0, normal @ VIEWER)
     upward = next(each for each in np.eye(3)[[2, 1]] if np.linalg.norm(np.cross(each, normal)) > TOLERANCES.alignment)
     right = np.cross(upward, normal)
     right /= np.linalg.norm(right)
-    return np.array([right, np.cross(normal, right)])
+    return np.array([right, np.cross(normal, right)]) + 0.0  # no negative zeros
 
 
 def _body(mechanism: Structure, body: str, spots: Places, reference: Floats) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..kernels.closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES
-from ..rotations import UNTURNED, from_rotvec, shortest_turns, yaws
+from ..rotations import angles_between, from_rotvec, shortest_turns, yaws
 from .joint_types import TASK_TURNS
 from .mechanism import Mechanism
 
@@ -79,9 +79,7 @@ class Task:
             return norms(offset), np.abs(self._yaw_errors(poses, targets))
         if self.rotations == 2:
             return norms(offset), 2.0 * np.arcsin(np.minimum(norms((poses - targets)[:, :3, 2]) / 2.0, 1.0))
-        turned = poses[:, :3, :3] @ np.swapaxes(targets[:, :3, :3], 1, 2)
-        half_sine = np.sqrt(((turned - UNTURNED) ** 2).sum(axis=(1, 2)) / 8.0)
-        return norms(offset), 2.0 * np.arcsin(np.minimum(half_sine, 1.0))
+        return norms(offset), angles_between(poses[:, :3, :3], targets[:, :3, :3])
 
     @staticmethod
     def _yaw_errors(poses: Floats, others: Floats) -> Floats:

@@ -17,6 +17,7 @@ from ..decomposition.items import Item
 from ..decomposition.leg_forms import LegForm, Pivot, Rod, holds_spin
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
+from ..rotations import square_to
 
 Number = float | Floats
 End = Literal["foot", "head"]
@@ -181,9 +182,9 @@ def _pivot(mechanism: Mechanism, pivot: Pivot, place: int) -> LegCode:
         numbers["fixed"] = _padded(fixed)
     last = {"hinge": 1, "cross": 2, "triple": 3}.get(kind, 0)
     if last:
-        numbers["square"] = np.linalg.svd(axes[last - 1][None])[2][1]
+        numbers["square"] = square_to(axes[last - 1])[0]
     if kind == "hinge":
-        numbers["kept"] = _padded(np.linalg.svd(axes[0][None])[2][1:])
+        numbers["kept"] = _padded(square_to(axes[0]))
     if kind == "triple":
         numbers["foot_side"] = _aiming_side(axes, axes[2])
     return LegCode(PivotShape(n_slides, kind, pivot.is_reversed), place, numbers, _names(pivot.items))

@@ -12,7 +12,7 @@ from ..description.graph import tree_of
 from ..description.home_mobility import body_twist, column_joints
 from ..description.structure import Structure
 from ..motion.displacements import columns, displacements, rate_units, screws, stepped
-from ..rotations import angles_and_sines
+from ..rotations import angles_and_sines, square_to
 from ..tolerances import TOLERANCES
 from .opened import Loop, OpenMechanism
 
@@ -90,7 +90,7 @@ class Closer:
             slopes.append(moved[0] - moved[1])
             if loop.type != "spherical":
                 turned = twists[0][:3] - twists[1][:3]
-                across = np.eye(3) if loop.type == "fixed" else _across(frames[0][:, 2])
+                across = np.eye(3) if loop.type == "fixed" else square_to(frames[0][:, 2])
                 rows.append(across @ _turn(loop, frames))
                 slopes.append(across @ turned)
         return np.concatenate(rows), np.concatenate(slopes)
@@ -127,11 +127,6 @@ def _turn(loop: Loop, frames: Floats) -> Floats:
         return np.asarray(sine * (np.arctan2(size, axes[0] @ axes[1]) / size if size else 1.0))
     angle, sines = angles_and_sines(frames[0] @ frames[1].T)
     return np.asarray(sines / np.sinc(angle / np.pi))
-
-
-def _across(axis: Floats) -> Floats:
-    """Two directions square to an axis, (2, 3)."""
-    return np.asarray(np.linalg.svd(axis.reshape(1, 3))[2][1:])
 
 
 def closed(closer: Closer, free: NDArray[np.bool_], low: Floats, high: Floats) -> Placed:

@@ -24,6 +24,7 @@ from ..description.coercion import numbers
 from ..description.form_faults import is_numbers, key_faults, shown
 from ..errors import Fault, InvalidArgument, InvalidMechanism, near_miss
 from ..extras import require
+from ..rotations import square_to
 from .opened import Loop, LoopType
 from .xml_reading import fault
 
@@ -188,9 +189,9 @@ def _loop(
 
 def _about(axis: Floats) -> Floats:
     """A frame (3, 3) whose third column is along an axis."""
-    across = np.linalg.svd(axis.reshape(1, 3))[2][1:]
+    across = square_to(axis)[0]
     third = axis / np.linalg.norm(axis)
-    return np.column_stack([across[0], np.cross(third, across[0]), third])
+    return np.column_stack([across, np.cross(third, across), third])
 
 
 def _entry_faults(

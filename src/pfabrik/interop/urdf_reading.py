@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Floats
 from ..description.joints import Joint
 from ..errors import Fault, InvalidMechanism
-from ..rotations import from_rpy
+from ..rotations import from_rpy, square_to
 from .assembling import Imported
 from .loops_file import LoopsFile, read_loops
 from .opened import Note
@@ -140,7 +140,7 @@ class _Links:
                 yield {"name": f"{name}_{letter}", "type": "revolute", "at": at, "axis": turned[:, "XYZ".index(letter)]}
         elif kind == "PLANAR":
             normal = turned @ _axis(element)
-            for letter, axis in zip("xy", np.linalg.svd(normal.reshape(1, 3))[2][1:], strict=True):
+            for letter, axis in zip("xy", square_to(normal), strict=True):
                 yield {"name": f"{name}_{letter}", "type": "prismatic", "axis": axis}
             yield {"name": name, "type": "revolute", "at": at, "axis": normal}
         else:

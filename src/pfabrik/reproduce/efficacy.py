@@ -12,6 +12,7 @@ from ..answers.status import Status
 from ..arrays import Floats
 from ..fk import solve_fk
 from ..options import Options
+from ..rotations import angles_between
 from ..track import track
 from .checking import Feasibility, feasibility
 from .study import SETTINGS, Case, Extent, Tick
@@ -70,16 +71,10 @@ def follow(case: Case, targets: Floats, options: Options) -> Followed:
     return Followed(
         solution=solution,
         position_errors=np.linalg.norm(poses[:, :3, 3] - targets[:, :3, 3], axis=1),
-        orientation_errors=np.degrees(angles_between(poses, targets)),
+        orientation_errors=np.degrees(angles_between(poses[:, :3, :3], targets[:, :3, :3])),
         newton=float(np.mean(np.append(start.iterations, rest.iterations))),
         feasibility=feasibility(solution),
     )
-
-
-def angles_between(poses: Floats, targets: Floats) -> Floats:
-    """Angles of the rotations that take one orientation to the other (n,) [rad], exact also where they are tiny."""
-    chord = np.linalg.norm((poses - targets)[:, :3, :3], axis=(1, 2))
-    return np.asarray(2.0 * np.arcsin(np.minimum(chord / np.sqrt(8.0), 1.0)))
 
 
 def rms(values: Floats) -> float:

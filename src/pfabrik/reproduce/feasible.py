@@ -18,7 +18,7 @@ from ..arrays import Floats
 from ..decomposition.decompose import decompose
 from ..description.graph import Step
 from ..description.mechanism import Cone, Joint, Mechanism, Range
-from ..rotations import from_rotvec
+from ..rotations import from_rotvec, square_to
 
 ROOM = 4.0
 """How far from home positions are looked for, along each axis [L]."""
@@ -184,7 +184,7 @@ class Cranks(Model):
 
     def __init__(self, mechanism: Mechanism) -> None:
         normal = np.array(mechanism.joint(mechanism.end_effector).axis)
-        axes = np.linalg.svd(normal[None])[2][1:]
+        axes = square_to(normal)
         axes = axes if np.cross(*axes) @ normal > 0.0 else axes[::-1]
         legs = [chain.branches[0] for chain in decompose(mechanism)]
         super().__init__(mechanism, axes, [shoulder.joint for shoulder, *_ in legs])

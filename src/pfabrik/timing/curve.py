@@ -10,6 +10,7 @@ from ..answers.tracked import Track
 from ..arrays import Floats
 from ..kernels.timing import second_derivatives
 from ..poses import between
+from ..rotations import angles_between
 
 FINEST = 6000
 """Grid points that a path is given at least: between them limits are exceeded by up to 1e-3, with 1000 by 1e-2."""
@@ -68,9 +69,7 @@ class Curve:
 
     def turning(self) -> Floats:
         """How fast the platform turns by s after each step, (k,) [rad per s]."""
-        turned = np.swapaxes(self.poses[:-1, :3, :3], 1, 2) @ self.poses[1:, :3, :3]
-        half_sine = np.linalg.norm(turned - np.eye(3), axis=(1, 2)) / np.sqrt(8.0)
-        rates = 2.0 * np.arcsin(np.minimum(half_sine, 1.0)) / np.diff(self.s)
+        rates = angles_between(self.poses[:-1, :3, :3], self.poses[1:, :3, :3]) / np.diff(self.s)
         return np.append(rates, rates[-1:])
 
     def step_of(self, s: Floats) -> np.ndarray:

@@ -6,10 +6,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
+from ..description.sketch import seen_along
 from ..tolerances import TOLERANCES
-
-VIEWER = np.array([1.0, -1.0, 1.0]) / np.sqrt(3.0)
-"""Where a plane is looked at from: x to the right, y to the back, z up."""
 
 
 def plane_of(mechanism: Mechanism) -> Floats | None:
@@ -27,11 +25,7 @@ def plane_of(mechanism: Mechanism) -> Floats | None:
     off = [np.linalg.norm(np.cross(hinges, normal), axis=1), np.abs(slides @ normal)]
     if np.concatenate(off).max(initial=0.0) > TOLERANCES.alignment:
         return None
-    normal = normal * np.copysign(1.0, normal @ VIEWER)
-    upward = next(each for each in np.eye(3)[[2, 1]] if np.linalg.norm(np.cross(each, normal)) > TOLERANCES.alignment)
-    right = np.cross(upward, normal)
-    right /= np.linalg.norm(right)
-    return np.array([right, np.cross(normal, right)]) + 0.0
+    return seen_along(normal)
 
 
 def _axes(mechanism: Mechanism, kind: str) -> Floats:
