@@ -1,4 +1,4 @@
-"""How far a long question is: a bar on a terminal, once it has taken a while."""
+"""How far something long is: a bar on a terminal, once it has taken a while."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ PATIENCE = 2.0
 
 
 @contextmanager
-def telling(label: str, on_progress: OnProgress | None) -> Iterator[OnProgress | None]:
-    """What to call with (done, total): what the caller gave, else a bar on stderr; None where nobody would see it."""
+def telling(label: str, on_progress: OnProgress | None = None) -> Iterator[OnProgress | None]:
+    """What to call with (done, total): what the caller gave, else a bar on stderr; None where nobody would see it.
+
+    A bar takes a total of 0 for one that is not known.
+    """
     if on_progress is not None or not sys.stderr.isatty():
         yield on_progress
         return
@@ -32,7 +35,7 @@ def telling(label: str, on_progress: OnProgress | None) -> Iterator[OnProgress |
             bar.add_task(label, total=None)
             bar.start()
         if bar.tasks:
-            bar.update(task, completed=done, total=total)
+            bar.update(task, completed=done, total=total or None)
 
     try:
         yield tell

@@ -13,8 +13,8 @@ import pfabrik as pf
 
 from ..answers.table import aligned
 from ..extras import require
+from ..telling import telling
 from .picture import picture
-from .progress import progress
 from .track import count_statuses
 from .whole import new_folder, whole_folder
 
@@ -79,7 +79,7 @@ def follow(case: Case, steps: int) -> Run:
     mechanism = case.mechanism
     targets = case.leaving.poses(steps)
     rehearse(case, steps)
-    with progress(f"{mechanism.name}: {steps} steps") as on_progress:
+    with telling(f"{mechanism.name}: {steps} steps") as on_progress:
         start = time.perf_counter()
         solution = pf.track(mechanism, targets, on_progress=on_progress)
         seconds = time.perf_counter() - start

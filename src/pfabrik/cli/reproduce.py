@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from ..answers.table import aligned
-from .progress import progress
+from ..telling import telling
 from .whole import whole_folder
 
 NEEDED = ("matplotlib", "scipy")
@@ -34,7 +34,7 @@ def reproduce(out: Path, quick: bool, readme: Path | None) -> int:
         raise click.UsageError(f"this needs {found}; install it with: pip install 'pfabrik[reproduce]'")
     from ..reproduce import everything, output, report
 
-    with whole_folder(out) as folder, progress("reproduce") as on_progress:
+    with whole_folder(out) as folder, telling("reproduce") as on_progress:
         findings = everything.run(quick, on_progress)
         output.write(findings, folder)
     if readme is not None:

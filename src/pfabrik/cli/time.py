@@ -12,9 +12,9 @@ import click
 import pfabrik as pf
 
 from ..answers.table import aligned
+from ..telling import telling
 from .finite import FINITE
 from .mech import MECH, load
-from .progress import progress
 from .speeds import speed_limits, speed_option
 from .whole import whole_file
 
@@ -62,7 +62,7 @@ def time(
     pushes = speed_limits(mechanism, accelerations, "--acceleration")
     targets = pf.read_path(path, mechanism).targets
     with nullcontext() if output is None else whole_file(output, inputs=(path, Path(mech))) as handle:
-        with progress(f"tracking {len(targets)} targets") as on_progress:
+        with telling(f"tracking {len(targets)} targets") as on_progress:
             followed = pf.track(mechanism, targets, on_progress=on_progress)
         timed = pf.time_path(
             followed,

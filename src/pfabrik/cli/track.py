@@ -14,10 +14,10 @@ import click
 import pfabrik as pf
 
 from ..extras import require
+from ..telling import telling
 from .finite import FINITE
 from .mech import MECH, load
 from .picture import ending_checked, picture
-from .progress import progress
 from .projecting import options_projecting, projecting
 from .speeds import own_limits, speed_limits, speed_option
 from .track_checks import checked
@@ -150,8 +150,7 @@ def draw(followed: Track, picture_path: Path | None, film_path: Path | None) -> 
         with picture(picture_path):
             pf.plot_track(followed)
     if film_path is not None:
-        with progress(f"drawing {film_path}") as on_progress:
-            pf.animate(followed, film_path, on_progress=on_progress)
+        pf.animate(followed, film_path)
         click.echo(f"wrote {film_path}", err=True)
 
 
@@ -170,8 +169,8 @@ def answered(
     from .track_rows import Rows
 
     rows: Rows | None = None
-    with progress(f"tracking {total or ''} targets") as show:
-        on_progress = None if show is None else lambda done: show(done, total)
+    with telling(f"tracking {total or ''} targets") as tell:
+        on_progress = None if tell is None else lambda done: tell(done, total or 0)
         parts = follow_parts(mechanism, blocks, options=options, speed_limits=limits or None, on_progress=on_progress)
         for path, followed, first in parts:
             room, tilts = least_margins(followed), largest_tilts(followed)

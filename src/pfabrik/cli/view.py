@@ -10,9 +10,9 @@ import click
 
 import pfabrik as pf
 
+from ..telling import telling
 from .mech import MECH, STANDARD_INPUT, load
 from .picture import ending_checked
-from .progress import progress
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
@@ -40,7 +40,7 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
     if path is not None:
         mechanism = load(mech)
         targets = pf.read_path(path, mechanism).targets
-        with progress(f"tracking {len(targets)} targets") as on_progress:
+        with telling(f"tracking {len(targets)} targets") as on_progress:
             shown = pf.track(mechanism, targets, on_progress=on_progress)
     with pf.view(shown, port=port, host=host) as viewer:
         if html is not None:

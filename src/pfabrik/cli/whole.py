@@ -13,6 +13,8 @@ from typing import TextIO
 
 import click
 
+from ..writing import whole_path
+
 
 @contextmanager
 def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
@@ -29,19 +31,12 @@ def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
         yield sys.stdout
         return
     refuse_input(path, inputs)
-    path = path.resolve()  # a link keeps pointing where it points
     if path.exists() and not path.is_file():
         with path.open("w", newline="", encoding="utf-8") as direct:
             yield direct
         return
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    handle = open_new(part, path)
-    try:
-        with handle:
-            yield handle
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    with whole_path(path) as part, open_new(part, path) as handle:
+        yield handle
 
 
 def refuse_input(path: Path, inputs: Iterable[Path]) -> None:

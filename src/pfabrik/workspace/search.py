@@ -64,5 +64,5 @@ def sliced(
     kept = [question.space.names.index(name) for name in space.names]
     asked = dataclasses.replace(question, space=space, lowest=question.lowest[kept], highest=question.highest[kept])
     step = resolution[kept] if isinstance(resolution, np.ndarray) else step_of(asked, resolution)
-    with telling("slice", None) as tell:
+    with telling("slice") as tell:
         return asked, step, *searched(asked, step, Measure(asked, None, tell))
