@@ -39,14 +39,19 @@ def as_targets(mechanism: Mechanism, target: Target) -> tuple[Floats, tuple[int,
     return poses, shape
 
 
+def carrying_joint(mechanism: Mechanism) -> str | None:
+    """The one joint, fixed ones aside, that connects base and end effector; None where none or several do."""
+    between = {mechanism.base, mechanism.end_effector}
+    joints = [joint.name for joint in mechanism.joints if set(joint.connects) == between and joint.type != "fixed"]
+    return joints[0] if len(joints) == 1 else None
+
+
 def _from_joint(mechanism: Mechanism, target: Mapping[str, Any]) -> tuple[Floats, tuple[int, ...]]:
     """Poses that have given coordinates at the one joint that connects base and end effector."""
-    between = {mechanism.base, mechanism.end_effector}
-    carrying = [j.name for j in mechanism.joints if set(j.connects) == between and j.type != "fixed"]
-    if len(carrying) != 1:
+    name = carrying_joint(mechanism)
+    if name is None:
         expected = "a pose or position: no single joint connects base and end effector here"
         raise InvalidArgument("target", f"joint coordinates of {', '.join(target)}", expected)
-    (name,) = carrying
     if list(target) != [name]:
         raise InvalidArgument("target", f"coordinates of {', '.join(target) or 'no joint'}", f"those of '{name}'")
     span = columns(mechanism)[name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +16,6 @@ from ..answers.table import aligned
 from ..extras import require
 from ..telling import telling
 from .picture import picture
-from .track import count_statuses
 from .whole import new_folder, whole_folder
 
 if TYPE_CHECKING:
@@ -111,12 +111,12 @@ def row(run: Run) -> tuple[str, ...]:
     """One line of the table; the worst of the run in every column."""
     solution = run.solution
     unit = solution.mechanism.length_unit
-    counts = count_statuses(solution)
+    counts = Counter(solution.status.tolist())
     return (
         solution.mechanism.name,
-        str(counts["reached"]),
-        str(counts["projected"]),
-        str(counts["failed"] + counts["invalid"]),
+        str(counts[pf.Status.REACHED]),
+        str(counts[pf.Status.PROJECTED]),
+        str(counts[pf.Status.FAILED] + counts[pf.Status.INVALID]),
         f"{solution.position_error.max():.3g} {unit}",
         f"{solution.residual.max():.1e} {unit}",
         f"{solution.limit_excess.max():.1e}",
@@ -128,7 +128,7 @@ def holds(solution: Track) -> bool:
     """Whether every step has an answer with its loops closed and its limits kept."""
     from ..tolerances import TOLERANCES
 
-    counts = count_statuses(solution)
+    answered = (solution.status < pf.Status.FAILED).all()
     closed = solution.residual.max() <= TOLERANCES.position * solution.mechanism.characteristic_length
     kept = solution.limit_excess.max() <= TOLERANCES.limit
-    return bool(closed and kept and not counts["failed"] and not counts["invalid"])
+    return bool(answered and closed and kept)

@@ -192,8 +192,3 @@ def as_object(followed: Track) -> dict[str, object]:
         plain[name] = None if each is None else as_plain(each.values)
         plain[f"{name}_of"] = None if each is None else each.names
     return plain
-
-
-def count_statuses(solution: Track) -> dict[str, int]:
-    """How many targets ended in each status, by its name in lower case."""
-    return {status.name.lower(): int((solution.status == status).sum()) for status in pf.Status}

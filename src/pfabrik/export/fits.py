@@ -93,9 +93,9 @@ def towers_of(machine: Machine) -> list[Tower] | None:
     return towers
 
 
-def angles_of(towers: list[Tower]) -> list[float]:
-    """Where towers stand [deg]."""
-    return [math.degrees(math.atan2(tower.place[1], tower.place[0])) % 360.0 for tower in towers]
+def angle_of(place: Floats) -> float:
+    """Where a place (3,) is about the z axis [deg], from 0 to 360."""
+    return math.degrees(math.atan2(place[1], place[0])) % 360.0
 
 
 def thighs_of(machine: Machine) -> list[Thigh] | None:

@@ -10,7 +10,7 @@ import numpy as np
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..tolerances import TOLERANCES
-from .fits import Thigh, Tower, angles_of, thighs_of, towers_of
+from .fits import Thigh, Tower, angle_of, thighs_of, towers_of
 from .machine import Machine
 from .wording import comment
 
@@ -54,8 +54,7 @@ def _rotary_delta(mechanism: Mechanism, thighs: list[Thigh]) -> str:
     lines = _begun(mechanism, "rotary_delta", ["which way steppers turn: it counts arms upward"])
     lines += [f"shoulder_radius: {radii[0]:.9g}", f"shoulder_height: {heights[0]:.9g}"]
     for letter, thigh in zip(LETTERS, thighs, strict=True):
-        angle = math.degrees(math.atan2(thigh.hip[1], thigh.hip[0])) % 360.0
-        lines += ["", f"[stepper_{letter}]", f"angle: {angle:.9g}"]
+        lines += ["", f"[stepper_{letter}]", f"angle: {angle_of(thigh.hip):.9g}"]
         lines += [f"upper_arm_length: {thigh.length:.9g}", f"lower_arm_length: {thigh.shin:.9g}"]
         reach = radii[0] + thigh.length * math.cos(thigh.least) if math.isfinite(thigh.least) else math.inf
         if reach < thigh.shin:
@@ -92,8 +91,8 @@ def _delta(mechanism: Mechanism, towers: list[Tower]) -> str:
     lines.append(
         f"# the carriages' own: at most {min(known):.9g} a second" if known else "# max_velocity, max_accel: yours"
     )
-    for letter, tower, angle in zip(LETTERS, towers, angles_of(towers), strict=True):
-        lines += ["", f"[stepper_{letter}]", f"arm_length: {tower.rod:.9g}", f"angle: {angle:.9g}"]
+    for letter, tower in zip(LETTERS, towers, strict=True):
+        lines += ["", f"[stepper_{letter}]", f"arm_length: {tower.rod:.9g}", f"angle: {angle_of(tower.place):.9g}"]
         height = tower.place[2] + tower.highest - math.sqrt(max(tower.rod**2 - radii[0] ** 2, 0.0))
         if math.isfinite(height):
             lines.append(f"position_endstop: {height:.9g}")

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
-from .fits import Thigh, Tower, struts_of, thighs_of, towers_of
+from .fits import Thigh, Tower, angle_of, struts_of, thighs_of, towers_of
 from .linuxcnc_module import module
 from .machine import Machine
 from .wording import comment
@@ -50,13 +50,13 @@ def _are_towers(towers: Sequence[Tower], size: float) -> bool:
     radii = [math.hypot(*tower.place[:2]) for tower in towers]
     heights = [abs(tower.place[2]) for tower in towers]
     spread = max(np.ptp(radii), np.ptp([tower.rod for tower in towers]), *heights)
-    angles = [math.degrees(math.atan2(tower.place[1], tower.place[0])) for tower in towers]
+    angles = [angle_of(tower.place) for tower in towers]
     return bool(spread <= TOLERANCES.alignment * size and _stand_at(angles, TOWERS))
 
 
 def _are_thighs(thighs: Sequence[Thigh], size: float) -> bool:
     """Whether thighs are where rotarydeltakins has them: alike, and as high as the origin, as the ankles are."""
-    angles = [math.degrees(math.atan2(thigh.hip[1], thigh.hip[0])) for thigh in thighs]
+    angles = [angle_of(thigh.hip) for thigh in thighs]
     aside = [abs(t.hip[0] * t.ankle[1] - t.hip[1] * t.ankle[0]) / math.hypot(*t.hip[:2]) for t in thighs]
     heights = [abs(point[2]) for thigh in thighs for point in (thigh.hip, thigh.ankle)]
     spread = max(*heights, *aside, *(np.ptp(column) for column in zip(*map(_radii, thighs), strict=True)))

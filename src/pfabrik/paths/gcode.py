@@ -35,7 +35,7 @@ OFF_ROUND, DIGITS = 1e-3, 1e-6
 """Shares of an arc's radius by which its ends may differ in theirs, as other readers have it, and by which a radius
 may be too short for them: programs are written with some six digits."""
 
-FULL_TURN = 1e-9
+ONE_PLACE = 1e-9
 """Angle of an arc whose ends are one place, which goes all the way round, up to rounding [rad]."""
 
 
@@ -177,7 +177,7 @@ def _arc(
         raise WrongPath(f"line {number}: an arc from radius {radius:g} to {off:g}; expected the same")
     start, stop = math.atan2(-centre[1], -centre[0]), math.atan2(*(chord - centre)[::-1])
     turn = (sense * (stop - start)) % (2.0 * math.pi)
-    turn = 2.0 * math.pi if turn < FULL_TURN else turn
+    turn = 2.0 * math.pi if turn < ONE_PLACE else turn
     flat = 2.0 * math.acos(max(1.0 - tolerance / radius, 0.0)) if tolerance < radius else math.pi / 2.0
     count = max(_parts(radius * turn, longest, number), math.ceil(turn / flat))
     for part in range(1, count):

@@ -16,7 +16,7 @@ from ..motion.displacements import columns, home_coordinates
 from ..motion.mobility import generic_of
 from ..poses import SupportsMatrix, is_rotation
 from ..rotations import from_rotvec
-from ..targets import as_targets
+from ..targets import as_targets, carrying_joint
 from ..tolerances import TOLERANCES
 
 POSITIONS = ("x", "y", "z")
@@ -104,7 +104,7 @@ def space_of(
     UnknownName, InvalidArgument : coordinates that there are none of, or none left to vary; an orientation that is no
         rotation, or that the task has no place for.
     """
-    joint = _carrying_joint(mechanism)
+    joint = _pivot(mechanism)
     known = (*POSITIONS, *TURNS, *(_coordinate_names(joint) if joint else ()))
     fixed = _checked_fixed(fixed, known)
     asked = _checked_over(over, known, fixed)
@@ -203,12 +203,10 @@ def _checked_over(
     return names
 
 
-def _carrying_joint(mechanism: Mechanism) -> str | None:
+def _pivot(mechanism: Mechanism) -> str | None:
     """The universal joint that alone connects base and end effector, whose two angles then say the whole pose."""
-    between = {mechanism.base, mechanism.end_effector}
-    joints = [joint.name for joint in mechanism.joints if set(joint.connects) == between and joint.type != "fixed"]
-    (name, *more) = joints or ("",)
-    if more or not name or any(task_of(mechanism).axes):
+    name = carrying_joint(mechanism)
+    if name is None or any(task_of(mechanism).axes):
         return None
     return name if mechanism.joint(name).type == "universal" else None
 
