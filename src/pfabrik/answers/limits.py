@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..description.joint_types import KINDS
 from ..description.mechanism import Mechanism
+from ..motion.displacements import rate_units
 from ..motion.limits import coned, ranges_of
 from ..tolerances import TOLERANCES
 
@@ -73,13 +73,14 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
     multipliers : (n, 2 columns + cones), as of `weighed_limits`.
     """
     found: list[list[ActiveLimit]] = [[] for _ in coordinates]
-    bounded, n = _bounds(mechanism), coordinates.shape[1]
+    n, units = coordinates.shape[1], rate_units(mechanism)
     angles = list(coned(mechanism, coordinates))
     for row, place in ((row, place) for row, own in enumerate(multipliers) for place in _hardest_first(own)):
         which = 0
         if place < 2 * n:
-            name, which, home, bounds, unit = bounded[place // 2]
-            value, limit = float(coordinates[row, place // 2]) + home, bounds[place % 2]
+            own = mechanism.coordinates[place // 2]
+            name, which, unit = own.joint.name, own.place, mechanism.characteristic_length / float(units[own.column])
+            value, limit = float(coordinates[row, own.column]) + own.home, own.bounds[place % 2]
             bound: Literal["min", "max", "cone"] = "max" if place % 2 else "min"
         else:
             joint, values, limit = angles[place - 2 * n]
@@ -99,20 +100,6 @@ def _hardest_first(multipliers: Floats) -> list[int]:
         else:
             alike.append([place])
     return [place for group in alike for place in sorted(group)]
-
-
-def _bounds(mechanism: Mechanism) -> list[tuple[str, int, float, tuple[float, float], float]]:
-    """Of every coordinate: its joint, its place there, its value at home, its bounds; and L for an angle, else 1."""
-    found = []
-    for joint in mechanism.joints:
-        kinds = KINDS[joint.type].coordinates
-        least = 0.0 if joint.along is not None else -np.inf  # a distance is not negative
-        bounds = [(least, np.inf)] * len(kinds) if joint.range is None else np.reshape(joint.range, (-1, 2)).tolist()
-        homes = np.ravel(mechanism.home_coordinate(joint.name)).tolist()
-        for place, (kind, home, (low, high)) in enumerate(zip(kinds, homes, bounds, strict=True)):
-            unit = 1.0 if kind == "length" else mechanism.characteristic_length
-            found.append((joint.name, place, home, (max(low, least), high), unit))
-    return found
 
 
 BINDING = np.dtype(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..description.task import Task
-from ..motion.displacements import end_effector_pose, gaps
+from ..motion.displacements import actuator_units, end_effector_pose, gaps
 from .solution import Solution, checked_solution
 
 
@@ -28,8 +28,7 @@ def closure_residual(solution: Solution) -> float | NDArray[np.float64]:
     compared = Task((True, True, True), 0 if mechanism.end_effector_is_joint else 3)
     position, rotation = compared.errors(end_effector_pose(mechanism, q[known]), rows.poses[known])
     found[known] = np.max([gaps(mechanism, q[known]), position, rotation * length], axis=0)
-    for place, drive in enumerate(mechanism.drives):
-        unit = 1.0 if drive.kind == "length" else length
+    for place, (drive, unit) in enumerate(zip(mechanism.drives, actuator_units(mechanism), strict=True)):
         value = q[known, drive.column] + drive.home
-        found[known] = np.maximum(found[known], np.abs(value - rows.actuators[known, place]) * unit)
+        found[known] = np.maximum(found[known], np.abs(value - rows.actuators[known, place]) * (length / unit))
     return float(found[0]) if solution.shape == () else found.reshape(solution.shape)

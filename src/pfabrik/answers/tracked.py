@@ -15,6 +15,7 @@ from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..errors import InvalidArgument
+from ..motion.displacements import actuator_units
 from ..poses import as_floats, between
 from ..tolerances import TOLERANCES
 from .answer import Integers, Wanted
@@ -251,6 +252,4 @@ def _moves(mechanism: Mechanism, poses: Floats) -> Floats:
 
 def _scaled(mechanism: Mechanism, actuators: Floats) -> Floats:
     """How far each actuator moves in every step, (n, n_a) [L or rad]."""
-    slides = np.array([drive.kind == "length" for drive in mechanism.drives])
-    units = np.where(slides, mechanism.characteristic_length, 1.0)
-    return np.asarray(np.abs(np.diff(actuators, axis=0, prepend=actuators[:1])) / units)
+    return np.asarray(np.abs(np.diff(actuators, axis=0, prepend=actuators[:1])) / actuator_units(mechanism))

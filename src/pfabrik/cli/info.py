@@ -6,17 +6,17 @@ import dataclasses
 import json
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
 import pfabrik as pf
 
 from ..answers.table import aligned
 from ..decomposition.leg_table import leg_table, legs_answer
 from ..description.joint_types import KINDS
+from ..description.readouts import Readout, readout
 from .mech import MECH, load
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def joint_table(mechanism: Mechanism) -> str:
             joint.type,
             " - ".join(joint.connects),
             coordinate(joint),
-            limits(joint, mechanism.length_unit),
+            limits(joint, mechanism),
         )
         for joint in mechanism.joints
     ]
@@ -138,25 +138,20 @@ def coordinate(joint: Joint) -> str:
     )
 
 
-def limits(joint: Joint, unit: str) -> str:
+def limits(joint: Joint, mechanism: Mechanism) -> str:
     """The joint's range and cone, in degrees and the mechanism's length unit."""
-    kinds = KINDS[joint.type].coordinates
-    parts = [interval(pair, unit, kind == "angle") for pair, kind in zip(ranges(joint), kinds, strict=False)]
+    ranged = [each for each in mechanism.coordinates if each.joint is joint and joint.range is not None]
+    parts = [interval(readout(each, mechanism.length_unit)) for each in ranged]
     if joint.cone:
         half_angle = math.degrees(joint.cone.half_angle)
         parts.append(f"cone {half_angle:.6g} deg about {vector(joint.cone.axis)} of {joint.cone.fixed_to}")
     return "; ".join(parts)
 
 
-def ranges(joint: Joint) -> Sequence[Sequence[float]]:
-    """The joint's ranges, one pair for each limited coordinate."""
-    return [] if joint.range is None else np.reshape(joint.range, (-1, 2)).tolist()
-
-
-def interval(pair: Sequence[float], unit: str, is_angle: bool) -> str:
+def interval(shown: Readout) -> str:
     """``140 to 250 mm``."""
-    low, high = (math.degrees(bound) + 0.0 if is_angle else bound + 0.0 for bound in pair)
-    return f"{low:.6g} to {high:.6g} {'deg' if is_angle else unit}"
+    low, high = shown.limits
+    return f"{low + 0.0:.6g} to {high + 0.0:.6g} {shown.unit}"
 
 
 def vector(components: Iterable[float]) -> str:

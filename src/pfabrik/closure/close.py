@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..description.joint_types import KINDS
 from ..description.mechanism import Mechanism
 from ..kernels.closure import loops as K
 from ..kernels.threads import in_blocks
@@ -86,8 +85,7 @@ def closure_of(mechanism: Mechanism, whole: bool = True) -> Closure:
         others (a gripper's) are idle then.
     """
     loops = loops_of(mechanism, whole=whole)
-    kinds = [kind for joint in mechanism.joints for kind in KINDS[joint.type].coordinates]
-    turning = np.array([float(kind == "angle") for kind in kinds])
+    turning = np.array([float(each.kind == "angle") for each in mechanism.coordinates])
     scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
     actuated = np.array([drive.column for drive in mechanism.drives], np.int64)
     home = np.array([drive.home for drive in mechanism.drives])

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..description.graph import cone_line, opposite
 from ..description.home_mobility import universal_axes
-from ..description.joint_types import KINDS
 from ..description.mechanism import Joint, Mechanism
 from ..description.paths import Path, independent_paths
 from ..kernels.closure import loops as K
-from ..motion.displacements import columns
+from ..motion.displacements import columns, home_coordinates, rate_units
 from ..tolerances import TOLERANCES
 
 
@@ -81,7 +80,7 @@ class _Builder:
         visits = [visit for path in order for visit in self.paths[path]]
         starts = _starts(len(self.paths[path]) for path in order)
         widths = [3 if self.records[k][0] == K.BALL else 1 for k, _ in visits]
-        n_columns = sum(len(KINDS[joint.type].coordinates) for joint in self.mechanism.joints)
+        n_columns = len(self.mechanism.coordinates)
         group_of = np.zeros(n_columns, np.int64)
         for number, group in enumerate(groups):
             for k in {k for path in group for k, _ in self.paths[path]}:
@@ -89,7 +88,7 @@ class _Builder:
         marks = [
             (starts[place] + visit, joint) for place, path in enumerate(order) for visit, joint in self.marks[path]
         ]
-        lo, hi = _ranges(self.mechanism, n_columns)
+        lo, hi = _ranges(self.mechanism)
         return K.Loops(
             kinds=_ints(record[0] for record in self.records),
             axes=_vectors(record[1] for record in self.records),
@@ -189,21 +188,13 @@ def _connected(sets: Sequence[set[int]]) -> list[list[int]]:
     return [members for _, members in groups]
 
 
-def _ranges(mechanism: Mechanism, n_columns: int) -> tuple[Floats, Floats]:
+def _ranges(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """Bounds of the deviations from home, (columns,) each, dimensionless; infinite where there are none.
 
     A coordinate that is a distance has one even where the description gives none: it is not negative.
     """
-    lo, hi = np.full(n_columns, -np.inf), np.full(n_columns, np.inf)
-    for joint in mechanism.joints:
-        span = columns(mechanism)[joint.name]
-        home = np.reshape(mechanism.home_coordinate(joint.name), (-1, 1))
-        lengths = np.array([kind == "length" for kind in KINDS[joint.type].coordinates])
-        units = np.where(lengths, mechanism.characteristic_length, 1.0)[:, None]
-        if joint.range is not None:
-            lo[span], hi[span] = ((np.reshape(joint.range, (-1, 2)) - home) / units).T
-        if joint.along is not None:
-            lo[span] = np.maximum(lo[span], -home[:, 0] / units[:, 0])
+    bounds = np.reshape([each.bounds for each in mechanism.coordinates], (-1, 2)).T
+    lo, hi = np.ascontiguousarray((bounds - home_coordinates(mechanism)) / rate_units(mechanism))
     return lo, hi
 
 

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..description.graph import cone_line
-from ..description.home_mobility import column_joints
-from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
@@ -26,8 +24,6 @@ from .stations import legs_of_sub_chain
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
-
-_NO_BOUNDS = (-math.inf, math.inf)
 
 NO_WAY = "does not lead to the end effector"
 """The reason of a sub-chain beside every way to the end effector."""
@@ -186,31 +182,27 @@ def _aimed(legs: Records, asked: Records) -> Records:
 
 def _require_all(mechanism: Mechanism, seen: set[tuple[str, int]]) -> None:
     """Every range and every motor is one that legs tell."""
-    for joint in mechanism.joints:
-        for place in range(len(KINDS[joint.type].coordinates)):
-            if (joint.range is not None or place in joint.driven) and (joint.name, place) not in seen:
-                raise NoLeg(f"joint {joint.name} has a motor or a limit that no closed form tells")
+    for each in mechanism.coordinates:
+        joint = each.joint
+        if (joint.range is not None or each.place in joint.driven) and (joint.name, each.place) not in seen:
+            raise NoLeg(f"joint {joint.name} has a motor or a limit that no closed form tells")
 
 
 def _coordinate(mechanism: Mechanism, leg: int, item: Item, place: int) -> tuple[float, ...]:
     """A record of `COORDINATE`, its column that among all joint coordinates."""
-    joint, is_length = item.joint, item.kind == "P"
-    unit = mechanism.characteristic_length if is_length else 1.0
-    home = float(np.ravel(mechanism.home_coordinate(joint.name))[item.place])
-    lo, hi = _NO_BOUNDS if joint.range is None else np.reshape(joint.range, (-1, 2))[item.place].tolist()
-    if joint.along is not None:
-        lo = max(lo, 0.0)
-    index = [each.name for each in mechanism.joints].index(joint.name)
-    column = int(np.searchsorted(column_joints(mechanism), index)) + item.place
+    key = item.joint.name, item.place
+    own = next(each for each in mechanism.coordinates if (each.joint.name, each.place) == key)
+    unit = 1.0 if own.kind == "angle" else mechanism.characteristic_length
+    lo, hi = own.bounds
     return (
         leg,
         place,
-        column,
-        int(joint.type in ("revolute", "cylindrical") and not is_length),
+        own.column,
+        int(own.joint.type in ("revolute", "cylindrical") and own.kind == "angle"),
         item.sense,
-        (lo - home) / unit,
-        (hi - home) / unit,
-        home,
+        (lo - own.home) / unit,
+        (hi - own.home) / unit,
+        own.home,
         unit,
     )
 

@@ -41,3 +41,9 @@ class JointCoordinate:
             return -math.inf, math.inf
         low, high = np.reshape(self.joint.range, (-1, 2))[self.place].tolist()
         return low, high
+
+    @property
+    def bounds(self) -> Range:
+        """The same, but that a distance is not negative where nothing says so either."""
+        low, high = self.limits
+        return (low if self.joint.along is None else max(low, 0.0)), high

@@ -11,7 +11,7 @@ from ..arrays import Floats
 from ..description.graph import tree_of
 from ..description.home_mobility import body_twist, column_joints
 from ..description.structure import Structure
-from ..motion.displacements import columns, displacements, rate_units, screws, stepped
+from ..motion.displacements import displacements, home_coordinates, rate_units, screws, stepped
 from ..rotations import angles_and_sines, square_to
 from ..tolerances import TOLERANCES
 from .opened import Loop, OpenMechanism
@@ -180,10 +180,5 @@ def _descended(closer: Closer, q: Floats, free: NDArray[np.bool_], low: Floats, 
 def bounds(opened: OpenMechanism) -> tuple[Floats, Floats]:
     """Bounds of all coordinates as deviations from home, (c,) each; infinite where there are none."""
     tree = opened.tree()
-    low, high = np.full((2, len(column_joints(tree))), np.inf)
-    low = -low
-    for joint in opened.joints:
-        if joint.range is not None:
-            pairs = np.reshape(joint.range, (-1, 2)) - np.reshape(tree.home_coordinate(joint.name), (-1, 1))
-            low[columns(tree)[joint.name]], high[columns(tree)[joint.name]] = pairs.T
+    low, high = np.reshape([each.limits for each in tree.coordinates], (-1, 2)).T - home_coordinates(tree)
     return low, high

@@ -14,6 +14,7 @@ from ..description.home_mobility import universal_axes
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
+from ..motion.displacements import columns
 from .cuts import Branch, CutTree, unique
 from .physics import Physics
 
@@ -112,23 +113,20 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
     if joint.type == "spherical":
         yield {"name": joint.name, "type": "ball"} | as_attributes(physics.joint(True, False))
         return
-    kinds = KINDS[joint.type].coordinates
-    pairs = (joint.range,) if len(kinds) == 1 else joint.range or (None,) * len(kinds)
-    homes = np.ravel(mechanism.home_coordinate(joint.name))
-    order = range(len(kinds))
-    for index in order if branch.forward else reversed(order):
-        turning = kinds[index] == "angle"
+    own = mechanism.coordinates[columns(mechanism)[joint.name]]
+    for each in own if branch.forward else reversed(own):
+        turning = each.kind == "angle"
         unit = 1.0 if turning else metres
         attributes = {
-            "name": joint.name if len(kinds) == 1 else f"{joint.name}[{index}]",
+            "name": each.name,
             "type": "hinge" if turning else "slide",
-            "axis": vector(_axes(mechanism, joint)[index] * (1.0 if branch.forward else -1.0)),
+            "axis": vector(_axes(mechanism, joint)[each.place] * (1.0 if branch.forward else -1.0)),
         }
-        if homes[index]:
-            attributes["ref"] = repr(float(homes[index]) * unit)
-        if pairs[index] is not None:
-            attributes["range"] = vector(np.array(pairs[index]) * unit)
-        yield attributes | as_attributes(physics.joint(turning, index in joint.driven))
+        if each.home:
+            attributes["ref"] = repr(each.home * unit)
+        if joint.range is not None:
+            attributes["range"] = vector(np.array(each.limits) * unit)
+        yield attributes | as_attributes(physics.joint(turning, each.place in joint.driven))
 
 
 def _axes(mechanism: Mechanism, joint: Joint) -> Floats:

@@ -78,7 +78,7 @@ def columns(mechanism: Structure) -> Mapping[str, slice]:
 @lru_cache(maxsize=64)
 def home_coordinates(mechanism: Structure) -> Floats:
     """All joint coordinates at home as the description counts them, (c,) [rad or length]."""
-    home = np.concatenate([np.ravel(mechanism.home_coordinate(joint.name)) for joint in mechanism.joints])
+    home = np.array([each.home for each in mechanism.coordinates], float)
     home.setflags(write=False)
     return home
 
@@ -224,6 +224,11 @@ def rate_units(mechanism: Structure) -> Floats:
     units = np.where(turning, 1.0, mechanism.characteristic_length)
     units.setflags(write=False)
     return units
+
+
+def actuator_units(mechanism: Structure) -> Floats:
+    """What the rates of actuators are counted in, (n_a,): 1 for an angle [1/s], L for a displacement [L/s]."""
+    return rate_units(mechanism)[[drive.column for drive in mechanism.drives]]
 
 
 @lru_cache(maxsize=64)

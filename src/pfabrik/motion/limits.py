@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..description.graph import cone_line
-from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
-from .displacements import columns, placed
+from .displacements import placed, rate_units
 
 
 class Ranges(NamedTuple):
@@ -44,23 +43,18 @@ class Ranges(NamedTuple):
 @lru_cache(maxsize=64)
 def ranges_of(mechanism: Mechanism) -> Ranges:
     """The ranges of a mechanism."""
-    joints = [joint for joint in mechanism.joints if joint.range is not None]
-    own = [(joint, place) for joint in joints for place in range(len(KINDS[joint.type].coordinates))]
-    bounds = np.concatenate([np.zeros((0, 2)), *(np.reshape(np.asarray(joint.range), (-1, 2)) for joint in joints)])
-    low, high = np.ascontiguousarray(bounds.T, np.float64)
+    own = [each for each in mechanism.coordinates if each.joint.range is not None]
+    columns = np.array([each.column for each in own], np.intp)
+    low, high = np.ascontiguousarray(np.reshape([each.limits for each in own], (-1, 2)).T, np.float64)
     return Ranges(
-        tuple(joint for joint, _ in own),
-        tuple(place for _, place in own),
-        np.array([columns(mechanism)[joint.name].start + place for joint, place in own], np.intp),
-        np.array([np.ravel(mechanism.home_coordinate(joint.name))[place] for joint, place in own], float),
+        tuple(each.joint for each in own),
+        tuple(each.place for each in own),
+        columns,
+        np.array([each.home for each in own], float),
         low,
         high,
-        np.array([_unit(mechanism, joint, place) for joint, place in own], float),
+        rate_units(mechanism)[columns],
     )
-
-
-def _unit(mechanism: Mechanism, joint: Joint, place: int) -> float:
-    return mechanism.characteristic_length if KINDS[joint.type].coordinates[place] == "length" else 1.0
 
 
 def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:

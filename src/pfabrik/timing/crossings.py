@@ -8,6 +8,7 @@ from ..answers.differential import inverse_jacobian
 from ..answers.tracked import Track
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
+from ..motion.displacements import actuator_units
 from ..tolerances import TOLERANCES
 
 LOOKS = 80
@@ -48,10 +49,8 @@ def _measured(track: Track, rows: Ints) -> tuple[Floats, Floats, Floats]:
     there are not as many actuators as freedoms.
     """
     mechanism = track.mechanism
-    slides = np.array([drive.kind == "length" for drive in mechanism.drives])
-    length = mechanism.characteristic_length
-    jacobians = inverse_jacobian(track[rows]) / np.where(slides, length, 1.0)[:, None]
-    jacobians[..., :3] *= length
+    jacobians = inverse_jacobian(track[rows]) / actuator_units(mechanism)[:, None]
+    jacobians[..., :3] *= mechanism.characteristic_length
     left, sizes, right = np.linalg.svd(jacobians, full_matrices=False)
     freedoms = int((sizes > TOLERANCES.rank * sizes[:, :1]).sum(axis=1).max(initial=0))
     square = freedoms == jacobians.shape[1]

@@ -9,6 +9,7 @@ import numpy as np
 from ..answers.tracked import Track
 from ..arrays import Floats
 from ..kernels.timing import second_derivatives
+from ..motion.displacements import actuator_units
 from ..poses import between
 from ..rotations import angles_between
 
@@ -84,9 +85,7 @@ class Curve:
 def curve_of(track: Track) -> Curve:
     """The curve through a path."""
     mechanism = track.mechanism
-    slides = np.array([drive.kind == "length" for drive in mechanism.drives])
-    sizes = np.where(slides, mechanism.characteristic_length, 1.0)
-    moves = np.linalg.norm(np.diff(track.actuators, axis=0) / sizes, axis=1)
+    moves = np.linalg.norm(np.diff(track.actuators, axis=0) / actuator_units(mechanism), axis=1)
     steps = np.concatenate([[0], 1 + np.flatnonzero(moves > STANDS)])
     s = np.concatenate([[0.0], np.cumsum(moves[steps[1:] - 1])])
     poses = np.ascontiguousarray(track.pose[steps])
@@ -94,4 +93,4 @@ def curve_of(track: Track) -> Curve:
     curves = np.empty_like(values)
     if len(steps) > 1:
         second_derivatives(s, values, curves)
-    return Curve(steps, s, values, curves, poses, len(sizes))
+    return Curve(steps, s, values, curves, poses, track.actuators.shape[1])
