@@ -5,7 +5,6 @@ Lengths are in the mechanism's unit. A leg that is read from the platform has it
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Literal, NamedTuple
@@ -14,9 +13,12 @@ import numpy as np
 
 from ..arrays import Floats
 from ..decomposition.items import Item
-from ..decomposition.leg_forms import LegForm, Pivot, Rod, holds_spin
+from ..decomposition.leg_forms import LegForm, Pivot, Rod, keeps_from_spinning
+from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
+from ..kernels.legs import records as K
+from ..kernels.legs.records import Record
 from ..rotations import square_to
 
 Number = float | Floats
@@ -75,7 +77,7 @@ _KNOWN = {
 }
 
 
-def leg_codes(mechanism: Mechanism, forms: Sequence[LegForm]) -> list[LegCode]:
+def leg_codes(mechanism: Mechanism, table: LegTable) -> list[LegCode]:
     """The legs of a mechanism.
 
     Raises
@@ -84,16 +86,16 @@ def leg_codes(mechanism: Mechanism, forms: Sequence[LegForm]) -> list[LegCode]:
     """
     codes: list[LegCode] = []
     main = 0
-    for place, form in enumerate(forms):
+    for place, (form, leg) in enumerate(zip(table.forms, table.legs, strict=True)):
         _require_known(mechanism, form)
         if isinstance(form, Pivot):
-            codes.append(_pivot(mechanism, form, place))
+            codes.append(LegCode(_pivot_shape(form), place, _pivot_numbers(mechanism, form, leg), _names(form.items)))
             continue
         assert isinstance(form, Rod)
         main = main if form.is_shared else place
-        first = forms[main]
+        first = table.forms[main]
         assert isinstance(first, Rod)
-        codes.append(_rod(mechanism, form, first, main))
+        codes.append(LegCode(_rod_shape(form, first), main, _rod_numbers(mechanism, form, leg), _names(form.items)))
     return codes
 
 
@@ -116,99 +118,81 @@ def _says_something(form: LegForm, name: str) -> bool:
     return not (value is None or value is False or (isinstance(value, tuple) and not value))
 
 
-def _rod(mechanism: Mechanism, rod: Rod, main: Rod, place: int) -> LegCode:
+def _rod_shape(rod: Rod, main: Rod) -> RodShape:
+    carrier = CARRIERS[main.carrier.kind] if main.carrier is not None else ""
+    foot, head, twists = rod.foot_ending.kind, rod.head_ending.kind, keeps_from_spinning(rod)
+    return RodShape(carrier, rod.is_shared, rod.slide is not None, twists, foot, head, rod.is_reversed)
+
+
+def _rod_numbers(mechanism: Mechanism, rod: Rod, leg: Record) -> dict[str, Number]:
     length = mechanism.characteristic_length
     span = (rod.head - rod.foot) * length
-    line = span / np.linalg.norm(span)
-    foot, head = rod.foot_ending, rod.head_ending
-    twists = holds_spin(foot) and holds_spin(head) and rod.twist is None
-    carrier = CARRIERS[main.carrier.kind] if main.carrier is not None else ""
     numbers: dict[str, Number] = {
-        "foot": rod.foot * length,
+        "foot": leg["foot_point"] * length,
         "head": _head_point(mechanism, rod.head, rod.is_reversed),
         "length": float(np.linalg.norm(span)),
-        "line": line,
+        "line": span / np.linalg.norm(span),
     }
-    for end, items in (("foot", foot.items), ("head", head.items[::-1])):
-        kind = foot.kind if end == "foot" else head.kind
-        if kind in ("hinge", "cross"):
-            numbers[f"{end}_axes"] = _axes(items)
-        if kind == "cross":
-            numbers[f"{end}_side"] = _aiming_side(numbers[f"{end}_axes"], line)
-    if twists:
-        first, last = foot.items[-1].axis, head.items[0].axis
-        flat = first @ last - (line @ first) * (line @ last)
-        numbers["twist"] = math.atan2(line @ np.cross(first, last), flat)
+    for end, ending in (("foot", rod.foot_ending), ("head", rod.head_ending)):
+        if ending.kind in ("hinge", "cross"):
+            numbers[f"{end}_axes"] = leg[f"{end}_axes"]
+        if ending.kind == "cross":
+            numbers[f"{end}_side"] = float(leg[f"{end}_side"])
+    if leg["twists"]:
+        numbers["twist"] = float(leg["twist"])
     if rod.carrier is not None:
-        numbers |= _carrier_numbers(rod.carrier, rod.foot, rod.head, length)
-    shape = RodShape(carrier, rod.is_shared, rod.slide is not None, twists, foot.kind, head.kind, rod.is_reversed)
-    return LegCode(shape, place, numbers, _names(rod.items))
+        numbers |= _carrier_numbers(rod, leg, length)
+    return numbers
 
 
-def _carrier_numbers(carrier: Item, foot: Floats, head: Floats, length: float) -> dict[str, Number]:
+def _carrier_numbers(rod: Rod, leg: Record, length: float) -> dict[str, Number]:
     """Of a crank the spoke from its axis to the foot, and that a quarter turn on; which solution is home's.
 
     What is to be reached at home counts from a crank's axis, or from the foot on a carriage.
     """
-    axis = carrier.axis
-    numbers: dict[str, Number] = {"axis": axis, "reach": (head - foot) * length}
-    motion = axis
-    if carrier.kind == "R":
-        centre = carrier.point + axis * (axis @ (foot - carrier.point))
-        motion = np.cross(axis, foot - centre)
-        numbers["reach"] = (head - centre) * length
-        numbers |= {"centre": centre * length, "spoke": (foot - centre) * length, "across": motion * length}
+    is_crank = leg["carrier"] == K.CRANK
+    begin = leg["carrier_point"] if is_crank else rod.foot
+    numbers: dict[str, Number] = {"axis": leg["carrier_axis"], "reach": (rod.head - begin) * length}
+    if is_crank:
+        fields = {"centre": "carrier_point", "spoke": "spoke", "across": "spoke_across"}
+        numbers |= {name: leg[field] * length for name, field in fields.items()}
     # a carriage has q = middle + side root, a crank q = middle + side acos: home's foot leaves the line or goes along
-    numbers["side"] = -1.0 if (head - foot) @ motion >= 0.0 else 1.0
+    return numbers | {"side": float(leg["side"])}
+
+
+def _pivot_shape(pivot: Pivot) -> PivotShape:
+    return PivotShape(len(pivot.slides), pivot.ending.kind, pivot.is_reversed)
+
+
+def _pivot_numbers(mechanism: Mechanism, pivot: Pivot, leg: Record) -> dict[str, Number]:
+    kind, n_slides = pivot.ending.kind, len(pivot.slides)
+    numbers: dict[str, Number] = {
+        "foot": leg["foot_point"] * mechanism.characteristic_length,
+        "head": _head_point(mechanism, leg["foot_point"], pivot.is_reversed),
+    }
+    if kind != "ball":
+        numbers["foot_axes"] = leg["foot_axes"]
+    if n_slides:
+        numbers["slides"] = leg["slide_rows"]
+    if n_slides < 3:
+        numbers["fixed"] = leg["fixed_rows"]
+    last = {"hinge": 1, "cross": 2, "triple": 3}.get(kind, 0)
+    if last:
+        numbers["square"] = square_to(leg["foot_axes"][last - 1])[0]
+    if kind == "hinge":
+        numbers["kept"] = leg["kept"]
+    if kind == "triple":
+        numbers["foot_side"] = float(leg["side"])
     return numbers
 
 
-def _pivot(mechanism: Mechanism, pivot: Pivot, place: int) -> LegCode:
-    kind, n_slides = pivot.ending.kind, len(pivot.slides)
-    reference = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
-    centre = pivot.ending.centre if pivot.ending.items else reference
-    directions = np.array([item.axis for item in pivot.slides]).reshape(-1, 3)
-    fixed = np.linalg.svd(directions)[2][n_slides:] if n_slides else np.eye(3)
-    axes = np.eye(3) if kind == "weld" else _axes(pivot.ending.items)
-    numbers: dict[str, Number] = {
-        "foot": centre * mechanism.characteristic_length,
-        "head": _head_point(mechanism, centre, pivot.is_reversed),
-    }
-    if kind != "ball":
-        numbers["foot_axes"] = axes
-    if n_slides:
-        numbers["slides"] = _padded(np.linalg.pinv(directions.T))
-    if n_slides < 3:
-        numbers["fixed"] = _padded(fixed)
-    last = {"hinge": 1, "cross": 2, "triple": 3}.get(kind, 0)
-    if last:
-        numbers["square"] = square_to(axes[last - 1])[0]
-    if kind == "hinge":
-        numbers["kept"] = _padded(square_to(axes[0]))
-    if kind == "triple":
-        numbers["foot_side"] = _aiming_side(axes, axes[2])
-    return LegCode(PivotShape(n_slides, kind, pivot.is_reversed), place, numbers, _names(pivot.items))
-
-
 def _head_point(mechanism: Mechanism, point: Floats, is_reversed: bool) -> Floats:
-    """A head at home, seen from the reference point; of a leg read from the platform, from the base's origin."""
+    """A head at home, seen from the reference point; of a leg read from the platform, from the base's origin.
+
+    It is told in the mechanism's unit, where round numbers stay so.
+    """
     head = point * mechanism.characteristic_length
     return head if is_reversed else head - np.asarray(mechanism.reference_point)
-
-
-def _axes(items: Sequence[Item]) -> Floats:
-    return _padded(np.array([item.axis for item in items]).reshape(-1, 3))
-
-
-def _padded(rows: Floats) -> Floats:
-    """Three rows, the last of them zero where there are fewer."""
-    return np.vstack([rows, np.zeros((3 - len(rows), 3))])
-
-
-def _aiming_side(axes: Number, line: Floats) -> float:
-    """Which of the two ways to aim two crossed hinges is home's."""
-    first, second, *_ = np.asarray(axes)
-    return -math.copysign(1.0, first @ np.cross(second, line))
 
 
 def _names(items: Sequence[Item]) -> tuple[str, ...]:

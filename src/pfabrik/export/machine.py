@@ -79,7 +79,7 @@ class Machine:
         self.task: Task = task_of(mechanism)
         if self.task.rotations == 1:
             raise UnsupportedMechanism(mechanism.name, ["its task sets the yaw alone of the rotation"], "exported")
-        self.codes = leg_codes(mechanism, table.forms)
+        self.codes = leg_codes(mechanism, table)
         shapes = dict.fromkeys(code.shape for code in self.codes)
         self.letters = {shape: chr(ord("a") + place) for place, shape in enumerate(shapes)}
         self.limited = [self._coordinate(record) for record in table.limited]
