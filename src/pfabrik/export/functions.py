@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..description.task import Task
 from .machine import Machine
 from .wording import literal, quoted
 
@@ -18,7 +19,7 @@ def functions(machine: Machine, parts: Sequence[str]) -> str:
     if "ik" in parts or "fk" in parts:
         lines += _read(machine)
     if "ik" in parts:
-        lines += _ik(machine, "limits" in parts, "fk" in parts)
+        lines += [*_ik(machine, "limits" in parts, "fk" in parts), *_count_turns(machine)]
     if "limits" in parts:
         lines += _limits(machine, "fk" in parts)
     if "fk" in parts:
@@ -166,7 +167,7 @@ def _lead(machine: Machine, forward: bool) -> Iterator[str]:
 
 
 def _ik(machine: Machine, limits: bool, forward: bool) -> Iterator[str]:
-    task, completes = machine.task, bool(machine.unset)
+    completes = bool(machine.unset)
     if completes:
         yield from _lead(machine, forward)
     yield "int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS])"
@@ -179,24 +180,7 @@ def _ik(machine: Machine, limits: bool, forward: bool) -> Iterator[str]:
         yield "    pfk_real row[PFK_ROWS], slope[PFK_ROWS][6], worst;"
     yield "    int code;"
     if completes:
-        for axis in range(3):
-            if not task.axes[axis]:
-                yield f"    wanted.p[{axis}] = 0.0;"
-        if task.rotations == 0:
-            yield "    pfk_home(&wanted);"
-            for axis in range(3):
-                if task.axes[axis]:
-                    yield f"    wanted.p[{axis}] = target->p[{axis}];"
-        yield "    if (pfk_make_exact(&wanted) || pfk_make_exact(&own))"
-        yield "        return PFK_NO_POSE;"
-        yield "    code = pfk_lead(&wanted, 1, &own, leg);"
-        yield "    if (code > 0) { /* there may be a way in small steps */"
-        yield "        own = *pose;"
-        yield "        pfk_make_exact(&own);"
-        yield "        code = pfk_lead(&wanted, PFK_PARTS, &own, leg);"
-        yield "    }"
-        yield "    if (code < 0)"
-        yield "        return code;"
+        yield from _complete(machine.task)
     else:
         yield "    if (pfk_make_exact(&own))"
         yield "        return PFK_NO_POSE;"
@@ -212,21 +196,48 @@ def _ik(machine: Machine, limits: bool, forward: bool) -> Iterator[str]:
     yield "    return 0;"
     yield "}"
     yield ""
+
+
+def _complete(task: Task) -> Iterator[str]:
+    """Lead the pose to a target that leaves something open, at once or in small steps."""
+    for axis in range(3):
+        if not task.axes[axis]:
+            yield f"    wanted.p[{axis}] = 0.0;"
+    if task.rotations == 0:
+        yield "    pfk_home(&wanted);"
+        for axis in range(3):
+            if task.axes[axis]:
+                yield f"    wanted.p[{axis}] = target->p[{axis}];"
+    yield "    if (pfk_make_exact(&wanted) || pfk_make_exact(&own))"
+    yield "        return PFK_NO_POSE;"
+    yield "    code = pfk_lead(&wanted, 1, &own, leg);"
+    yield "    if (code > 0) { /* there may be a way in small steps */"
+    yield "        own = *pose;"
+    yield "        pfk_make_exact(&own);"
+    yield "        code = pfk_lead(&wanted, PFK_PARTS, &own, leg);"
+    yield "    }"
+    yield "    if (code < 0)"
+    yield "        return code;"
+
+
+def _count_turns(machine: Machine) -> Iterator[str]:
+    """A function that counts angles by whole turns from those before, where a range lets them turn so far."""
     turning = [(place, each) for place, each in enumerate(machine.driven) if each.may_turn]
-    if turning:
-        yield "void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS])"
-        yield "{"
-        yield "    pfk_real near;"
-        for place, each in turning:
-            yield f"    near = pfk_wrap(now[{place}], before[{place}]);"
-            lo, hi = each.home + each.lo, each.home + each.hi
-            if np.isfinite(each.hi - each.lo):
-                yield f"    if (near >= {_signed(lo)} && near <= {_signed(hi)})"
-                yield f"        now[{place}] = near;"
-            else:
-                yield f"    now[{place}] = near;"
-        yield "}"
-        yield ""
+    if not turning:
+        return
+    yield "void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS])"
+    yield "{"
+    yield "    pfk_real near;"
+    for place, each in turning:
+        yield f"    near = pfk_wrap(now[{place}], before[{place}]);"
+        lo, hi = each.home + each.lo, each.home + each.hi
+        if np.isfinite(each.hi - each.lo):
+            yield f"    if (near >= {_signed(lo)} && near <= {_signed(hi)})"
+            yield f"        now[{place}] = near;"
+        else:
+            yield f"    now[{place}] = near;"
+    yield "}"
+    yield ""
 
 
 def _limits(machine: Machine, forward: bool) -> Iterator[str]:

@@ -73,10 +73,8 @@ def _head(shape: RodShape | PivotShape, letter: str, can_be_given: bool) -> list
 
 
 def _place_rod(shape: RodShape, needs: Needs) -> Iterator[str]:
-    rod, leg = ("main", "lead") if shape.is_shared else ("rod", "leg")
     ends = [(end, kind) for end, kind in (("foot", shape.foot), ("head", shape.head)) if end in needs.angles]
     aimed = [end for end, kind in ends if kind == "cross"]
-    can_be_given = needs.given
     own_carrier = shape.carrier and not shape.is_shared
     yield "    pfk_real gap = 0.0;"
     if aimed:
@@ -87,19 +85,46 @@ def _place_rod(shape: RodShape, needs: Needs) -> Iterator[str]:
         yield "    pfk_real moved[3];"
     yield "    pfk_map(frame, rod->head, leg->head);"
     if own_carrier:
-        find = f"leg->is_held = pfk_{shape.carrier}(rod, moved, leg);"
-        yield "    pfk_displaced(frame, rod->head, moved);"
-        if can_be_given:
-            yield "    if (given) {"
-            yield "        leg->is_held = 1;"
-            yield "        leg->carrier = *given;"
-            if shape.carrier == "crank":
-                yield "        leg->cosine = cos(*given);"
-                yield "        leg->sine = sin(*given);"
-            yield "    } else"
-            yield f"        {find}"
-        else:
-            yield f"    {find}"
+        yield from _find_carrier(shape.carrier, needs.given)
+    yield from _place_foot(shape)
+    yield "    pfk_along(leg->head, -1.0, leg->foot, leg->span);"
+    yield "    leg->length = pfk_norm(leg->span);"
+    yield "    leg->u[0] = leg->u[1] = leg->u[2] = 0.0;"
+    yield "    if (!(leg->length > 0.0))"
+    yield "        return 1.0;"
+    yield "    pfk_along(leg->u, 1.0 / leg->length, leg->span, leg->u);"
+    yield from _see_line(shape, needs.lines | {end for end, _ in ends})
+    if own_carrier:
+        test = "leg->is_held && !given" if needs.given else "leg->is_held"
+        yield f"    if ({test})"
+        yield "        gap = fabs(leg->length - rod->length) / PFK_SIZE;"
+    for end, kind in ends:
+        yield from _turn_end(end, kind)
+    if shape.twists and aimed:
+        yield from _aim_otherwise(shape, aimed[-1])
+    yield "    return gap;"
+
+
+def _find_carrier(carrier: str, can_be_given: bool) -> Iterator[str]:
+    """Where a rod's own carrier is, so that the rod reaches its head; or as it is given."""
+    find = f"leg->is_held = pfk_{carrier}(rod, moved, leg);"
+    yield "    pfk_displaced(frame, rod->head, moved);"
+    if not can_be_given:
+        yield f"    {find}"
+        return
+    yield "    if (given) {"
+    yield "        leg->is_held = 1;"
+    yield "        leg->carrier = *given;"
+    if carrier == "crank":
+        yield "        leg->cosine = cos(*given);"
+        yield "        leg->sine = sin(*given);"
+    yield "    } else"
+    yield f"        {find}"
+
+
+def _place_foot(shape: RodShape) -> Iterator[str]:
+    """Where the foot is, on what carries it."""
+    rod, leg = ("main", "lead") if shape.is_shared else ("rod", "leg")
     if shape.carrier == "crank" and shape.is_shared:
         yield "    pfk_along(rod->foot, -1.0, main->centre, arm);"
         yield "    pfk_about(arm, main->axis, lead->cosine, lead->sine, leg->arm);"
@@ -113,33 +138,27 @@ def _place_rod(shape: RodShape, needs: Needs) -> Iterator[str]:
         yield f"    pfk_along(rod->foot, {leg}->carrier, {rod}->axis, leg->foot);"
     else:
         yield "    pfk_along(rod->foot, 0.0, rod->foot, leg->foot);"
-    yield "    pfk_along(leg->head, -1.0, leg->foot, leg->span);"
-    yield "    leg->length = pfk_norm(leg->span);"
-    yield "    leg->u[0] = leg->u[1] = leg->u[2] = 0.0;"
-    yield "    if (!(leg->length > 0.0))"
-    yield "        return 1.0;"
-    yield "    pfk_along(leg->u, 1.0 / leg->length, leg->span, leg->u);"
-    seen = needs.lines | {end for end, _ in ends}
+
+
+def _see_line(shape: RodShape, seen: frozenset[str]) -> Iterator[str]:
+    """The rod's direction as what its foot, or its head, is on sees it."""
+    rod, leg = ("main", "lead") if shape.is_shared else ("rod", "leg")
     if "foot" in seen and shape.carrier == "crank":
         yield f"    pfk_about(leg->u, {rod}->axis, {leg}->cosine, -{leg}->sine, leg->foot_line);"
     elif "foot" in seen:
         yield "    pfk_along(leg->u, 0.0, leg->u, leg->foot_line);"
     if "head" in seen:
         yield "    pfk_rotate_back(frame, leg->u, leg->head_line);"
-    if own_carrier:
-        test = "leg->is_held && !given" if can_be_given else "leg->is_held"
-        yield f"    if ({test})"
-        yield "        gap = fabs(leg->length - rod->length) / PFK_SIZE;"
-    for end, kind in ends:
-        if kind == "hinge":
-            yield f"    leg->{end}_angle[0] = pfk_angle(rod->{end}_axes[0], rod->line, leg->{end}_line);"
-        elif kind == "cross":
-            arguments = f"rod->{end}_axes, rod->line, leg->{end}_line, rod->{end}_side, leg->{end}_angle"
-            yield f"    sure = pfk_aim({arguments});"
-            yield "    gap = -sure > gap ? -sure : gap;"
-    if shape.twists and aimed:
-        yield from _aim_otherwise(shape, aimed[-1])
-    yield "    return gap;"
+
+
+def _turn_end(end: str, kind: str) -> Iterator[str]:
+    """The angles of the hinges at an end; of two that cross, also whether they can point the rod there."""
+    if kind == "hinge":
+        yield f"    leg->{end}_angle[0] = pfk_angle(rod->{end}_axes[0], rod->line, leg->{end}_line);"
+    elif kind == "cross":
+        arguments = f"rod->{end}_axes, rod->line, leg->{end}_line, rod->{end}_side, leg->{end}_angle"
+        yield f"    sure = pfk_aim({arguments});"
+        yield "    gap = -sure > gap ? -sure : gap;"
 
 
 def _aim_otherwise(shape: RodShape, end: str) -> Iterator[str]:
