@@ -1,4 +1,4 @@
-"""How a question is to be answered."""
+"""Options of questions: tolerances, iterations, the working mode, what projections keep, and what wrong rows do."""
 
 from __future__ import annotations
 

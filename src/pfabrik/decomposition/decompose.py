@@ -132,7 +132,7 @@ def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
     the bodies that all its ways pass: where several ways leave a body, they are branches if they end at the end
     effector, else a loop of its own. Each sub-chain says why positions alone cannot express it, if so.
 
-    Source: the paper's TDS. Which chains positions can express: `pfabrik.positions`.
+    Source: the paper's TDS. Which chains positions can express: `decomposition.positions`.
     """
     graph = graph_of(checked_mechanism(mechanism))
     groups = components(graph.edges, graph.base, graph.end)

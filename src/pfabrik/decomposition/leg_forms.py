@@ -26,7 +26,7 @@ class Ending:
 
 @dataclass(frozen=True, eq=False)
 class Rod:
-    """A rod and what carries it; see above.
+    """A rod and what carries it.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Rod:
 
 @dataclass(frozen=True, eq=False)
 class Pivot:
-    """Slides and an ending of no length; see above."""
+    """Slides and an ending of no length."""
 
     slides: tuple[Item, ...]
     ending: Ending
@@ -82,7 +82,7 @@ class KeptAxis:
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """A hinge or slide that legs are on; see above.
+    """A hinge or slide that legs are on.
 
     Attributes
     ----------
