@@ -112,7 +112,7 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
     """Looked at alone, those that have multipliers, and what carries them, give the gradient that all legs give."""
     mechanism, described, table = described_by_name(name)
     rng = np.random.default_rng(1)
-    search, n = new_search(table), E.count_unknowns(table)
+    search, n = new_search(table, table.cones.shape[0]), E.count_unknowns(table)
     objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
     aim = Aim(objective, np.zeros((0, len(table.driven))))
     search.target[:] = somewhere(mechanism, described, rng).pose

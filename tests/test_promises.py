@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from checks import excess_of_joints, gap_of_joints
 from pfabrik import Cone, Joint, Mechanism, Options, Status
 from pfabrik.errors import InvalidArgument
 
@@ -140,6 +141,77 @@ def test_a_coarse_tolerance_opens_no_loop() -> None:
     answer = pf.solve_ik(machine, targets, options=Options(exact=False, tolerance=1e3))
     assert np.max(answer.residual) <= 1e-9 * machine.characteristic_length
     assert (answer.status <= Status.PROJECTED).all()
+
+
+def wrist(legs: int, lean: float, offset: float, half: float, elbow: float | None) -> Mechanism:
+    """Legs of four hinges between two centres, crossed in pairs, neither square to each other nor to the line between
+    the centres: they cannot point it anywhere. An Omni-Wrist has four, two of them driven."""
+    joints = []
+    for i, angle in enumerate(2.0 * np.pi * np.arange(legs) / legs):
+        out, aside = (np.cos(angle), np.sin(angle), 0.0), (np.cos(angle + lean), np.sin(angle + lean), 0.0)
+        knee, shin = np.multiply(offset, out) + (0, 0, 0.3), np.multiply(offset, out) + (0, 0, 0.7)
+        joints += [
+            Joint(
+                f"A{i}", "revolute", ("base", f"p{i}"), at=(0, 0, 0), axis=aside, actuated=i < 2, range=(-half, half)
+            ),
+            Joint(f"B{i}", "revolute", (f"p{i}", f"q{i}"), at=knee, axis=knee, range=elbow and (-elbow, elbow)),
+            Joint(
+                f"C{i}",
+                "revolute",
+                (f"q{i}", f"r{i}"),
+                at=shin,
+                axis=(*-shin[:2], 0.3),
+                range=elbow and (-elbow, elbow),
+            ),
+            Joint(f"D{i}", "revolute", (f"r{i}", "platform"), at=(0, 0, 1), axis=aside),
+        ]
+    return Mechanism("wrist", joints, "platform", (0, 0, 1), task=("tilt",))
+
+
+@pytest.mark.parametrize("machine", [wrist(4, 1.047, 0.42, 1.22, 1.745), wrist(3, 1.309, 0.4125, 1.047, None)])
+def test_hinges_that_cannot_point_their_rod_anywhere_are_not_told_to(machine: Mechanism) -> None:
+    """Out of reach, on a path and by actuator values alike; from a feasible start there is always an answer."""
+    rng = np.random.default_rng(0)
+    axes = rng.normal(size=(60, 3)) * (1.0, 1.0, 0.1)
+    tilts = rng.uniform(0.0, 3.1, (60, 1)) * axes / np.linalg.norm(axes, axis=1)[:, None]
+    targets = np.stack([pf.pose((0, 0, 1), rotvec=tilt) for tilt in tilts])
+    home = pf.solve_ik(machine, machine.home_pose)
+    for answer in (pf.solve_ik(machine, targets), pf.solve_ik(machine, targets, start=home)):
+        assert (answer.status <= Status.PROJECTED).all() and (answer.status == Status.PROJECTED).any()
+        assert gap_of_joints(machine, answer).max() <= 1e-9
+        assert excess_of_joints(machine, answer).max() <= 1e-9
+    found = pf.solve_fk(machine, rng.uniform(-1.0, 1.0, (60, 2)))
+    assert gap_of_joints(machine, found).max() <= 1e-9
+    assert excess_of_joints(machine, found).max() <= 1e-9
+
+
+def wide_five_bar() -> Mechanism:
+    """A 5-bar whose elbows may go through their dead points."""
+    turn = np.radians
+    return Mechanism(
+        "5-bar with wide elbows",
+        [
+            Joint("A1", "revolute", ("base", "a1"), at=(-36, 0, 0), axis=Z, actuated=True, range=(turn(-94), turn(94))),
+            Joint("B1", "revolute", ("a1", "c1"), at=(-78, 106, 0), axis=Z, range=(turn(-143), turn(85))),
+            Joint("A2", "revolute", ("base", "a2"), at=(36, 0, 0), axis=Z, actuated=True, range=(turn(-94), turn(94))),
+            Joint("B2", "revolute", ("a2", "c2"), at=(78, 106, 0), axis=Z, range=(turn(-85), turn(143))),
+            Joint("tip", "revolute", ("c1", "c2"), at=(0, 231, 0), axis=Z),
+        ],
+        "tip",
+        task=("x", "y"),
+    )
+
+
+def test_more_freedom_leads_no_farther_from_the_target() -> None:
+    """Answers that may be in any working mode are no farther than those that may not, nor than what others reach."""
+    machine, rng = wide_five_bar(), np.random.default_rng(3)
+    targets = machine.home_pose[:3, 3] + rng.uniform(-500, 500, (300, 3)) * (1, 1, 0)
+    answer = pf.solve_ik(machine, targets)
+    kept = pf.solve_ik(machine, targets, options=Options(working_mode="keep"))
+    assert (answer.position_error <= kept.position_error + 1e-6 * machine.characteristic_length).all()
+    feasible = answer.pose[:, :3, 3]
+    nearest = np.linalg.norm(targets[:, None] - feasible[None], axis=2).min(axis=1)
+    assert (answer.position_error <= nearest + 1e-6 * machine.characteristic_length).all()
 
 
 def test_answers_survive_pickling_and_copying_after_they_were_read() -> None:

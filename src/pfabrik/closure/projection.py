@@ -16,7 +16,7 @@ from ..kernels.closure.loops import LOCKED
 from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
-from .close import Closing, Closure, close, closure_of
+from .close import Closing, Closure, close, closure_of, platform_poses
 from .descend import approached, weighed_limits
 from .known import corners_of
 from .nearest import nearest
@@ -104,6 +104,11 @@ def project(
         if len(lost) and LOCKED in way.weights:
             placed = _placed(closure, starts[0][lost], targets[lost], way)
             _take_nearer(closure, best, lost, placed, targets, way, np.zeros(len(lost), np.int64))
+    lost = np.flatnonzero(np.isinf(best.distances))
+    if len(lost):  # where a search starts is feasible, or nearly: better than no answer
+        begin = starts[0][lost]
+        stayed = close(closure, begin, platform_poses(closure.mechanism, begin), max_iterations=0)
+        _take_nearer(closure, best, lost, stayed, targets, ways[-1], np.zeros(len(lost), np.int64))
     return best
 
 

@@ -73,6 +73,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
             _STARTS,
             0,
             0,
+            0,
             Found(*_values("f1 f3 f2 f2 i1 f2 f2")),
             _F2,
         ),

@@ -17,7 +17,7 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
 from .nearest import corners_of, home_start, nearest_actuators, no_starts, starts_at
-from .table import machine
+from .table import machine_searched
 
 ROWS_A_BLOCK = 256
 
@@ -97,7 +97,7 @@ def _assemble(
     """Assemble rows on all cores; the arrays are the actuators, then what is filled: see the kernel."""
     from ..kernels.platform.forward import assemble
 
-    legs, turns, elsewhere = machine(table), not mechanism.end_effector_is_joint, Handle(others)
+    legs, turns, elsewhere = machine_searched(table), not mechanism.end_effector_is_joint, Handle(others)
 
     def run(block: slice) -> None:
         first, (values, *filled) = Handle(own if len(own.poses) == 1 else own.at(block)), (a[block] for a in arrays)

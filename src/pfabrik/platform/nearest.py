@@ -21,12 +21,12 @@ from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Aim, Found, Starts
-from ..kernels.rows import HOLD_NOTHING
+from ..kernels.rows import HOLD_NOTHING, LIMIT_EXCESS
 from ..kernels.threads import in_blocks
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 from .rotation import constraints_at, keeps_rotation, without_idle_legs
-from .table import machine
+from .table import machine_searched, with_aims
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
@@ -194,20 +194,25 @@ def _approach(
     driven: Records | None = None,
     *,
     stays: bool = False,
+    minds_aims: bool = False,
 ) -> tuple[Found, Floats]:
     """The kernel over all rows, on all cores: what was found, or what holds them where they start.
 
     Parameters
     ----------
     values : what coordinates, those of actuators if no others are `driven`, are to be near to; see `Aim`.
+    minds_aims : keep on the way, too, to where crossed hinges can point their rods. Rows that end where they cannot are
+        searched for again like this: a way that is barred ends earlier.
     """
     from ..kernels.platform.nearest import approach
 
     at_home = table.task[0]["rotations"] == 0 and objective.platform[3] == LOCKED and objective.max_iterations > 0
-    asked = without_idle_legs(table) if at_home and not len(table.arms) else machine(table)
+    asked = without_idle_legs(table) if at_home and not len(table.arms) else machine_searched(table)
     asked = asked if driven is None else Handle(asked.record._replace(driven=driven))
     found, legs = _new_found(len(objective.targets), table), asked.record
     limits = 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)
+    aims = len(with_aims(legs.legs, legs.cones[:0]))
+    minded = len(legs.cones) - (0 if minds_aims or objective.max_iterations == 0 else aims)
     weights = np.zeros((len(objective.targets), limits))
     hits = _hits(table) if values is None else HITS_OF_VALUES
     near = np.zeros((0, len(legs.driven))) if values is None else values
@@ -216,9 +221,17 @@ def _approach(
         first = own if len(own.poses) == 1 else own.at(block)
         aim = Aim(objective._replace(targets=objective.targets[block]), near[block])
         into = Found._make(array[block] for array in found)
-        approach(asked.address, aim, first, others, hits, int(stays), into, weights[block])
+        approach(asked.address, aim, first, others, hits, int(stays), minded, into, weights[block])
 
     in_blocks(run, len(found.distances), ROWS_A_BLOCK)
+    astray = found.measures[:, LIMIT_EXCESS] > TOLERANCES.limit
+    if minded < len(legs.cones) and astray.any():
+        begin = own if len(own.poses) == 1 else own.at(np.flatnonzero(astray))
+        again = objective._replace(targets=objective.targets[astray])
+        asked_values = None if values is None else values[astray]
+        pointed = _approach(table, again, begin, others, asked_values, driven, stays=stays, minds_aims=True)[0]
+        for array, tried in zip(found, pointed, strict=True):
+            array[astray] = tried
     return found, weights
 
 

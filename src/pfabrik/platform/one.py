@@ -16,7 +16,7 @@ from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
 from ..kernels.rows import Rows
 from .nearest import home_start, no_starts
-from .table import machine, machine_nearby, resting_at_home
+from .table import machine, machine_nearby, machine_searched, resting_at_home
 
 
 class OneTarget:
@@ -105,7 +105,7 @@ class OneAssembly:
         turns = not mechanism.end_effector_is_joint
         self._starts = Handle(home_start(mechanism, table)), Handle(no_starts(table))
         self._asked = turns, *(starts.address for starts in self._starts)
-        self._legs, self._arms = machine(table), table.led_arms["leg"]
+        self._legs, self._arms = machine_searched(table), table.led_arms["leg"]
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:

@@ -14,7 +14,7 @@ from ..description.task import task_of
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
-from .table import Machine, kernel_table, machine
+from .table import Machine, kernel_table, machine, machine_searched, with_aims
 
 SAMPLES, NEARBY = 8, 0.05
 """How many poses about home are looked at, and how far off they are [L]."""
@@ -48,7 +48,7 @@ def without_idle_legs(table: LegTable) -> Machine:
     legs, rows = table.legs.copy(), table.task[0]["rows"]
     values, slopes = constraints_at(table, _shifted_about_home(table))
     if not len(values):
-        return machine(table)
+        return machine_searched(table)
     quiet = np.maximum(np.abs(values), np.abs(slopes[:, :, :3]).max(axis=2)).max(axis=0) <= TOLERANCES.implied
     ends = np.append(legs["first_row"][1:], rows)
     limited = np.concatenate([table.limited["leg"], table.driven["leg"]])
@@ -61,7 +61,7 @@ def without_idle_legs(table: LegTable) -> Machine:
         if len(own) and own.all() and k not in limited and (has_first or k not in cones["leg"]):
             legs["kind"][k] = K.IDLE
             cones["leg"][cones["leg"] == k] = main
-    return Handle(kernel_table(table)._replace(legs=legs, cones=cones[_of_their_own(cones)]))
+    return Handle(kernel_table(table)._replace(legs=legs, cones=with_aims(legs, cones[_of_their_own(cones)])))
 
 
 def _of_their_own(cones: NDArray[np.void]) -> NDArray[np.bool_]:

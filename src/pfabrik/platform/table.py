@@ -12,6 +12,7 @@ from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting, at_rest
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
+from ..tolerances import TOLERANCES
 
 Machine: TypeAlias = Handle[K.Table]
 
@@ -38,6 +39,31 @@ def machine(table: LegTable) -> Machine:
 def machine_nearby(table: LegTable) -> Machine:
     """The same for poses that are completed near to where they began alone."""
     return Handle(kernel_table(table)._replace(task=table.task_within(STRANGE)))
+
+
+@lru_cache(maxsize=64)
+def machine_searched(table: LegTable) -> Machine:
+    """The same for searches and assembly, where it is a limit that crossed hinges cannot point rods anywhere."""
+    return Handle(kernel_table(table)._replace(cones=with_aims(table.legs, table.cones)))
+
+
+def with_aims(legs: K.Records, cones: K.Records) -> K.Records:
+    """Cones, and after them those that say where two crossed hinges can point their rods.
+
+    Hinges a, b with an angle A between them, and B between b and the rod: its angle from a is from |A - B| to A + B, or
+    to 2 pi - A - B. Hinges square to each other and to their rod point it anywhere.
+    """
+    aims = []
+    for k, leg in enumerate(legs):
+        for end, place in (("foot", K.FOOT_LINE), ("head", K.HEAD_LINE)):
+            if leg["kind"] != K.ROD or leg[end] != K.CROSS:
+                continue
+            a, b = leg[f"{end}_axes"][:2]
+            A, B = np.arccos(np.clip([a @ b, b @ leg["line"]], -1.0, 1.0))
+            for axis, most in ((a, min(A + B, 2.0 * np.pi - A - B)), (-a, np.pi - abs(A - B))):
+                if most < np.pi - TOLERANCES.alignment:
+                    aims.append((k, place, axis, most, np.cos(most), 0))
+    return np.concatenate([cones, np.array(aims, K.CONE)]) if aims else cones
 
 
 @lru_cache(maxsize=64)

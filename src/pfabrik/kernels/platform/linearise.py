@@ -70,7 +70,7 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
             for j in range(slope.shape[0]):
                 slope[j] = -slope[j]
             k = add_limit(k, below, 2 * i, search.look.slope, view)
-    for i in range(table.cones.shape[0]):
+    for i in range(search.near_cosines.shape[0]):
         cone = table.cones[i]
         line = vec(values[cone["leg"], cone["place"] :])
         if dot(vec(cone["axis"]), line) <= search.near_cosines[i]:

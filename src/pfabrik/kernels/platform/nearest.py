@@ -185,7 +185,15 @@ def search_row(
 
 @search
 def approach(
-    machine: int, aim: Aim, own: Starts, others: Starts, hits: int, stays: int, found: Found, weights: Floats
+    machine: int,
+    aim: Aim,
+    own: Starts,
+    others: Starts,
+    hits: int,
+    stays: int,
+    cones: int,
+    found: Found,
+    weights: Floats,
 ) -> None:
     """Fill the nearest feasible configuration of every row.
 
@@ -198,9 +206,10 @@ def approach(
     own : the first start of each row, or one for all.
     others : starts that follow, for any row, until the nearest configuration has been met as often as `hits` says.
     stays : 1 for configurations in the working mode of a row's first start alone.
+    cones : how many of the cones searches mind, the first ones; excesses over all of them are told.
     """
     table = open_table(machine)
-    search, best = new_search(table), new_now(table.legs.shape[0])
+    search, best = new_search(table, cones), new_now(table.legs.shape[0])
     k, n = search.first.linear.G.shape
     p, pulls = new_qp(k, k), np.zeros((k, n))
     for row in range(found.distances.shape[0]):

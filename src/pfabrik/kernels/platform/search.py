@@ -45,18 +45,18 @@ class Search(NamedTuple):
     target: Floats  # (4, 4): of the row [L]
     kept: Floats  # (legs,): the sides that carriers are to stay on; 0 for either
     pulled: Ints  # (legs,): 1 for those that the Lagrangian asks for
-    near_cosines: Floats  # (cones,): of angles from their axes at which cones are near
+    near_cosines: Floats  # (cones,): of angles from their axes at which the cones that are minded are near
 
 
 @allocator
-def new_search(table: Table) -> Search:
-    """Scratch memory of one thread."""
+def new_search(table: Table, cones: int) -> Search:
+    """Scratch memory of one thread, for searches that mind so many cones, the first ones."""
     n, legs = count_unknowns(table), table.legs.shape[0]
     rows, limits = table.task[0]["rows"] + n, 2 * table.limited.shape[0] + table.cones.shape[0] + legs
     elimination = new_elimination(n, rows)
     for j in range(n):
         elimination.used[j] = 2 if j < 6 else 1
-    near_cosines = np.zeros(table.cones.shape[0])
+    near_cosines = np.zeros(cones)
     for i in range(near_cosines.shape[0]):
         near_cosines[i] = math.cos(max(table.cones[i]["half_angle"] - NEAR, 0.0))
     return Search(
