@@ -146,7 +146,7 @@ def test_a_coarse_tolerance_opens_no_loop() -> None:
 def wrist(legs: int, lean: float, offset: float, half: float, elbow: float | None) -> Mechanism:
     """Legs of four hinges between two centres, crossed in pairs, neither square to each other nor to the line between
     the centres: they cannot point it anywhere. An Omni-Wrist has four, two of them driven."""
-    joints = []
+    joints, wide, bend = [], (-half, half), elbow and (-elbow, elbow)
     for i, angle in enumerate(2.0 * np.pi * np.arange(legs) / legs):
         out, aside = (np.cos(angle), np.sin(angle), 0.0), (np.cos(angle + lean), np.sin(angle + lean), 0.0)
         knee, shin = np.multiply(offset, out) + (0, 0, 0.3), np.multiply(offset, out) + (0, 0, 0.7)
@@ -154,7 +154,7 @@ def wrist(legs: int, lean: float, offset: float, half: float, elbow: float | Non
             Joint(
                 f"A{i}", "revolute", ("base", f"p{i}"), at=(0, 0, 0), axis=aside, actuated=i < 2, range=(-half, half)
             ),
-            Joint(f"B{i}", "revolute", (f"p{i}", f"q{i}"), at=knee, axis=knee, range=elbow and (-elbow, elbow)),
+            Joint(f"B{i}", "revolute", (f"p{i}", f"q{i}"), at=knee, axis=knee, range=bend),
             Joint(
                 f"C{i}",
                 "revolute",

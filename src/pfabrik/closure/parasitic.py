@@ -35,7 +35,7 @@ def asks_too_much(mechanism: Mechanism) -> bool:
 
 def has_other_assemblies(mechanism: Mechanism) -> bool:
     """Whether a target that one way of assembly misses is to be looked for in all others: they reach different ones."""
-    return follows_task(mechanism) and asks_too_much(mechanism)
+    return follows_task(mechanism) and asks_too_much(mechanism) and has_parasitic_motion(mechanism)
 
 
 def _asked(mechanism: Mechanism) -> int:
