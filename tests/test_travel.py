@@ -316,3 +316,20 @@ def test_a_projected_answer_is_a_start_like_any_other() -> None:
     from_home = pf.travel(home_of(machine), along=-Z).distances[0]
     height = top.pose[2, 3] - machine.reference_point[2]
     assert down.distance == pytest.approx(height + from_home, abs=1e-6 * machine.characteristic_length)
+
+
+def test_a_rod_that_goes_faster_and_faster_stops_nothing_before_it_is_square_to_its_rail() -> None:
+    """A lambda of two rods on rails: near the end of its way a step of the length of the first ones is not followed."""
+    turn = np.radians
+    joints = [
+        Joint("P1", "prismatic", ("base", "car1"), axis=(1, 0, 0), actuated=True, range=(-80, 70)),
+        Joint("P2", "prismatic", ("base", "car2"), axis=(1, 0, 0), actuated=True, range=(-90, 80)),
+        Joint("A1", "revolute", ("car1", "rod1"), at=(-60, 0, 0), axis=(0, 0, 1), range=(turn(-35), turn(50))),
+        Joint("A2", "revolute", ("car2", "rod2"), at=(110, -10, 0), axis=(0, 0, 1), range=(turn(-40), turn(50))),
+        Joint("B", "revolute", ("rod1", "rod2"), at=(60, 65, 0), axis=(0, 0, 1), range=(turn(-60), turn(60))),
+    ]
+    machine = Mechanism("lambda", joints, "rod1", (160, 120, 0), task=("x", "y"))
+    end = pf.travel(pf.solve_ik(machine, machine.home_pose), along=(0, 1, 0))[0]
+    knee = np.hypot(50, 75) - 10  # how high B is with the second rod square to its rail
+    lift = np.arcsin(knee / np.hypot(120, 65)) - np.arctan2(65, 120)
+    assert end.distance == pytest.approx(220 * np.sin(lift) + 120 * np.cos(lift) - 120, abs=1e-6)

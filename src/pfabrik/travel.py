@@ -135,8 +135,8 @@ def travel(
 ) -> Travel:
     """How far the end effector can go from a configuration, in its working mode, until a limit or a link stops it.
 
-    Directions are looked along in steps of L/32 or 1/32 rad, each from the configuration before it; where a step is not
-    reached, the last pose that is reached is found by bisection, to the tolerance of a pose. All are followed at once.
+    Directions are looked along in steps of L/32 or 1/32 rad, each from the configuration before it; steps that are not
+    reached are halved, down to the tolerance of a pose. All are followed at once.
 
     Parameters
     ----------
@@ -257,26 +257,28 @@ class _Search:
         self.best = self._engine.advance(self._targets(every, np.zeros(len(every))), start)
 
     def run(self) -> Floats:
-        """How far each goes, (n,) [length or rad]: ahead until something stops it, then by bisection."""
+        """How far each goes, (n,) [length or rad].
+
+        Steps that are not reached are halved, until they are as short as the tolerance; two in a row that are reached
+        after all, for they begin nearer, are doubled again.
+        """
         units = np.where(self._turns, 1.0, self._length)
         farthest = np.where(self._turns, FULL_TURN, HORIZON * self._length)
-        near, step = np.zeros(len(units)), STEP * units
+        near, step, longest = np.zeros(len(units)), STEP * units, STEP * units
+        streak = np.zeros(len(units), np.int64)
         moving = np.arange(len(units))
         while len(moving):
-            ahead = near[moving] + step[moving]
-            reached = self._go_on(moving, ahead)
-            moving = moving[reached]
-            near[moving] = ahead[reached]
-            distant = moving[(near[moving] > NEARBY * self._length) & ~self._turns[moving]]
-            step[distant] = np.minimum(2.0 * step[distant], LONGEST * self._length)
+            reached = self._go_on(moving, near[moving] + step[moving])
+            near[moving[reached]] += step[moving[reached]]
+            streak[moving] = np.where(reached, streak[moving] + 1, 0)
+            step[moving[~reached]] *= 0.5
+            distant = (near > NEARBY * self._length) & ~self._turns
+            longest[distant] = LONGEST * self._length
+            steady = moving[streak[moving] >= 2]
+            step[steady] = np.minimum(2.0 * step[steady], longest[steady])
+            streak[steady] = 0
             near[near > farthest] = np.inf
-            moving = moving[np.isfinite(near[moving])]
-        bounded, far = np.flatnonzero(np.isfinite(near)), near + step
-        while len(bounded):
-            middle = 0.5 * (near[bounded] + far[bounded])
-            reached = self._go_on(bounded, middle)
-            near[bounded[reached]], far[bounded[~reached]] = middle[reached], middle[~reached]
-            bounded = bounded[far[bounded] - near[bounded] > TOLERANCES.position * units[bounded]]
+            moving = moving[np.isfinite(near[moving]) & (step[moving] > 0.5 * TOLERANCES.position * units[moving])]
         return near
 
     def _go_on(self, which: NDArray[np.intp], distances: Floats) -> NDArray[np.bool_]:
