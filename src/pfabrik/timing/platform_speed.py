@@ -10,6 +10,7 @@ import numpy as np
 from ..answers.differential import forward_jacobian, inverse_jacobian
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
+from ..description.task import task_of
 from ..errors import InvalidArgument
 from ..tolerances import TOLERANCES
 from .time_path import limits_of
@@ -22,7 +23,8 @@ class PlatformSpeed(NamedTuple):
     ----------
     kind : "along" or "about".
     direction : unit vector (3,) in the base frame.
-    speed : [length/s or rad/s]; 0 where the machine cannot move so, infinite where no actuator would be limited.
+    speed : [length/s or rad/s]; 0 where the machine cannot move so, infinite where no actuator would be limited. Where
+        it cannot do so without moving in what its task leaves out, that follows.
     limited_by : the actuator that limits it; "" where none does.
     """
 
@@ -35,7 +37,9 @@ class PlatformSpeed(NamedTuple):
 def platform_speed(
     solution: Solution, *, speed: float | Mapping[str, float] | None = None
 ) -> tuple[PlatformSpeed, ...]:
-    """The highest speeds of a platform along and about each axis, and along the slowest direction of all.
+    """The highest speeds of a platform along and about each axis of its task, and along the slowest direction of all.
+
+    Axes are those of the base; of a tilt, the platform's x and y axes.
 
     They are those of the present moment: both ways along a direction they are the same. The last one is the direction
     in which the reference point is slowest of all that the machine can move it in without turning; it is left out
@@ -59,21 +63,38 @@ def platform_speed(
         raise InvalidArgument("speed", f"'{mechanism.name}' without max_speed", "a limit: in the mechanism, or speed")
     inverse, forward = inverse_jacobian(solution), forward_jacobian(solution)
     sizes = np.repeat([mechanism.characteristic_length, 1.0], 3)[: inverse.shape[1]]
-    twists = np.eye(inverse.shape[1])
-    found = [_fastest(twist, inverse, forward, sizes, limits, mechanism.actuator_names) for twist in twists]
+    twists = _twists(solution)[:, : len(sizes)]
+    kept = (twists * sizes) @ (forward / sizes[:, None])
+    following = np.linalg.pinv(kept, rcond=TOLERANCES.alignment)
+    found = []
+    for place, twist in enumerate(twists):
+        rates = inverse @ twist
+        if not _is_made(twist, forward @ rates, sizes):
+            wanted = twists @ (sizes * twist)
+            rates = following @ wanted
+            if not _is_made(wanted, kept @ rates, np.ones(len(wanted))):
+                rates = np.full(len(limits), np.nan)
+        found.append(_fastest(twist, rates, limits, mechanism.actuator_names))
     slowest = _slowest(inverse, forward, sizes, limits)
     if slowest is not None:
-        found.append(_fastest(slowest, inverse, forward, sizes, limits, mechanism.actuator_names))
+        found.append(_fastest(slowest, inverse @ slowest, limits, mechanism.actuator_names))
     return tuple(found)
 
 
-def _fastest(
-    twist: Floats, inverse: Floats, forward: Floats, sizes: Floats, limits: Floats, names: tuple[str, ...]
-) -> PlatformSpeed:
+def _twists(solution: Solution) -> Floats:
+    """The motions that a task sets, unit vectors (m, 6), each along or about one axis."""
+    task, turns = task_of(solution.mechanism), np.zeros((0, 3))
+    if task.rotations:
+        turns = {3: np.eye(3), 2: solution.pose[:3, :2].T, 1: np.eye(3)[2:]}[task.rotations]
+    lines = np.eye(3)[list(task.axes)]
+    return np.block([[lines, np.zeros((len(lines), 3))], [np.zeros((len(turns), 3)), turns]])
+
+
+def _fastest(twist: Floats, rates: Floats, limits: Floats, names: tuple[str, ...]) -> PlatformSpeed:
+    """The highest speed along or about an axis, by the rates of the actuators that it asks for; NaN for none."""
     kind = "along" if twist[:3].any() else "about"
     x, y, z = (twist[:3] if kind == "along" else twist[3:]).tolist()
-    rates = inverse @ twist
-    if not _is_made(twist, forward @ rates, sizes):
+    if np.isnan(rates).any():
         return PlatformSpeed(kind, (x, y, z), 0.0, "")
     with np.errstate(divide="ignore"):
         most = limits / np.abs(rates)
