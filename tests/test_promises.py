@@ -151,18 +151,9 @@ def wrist(legs: int, lean: float, offset: float, half: float, elbow: float | Non
         out, aside = (np.cos(angle), np.sin(angle), 0.0), (np.cos(angle + lean), np.sin(angle + lean), 0.0)
         knee, shin = np.multiply(offset, out) + (0, 0, 0.3), np.multiply(offset, out) + (0, 0, 0.7)
         joints += [
-            Joint(
-                f"A{i}", "revolute", ("base", f"p{i}"), at=(0, 0, 0), axis=aside, actuated=i < 2, range=(-half, half)
-            ),
+            Joint(f"A{i}", "revolute", ("base", f"p{i}"), at=(0, 0, 0), axis=aside, actuated=i < 2, range=wide),
             Joint(f"B{i}", "revolute", (f"p{i}", f"q{i}"), at=knee, axis=knee, range=bend),
-            Joint(
-                f"C{i}",
-                "revolute",
-                (f"q{i}", f"r{i}"),
-                at=shin,
-                axis=(*-shin[:2], 0.3),
-                range=elbow and (-elbow, elbow),
-            ),
+            Joint(f"C{i}", "revolute", (f"q{i}", f"r{i}"), at=shin, axis=(*-shin[:2], 0.3), range=bend),
             Joint(f"D{i}", "revolute", (f"r{i}", "platform"), at=(0, 0, 1), axis=aside),
         ]
     return Mechanism("wrist", joints, "platform", (0, 0, 1), task=("tilt",))

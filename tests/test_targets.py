@@ -62,7 +62,6 @@ def test_a_path_of_coordinates_is_followed() -> None:
         ("ankle_ups", {}, "found coordinates of no joint"),
         ("ankle_ups", {"pivot": 0.1}, r"target\['pivot'\]: found shape \(\); expected finite coordinates of shape"),
         ("ankle_ups", {"pivot": (0.1, 0.0, 0.2)}, r"target\['pivot'\]: found shape \(3,\)"),
-        ("ankle_ups", {"pivot": (0.1, np.nan)}, r"target\['pivot'\]: found a number that is not finite"),
         ("ankle_ups", {"pivot": "level"}, r"target\['pivot'\]: found str"),
     ],
 )
@@ -70,3 +69,13 @@ def test_coordinates_that_are_no_target_are_told(name: str, target: Any, told: s
     for options in (None, Options(on_invalid="mark")):
         with pytest.raises(InvalidArgument, match=told):
             pf.solve_ik(pf.load(name), target, options=options)
+
+
+def test_coordinates_that_are_not_finite_are_no_pose() -> None:
+    machine, target = pf.load("ankle_ups"), {"pivot": [(0.1, np.nan), (0.1, 0.0)]}
+    with pytest.raises(InvalidArgument, match="target: found a number that is not finite") as caught:
+        pf.solve_ik(machine, target)
+    assert caught.value.rows == (0,) or list(caught.value.rows) == [0]
+    marked = pf.solve_ik(machine, target, options=Options(on_invalid="mark"))
+    assert list(marked.status) == [pf.Status.INVALID, pf.Status.REACHED]
+

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from pfabrik.description.task import task_of
 from pfabrik.errors import InvalidArgument, UnknownName
 from pfabrik.motion.mobility import generic_of
 from pfabrik.timing.curve import curve_of
@@ -206,3 +208,30 @@ def test_curves_are_drawn_over_time() -> None:
     pytest.importorskip("matplotlib")
     figure = pf.time_path(followed("five_bar", 1), speed=1.0, rate=20).plot()
     assert [len(axes.lines) for axes in figure.axes] == [2, 2, 2]
+
+
+@pytest.mark.parametrize("name", ["rps", "ankle_ups", "stewart", "delta", "rrr", "five_bar"])
+def test_the_speed_of_a_platform_is_that_at_which_an_actuator_meets_its_limit(name: str) -> None:
+    """Away from home too, where what a task leaves out moves along: by central differences of inverse kinematics."""
+    machine = pf.load(name)
+    task = task_of(machine)
+    tilt = (0.05, 0.08, 0.0) if task.rotations in (2, 3) and name != "rrr" else (0.0, 0.0, 0.0)
+    here = pf.solve_ik(machine, pf.pose(np.array(machine.reference_point), rotvec=tilt))
+    assert here.status is pf.Status.REACHED
+    fastest = pf.platform_speed(here, speed=2.0)
+    assert sum(each.speed > 0.0 for each in fastest) >= sum(task.axes) + task.rotations - 3 * (name == "rrr")
+    for each in fastest:
+        if each.speed == 0.0:
+            continue
+        step = 1e-5 * (machine.characteristic_length if each.kind == "along" else 1.0)
+        sides = []
+        for way in (step, -step):
+            target = here.pose.copy()
+            if each.kind == "along":
+                target[:3, 3] += way * np.array(each.direction)
+            else:
+                target[:3, :3] = Rotation.from_rotvec(way * np.array(each.direction)).as_matrix() @ target[:3, :3]
+            sides.append(pf.solve_ik(machine, target, start=here).actuators)
+        rates = np.abs(sides[0] - sides[1]) / (2.0 * step)
+        assert each.speed * rates.max() == pytest.approx(2.0, rel=1e-4)
+        assert machine.actuator_names[rates.argmax()] == each.limited_by or np.sum(rates > 0.9999 * rates.max()) > 1

@@ -13,12 +13,26 @@ def from_rotvec(vectors: Floats) -> Floats:
     R = I + sinc(a) K + sinc(a / 2)^2 / 2 K^2 with K the cross product by the vector and a its length: exact down to
     zero, so that there is no branch for small angles.
     """
+    if np.abs(vectors).max(initial=0.0) > MANY_TURNS:
+        vectors = _within_a_turn(vectors)
     angles = np.sqrt((vectors * vectors).sum(axis=-1))[..., None, None]
     angles[angles == 0.0] = 1e-20  # whose sine is itself
     half = 0.5 * angles
     K = (vectors @ CROSSED).reshape(*vectors.shape, 3)
     return np.asarray(UNTURNED + np.sin(angles) / angles * K + 0.5 * (np.sin(half) / half) ** 2 * (K @ K))
 
+
+def _within_a_turn(vectors: Floats) -> Floats:
+    """Rotation vectors of any length, less than a turn long: of the largest no square can be represented."""
+    largest = np.maximum(np.abs(vectors).max(axis=-1, keepdims=True), 1.0)
+    axes = vectors / largest
+    sizes = np.linalg.norm(axes, axis=-1, keepdims=True)
+    turns = np.remainder(np.minimum(sizes, np.finfo(float).max / largest) * largest, 2.0 * np.pi)
+    return np.asarray(axes / np.maximum(sizes, np.finfo(float).tiny) * turns)
+
+
+MANY_TURNS = 1e6
+"""Length beyond which whole turns are left out of a rotation vector [rad]."""
 
 UNTURNED = np.eye(3)
 CROSSED = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0.0]])

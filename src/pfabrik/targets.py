@@ -59,14 +59,16 @@ def _from_joint(mechanism: Mechanism, target: Mapping[str, Any]) -> tuple[Floats
     expected = f"finite coordinates of shape (..., {n})" if n > 1 else "finite coordinates of shape (...)"
     values = as_floats(f"target['{name}']", target[name], expected)
     values = values if n > 1 else values[..., None]
-    if values.shape[-1:] != (n,) or not np.isfinite(values).all():
-        found = f"shape {values.shape}" if values.shape[-1:] != (n,) else "a number that is not finite"
-        raise InvalidArgument(f"target['{name}']", found, expected)
+    if values.shape[-1:] != (n,):
+        raise InvalidArgument(f"target['{name}']", f"shape {values.shape}", expected)
     deviations = values.reshape(-1, n) - home_coordinates(mechanism)[span]
-    moved = joint_displacements(mechanism, name, deviations)
+    known = np.isfinite(deviations).all(axis=1)
+    moved = joint_displacements(mechanism, name, deviations[known])
     if mechanism.joint(name).connects[0] != mechanism.base:
         moved = np.asarray(np.linalg.inv(moved), np.float64)
-    return np.ascontiguousarray(moved @ mechanism.home_pose), values.shape[:-1]
+    poses = np.full((len(deviations), 4, 4), np.nan)
+    poses[known] = moved @ mechanism.home_pose
+    return poses, values.shape[:-1]
 
 
 def refuse_invalid(targets: Floats, shape: tuple[int, ...], status: NDArray[np.int64], options: Options) -> None:

@@ -182,6 +182,8 @@ def _ik(machine: Machine, limits: bool, forward: bool) -> Iterator[str]:
     if completes:
         yield from _complete(machine.task)
     else:
+        if machine.task.rotations == 0:
+            yield from _positions_alone("own", machine.task)
         yield "    if (pfk_make_exact(&own))"
         yield "        return PFK_NO_POSE;"
         yield from _rest(machine, _given_argument(forward))
@@ -198,16 +200,21 @@ def _ik(machine: Machine, limits: bool, forward: bool) -> Iterator[str]:
     yield ""
 
 
+def _positions_alone(name: str, task: Task) -> Iterator[str]:
+    """Take over what a task sets that has no rotation; the rest is home's."""
+    yield f"    pfk_home(&{name});"
+    for axis in range(3):
+        if task.axes[axis]:
+            yield f"    {name}.p[{axis}] = target->p[{axis}];"
+
+
 def _complete(task: Task) -> Iterator[str]:
     """Lead the pose to a target that leaves something open, at once or in small steps."""
     for axis in range(3):
         if not task.axes[axis]:
             yield f"    wanted.p[{axis}] = 0.0;"
     if task.rotations == 0:
-        yield "    pfk_home(&wanted);"
-        for axis in range(3):
-            if task.axes[axis]:
-                yield f"    wanted.p[{axis}] = target->p[{axis}];"
+        yield from _positions_alone("wanted", task)
     yield "    if (pfk_make_exact(&wanted) || pfk_make_exact(&own))"
     yield "        return PFK_NO_POSE;"
     yield "    code = pfk_lead(&wanted, 1, &own, leg);"

@@ -20,6 +20,7 @@ from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import LOCKED
+from ..kernels.legs.records import ARM
 from ..kernels.reaching import plan as P
 from ..kernels.rows import FAILED, ITERATIONS, REACHED, ROUNDS
 from ..kernels.threads import in_blocks
@@ -109,7 +110,7 @@ class ReachingEngine:
         for way in ways_of(self.mechanism, options.hold, options.rotation_length):
             tried = self._tried(wanted[away], begin[away], options, way)
             if sides is not None:
-                strayed = (self._sides(tried) != (sides if len(sides) == 1 else sides[away])).any(axis=1)
+                strayed = (self._sides(tried) * (sides if len(sides) == 1 else sides[away]) < 0.0).any(axis=1)
                 tried.rows.status[strayed] = FAILED
             found.replace(away, tried, np.ones(len(away), bool))
             away = np.flatnonzero(found.rows.status == FAILED)
@@ -121,7 +122,9 @@ class ReachingEngine:
         """The working mode of configurations, home's for None: which of its two solutions each leg takes, (n, legs)."""
         if not isinstance(self._table, LegTable):
             return np.zeros((1, 0))
-        return self._table.home_sides if found is None else sides_at(self.mechanism, self._table, found)
+        legs, home = self._table.legs, self._table.home_sides
+        chosen = (legs["kind"] != ARM) | (legs["by_plane"] == 1)
+        return np.where(chosen, home if found is None else sides_at(self.mechanism, self._table, found), 0.0)
 
     def _tried(self, wanted: Floats, begin: Floats, options: Options, way: Way) -> Configurations:
         """Answer poses by passes one way, from joint coordinates (n, columns); FAILED where the loops do not close."""

@@ -67,7 +67,7 @@ def platform_speed(
     kept = (twists * sizes) @ (forward / sizes[:, None])
     following = np.linalg.pinv(kept, rcond=TOLERANCES.alignment)
     found = []
-    for place, twist in enumerate(twists):
+    for twist in twists:
         rates = inverse @ twist
         if not _is_made(twist, forward @ rates, sizes):
             wanted = twists @ (sizes * twist)
