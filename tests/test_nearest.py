@@ -514,7 +514,8 @@ def test_a_pose_that_is_answered_is_reached_when_it_is_asked_for(name: str, coun
     answers = pf.solve_ik(mechanism, targets, options=Options(hold=None))
     again = pf.solve_ik(mechanism, answers.pose)
     off = again.position_error / mechanism.characteristic_length + again.rotation_error
-    assert np.mean(off > 1e-6) <= (0.15 if has_arms else 0.0)
+    most = 0.15 if count > 100 else 0.2  # of few rows more by chance
+    assert np.mean(off > 1e-6) <= (most if has_arms else 0.0)
 
 
 @pytest.mark.campaign

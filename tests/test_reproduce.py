@@ -111,12 +111,12 @@ def test_every_step_out_of_reach_is_feasible_and_continuous(rows: Rows, key: str
 @pytest.mark.slow
 @pytest.mark.parametrize("key", MACHINES)
 def test_projections_are_near_the_nearest_feasible_pose_and_never_nearer(rows: Rows, key: str) -> None:
-    """Passes are caught by the ranges of the 5-bar's hinges: its projections are feasible, and far."""
+    """The 5-bar's are farther: what its chains agree on beside a stop of a hinge is aside of the way to the target."""
     compared = [row for row in rows(f"robustness_{key}.csv") if row["nearest_by_search"]]
     assert len(compared) >= 5
     for row in compared:
         found = [float(row["exact_projection"]), float(row["nearest_by_search"])]
-        assert 1.0 - 1e-5 <= float(row["position_error"]) / min(found) <= (20.0 if key == "five_bar" else 1.1)
+        assert 1.0 - 1e-5 <= float(row["position_error"]) / min(found) <= (1.5 if key == "five_bar" else 1.1)
 
 
 @pytest.mark.slow

@@ -75,7 +75,6 @@ def test_coordinates_that_are_not_finite_are_no_pose() -> None:
     machine, target = pf.load("ankle_ups"), {"pivot": [(0.1, np.nan), (0.1, 0.0)]}
     with pytest.raises(InvalidArgument, match="target: found a number that is not finite") as caught:
         pf.solve_ik(machine, target)
-    assert caught.value.rows == (0,) or list(caught.value.rows) == [0]
+    assert caught.value.rows == (0,)
     marked = pf.solve_ik(machine, target, options=Options(on_invalid="mark"))
     assert list(marked.status) == [pf.Status.INVALID, pf.Status.REACHED]
-

@@ -26,6 +26,7 @@ from .platform.otherwise import answer_otherwise
 from .platform.records import Aim, Found, Starts
 from .reaching import plan as P
 from .reaching.solve import solve_by_passes
+from .timing import fastest, second_derivatives
 
 _typeof: Any = numba.typeof
 
@@ -46,7 +47,7 @@ _PASSES = (
     P.Plan._make([*(np.zeros(0, record) for record in _PLAN_RECORDS), 0.0]),
     np.zeros((0, 4, 4)),
     P.Seeds(*_values("f3 f3 f2")),
-    P.Settings(*_values("f f i i i")),
+    P.Settings(*_values("f i i i")),
     P.Reached(*_values("f3 f3 f2 f1 i1 i1")),
 )
 
@@ -84,6 +85,8 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (measure_rows, tuple(_values("i f3 f2 f2 f3"))),
     (number_points, (*_values("i1 i1 i1 i"), True, *_values("i1"))),
     (join, tuple(_values("i2 i1"))),
+    (second_derivatives, tuple(_values("f1 f2 f2"))),
+    (fastest, (*_values("f1 f2 f2 f1 f1"), True, np.zeros(0))),
 )
 """Every kernel with arguments of the types it takes, what most questions need first."""
 

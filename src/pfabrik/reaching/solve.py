@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.close import MARGIN, close, closure_of
+from ..closure.close import HELD, MARGIN, Closing, close, closure_of
 from ..closure.configurations import Configurations, new_rows, put_rows
 from ..closure.descend import within_sight
 from ..closure.projection import Way, kept, ways_of
@@ -18,7 +17,7 @@ from ..closure.solve import ClosureEngine, begin_of, told
 from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
+from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
 from ..kernels.legs.records import ARM
 from ..kernels.reaching import plan as P
@@ -34,8 +33,8 @@ from .positions import new_reached, place, positions_of
 NEAR = 1e-3
 """Share of L within which passes bring the ends of chains where exact answers are asked for: loops close from there."""
 
-GAIN = 0.999
-"""Share of the gap beyond which what a pass leaves is no gain, where exact answers are asked for."""
+STEPS = 8
+"""Steps to come as near as chains can, each round."""
 
 ROWS_A_BLOCK = 64
 
@@ -129,15 +128,65 @@ class ReachingEngine:
     def _tried(self, wanted: Floats, begin: Floats, options: Options, way: Way) -> Configurations:
         """Answer poses by passes one way, from joint coordinates (n, columns); FAILED where the loops do not close."""
         closure = closure_of(self.mechanism, whole=False)
-        reached = self._run(within_sight(self.mechanism, wanted), begin, settings_of(self.mechanism, options, way))
-        placed = place(self.mechanism, self._compiled, begin, reached)
+        settings, sought = settings_of(self.mechanism, options, way), within_sight(self.mechanism, wanted)
+        if options.exact and not self._is_struts:
+            placed, reached = self._agree(sought, begin, settings)
+        else:
+            passes = settings._replace(max_iterations=1) if options.exact else settings
+            reached = self._run(sought, begin, passes)
+            placed = place(self.mechanism, self._compiled, begin, reached)
         free = tuple(LOCKED if weight == LOCKED else 0.0 for weight in way.weights)
         closed = close(closure, placed.coordinates, placed.poses, platform=free, limits=True, margin=MARGIN)
         errors = task_of(self.mechanism).errors(closed.poses, wanted)
+        slipped = np.flatnonzero((reached.rounds == 0) & (errors[0] > settings.enough))
+        if len(slipped):  # loops that close only off a target that chains came near to may close on it
+            start = placed.coordinates[slipped], placed.poses[slipped]
+            closed.improve(slipped, close(closure, *start, platform=self._held, limits=True, margin=MARGIN))
+            errors = task_of(self.mechanism).errors(closed.poses, wanted)
         holds = kept(self.mechanism, np.full(len(wanted), way.hold), *errors)
         found = told(closure, closed, wanted, holds, options)
         found.rows.counters[:, ITERATIONS], found.rows.counters[:, ROUNDS] = reached.iterations, reached.rounds
         return found
+
+    def _agree(self, wanted: Floats, begin: Floats, settings: P.Settings) -> tuple[Closing, P.Reached]:
+        """Configurations with their platforms where chains that come as near as they can agree.
+
+        Passes are caught by the ranges of joints. As near as it can is here what closes the chain's loops in the sense
+        of least squares, with all that it misses put at its ends.
+        """
+        closure = closure_of(self.mechanism, whole=False)
+        reached, rest = new_reached(self._compiled, len(wanted)), np.arange(len(wanted))
+        reached.rounds[:] = 0
+        placed = close(closure, begin, wanted, platform=self._held, limits=True, max_iterations=0)
+        once = settings._replace(max_iterations=0, max_rounds=1)
+        for _ in range(settings.max_rounds):
+            start, poses = placed.coordinates[rest], placed.poses[rest]
+            tried = close(closure, start, poses, platform=self._held, limits=True, max_iterations=STEPS)
+            ended = self._run(tried.poses.copy(), tried.coordinates, once)
+            if not self.mechanism.end_effector_is_joint:
+                tried.poses[:] = ended.poses
+            tried.poses[:, :3, 3] = ended.poses[:, :3, 3]
+            placed.take(rest, tried)
+            rounds = reached.rounds[rest] + ended.rounds
+            for array, own in zip(reached, ended, strict=True):
+                array[rest] = own
+            reached.rounds[rest] = rounds
+            rest = rest[ended.gaps > settings.enough]
+            if not len(rest):
+                break
+        reached.iterations[:] = reached.rounds
+        return placed, reached
+
+    @cached_property
+    def _held(self) -> Weights:
+        """What holds the platform where it is; of a joint end effector nothing holds its body's orientation."""
+        return (*HELD[:3], 0.0, 0.0, 0.0) if self.mechanism.end_effector_is_joint else HELD
+
+    @cached_property
+    def _is_struts(self) -> bool:
+        """Whether one pass brings all ends as near as they come: single segments on the base."""
+        branches = self._compiled.plan.branches
+        return bool((branches["last"] - branches["first"] <= 1).all() and (branches["carrier"] == 0).all())
 
     def _run(self, wanted: Floats, begin: Floats, settings: P.Settings) -> P.Reached:
         """The kernel over all rows, on all cores."""
@@ -169,7 +218,6 @@ def settings_of(mechanism: Mechanism, options: Options, way: Way) -> P.Settings:
     tolerance = float(options.tolerance or TOLERANCES.position * length)
     return P.Settings(
         enough=max(tolerance, NEAR * length) if options.exact else tolerance,
-        gain=GAIN if options.exact else math.inf,
         max_iterations=int(options.max_iterations),
         max_rounds=int(options.max_rounds),
         free=P.TRANSLATES * any(free[:3]) + P.TURNS * any(free[3:]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from .._jit import routine
 from ..vectors import Vec, along, dot, flatten, move, norm, put, sub, turn, vec
 from .fit import fit_trunk
+from .frames import move_carriers
 from .plan import PLATFORM_CONE, Configuration, Plan, Records, Settings
 from .restrict import NO_LENGTH, clamp_cone, clamp_stroke, cone_axis, restrict_step
 
@@ -89,7 +90,17 @@ def pass_over_chain(plan: Plan, c: int, now: Configuration) -> float:
         put(now.wanted[b], vec(now.nodes[plan.branches[b]["first"]]))
     if chain["trunk"] >= 0:
         fit_trunk(plan, c, now)
-    gap = 0.0
+    return pass_outward(plan, c, now)
+
+
+@routine
+def pass_outward(plan: Plan, c: int, now: Configuration) -> float:
+    """From the base to the ends of a chain, each joint within its limits; the largest end gap."""
+    chain, gap = plan.chains[c], 0.0
+    if chain["trunk"] >= 0:
+        for j in range(plan.trunks[chain["trunk"]]["first"], plan.trunks[chain["trunk"]]["last"]):
+            now.trunks[j] = min(max(now.trunks[j], plan.trunk_joints[j]["lo"]), plan.trunk_joints[j]["hi"])
+        move_carriers(plan, now)
     for b in range(chain["first"], chain["last"]):
         reach_backward(plan, b, now)
         gap = max(gap, end_gap(plan, b, now))
@@ -98,13 +109,15 @@ def pass_over_chain(plan: Plan, c: int, now: Configuration) -> float:
 
 @routine
 def reach_by_passes(plan: Plan, c: int, now: Configuration, settings: Settings) -> tuple[float, int]:
-    """Forward and backward passes until the ends are within E, K iterations are spent, or passes gain too little; the
-    gap left, and how many."""
+    """Forward and backward passes until the ends are within E, or K iterations are spent; the gap left, and how many.
+
+    With no iterations, chains stay as they are: one pass outward puts all they miss at their ends.
+    """
+    if settings.max_iterations == 0:
+        return pass_outward(plan, c, now), 0
     gap = pass_over_chain(plan, c, now)
     for iteration in range(1, settings.max_iterations):
         if gap <= settings.enough:
             return gap, iteration
-        before, gap = gap, pass_over_chain(plan, c, now)
-        if gap > settings.gain * before:
-            return gap, iteration + 1
+        gap = pass_over_chain(plan, c, now)
     return gap, settings.max_iterations

@@ -106,8 +106,7 @@ class Settings(NamedTuple):
     """Options, as numbers; lengths in the mechanism's unit."""
 
     enough: float  # E: passes end where the chains' ends are this close to their targets
-    gain: float  # passes end, too, where one leaves more than this share of the gap
-    max_iterations: int  # K
+    max_iterations: int  # K; 0 for a pass outward alone
     max_rounds: int
     free: int  # what a target that is not reached may do: TRANSLATES, TURNS, or both
 
