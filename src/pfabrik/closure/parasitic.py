@@ -34,8 +34,13 @@ def asks_too_much(mechanism: Mechanism) -> bool:
 
 
 def has_other_assemblies(mechanism: Mechanism) -> bool:
-    """Whether a target that one way of assembly misses is to be looked for in all others: they reach different ones."""
-    return follows_task(mechanism) and asks_too_much(mechanism) and has_parasitic_motion(mechanism)
+    """Whether a target that one way of assembly misses is to be looked for in all others: they reach different ones.
+
+    Not where nothing is left out but positions that never change, as the height of a planar machine.
+    """
+    if not (follows_task(mechanism) and asks_too_much(mechanism)):
+        return False
+    return task_of(mechanism).rotations in (1, 2) or has_parasitic_motion(mechanism)
 
 
 def _asked(mechanism: Mechanism) -> int:
