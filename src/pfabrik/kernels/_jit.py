@@ -77,7 +77,7 @@ def _digest_for(function: Callable[..., Any]) -> str:
     return digest.hexdigest()
 
 
-class _KernelCache(_Cache):  # type: ignore[misc]  # a class only at run time
+class _KernelCache(_Cache):
     """Numba's file cache, made stale by an edit to any file that the kernel is made of."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -146,7 +146,7 @@ def _warn_of_no_cache() -> None:
     )
 
 
-class Reference(_types.Type):  # type: ignore[misc]  # a class only at run time
+class Reference(_types.Type):
     """Numba's type of a NamedTuple of arrays taken by reference: a pointer to what its owner keeps alive.
 
     In compiled code it reads like the NamedTuple; whoever calls a part with one converts it. By value, every array
@@ -159,13 +159,13 @@ class Reference(_types.Type):  # type: ignore[misc]  # a class only at run time
 
 
 @_extending.register_model(Reference)
-class _ReferenceModel(_extending.models.PrimitiveModel):  # type: ignore[misc]  # a class only at run time
+class _ReferenceModel(_extending.models.PrimitiveModel):
     def __init__(self, manager: Any, reference: Any) -> None:
         super().__init__(manager, reference, manager.lookup(reference.record).get_value_type().as_pointer())
 
 
 @_extending.infer_getattr
-class _ReferenceAttribute(_AttributeTemplate):  # type: ignore[misc]  # a class only at run time
+class _ReferenceAttribute(_AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, reference: Any, name: str) -> Any:
@@ -207,7 +207,7 @@ def _resolve_call(
     return known[taken]
 
 
-class _PartLibrary(_Library):  # type: ignore[misc]  # a class only at run time
+class _PartLibrary(_Library):
     """The code of a part, not optimised and no machine code: each kernel that it goes into does both, for the whole."""
 
     def _optimize_functions(self, module: Any) -> None:
@@ -231,7 +231,7 @@ class _PartLibrary(_Library):  # type: ignore[misc]  # a class only at run time
         return SimpleNamespace(set_env=lambda name, environment: None)
 
 
-class _KernelLibrary(_Library):  # type: ignore[misc]  # a class only at run time
+class _KernelLibrary(_Library):
     """The code of a kernel with all its parts; nobody else can call them, so arguments that go unused are dropped.
 
     A mechanism by value is more than fifty arguments, of which most parts use a few. Optimised once: Numba does it
@@ -257,7 +257,7 @@ class _SearchLibrary(_KernelLibrary):
         super()._optimize_final_module()
 
 
-class _StackedOptions(_Flags):  # type: ignore[misc]  # a class only at run time
+class _StackedOptions(_Flags):
     """Options of a function being compiled, equal to themselves alone."""
 
     __hash__ = object.__hash__
@@ -267,7 +267,7 @@ class _StackedOptions(_Flags):  # type: ignore[misc]  # a class only at run time
 _STACKED: dict[str, _StackedOptions] = {}
 
 
-class _Options(_Flags):  # type: ignore[misc]  # a class only at run time
+class _Options(_Flags):
     """Options of a function, which give one object for all that are equal.
 
     Numba takes a copy along while it compiles the function, and compares it, option by option, for every expression
@@ -282,7 +282,7 @@ _NEEDLESS = {"WithLifting", "InlineClosureLikes", "InlineInlinables", "InlineOve
 """Numba's passes for what no kernel has: `with`, closures and comprehensions, arithmetic of whole arrays."""
 
 
-class _KernelCompiler(_Compiler):  # type: ignore[misc]  # a class only at run time
+class _KernelCompiler(_Compiler):
     """Numba's compiler, which otherwise optimises a part by itself and again in every function above it."""
 
     library: Any = _KernelLibrary

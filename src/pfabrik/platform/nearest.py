@@ -26,7 +26,7 @@ from ..kernels.threads import in_blocks
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 from .rotation import constraints_at, keeps_rotation, without_idle_legs
-from .table import machine_searched, with_aims
+from .table import OF_AIMS, machine_searched
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
@@ -211,8 +211,8 @@ def _approach(
     asked = asked if driven is None else Handle(asked.record._replace(driven=driven))
     found, legs = _new_found(len(objective.targets), table), asked.record
     limits = 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)
-    aims = len(with_aims(legs.legs, legs.cones[:0]))
-    minded = len(legs.cones) - (0 if minds_aims or objective.max_iterations == 0 else aims)
+    minds_aims = minds_aims or objective.max_iterations == 0
+    minded = len(legs.cones) if minds_aims else int((legs.cones["leader"] != OF_AIMS).sum())
     weights = np.zeros((len(objective.targets), limits))
     hits = _hits(table) if values is None else HITS_OF_VALUES
     near = np.zeros((0, len(legs.driven))) if values is None else values

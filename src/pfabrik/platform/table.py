@@ -16,6 +16,9 @@ from ..tolerances import TOLERANCES
 
 Machine: TypeAlias = Handle[K.Table]
 
+OF_AIMS = -1
+"""The leader of cones that no joint has: see `with_aims`."""
+
 
 @lru_cache(maxsize=64)
 def kernel_table(table: LegTable) -> K.Table:
@@ -62,7 +65,7 @@ def with_aims(legs: K.Records, cones: K.Records) -> K.Records:
             A, B = np.arccos(np.clip([a @ b, b @ leg["line"]], -1.0, 1.0))
             for axis, most in ((a, min(A + B, 2.0 * np.pi - A - B)), (-a, np.pi - abs(A - B))):
                 if most < np.pi - TOLERANCES.alignment:
-                    aims.append((k, place, axis, most, np.cos(most), 0))
+                    aims.append((k, place, axis, most, np.cos(most), OF_AIMS))
     return np.concatenate([cones, np.array(aims, K.CONE)]) if aims else cones
 
 

@@ -11,6 +11,7 @@ from ..arrays import Floats
 from ..closure.close import HELD, Closing, close, closure_of, platform_poses
 from ..decomposition.plan import CompiledPlan, compile_plan
 from ..description.mechanism import Mechanism
+from ..description.task import Weights
 from ..kernels.reaching import plan as P
 from ..motion.displacements import columns, displacements
 from ..tolerances import TOLERANCES
@@ -34,6 +35,11 @@ def positions_of(mechanism: Mechanism, compiled: CompiledPlan, coordinates: Floa
     return P.Seeds(platform_poses(mechanism, coordinates), nodes, trunks)
 
 
+def holding(mechanism: Mechanism) -> Weights:
+    """What holds the platform where it is; of a joint end effector nothing holds its body's orientation."""
+    return (*HELD[:3], 0.0, 0.0, 0.0) if mechanism.end_effector_is_joint else HELD
+
+
 def new_reached(compiled: CompiledPlan, n: int) -> P.Reached:
     """Room for where n rows end."""
     home = compiled.home_seed
@@ -54,8 +60,7 @@ def place(mechanism: Mechanism, compiled: CompiledPlan, begin: Floats, reached: 
     rows that follow worse are tried from elsewhere.
     """
     closure, poses = closure_of(mechanism, whole=False), reached.poses
-    platform = (*HELD[:3], *((0.0,) * 3)) if mechanism.end_effector_is_joint else HELD
-    centres = _centres(mechanism, compiled, reached)
+    platform, centres = holding(mechanism), _centres(mechanism, compiled, reached)
     placed = close(closure, begin, poses, platform=platform, centres=centres)
     near = 2.0 * reached.gaps / mechanism.characteristic_length + TOLERANCES.position
     rng = np.random.default_rng(0)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.close import HELD, MARGIN, Closing, close, closure_of
+from ..closure.close import MARGIN, Closing, close, closure_of
 from ..closure.configurations import Configurations, new_rows, put_rows
 from ..closure.descend import within_sight
 from ..closure.projection import Way, kept, ways_of
@@ -17,7 +17,7 @@ from ..closure.solve import ClosureEngine, begin_of, told
 from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
-from ..description.task import Weights, task_of
+from ..description.task import task_of
 from ..kernels.closure.loops import LOCKED
 from ..kernels.legs.records import ARM
 from ..kernels.reaching import plan as P
@@ -28,7 +28,7 @@ from ..platform.answers import sides_at
 from ..platform.solve import LegsEngine
 from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
-from .positions import new_reached, place, positions_of
+from .positions import holding, new_reached, place, positions_of
 
 NEAR = 1e-3
 """Share of L within which passes bring the ends of chains where exact answers are asked for: loops close from there."""
@@ -53,6 +53,7 @@ class ReachingEngine:
     def __init__(self, mechanism: Mechanism, exact: LegsEngine | ClosureEngine) -> None:
         self.mechanism, self._exact = mechanism, exact
         self._compiled, self._table = compile_plan(mechanism), leg_table(mechanism)
+        self._held = holding(mechanism)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -104,17 +105,11 @@ class ReachingEngine:
         """Answer poses by passes; FAILED where these end in nothing feasible, or leave the mode to be kept."""
         begin = begin_of(self.mechanism, start)
         begin = np.repeat(begin, len(wanted), axis=0) if len(begin) == 1 else begin
-        sides = self._sides(start) if keep_mode else None
-        found, away = Configurations(new_rows(self.mechanism, len(wanted)), begin.copy()), np.arange(len(wanted))
-        for way in ways_of(self.mechanism, options.hold, options.rotation_length):
-            tried = self._tried(wanted[away], begin[away], options, way)
-            if sides is not None:
-                strayed = (self._sides(tried) * (sides if len(sides) == 1 else sides[away]) < 0.0).any(axis=1)
-                tried.rows.status[strayed] = FAILED
-            found.replace(away, tried, np.ones(len(away), bool))
-            away = np.flatnonzero(found.rows.status == FAILED)
-            if not len(away):
-                break
+        way = ways_of(self.mechanism, options.hold, options.rotation_length)[0]
+        found = self._tried(wanted, begin, options, way)
+        if keep_mode:
+            strayed = (self._sides(found) * self._sides(start) < 0.0).any(axis=1)
+            found.rows.status[strayed] = FAILED
         return found
 
     def _sides(self, found: Configurations | None) -> Floats:
@@ -176,11 +171,6 @@ class ReachingEngine:
                 break
         reached.iterations[:] = reached.rounds
         return placed, reached
-
-    @cached_property
-    def _held(self) -> Weights:
-        """What holds the platform where it is; of a joint end effector nothing holds its body's orientation."""
-        return (*HELD[:3], 0.0, 0.0, 0.0) if self.mechanism.end_effector_is_joint else HELD
 
     @cached_property
     def _is_struts(self) -> bool:

@@ -6,6 +6,7 @@ hinges and slides carry, and cranks with forearms that meet in one plane. Nothin
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,7 +25,7 @@ ROOM = 4.0
 """How far from home positions are looked for, along each axis [L]."""
 
 
-class Model:
+class Model(ABC):
     """A machine at a fixed orientation of its platform, as functions of its free variables x (k,) [L or rad].
 
     Attributes
@@ -53,9 +54,9 @@ class Model:
         positions = solution.pose[:, :3, 3] @ self.axes.T / self.length
         return np.concatenate([positions, solution.actuators[:, order] / self.units], axis=1)
 
+    @abstractmethod
     def slacks(self, x: Floats, rotation: Floats) -> Floats:
         """How far every limit is away [L or rad]; negative where it is exceeded."""
-        raise NotImplementedError
 
     def gaps(self, x: Floats, rotation: Floats) -> Floats:
         """By how much every loop is open [L]; empty where the variables close all of them."""
