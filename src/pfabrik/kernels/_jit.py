@@ -16,12 +16,13 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache, partial, partialmethod
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, TypeVar, cast
 
 import numba
+from llvmlite import ir
 from numba import extending
 from numba.core import cgutils, codegen, compiler, imputils, types
 from numba.core.caching import FunctionCache
@@ -36,6 +37,8 @@ _Library: Any = getattr(codegen, "JITCodeLibrary", object)
 _Codegen: Any = getattr(codegen, "CPUCodegen", object)
 _Compiler: Any = getattr(compiler, "Compiler", object)
 _Flags: Any = getattr(compiler, "Flags", object)
+_Function: Any = getattr(types, "BaseFunction", object)
+_ir: Any = ir
 _types: Any = types
 _cgutils: Any = cgutils
 _imputils: Any = imputils
@@ -87,15 +90,34 @@ class _KernelCache(_Cache):
 
 
 @contextmanager
-def _without_collection() -> Iterator[None]:
-    """No garbage collection: the compiler makes so many objects that collecting them is a tenth of its time."""
-    collects = gc.isenabled()
+def _in_haste() -> Iterator[None]:
+    """Without what takes Numba long and gives nothing here, for as long as it compiles.
+
+    Collecting garbage among so many objects is a tenth of its time. Another is to find out what an operator means for
+    arguments of some types, at each place anew, by trying all that it could mean.
+    """
+    collects, find = gc.isenabled(), getattr(_Function, "get_call_type", None)
     gc.disable()
+    if _IS_HOOKED:
+        _Function.get_call_type = partialmethod(_find_once, find)
     try:
         yield
     finally:
+        if _IS_HOOKED:
+            _Function.get_call_type = find
         if collects:
             gc.enable()
+
+
+_FOUND: dict[Any, Any] = {}
+
+
+def _find_once(function: Any, find: Callable[..., Any], context: Any, arguments: Any, keywords: Any) -> Any:
+    """What a function of Numba's means for arguments of some types, found before or now."""
+    asked = function, context, arguments, tuple(keywords.items())
+    if asked not in _FOUND:
+        _FOUND[asked] = find(function, context, arguments, keywords)
+    return _FOUND[asked]
 
 
 LARGE = 150
@@ -120,7 +142,7 @@ def _compile_announced(name: str, original: Callable[..., Any], *arguments: Any)
     began, done = time.perf_counter(), threading.Event()
     threading.Thread(target=_tick, args=(done,), daemon=True).start()
     try:
-        with _without_collection():
+        with _in_haste():
             return original(*arguments)
     finally:
         done.set()
@@ -184,6 +206,9 @@ def _load_field(context: Any, builder: Any, reference: Any, pointer: Any, name: 
 
 @_extending.lower_cast(_types.BaseNamedTuple, Reference)
 def _refer(context: Any, builder: Any, record: Any, reference: Any, value: Any) -> Any:
+    """Where a NamedTuple is, if it was loaded from somewhere; LLVM takes long to copy it, array by array."""
+    if isinstance(value, _ir.LoadInstr) and isinstance(value.operands[0], _ir.AllocaInstr):
+        return value.operands[0]
     return _cgutils.alloca_once_value(builder, value)
 
 
@@ -251,8 +276,7 @@ class _SearchLibrary(_KernelLibrary):
 
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
-            instructions = sum(1 for block in function.blocks for _ in block.instructions)
-            if instructions > LARGE and not any(b"alwaysinline" in each for each in function.attributes):
+            if str(function).count("\n  ") > LARGE and not any(b"alwaysinline" in each for each in function.attributes):
                 function.add_function_attribute("noinline")
         super()._optimize_final_module()
 
@@ -316,13 +340,14 @@ _HOOKS = (
     (_Codegen, "_function_pass_manager _module_pass_manager"),
     (_Compiler, "define_pipelines"),
     (_Flags, "summary copy"),
+    (_Function, "get_call_type"),
 )
 _IS_HOOKED = all(hasattr(owner, name) for owner, names in _HOOKS for name in names.split())
 
-_KERNEL: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+_KERNEL: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _SEARCH = _KERNEL.copy()
 # Parts of kernels are called by compiled code alone: without entry points for Python they compile faster.
-_PART = _KERNEL | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_PART = _KERNEL | {"no_cpython_wrapper": True}
 if _IS_HOOKED:
     _KERNEL["pipeline_class"], _SEARCH["pipeline_class"] = _KernelCompiler, _SearchCompiler
     _PART["pipeline_class"] = _PartCompiler

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from .._jit import inlined, search
+from .._jit import inlined, routine, search
 from ..rotations import exponential, turn_about_z, turn_ball, yaw_of
 from .equations import (
     add_anchors,
@@ -171,6 +171,65 @@ def is_close(problem: ClosureProblem, eq: Equations) -> bool:
     return largest <= problem.closeness
 
 
+@routine
+def close_row(
+    loops: Loops, layout: Layout, problem: ClosureProblem, row: int, best: State, trial: State, eq: Equations, closed: Closed
+) -> int:
+    """Close the loops of a row, from `trial`, into `best`; how many steps it took."""
+    plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
+    copy_state(trial, best)
+    cost, factor, step = math.inf, 1.0, math.inf
+    iterations, turn = 0, TRY
+    while True:
+        clear(layout, eq)
+        found = 0.0
+        if turn != MEASURE:
+            found += add_paths(loops, layout, problem, row, trial, eq)
+        if problem.limits == 1 or turn == MEASURE:
+            found += add_ranges(loops, layout.slots, trial, problem.margin, eq)
+            found += add_cones(loops, layout.slots, trial, problem.margin, eq)
+        if turn == MEASURE:
+            for group in range(len(layout.sizes)):
+                closed.excesses[row, group] = eq.excesses[group]
+            break
+        found += add_anchors(loops, layout.slots, row, trial, problem, eq)
+        if problem.frame != BASE_AXES:
+            pose_frame(row, trial, problem, eq)
+            turn_equations(eq.frame, layout, eq)
+        found += add_platform(row, trial, problem, eq)
+        if turn == TRY:
+            if found < cost or plunging:
+                gained, cost = cost - found, found
+                copy_state(trial, best)
+                note(eq, row, closed)
+                factor = max(factor / 4.0, 1e-3)
+                if is_close(problem, eq) or (gained <= 1e-13 * cost and not plunging):
+                    turn = MEASURE
+            else:
+                factor *= 8.0
+                turn = MEASURE if step < 1e-12 else RETURN
+                copy_state(best, trial)
+        elif turn == RETURN:
+            turn = TRY
+        damping = LEAST_DAMPING if plunging else max(LEAST_DAMPING, DAMPING * factor * min(cost, 1.0))
+        if turn == TRY and (iterations == problem.max_iterations or not damping < MOST_DAMPING):
+            turn = MEASURE
+        if turn == TRY:
+            solve(layout, damping, eq)
+            if problem.frame != BASE_AXES:
+                out_of_frame(eq.frame, eq.twist)
+            yaw = yaw_of(trial.X) if keeps_yaw else 0.0
+            step = move(loops, layout, eq, trial)
+            if keeps_yaw:
+                turn_about_z(trial.X, yaw - yaw_of(trial.X))  # what it yawed to second order
+            iterations += 1
+        elif turn == MEASURE:
+            if problem.balls_follow == 1:
+                follow_platform(loops, best, eq)
+            copy_state(best, trial)
+    return iterations
+
+
 @search
 def close(loops: Loops, layout: Layout, problem: ClosureProblem, closed: Closed) -> None:
     """Close the loops of every row, nearest to what is wished.
@@ -178,60 +237,8 @@ def close(loops: Loops, layout: Layout, problem: ClosureProblem, closed: Closed)
     A row ends when all that must hold is within `problem.closeness`, when its steps or gains vanish, or after
     `problem.max_iterations`; what was measured of it tells how far it came.
     """
-    best, trial = new_state(loops), new_state(loops)
-    eq = new_equations(loops, layout)
-    plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
+    best, trial, eq = new_state(loops), new_state(loops), new_equations(loops, layout)
     for row in range(len(closed.coordinates)):
         load_row(loops, layout, problem.chained == 1 and row > 0, row, closed, trial)
-        copy_state(trial, best)
-        cost, factor, step = math.inf, 1.0, math.inf
-        iterations, turn = 0, TRY
-        while True:
-            clear(layout, eq)
-            found = 0.0
-            if turn != MEASURE:
-                found += add_paths(loops, layout, problem, row, trial, eq)
-            if problem.limits == 1 or turn == MEASURE:
-                found += add_ranges(loops, layout.slots, trial, problem.margin, eq)
-                found += add_cones(loops, layout.slots, trial, problem.margin, eq)
-            if turn == MEASURE:
-                for group in range(len(layout.sizes)):
-                    closed.excesses[row, group] = eq.excesses[group]
-                break
-            found += add_anchors(loops, layout.slots, row, trial, problem, eq)
-            if problem.frame != BASE_AXES:
-                pose_frame(row, trial, problem, eq)
-                turn_equations(eq.frame, layout, eq)
-            found += add_platform(row, trial, problem, eq)
-            if turn == TRY:
-                if found < cost or plunging:
-                    gained, cost = cost - found, found
-                    copy_state(trial, best)
-                    note(eq, row, closed)
-                    factor = max(factor / 4.0, 1e-3)
-                    if is_close(problem, eq) or (gained <= 1e-13 * cost and not plunging):
-                        turn = MEASURE
-                else:
-                    factor *= 8.0
-                    turn = MEASURE if step < 1e-12 else RETURN
-                    copy_state(best, trial)
-            elif turn == RETURN:
-                turn = TRY
-            damping = LEAST_DAMPING if plunging else max(LEAST_DAMPING, DAMPING * factor * min(cost, 1.0))
-            if turn == TRY and (iterations == problem.max_iterations or not damping < MOST_DAMPING):
-                turn = MEASURE
-            if turn == TRY:
-                solve(layout, damping, eq)
-                if problem.frame != BASE_AXES:
-                    out_of_frame(eq.frame, eq.twist)
-                yaw = yaw_of(trial.X) if keeps_yaw else 0.0
-                step = move(loops, layout, eq, trial)
-                if keeps_yaw:
-                    turn_about_z(trial.X, yaw - yaw_of(trial.X))  # what it yawed to second order
-                iterations += 1
-            elif turn == MEASURE:
-                if problem.balls_follow == 1:
-                    follow_platform(loops, best, eq)
-                copy_state(best, trial)
+        closed.iterations[row] = close_row(loops, layout, problem, row, best, trial, eq, closed)
         store_row(loops, row, best, closed)
-        closed.iterations[row] = iterations
