@@ -100,10 +100,12 @@ def lagrangian_hessian(
         copy_state(state, trial)
         move(loops, work.row, probe, trial)
         lagrangian_gradient(loops, row, objective, trial, work, work.there)
+        for j in range(n):
+            there[j] = (there[j] - here[j]) / probe
         for b in range(motions):
             H[b, a] = 0.0
             for j in range(n):
-                H[b, a] += basis[j, b] * (there[j] - here[j]) / probe
+                H[b, a] += basis[j, b] * there[j]
     largest = 0.0
     for a in range(motions):
         largest = max(largest, abs(H[a, a]))

@@ -125,10 +125,12 @@ def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: F
         copy_now(search.best, search.trial)
         move(table, search.step, probe, search.trial)
         lagrangian_gradient(table, row, aim, search.trial, search, search.there)
+        for j in range(step.shape[0]):
+            there[j] = (there[j] - here[j]) / probe
         for b in range(motions):
             H[b, a] = 0.0
             for j in range(step.shape[0]):
-                H[b, a] += basis[j, b] * (there[j] - here[j]) / probe
+                H[b, a] += basis[j, b] * there[j]
     for a in range(motions):
         largest = max(largest, abs(H[a, a]))
         for b in range(a):
