@@ -6,6 +6,7 @@ import copy
 import multiprocessing
 import pickle
 import sys
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -211,6 +212,17 @@ def test_answers_survive_pickling_and_copying_after_they_were_read() -> None:
     for twin in (pickle.loads(pickle.dumps(answer)), copy.deepcopy(answer)):
         assert twin.active_limits == limits
         np.testing.assert_equal(dict(twin.points), points)
+
+
+def test_every_mapping_of_an_answer_and_legs_survive_pickling_and_copying() -> None:
+    leg = pf.Leg("R*-S-S", base=[1, 0, 0], by_letter={"A": {"axis": "z"}, "B": {"cone": {"half_angle": 0.5}}})
+    answer = pf.solve_ik(pf.load("stewart"), [0, 0, 200])
+    for value in (answer.joints, answer.points, pf.margins(answer), leg, leg.by_letter):
+        for twin in (pickle.loads(pickle.dumps(value)), copy.deepcopy(value), copy.copy(value)):
+            assert type(twin) is type(value)
+            np.testing.assert_equal(*(dict(each) if isinstance(each, Mapping) else each for each in (twin, value)))
+    with pytest.raises(TypeError):
+        leg.by_letter["A"] = {}  # type: ignore[index]
 
 
 def _solve_in_child() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import gc
+import pickle
 import weakref
 
 import numpy as np
@@ -177,3 +179,14 @@ def test_an_answer_may_be_asked_back_as_it_stands(started: bool) -> None:
     np.testing.assert_allclose(solver.pose, wanted, atol=1e-9 * mechanism.characteristic_length)
     assert solver.ik(solver.pose[:3, 3]) is pf.Status.REACHED
     np.testing.assert_allclose(solver.pose[:3, 3], wanted[:3, 3], atol=1e-9 * mechanism.characteristic_length)
+
+
+def test_a_copy_is_prepared_anew_and_shares_nothing() -> None:
+    mechanism = pf.load("stewart")
+    solver = pf.Solver(mechanism, options=Options(hold=None))
+    lower, higher = ([0.0, 0.0, z] for z in (190.0, 200.0))
+    for twin in (copy.copy(solver), copy.deepcopy(solver), pickle.loads(pickle.dumps(solver))):
+        solver.ik(lower)
+        assert twin.status is Status.INVALID and twin.options == solver.options
+        assert twin.ik(higher) is Status.REACHED
+        assert solver.pose[2, 3] == pytest.approx(190.0) and twin.pose[2, 3] == pytest.approx(200.0)

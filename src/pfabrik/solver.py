@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -136,6 +138,10 @@ class Solver:
             else:
                 self._found = solve_ik(self.mechanism, self._target[0], start=self._start, options=self.options)
         return self._found
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For copies and other processes: prepared anew, and not asked yet. Addresses lead nowhere there."""
+        return partial(type(self), start=self._start, options=self.options), (self.mechanism,)
 
     def __repr__(self) -> str:
         return f"<Solver of '{self.mechanism.name}': {self.status}>"

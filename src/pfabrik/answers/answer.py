@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
 import numpy as np
@@ -15,6 +14,7 @@ from ..closure.configurations import Configurations
 from ..closure.projection import ways_of
 from ..description.mechanism import Mechanism
 from ..engine import engine_of
+from ..frozen import FrozenMapping
 from ..kernels.rows import (
     ACTUATOR_ERROR,
     HOLD,
@@ -131,14 +131,14 @@ class Answer:
     def joints(self) -> Mapping[str, Floats]:
         spans = ((name, span) for name, span in columns(self.mechanism).items() if span.stop > span.start)
         single = {name: span.start if span.stop - span.start == 1 else span for name, span in spans}
-        return MappingProxyType({name: self.q[..., place][()] for name, place in single.items()})
+        return FrozenMapping({name: self.q[..., place][()] for name, place in single.items()})
 
     @cached_property
     def points(self) -> Mapping[str, Floats]:
         found = engine_of(self.mechanism).points(self._found)
         order = [joint.name for joint in self.mechanism.joints if joint.name in found]
         unknown = (self._rows.status == Status.INVALID)[:, None]
-        return MappingProxyType({name: self._shaped(np.where(unknown, np.nan, found[name])) for name in order})
+        return FrozenMapping({name: self._shaped(np.where(unknown, np.nan, found[name])) for name in order})
 
     @cached_property
     def active_limits(self) -> tuple[ActiveLimit, ...] | list[tuple[ActiveLimit, ...]]:

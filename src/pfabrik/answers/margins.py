@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 
 from ..arrays import Floats
+from ..frozen import FrozenMapping
 from ..motion.limits import coned, ranges_of
 from ..tolerances import TOLERANCES
 from .solution import Solution, checked_solution
@@ -39,7 +39,7 @@ def margins(solution: Solution) -> Mapping[tuple[str, str], float | Floats]:
             found[joint.name, bound] = each[place] if before is None else np.minimum(each[place], before)
     for joint, angles, half_angle in coned(mechanism, q):
         found[joint.name, "cone"] = (half_angle - angles) / half_angle
-    return MappingProxyType({key: _shaped(margin, solution.shape) for key, margin in found.items()})
+    return FrozenMapping({key: _shaped(margin, solution.shape) for key, margin in found.items()})
 
 
 def _shares(off: Floats, room: Floats, tolerances: Floats) -> Floats:

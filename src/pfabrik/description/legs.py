@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ..errors import InvalidArgument
+from ..frozen import FrozenMapping
 from .coercion import numbers, text, texts
 from .form_faults import shown
 from .joints import Cone, Range, set_fields
@@ -85,4 +85,4 @@ def _frozen(value: Any, depth: int) -> Any:
     if not isinstance(value, Mapping) or depth == 0:
         return numbers(value, 3)
     inner = {key: depth - 1 if depth == 3 or key == "cone" else 0 for key in value}
-    return MappingProxyType({key: _frozen(each, inner[key]) for key, each in value.items()})
+    return FrozenMapping({key: _frozen(each, inner[key]) for key, each in value.items()})

@@ -25,6 +25,10 @@ class Handle(Generic[R]):
         self._memory = np.array([number for array in record for number in _descriptor(array)], dtype=np.int64)
         self.address: Any = record if config.DISABLE_JIT else self._memory.ctypes.data
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy has arrays of its own, and their addresses."""
+        return Handle, (self.record,)
+
 
 def _descriptor(array: Any) -> tuple[int, ...]:
     """An array as Numba has it in memory: no owner, size, bytes of an element, where it is, shape, strides."""

@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +33,7 @@ from ..description.home_mobility import (
 )
 from ..description.joints import Joint
 from ..description.structure import Structure
+from ..frozen import FrozenMapping
 from ..rotations import angles_and_sines, composed, from_rotvec
 
 
@@ -70,7 +70,7 @@ class _Geometry:
 def columns(mechanism: Structure) -> Mapping[str, slice]:
     """Joint name -> its coordinates, as a slice of the columns of q."""
     bounds = np.searchsorted(column_joints(mechanism), np.arange(len(mechanism.joints) + 1)).tolist()
-    return MappingProxyType(
+    return FrozenMapping(
         {joint.name: slice(*bounds[index : index + 2]) for index, joint in enumerate(mechanism.joints)}
     )
 
