@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 import os
 import subprocess
@@ -9,6 +10,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -241,6 +243,16 @@ def test_the_cache_is_keyed_by_text_not_by_time(copies: Path) -> None:
     assert before == digest(copies, "qp.py")
 
 
+def loaded_kernel(copies: Path, caller: Path) -> Any:
+    """The kernel `double` of a file, compiled or from the cache."""
+    spec = importlib.util.spec_from_file_location("caller", caller)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    double = load_decorator(copies).kernel(module.double)
+    assert double(2.0) == 4.0
+    return double
+
+
 @pytest.mark.skipif(INTERPRETED, reason="nothing is cached")
 def test_a_kernel_compiled_from_other_sources_is_not_taken_from_the_cache(
     copies: Path, monkeypatch: pytest.MonkeyPatch
@@ -252,13 +264,39 @@ def test_a_kernel_compiled_from_other_sources_is_not_taken_from_the_cache(
     kernels = []  # all kept: a module that cannot be imported by name is found only while one of them lives
     for _ in range(2):
         for _again in range(2):
-            spec = importlib.util.spec_from_file_location("caller", caller)
-            module = importlib.util.module_from_spec(spec)
-            spec.loader.exec_module(module)
-            kernels.append(load_decorator(copies).kernel(module.double))
-            assert kernels[-1](2.0) == 4.0
+            kernels.append(loaded_kernel(copies, caller))
         (copies / "vectors.py").write_text("# edited\n")
     assert [sum(double.stats.cache_hits.values()) for double in kernels] == [0, 1, 0, 1]
+
+
+@pytest.mark.skipif(INTERPRETED, reason="nothing is cached")
+def test_what_is_damaged_in_the_cache_is_compiled_again(copies: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    caller = copies / "caller.py"
+    caller.write_text("def double(x):\n    return 2.0 * x\n")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
+    kernels = [loaded_kernel(copies, caller)]
+    for ending in ("nbc", "nbi"):
+        (kept,) = copies.rglob(f"*.{ending}")
+        whole = kept.read_bytes()
+        middle = len(whole) // 2
+        for damaged in (whole[:middle], b"", whole[:middle] + bytes(64) + whole[middle + 64 :]):
+            kept.write_bytes(damaged)
+            kernels += [loaded_kernel(copies, caller), loaded_kernel(copies, caller)]
+    assert [sum(double.stats.cache_hits.values()) for double in kernels] == [0, *[0, 1] * 6]
+
+
+@pytest.mark.skipif(INTERPRETED, reason="nothing is cached")
+def test_what_the_disk_does_not_take_runs_all_the_same(copies: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    caller = copies / "caller.py"
+    caller.write_text("def double(x):\n    return 2.0 * x\n")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", full)
+    with pytest.warns(RuntimeWarning, match="cannot be kept"):
+        loaded_kernel(copies, caller)
 
 
 @pytest.mark.skipif(INTERPRETED, reason="nothing is compiled")

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import gc
 import hashlib
+import pickle
 import re
 import sys
 import threading
 import time
 import warnings
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache, lru_cache, partial, partialmethod
@@ -25,12 +27,13 @@ import numba
 from llvmlite import ir
 from numba import extending
 from numba.core import cgutils, codegen, compiler, imputils, types
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.typing.templates import AttributeTemplate
 
 # Numba is typed in some versions and not in others, and never for the options below the public ones.
 _njit: Any = numba.njit
 _Cache: Any = FunctionCache
+_CacheFiles: Any = IndexDataCacheFile
 _config: Any = numba.config
 _typeof: Any = numba.typeof
 _Library: Any = getattr(codegen, "JITCodeLibrary", object)
@@ -80,13 +83,52 @@ def _digest_for(function: Callable[..., Any]) -> str:
     return digest.hexdigest()
 
 
+class _WholeFiles(_CacheFiles):
+    """Numba's files of one kernel. What is not as it was written counts as missing, so that it is compiled again:
+    machine code that a crash or a full disk has cut short must not run."""
+
+    def _load_index(self) -> dict[Any, Any]:
+        try:
+            return cast(dict[Any, Any], super()._load_index())
+        except Exception:  # damaged bytes unpickle to anything
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        written = Path(self._data_path(name)).read_bytes()
+        checksum, data = written[:CHECKSUM_BYTES], written[CHECKSUM_BYTES:]
+        if checksum != _checksum(data):
+            raise OSError(f"{name} is damaged")  # which Numba takes for one that is gone
+        return pickle.loads(data)
+
+    def _save_data(self, name: str, data: Any) -> None:
+        dumped = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(_checksum(dumped) + dumped)
+
+
+CHECKSUM_BYTES = 4
+
+
+def _checksum(data: bytes) -> bytes:
+    return zlib.crc32(data).to_bytes(CHECKSUM_BYTES, "little")
+
+
 class _KernelCache(_Cache):
     """Numba's file cache, made stale by an edit to any file that the kernel is made of."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
+        files = self._cache_file
+        self._cache_file = _WholeFiles(self._cache_path, self._impl.filename_base, files._source_stamp)
         # with the version, not the stamp: an index of other sources may hold types there are no more, and is not read
-        self._cache_file._version = (self._cache_file._version, _digest_for(function))
+        self._cache_file._version = (files._version, _digest_for(function))
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Keep what was compiled; where the disk takes no more, it runs all the same."""
+        try:
+            super().save_overload(signature, compiled)
+        except OSError:
+            _warn_of_no_cache()
 
 
 @contextmanager
