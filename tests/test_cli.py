@@ -1010,6 +1010,38 @@ def test_a_full_disk_is_told_in_one_line() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "closed", "code", "said"),
+    [
+        ("catalog", ">&-", 2, "pfabrik: Bad file descriptor\n"),
+        ("new 6-UPS", ">&-", 2, "pfabrik: Bad file descriptor\n"),
+        ("info - --json", "<&-", 2, "pfabrik: Bad file descriptor\n"),
+        ("catalog", "2>&-", 0, ""),
+        ("info nowhere.toml", "2>&-", 2, ""),
+        ("new 6-UPS", "> /dev/full", 2, "pfabrik: No space left on device\n"),
+    ],
+)
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a shell, and /dev/full")
+def test_closed_streams_and_full_disks_are_told_in_a_line(line: str, closed: str, code: int, said: str) -> None:
+    command = f"{shlex.quote(sys.executable)} -m pfabrik {line} {closed}"
+    ran = subprocess.run(["sh", "-c", command], text=True, capture_output=True)
+    assert (ran.returncode, ran.stderr) == (code, said)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs /dev/stdout")
+def test_dev_stdout_is_standard_output(tmp_path: Path) -> None:
+    plain, named = (
+        subprocess.run(
+            [sys.executable, "-m", "pfabrik", "new", "delta", *output], capture_output=True, text=True, cwd=tmp_path
+        )
+        for output in ((), ("-o", "/dev/stdout"))
+    )
+    assert named.returncode == 0 and named.stdout == plain.stdout
+    with (tmp_path / "out.toml").open("w") as handle:
+        in_process("new", "delta", "-o", "/dev/stdout", stdout=handle).communicate(timeout=60)
+    assert (tmp_path / "out.toml").read_text() == plain.stdout
+
+
 def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
     def interruptible() -> None:  # a shell starts what runs in its background with interrupts ignored
         signal.signal(signal.SIGINT, signal.SIG_DFL)

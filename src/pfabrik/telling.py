@@ -21,7 +21,7 @@ def telling(label: str, on_progress: OnProgress | None = None) -> Iterator[OnPro
 
     A bar takes a total of 0 for one that is not known.
     """
-    if on_progress is not None or not sys.stderr.isatty():
+    if on_progress is not None or sys.stderr is None or not sys.stderr.isatty():
         yield on_progress
         return
     from rich.console import Console

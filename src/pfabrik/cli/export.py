@@ -11,7 +11,7 @@ import click
 import pfabrik as pf
 
 from .mech import MECH, load
-from .whole import whole_file
+from .whole import OUTPUT, STANDARD, refuse_existing, whole_file
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -63,7 +63,7 @@ TARGETS: dict[str, tuple[Callable[[Mechanism], str], str]] = {
 def one_option_each(command: Callable[..., Any]) -> Callable[..., Any]:
     """An option for every target, which takes the file to write."""
     for name, (_, said) in reversed(TARGETS.items()):
-        command = click.option(option(name), type=click.Path(path_type=Path), metavar="FILE", help=said)(command)
+        command = click.option(option(name), metavar="FILE", help=said, **OUTPUT)(command)
     return command
 
 
@@ -85,14 +85,13 @@ def export(mech: str, force: bool, **files: Path | None) -> int:
     if not wanted:
         raise click.UsageError(f"say what to write: {', '.join(f'{option(name)} FILE' for name in TARGETS)}")
     for path in wanted.values():
-        if path.exists() and not force:
-            raise click.ClickException(f"{path}: exists already; --force replaces it")
+        refuse_existing(path, force)
     mechanism = load(mech)
     for name, path in wanted.items():
         text = TARGETS[name][0](mechanism)
         with whole_file(path, [Path(mech)]) as handle:
             handle.write(text)
-        if path != Path("-"):
+        if path != STANDARD:
             click.echo(f"wrote {path}", err=True)
         if name == "linuxcnc" and text.startswith("/*"):
             click.echo("pfabrik: note: LinuxCNC has no kinematics that are this machine's: a module for it", err=True)

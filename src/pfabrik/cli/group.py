@@ -73,7 +73,20 @@ class CommandGroup(click.Group):
     ) -> Any:
         """Run a command line; in standalone mode, exit with the code that the subcommand returned."""
         run = partial(super().main, args, prog_name or "pfabrik", complete_var, standalone_mode=False, **extra)
-        return leave(exit_code(run)) if standalone_mode else run()
+        if not standalone_mode:
+            return run()
+        take_closed_places()
+        return leave(exit_code(run))
+
+
+def take_closed_places() -> None:
+    """Open what stands in for standard streams that are closed, lest a file that is written gets their place.
+
+    Reading standard input and writing standard output then fail as they should; what is said on stderr is dropped.
+    """
+    for name, mode, flags in (("stdin", "r", os.O_WRONLY), ("stdout", "w", os.O_RDONLY), ("stderr", "w", os.O_WRONLY)):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, flags), mode, encoding="utf-8"))
 
 
 def exit_code(run: Callable[[], Any]) -> int:

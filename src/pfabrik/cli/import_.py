@@ -11,7 +11,7 @@ import click
 import pfabrik as pf
 
 from .group import complain
-from .whole import whole_file
+from .whole import OUTPUT, STANDARD, refuse_existing, whole_file
 
 if TYPE_CHECKING:
     from ..interop import Imported
@@ -36,7 +36,7 @@ def words(context: click.Context, parameter: click.Parameter, value: str | None)
 )
 @click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of MuJoCo: home.")
 @click.option("--unit", default="m", show_default=True, help="Unit of length of the mechanism.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), default="-", help="File to write. Default: print it.")
+@click.option("-o", "--output", default="-", help="File to write. Default: print it.", **OUTPUT)
 @click.option("--force", is_flag=True, help="Replace the file if it exists.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout: what was found, and the file's text.")
 def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) -> int:
@@ -45,8 +45,7 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) 
     FILE is the model. Of a robot, what the end effector does not depend on is left out; loops that are open are closed.
     All that is left out or changed is told on stderr, by name.
     """
-    if output != Path("-") and output.exists() and not force:
-        raise click.ClickException(f"{output}: exists already; --force replaces it")
+    refuse_existing(output, force)
     found = imported(file, **asked)
     from ..files import dumps
 
@@ -55,14 +54,14 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) 
         notes = [{"what": note.what, "names": note.names} for note in found.notes]
         told = {"name": found.mechanism.name, "gap": found.gap, "unit": found.mechanism.length_unit, "notes": notes}
         click.echo(json.dumps(told | {"file": text}))
-        if output == Path("-"):
+        if output == STANDARD:
             return 0
     with whole_file(output, [file]) as handle:
         handle.write(text)
     if not as_json:
         for note in found.notes:
             complain(f"note: {note}")
-        if output != Path("-"):
+        if output != STANDARD:
             click.echo(f"wrote {output}; next: pfabrik info {output}", err=True)
     return 0
 

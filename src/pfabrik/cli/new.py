@@ -11,7 +11,7 @@ from click.shell_completion import CompletionItem
 from ..answers.table import aligned
 from ..catalog import catalog, catalog_file, template, templates, title
 from .mech import MECH
-from .whole import whole_file
+from .whole import OUTPUT, STANDARD, refuse_existing, whole_file
 
 
 def kinds_completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -22,11 +22,11 @@ def kinds_completed(ctx: click.Context, param: click.Parameter, incomplete: str)
 @click.command()
 @click.argument("kind", required=False, shell_complete=kinds_completed)
 @click.option("--from", "machine", type=MECH, metavar="NAME", help="A machine of the catalogue, in place of a KIND.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write. Default: print it.")
+@click.option("-o", "--output", default="-", help="File to write. Default: print it.", **OUTPUT)
 @click.option("--force", is_flag=True, help="Replace the file if it exists.")
 @click.option("--list", "list_all", is_flag=True, help="List the kinds of machines there are files for.")
 @click.option("--json", "as_json", is_flag=True, help="With --list: one JSON object on stdout.")
-def new(kind: str | None, machine: str | None, output: Path | None, force: bool, list_all: bool, as_json: bool) -> int:
+def new(kind: str | None, machine: str | None, output: Path, force: bool, list_all: bool, as_json: bool) -> int:
     """Write a starting file for a machine of your own.
 
     KIND is a name from `pfabrik new --list`. The file describes a machine of this kind that works as it is; its
@@ -41,16 +41,11 @@ def new(kind: str | None, machine: str | None, output: Path | None, force: bool,
     if (kind is None) == (machine is None):
         raise click.UsageError(f"give either --from NAME or one KIND of {', '.join(templates())}")
     text = text_of(kind) if machine is None else catalog_file(machine).read_text(encoding="utf-8")
-    if output is None:
-        click.echo(text, nl=False)
-        return 0
-    if output.is_dir():
-        raise click.ClickException(f"{output}: is a folder; expected the name of a file")
-    if output.exists() and not force:
-        raise click.ClickException(f"{output}: exists already; --force replaces it")
+    refuse_existing(output, force)
     with whole_file(output) as handle:
         handle.write(text)
-    click.echo(f"wrote {output}; next: edit it, then pfabrik check {output}")
+    if output != STANDARD:
+        click.echo(f"wrote {output}; next: edit it, then pfabrik check {output}")
     return 0
 
 

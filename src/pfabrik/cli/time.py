@@ -16,7 +16,7 @@ from ..telling import telling
 from .finite import FINITE
 from .mech import MECH, load
 from .speeds import speed_limits, speed_option
-from .whole import whole_file
+from .whole import OUTPUT, STANDARD, whole_file
 
 if TYPE_CHECKING:
     from ..timing.timed import Timed
@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("mech", type=MECH)
 @click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path, allow_dash=True), help="CSV file to write; - prints it."
-)
+@click.option("-o", "--output", help="CSV file to write; - prints it.", **OUTPUT)
 @speed_option
 @click.option(
     "--acceleration",
@@ -55,7 +53,7 @@ def time(
     ends the machine is at rest. A path with steps that are not reached, that leaps or crosses a parallel singularity
     is refused.
     """
-    if as_json and output == Path("-"):
+    if as_json and output == STANDARD:
         raise click.UsageError("-o - and --json both print on stdout: give one of them")
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
@@ -76,7 +74,7 @@ def time(
     if as_json:
         click.echo(json.dumps(as_object(timed), allow_nan=False))
     else:
-        click.echo(describe(timed), err=output == Path("-"))
+        click.echo(describe(timed), err=output == STANDARD)
     return 0
 
 

@@ -21,7 +21,7 @@ from .picture import ending_checked, picture
 from .projecting import options_projecting, projecting
 from .speeds import own_limits, speed_limits, speed_option
 from .track_checks import checked
-from .whole import whole_file
+from .whole import OUTPUT, STANDARD, whole_file
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
@@ -31,15 +31,11 @@ if TYPE_CHECKING:
     from ..paths.along import Extremes
     from .track_summary import Summary
 
-STANDARD = Path("-")
-
 
 @click.command()
 @click.argument("mech", type=MECH)
 @click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path, allow_dash=True), help="CSV file to write; - prints it."
-)
+@click.option("-o", "--output", help="CSV file to write; - prints it.", **OUTPUT)
 @projecting
 @click.option("--sample-time", type=FINITE, metavar="S", help="Time from one target to the next [s].")
 @click.option("--rapid", type=FINITE, metavar="V", help="Feed of rapid moves (G0), which say none [length/s].")

@@ -9,11 +9,24 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import click
 
 from ..writing import whole_path
+
+
+STANDARD = Path("-")
+"""Standard input or output, in place of a file."""
+
+
+def standard_if_so_named(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
+    """Standard output also by the name that systems have for it."""
+    return STANDARD if path == Path("/dev/stdout") else path
+
+
+OUTPUT: dict[str, Any] = {"type": click.Path(path_type=Path, allow_dash=True), "callback": standard_if_so_named}
+"""What an option is that takes a file to write."""
 
 
 @contextmanager
@@ -27,8 +40,9 @@ def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
     ----------
     inputs : files that were read, by any name or link, ``-`` for standard input: none of them is ever overwritten.
     """
-    if path == Path("-"):
+    if path == STANDARD:
         yield sys.stdout
+        sys.stdout.flush()  # so that what it does not take is told
         return
     refuse_input(path, inputs)
     if path.exists() and not path.is_file():
@@ -39,6 +53,14 @@ def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
         yield handle
 
 
+def refuse_existing(path: Path, force: bool) -> None:
+    """Stop if an output would replace a file, unless that is wanted."""
+    if path.is_dir():
+        raise click.ClickException(f"{path}: is a folder; expected the name of a file")
+    if path != STANDARD and path.is_file() and not force:
+        raise click.ClickException(f"{path}: exists already; --force replaces it")
+
+
 def refuse_input(path: Path, inputs: Iterable[Path]) -> None:
     """Stop if an output would overwrite a file that was read."""
     if any(is_same_file(path, read) for read in inputs):
@@ -47,7 +69,7 @@ def refuse_input(path: Path, inputs: Iterable[Path]) -> None:
 
 def is_same_file(path: Path, read: Path) -> bool:
     """Whether a path leads to the file that was read, or that standard input (``-``) comes from."""
-    if read != Path("-"):
+    if read != STANDARD:
         return path.exists() and read.exists() and path.samefile(read)
     try:
         return path.is_file() and os.path.samestat(path.stat(), os.fstat(sys.stdin.fileno()))

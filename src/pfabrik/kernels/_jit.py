@@ -179,8 +179,7 @@ def _compile_announced(name: str, original: Callable[..., Any], *arguments: Any)
 
     Numba calls this for what is not in the cache, with its lock held: one thread compiles, others wait for it.
     """
-    sys.stderr.write(f"pfabrik: compiling {name} ...")
-    sys.stderr.flush()
+    _say(f"pfabrik: compiling {name} ...")
     began, done = time.perf_counter(), threading.Event()
     threading.Thread(target=_tick, args=(done,), daemon=True).start()
     try:
@@ -188,14 +187,19 @@ def _compile_announced(name: str, original: Callable[..., Any], *arguments: Any)
             return original(*arguments)
     finally:
         done.set()
-        sys.stderr.write(f" {time.perf_counter() - began:.1f} s\n")
-        sys.stderr.flush()
+        _say(f" {time.perf_counter() - began:.1f} s\n")
 
 
 def _tick(done: threading.Event) -> None:
     """A dot on standard error every few seconds, until it is done."""
     while not done.wait(TICK):
-        sys.stderr.write(".")
+        _say(".")
+
+
+def _say(text: str) -> None:
+    """Write on standard error at once, where there is one: a program without a terminal may have closed it."""
+    if sys.stderr is not None:
+        sys.stderr.write(text)
         sys.stderr.flush()
 
 
