@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pfabrik.checks import put_limits, require_positive
-from pfabrik.errors import InvalidArgument, UnknownName
+import pfabrik as pf
+from pfabrik.checks import put_limits, require_finite, require_names, require_path, require_positive
+from pfabrik.errors import InvalidArgument, PfabrikError, UnknownName
 
 NAMES = ("A1", "A2")
 
@@ -24,6 +27,69 @@ def test_positive_numbers_of_any_type_are_told_as_floats(value: Any) -> None:
 def test_what_is_no_positive_number_is_refused_by_name(value: Any) -> None:
     with pytest.raises(InvalidArgument, match=r"rate: found .*; expected a positive number"):
         require_positive("rate", value)
+
+
+@pytest.mark.parametrize("value", [np.nan, -np.inf, True, "2", None, [2.0], 10**400])
+def test_what_is_no_finite_number_is_refused_by_name(value: Any) -> None:
+    assert require_finite("x", np.int8(-3)) == -3.0
+    with pytest.raises(InvalidArgument, match=r"x: found .*; expected a finite number"):
+        require_finite("x", value)
+
+
+@pytest.mark.parametrize("value", [None, 3, b"a", "\0", ["a"]])
+def test_what_is_no_path_is_refused_by_name(value: Any) -> None:
+    assert require_path("path", "a") == require_path("path", Path("a")) == Path("a")
+    with pytest.raises(InvalidArgument, match=r"path: found .*; expected the path of a file"):
+        require_path("path", value)
+
+
+@pytest.mark.parametrize("value", [None, 3, "ab", b"ab", ["a", 3], np.array("ab"), np.eye(2)])
+def test_what_are_no_names_is_refused_by_name(value: Any) -> None:
+    assert require_names("over", np.array(["a", "b"])) == require_names("over", iter("ab")) == ("a", "b")
+    with pytest.raises(InvalidArgument, match=r"over: found .*; expected a list of names"):
+        require_names("over", value)
+
+
+ARRAY = np.zeros((0, 3))
+
+WRONG: dict[str, Callable[[pf.Mechanism], Any]] = {
+    "path: found None": lambda machine: pf.save(machine, None),
+    "path: found 3": lambda machine: pf.read_path(3, machine),
+    "path: found 4": lambda machine: pf.export_c(machine, 4),
+    "path: found 5": lambda machine: pf.interop.to_mjcf(machine, 5),
+    "parts: found": lambda machine: pf.export_c(machine, "x.c", parts=ARRAY),
+    "precision: found": lambda machine: pf.export_c(machine, "x.c", precision=ARRAY),
+    "masses: found": lambda machine: pf.interop.to_mjcf(machine, masses="x"),
+    "masses\\['platform'\\]": lambda machine: pf.interop.to_mjcf(machine, masses={"platform": None}),
+    "poses: found": lambda machine: pf.interop.verify(machine, poses=None),
+    "seed: found": lambda machine: pf.interop.verify(machine, seed=-1),
+    "opened: found": lambda machine: pf.interop.assemble(None),
+    "over: found": lambda machine: pf.workspace(machine, over=3),
+    "within: found": lambda machine: pf.workspace(machine, within=3),
+    "fixed\\['z'\\]: found": lambda machine: pf.workspace(machine, fixed={"z": 10**400}),
+    "orientation: found": lambda machine: pf.workspace(machine, orientation=10**400),
+    "start: found a ragged nest": lambda machine: pf.workspace(machine, start=[[1, 2], [3]]),
+    "on_progress: found": lambda machine: pf.track(machine, ARRAY, on_progress=3),
+    "on_step: found": lambda machine: pf.warm_up(machine, on_step=3),
+    "joint coordinates of 3": lambda machine: pf.solve_ik(machine, {3: 4}),
+    "limits: found": lambda machine: machine.with_limits(3),
+    "no joint named": lambda machine: machine.joint([]),
+    "task: found": lambda machine: pf.Mechanism("m", machine.joints, "platform", (0, 0, 1), task=[["x"]]),
+    "joint: found": lambda machine: pf.Mechanism("m", np.array(None), "platform"),
+    "joints: found": lambda machine: pf.Mechanism.from_legs("U-P*-S", joints=None),
+    "leg\\[0\\].name: found": lambda machine: pf.Mechanism.from_legs(pf.Leg("U-P*-S", name=[])),
+    "degrees: found": lambda machine: pf.pose([0, 0, 0], degrees=ARRAY),
+    "names: found": lambda machine: pf.plot(machine, names=None),
+    "ax: found": lambda machine: pf.plot(machine, 3),
+    "figure: found": lambda machine: pf.plot_track(pf.track(machine, machine.home_pose[None]), 3),
+    "track: found an empty path": lambda machine: pf.time_path(pf.track(machine, ARRAY), speed=1.0),
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_what_cannot_be_meant_is_told_by_the_argument(said: str) -> None:
+    with pytest.raises(PfabrikError, match=said):
+        WRONG[said](pf.load("stewart"))
 
 
 def test_limits_that_are_not_named_stay() -> None:

@@ -489,6 +489,7 @@ def test_a_track_survives_pickling() -> None:
         ({"sample_time": 0.1, "times": np.arange(9.0)}, "times"),
         ({"times": np.arange(8.0)}, "times"),
         ({"times": -np.arange(9.0)}, "times"),
+        ({"times": [2.0, np.nan, 1.0, *range(3, 9)]}, "times"),
         ({"times": [0.0, np.inf, *range(2, 9)]}, "times"),
         ({"sample_time": 0.1, "speed_limits": 0.0}, "speed_limits"),
         ({"sample_time": 0.1, "speed_limits": [1.0, 2.0]}, "speed_limits"),

@@ -397,3 +397,14 @@ def test_where_nothing_is_within_reach_the_workspace_is_empty() -> None:
     assert len(found.faces) == 0
     assert found.components == ()
     assert not found.contains([0.0, 0.0])
+
+
+def test_a_window_is_looked_at_however_far_from_the_start_it_is() -> None:
+    assert pf.workspace(pf.load("five_bar"), within={"y": (1e5, 2e5)}, resolution=10.0).size == 0.0
+    rail = pf.Joint("rail", "prismatic", ("base", "car"), axis=(1, 0, 0), actuated=True)
+    lift = pf.Joint("lift", "prismatic", ("car", "platform"), axis=(0, 1, 0), actuated=True, range=(-1, 1))
+    post = pf.Joint("post", "fixed", ("platform", "tip"), at=(0, 0, 1))
+    machine = pf.Mechanism("gantry", [rail, lift, post], "tip", (0, 0, 1), task=("x", "y"))
+    far = 9.0 * machine.characteristic_length
+    found = pf.workspace(machine, within={"x": (far, far + 1.0)})
+    np.testing.assert_allclose(found.bounds, [[far, -1.0], [far + 1.0, 1.0]], atol=0.05)

@@ -1,11 +1,14 @@
-"""What arguments of several questions are checked for: positive numbers, and highest values of actuators by name."""
+"""What arguments of several questions are checked for: positive numbers, paths of files, names, functions to call, and
+highest values of actuators by name."""
 
 from __future__ import annotations
 
 import math
+import os
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 from .arrays import Floats
@@ -20,10 +23,61 @@ def require_positive(name: str, value: Any) -> float:
 
 
 def _is_positive(value: Real) -> bool:
+    return _is_finite(value) and float(value) > 0.0
+
+
+def _is_finite(value: Real) -> bool:
     try:
-        return 0.0 < float(value) < math.inf
+        return math.isfinite(float(value))
     except OverflowError:  # an integer or a fraction too large for a float
         return False
+
+
+def require_finite(name: str, value: Any) -> float:
+    """A number of any type that is, as a float, finite; InvalidArgument for anything else."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not _is_finite(value):
+        raise InvalidArgument(name, reprlib.repr(value), "a finite number")
+    return float(value)
+
+
+def require_path(name: str, value: Any) -> Path:
+    """The path of a file; InvalidArgument for what cannot be one."""
+    path = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(path, str) or "\0" in path:
+        raise InvalidArgument(name, reprlib.repr(value), "the path of a file")
+    return Path(path)
+
+
+def require_names(name: str, value: Any) -> tuple[str, ...]:
+    """Names, as a tuple; InvalidArgument for a single text and for what is no list of texts."""
+    names = tuple(value) if isinstance(value, Iterable) and not _is_single(value) else None
+    if names is None or not all(isinstance(each, str) for each in names):
+        raise InvalidArgument(name, reprlib.repr(value), "a list of names")
+    return names
+
+
+def _is_single(value: Any) -> bool:
+    """Whether what seems to be many things is a text, or an array without axes."""
+    return isinstance(value, str | bytes) or getattr(value, "shape", None) == ()
+
+
+def require_mapping(name: str, value: Any, expected: str) -> Mapping[Any, Any]:
+    """Values by name, none for None; InvalidArgument for what is no mapping."""
+    if value is not None and not isinstance(value, Mapping):
+        raise InvalidArgument(name, reprlib.repr(value), expected)
+    return value or {}
+
+
+def require_callable(name: str, value: Any) -> None:
+    """InvalidArgument for what is neither None nor can be called."""
+    if value is not None and not callable(value):
+        raise InvalidArgument(name, reprlib.repr(value), "a function to call, or None")
+
+
+def require_method(name: str, value: Any, method: str, expected: str) -> None:
+    """InvalidArgument for what has no such method: objects of libraries that may not be there are told by these."""
+    if not callable(getattr(value, method, None)):
+        raise InvalidArgument(name, reprlib.repr(value), expected)
 
 
 def put_limits(limits: Floats, argument: str, given: float | Mapping[str, float] | None, names: Sequence[str]) -> None:

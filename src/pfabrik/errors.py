@@ -173,11 +173,11 @@ class InvalidArgument(PfabrikError, ValueError):
 class UnknownName(PfabrikError, KeyError):
     """A name that is not known here; the alternatives are listed on `known`."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: Any, known: Iterable[str]) -> None:
         self.kind = kind
-        self.name = name
+        self.name = str(name)
         self.known = tuple(known)
-        self._text = f"no {kind} named '{name}'{near_miss(name, self.known)} (known: {', '.join(self.known)})"
+        self._text = f"no {kind} named '{name}'{near_miss(self.name, self.known)} (known: {', '.join(self.known)})"
         super().__init__(self._text)
 
     def __str__(self) -> str:

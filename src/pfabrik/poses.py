@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
@@ -54,6 +55,8 @@ def pose(
         raise InvalidArgument("pose", " and ".join(given), "at most one rotation")
     if misplaced:
         raise InvalidArgument("xyz", f"{1 + len(misplaced)} arguments", "one position: pose([x, y, z], rpy=...)")
+    if not isinstance(degrees, bool | np.bool_):
+        raise InvalidArgument("degrees", reprlib.repr(degrees), "True or False")
     positions = _numbers("xyz", xyz, (3,))
     turned = np.eye(3)
     for name in given:

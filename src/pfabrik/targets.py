@@ -49,11 +49,12 @@ def carrying_joint(mechanism: Mechanism) -> str | None:
 def _from_joint(mechanism: Mechanism, target: Mapping[str, Any]) -> tuple[Floats, tuple[int, ...]]:
     """Poses that have given coordinates at the one joint that connects base and end effector."""
     name = carrying_joint(mechanism)
+    given = ", ".join(map(str, target)) or "no joint"
     if name is None:
         expected = "a pose or position: no single joint connects base and end effector here"
-        raise InvalidArgument("target", f"joint coordinates of {', '.join(target)}", expected)
+        raise InvalidArgument("target", f"joint coordinates of {given}", expected)
     if list(target) != [name]:
-        raise InvalidArgument("target", f"coordinates of {', '.join(target) or 'no joint'}", f"those of '{name}'")
+        raise InvalidArgument("target", f"coordinates of {given}", f"those of '{name}'")
     span = columns(mechanism)[name]
     n = span.stop - span.start
     expected = f"finite coordinates of shape (..., {n})" if n > 1 else "finite coordinates of shape (...)"

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
+from .checks import require_callable
+
 OnProgress: TypeAlias = Callable[[int, int], None]
 """Called with what is done, and with what there is in all, about."""
 
@@ -21,6 +23,7 @@ def telling(label: str, on_progress: OnProgress | None = None) -> Iterator[OnPro
 
     A bar takes a total of 0 for one that is not known.
     """
+    require_callable("on_progress", on_progress)
     if on_progress is not None or sys.stderr is None or not sys.stderr.isatty():
         yield on_progress
         return

@@ -13,6 +13,7 @@ from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track, pace_of
+from .checks import require_callable
 from .description.mechanism import Mechanism
 from .engine import inverse_engine_of
 from .errors import InvalidArgument
@@ -43,7 +44,8 @@ def track(
     start : a single Solution or joint vector q to start from; default home.
     on_progress : called with (steps done, steps in all) every few steps.
     sample_time : from one target to the next [s].
-    times : instead of it, when each target is to be there, (n,) [s], as of `read_path`.
+    times : instead of it, when each target is to be there, (n,) [s], as of `read_path`: none before one before it; the
+        same where the machine is to wait, NaN where nothing is known.
     speed_limits : highest speeds of the actuators, by name or the same for all [length/s or rad/s]; those not named may
         be as fast as they like.
 
@@ -58,6 +60,7 @@ def track(
     As `solve_ik`; also InvalidArgument for targets that are no path, and for options that change the working mode.
     """
     options = checked_options(options)
+    require_callable("on_progress", on_progress)
     poses, shape = as_targets(mechanism, targets)
     if len(shape) != 1:
         raise InvalidArgument("targets", f"batch shape {shape}", "a path: shape (n, 4, 4) or (n, 3)")

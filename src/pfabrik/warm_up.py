@@ -11,6 +11,7 @@ import numpy as np
 
 from .answers.differential import forward_jacobian
 from .answers.solution import Solution
+from .checks import require_callable
 from .description.mechanism import Mechanism, checked_mechanism
 from .fk import solve_fk
 from .ik import solve_ik
@@ -40,6 +41,7 @@ def warm_up(mechanism: Mechanism | None = None, *, on_step: Callable[[str, float
         What it does not need is not compiled. Default: everything that any machine needs.
     on_step : called after each step with its name and how long it took [s].
     """
+    require_callable("on_step", on_step)
     if mechanism is None:
         compile_all(on_step)
         return

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from .checks import require_path
+
 
 @contextmanager
 def whole_path(path: str | os.PathLike[str]) -> Iterator[Path]:
@@ -15,7 +17,7 @@ def whole_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     Its ending is that of `path`, which writers tell the format by.
     """
-    final = Path(path).resolve()  # a link keeps pointing where it points
+    final = require_path("path", path).resolve()  # a link keeps pointing where it points
     if not final.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     if final.is_dir():

@@ -221,11 +221,11 @@ def pace_of(
 
 
 def _checked_times(times: ArrayLike | None, count: int) -> Floats:
-    expected = f"shape ({count},): when each target is to be there [s], none before the one before it"
+    expected = f"shape ({count},): when each target is to be there [s], NaN where not known, none before one before it"
     found = as_floats("times", times, expected).copy()
     if found.shape != (count,):
         raise InvalidArgument("times", f"shape {found.shape}", expected)
-    if np.isinf(found).any() or (np.diff(found) < 0.0).any():
+    if np.isinf(found).any() or (np.diff(found[~np.isnan(found)]) < 0.0).any():
         raise InvalidArgument("times", "times that go back, or are infinite", expected)
     return found
 

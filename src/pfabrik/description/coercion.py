@@ -20,7 +20,7 @@ again would move the last digit, and a saved mechanism would not load as its equ
 
 def items(value: Any) -> Any:
     """The items of anything that can be iterated, as a tuple."""
-    return tuple(value) if isinstance(value, Iterable) else value
+    return tuple(value) if isinstance(value, Iterable) and getattr(value, "shape", None) != () else value
 
 
 def truths(value: Any, type_: Any) -> Any:

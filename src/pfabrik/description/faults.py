@@ -106,7 +106,7 @@ def _task_faults(task: Any, mechanism: Structure) -> Iterator[Fault]:
             yield Fault("task", f"{shown(each)}{near_miss(each, TASK_COORDINATES)}", expected)
     if len(set(map(str, task))) < len(task):
         yield Fault("task", shown(list(task)), f"{expected}, none of them twice")
-    turns = list(dict.fromkeys(each for each in task if each in TASK_TURNS))
+    turns = list(dict.fromkeys(each for each in map(str, task) if each in TASK_TURNS))
     if len(turns) > 1:
         expected = "one of the two: tilt and yaw are parts of the rotation, together all of it"
         yield Fault("task", f"both {turns[0]} and {turns[1]}", expected)

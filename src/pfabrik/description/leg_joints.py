@@ -38,8 +38,8 @@ def placed_joints(
             faults.append(Fault(f"{place}.connects", found, "the two bodies that the legs lead from and to"))
         ends = leg.connects if leg.connects is not None and is_pair_of_names(leg.connects) else (base, end_effector)
         maker = LegMaker(leg, place, ends, faults)
-        placed += maker.joints(counted[leg.name] + 1)
-        counted[leg.name] += maker.count
+        placed += maker.joints(counted[str(leg.name)] + 1)
+        counted[str(leg.name)] += maker.count
     return placed, faults
 
 

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
+from ..checks import require_mapping
 from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning
+from .coercion import items
 from .faults import find_faults, in_order, merged
-from .form_faults import joint_faults
+from .form_faults import joint_faults, shown
 from .home_mobility import end_effector_freedom, inexactness, is_held
 from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
@@ -118,7 +120,9 @@ class Mechanism(Structure):
         """
         parts = {"base": base, "platform": platform, "via": via, "axis": axis, "stroke": stroke, "copies": copies}
         described = as_legs(legs, parts | {"by_letter": by_letter})
-        own = tuple(joints)
+        own = items(joints)
+        if not isinstance(own, tuple):
+            raise InvalidArgument("joints", shown(own), "a list of joints")
         tips = [joint.name for joint in own if isinstance(joint, Joint)]
         placed, faults = placed_joints(described, base_body, end_effector, tips)
         made = own + tuple(each.joint for each in placed)
@@ -177,7 +181,7 @@ class Mechanism(Structure):
         UnknownName : no joint of that name.
         InvalidMechanism : a limit that does not fit its joint, or that home exceeds.
         """
-        changes = {**(limits or {}), **by_name}
+        changes = {**require_mapping("limits", limits, "limits by the names of joints"), **by_name}
         for name in changes:
             self.joint(name)
         return self._with_joints(

@@ -154,7 +154,7 @@ class Structure:
 
     def joint(self, name: str) -> Joint:
         """The joint of that name; `UnknownName` if there is none."""
-        if name not in self._by_name:
+        if not isinstance(name, str) or name not in self._by_name:
             raise UnknownName("joint", name, self._by_name)
         return self._by_name[name]
 

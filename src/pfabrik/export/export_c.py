@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
+from ..checks import require_names
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..writing import whole_path
@@ -61,9 +62,9 @@ def c_source(
 ) -> str:
     """The text that `export_c` writes."""
     checked_mechanism(mechanism)
-    if precision not in get_args(Precision):
+    if not isinstance(precision, str) or precision not in get_args(Precision):
         raise InvalidArgument("precision", repr(precision), "'double' or 'float'")
-    if isinstance(parts, str) or not parts or not set(parts) <= set(PARTS):
+    if not (named := require_names("parts", parts)) or not set(named) <= set(PARTS):
         raise InvalidArgument("parts", repr(parts), f"some of {', '.join(map(repr, PARTS))}")
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise InvalidArgument("name", repr(name), "lower-case letters, digits and underscores, a letter first")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..catalog import catalog, catalog_file
+from ..checks import require_path
 from ..description.form_faults import shown
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import Fault, InvalidArgument, InvalidMechanism, UnknownName
@@ -76,7 +77,7 @@ def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
     The file is replaced as a whole or not at all. Copies and shorthands of a file it came from are not kept.
     """
     checked_mechanism(mechanism)
-    target = Path(path).resolve()
+    target = require_path("path", path).resolve()
     draft = target.with_name(f".{secrets.token_hex(8)}.tmp")
     try:
         draft.write_bytes(dumps(mechanism).encode())

@@ -15,7 +15,7 @@ from ..description.home_mobility import column_joints
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
-from ..errors import Fault, InvalidMechanism, MobilityWarning
+from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
 from ..motion.displacements import centres, columns, displacements, screws
 from ..tolerances import TOLERANCES
 from .closing import CLOSED, Closer, Placed, bounds, closed
@@ -57,6 +57,8 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
     ------
     InvalidMechanism : the loops cannot be closed, with how far they stay open, or what they make is no mechanism.
     """
+    if not isinstance(opened, OpenMechanism):
+        raise InvalidArgument("opened", type(opened).__name__, "an OpenMechanism")
     told = list(notes)
     closer = Closer(opened)
     gap = closer.gap(np.zeros(closer.count))

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats
+from ..checks import require_mapping, require_positive
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument, UnknownName
+from ..errors import UnknownName
 
 DENSITY = 100.0
 """Mass of the end effector over the cube of the characteristic length [kg/m³]: 0.8 kg for a hexapod of 200 mm."""
@@ -83,12 +84,11 @@ def physics(mechanism: Mechanism, metres: float, masses: Mapping[str, float] | N
     UnknownName : a mass of no body of the mechanism.
     InvalidArgument : a mass that is not positive.
     """
-    given = dict(masses or {})
-    for body, mass in given.items():
+    given = {}
+    for body, mass in require_mapping("masses", masses, "masses in kg by the names of bodies").items():
         if body not in mechanism.bodies:
             raise UnknownName("body", body, mechanism.bodies)
-        if not 0.0 < mass < np.inf:
-            raise InvalidArgument(f"masses['{body}']", repr(mass), "a positive mass in kg")
+        given[body] = require_positive(f"masses['{body}']", mass)
     length = mechanism.characteristic_length * metres
     whole = DENSITY * length**3
     plausible = {body: whole if body == mechanism.end_effector_body else LINK * whole for body in mechanism.bodies}

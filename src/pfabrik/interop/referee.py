@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import reprlib
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -90,8 +92,9 @@ def verify(mechanism: Mechanism, *, poses: int = 100, seed: int = 0) -> Verifica
     InvalidArgument : less than one pose.
     """
     checked_mechanism(mechanism)
-    if poses < 1:
-        raise InvalidArgument("poses", str(poses), "at least 1")
+    for name, value, least in (("poses", poses, 1), ("seed", seed, 0)):
+        if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:
+            raise InvalidArgument(name, reprlib.repr(value), f"an integer from {least} on")
     rng = np.random.default_rng(seed)
     referee = Referee(mechanism)
     found = [referee.compare(solution, rng) for solution in reached_at_random(mechanism, poses, rng)]

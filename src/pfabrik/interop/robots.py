@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
+from ..checks import require_names
 from ..description.joint_types import KINDS, TASK_COORDINATES
 from ..description.joints import Cone, Joint
 from ..description.mechanism import Mechanism
@@ -77,7 +78,7 @@ def mechanism_of(robot: Robot, wanted: Wanted, told: list[Note]) -> Imported:
         None if point is None else tuple((point / metres).tolist()),
         base,
         wanted.length_unit,
-        tuple(wanted.task) if wanted.task is not None else robot.task if as_told else None,
+        require_names("task", wanted.task) if wanted.task is not None else robot.task if as_told else None,
         robot.cones,
     )
     found = assemble(prune(opened, told), told)
@@ -97,9 +98,7 @@ def _of_task(mechanism: Mechanism) -> Iterator[Note]:
 
 def _names(what: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
     """Names that are all known; UnknownName for the first that is not."""
-    if isinstance(names, str):
-        raise InvalidArgument(what, f"the text '{names}'", "a list of names")
-    listed, every = list(names), list(known)
+    listed, every = require_names(what, names), list(known)
     for name in listed:
         if name not in every:
             raise UnknownName(f"joint to be {what}", name, every)
@@ -132,7 +131,7 @@ def _base(robot: Robot, base: str | None) -> str:
     """The body asked for, else the file's own, else the root."""
     if base is None:
         return robot.base or robot.root
-    if base not in _bodies(robot):
+    if not isinstance(base, str) or base not in _bodies(robot):
         raise UnknownName("body", base, _bodies(robot))
     return base
 
@@ -141,7 +140,7 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str, told: list[
     """What was asked for, else the file's own, else the one body at which most joints and loops meet."""
     joints = [each.name for each in robot.joints] + [each.name for each in robot.loops]
     if end_effector is not None:
-        if end_effector not in robot.places and end_effector not in joints:
+        if not isinstance(end_effector, str) or end_effector not in [*robot.places, *joints]:
             raise UnknownName("body, site or joint", end_effector, [*robot.places, *joints])
         return end_effector
     if robot.end_effector is not None:

@@ -10,6 +10,6 @@ METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "µm": 1e-6,
 
 def metres_of(length_unit: str) -> float:
     """Length of a unit [m]; InvalidArgument for a label that is not known."""
-    if length_unit not in METRES:
+    if not isinstance(length_unit, str) or length_unit not in METRES:
         raise InvalidArgument("length_unit", f"'{length_unit}'", f"one of {', '.join(METRES)}")
     return METRES[length_unit]

@@ -8,6 +8,7 @@ from typing import Literal
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
+from ..checks import require_path
 from ..description.form_faults import shown
 from ..errors import Fault, InvalidArgument, InvalidMechanism
 
@@ -53,7 +54,7 @@ def read_xml(source: str | os.PathLike[str], root: str) -> ET.Element:
 
 def kind_of(path: str | os.PathLike[str]) -> Literal["mjcf", "urdf"]:
     """What kind of file this is, by its first element; InvalidMechanism where it is neither."""
-    tree = _parsed(_Budget().read(Path(path)), os.fspath(path))
+    tree = _parsed(_Budget().read(require_path("path", path)), os.fspath(path))
     if tree.tag not in KINDS:
         expected = " or ".join(f"<{tag}> ({kind.upper()})" for tag, kind in KINDS.items())
         raise fault(os.fspath(path), f"<{shown(tree.tag)[1:-1]}>", expected)

@@ -14,7 +14,7 @@ from typing import TextIO
 import numpy as np
 
 from ..arrays import Floats
-from ..checks import require_positive
+from ..checks import require_path, require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..poses import pose
@@ -96,10 +96,11 @@ def path_blocks(
     for option, value in asked.items():
         if value is not None:
             require_positive(option, value)
-    name = "standard input" if str(path) == "-" else str(path)
+    file = require_path("path", path)
+    name = "standard input" if str(file) == "-" else str(file)
     try:
-        with _opened(path) as handle:
-            is_table, lines = _begun(_text(handle), FilePath(path).suffix.lower())
+        with _opened(file) as handle:
+            is_table, lines = _begun(_text(handle), file.suffix.lower())
             if is_table:
                 table = Table(lines, mechanism)
                 blocks, has_times = _counted(table.blocks()), table.has_times
@@ -119,10 +120,10 @@ def path_blocks(
         raise InvalidArgument(name, "a file that is no text", "CSV or G-code") from None
 
 
-def _opened(path: str | PathLike[str]) -> AbstractContextManager[TextIO]:
+def _opened(path: FilePath) -> AbstractContextManager[TextIO]:
     if str(path) == "-":
         return nullcontext(sys.stdin)
-    return FilePath(path).open(newline="", encoding="utf-8-sig")
+    return path.open(newline="", encoding="utf-8-sig")
 
 
 def _text(handle: TextIO) -> Iterator[str]:

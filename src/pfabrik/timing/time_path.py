@@ -57,6 +57,8 @@ def time_path(
     if not np.isfinite([*speeds, *accelerations, most_platform]).any():
         found = f"'{mechanism.name}' without max_speed and max_acceleration"
         raise InvalidArgument("speed", found, "a limit: in the mechanism, or speed, acceleration or platform_speed")
+    if not len(track):
+        raise InvalidArgument("track", "an empty path", "two steps or more that differ")
     refuse_leaps(track)
     curve = curve_of(track)
     if len(curve.s) < 2:

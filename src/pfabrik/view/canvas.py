@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Floats
+from ..checks import require_method
 from ..errors import InvalidArgument
 from ..extras import require
 
@@ -185,7 +186,9 @@ def canvas_on(ax: Axes | None, plane: Floats | None) -> Canvas:
     MissingLibrary : matplotlib is not installed.
     """
     require("pictures", "matplotlib", "plot")
-    if ax is None:
+    if ax is not None:
+        require_method("ax", ax, "tick_params", "matplotlib axes, or None")
+    else:
         from matplotlib import pyplot
 
         figure = pyplot.figure(figsize=(5.0, 4.5), dpi=150, layout=None if plane is None else "constrained")

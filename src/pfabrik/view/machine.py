@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..answers.solution import Solution
+from ..checks import require_names
 from ..description.joint_types import JointType
 from ..description.mechanism import Mechanism
 from .canvas import SMALL, Canvas, canvas_on
@@ -52,7 +53,7 @@ def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence
     """
     mechanism, _ = checked_shown(shown)
     owners = {each.name: each.joint.name for each in mechanism.coordinates}
-    named = {mechanism.joint(owners.get(name, name)).name for name in names}
+    named = {mechanism.joint(owners.get(name, name)).name for name in require_names("names", names)}
     skeleton = skeleton_of(shown)
     canvas = canvas_on(ax, plane_of(mechanism))
     draw_machine(canvas, skeleton)

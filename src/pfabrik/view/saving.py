@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..checks import require_path
 from ..errors import InvalidArgument
 from ..writing import whole_path
 
@@ -45,7 +45,7 @@ def save_picture(figure: Figure, path: str | os.PathLike[str], *, tight: bool = 
 
 def checked_ending(path: str | os.PathLike[str], known: tuple[str, ...]) -> str:
     """How a file's name ends, in small letters; InvalidArgument where nothing is written that way."""
-    suffix = Path(path).suffix.lower()
+    suffix = require_path("path", path).suffix.lower()
     if suffix not in known:
         raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(known[:-1])} or {known[-1]}")
     return suffix

@@ -12,6 +12,7 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats
+from ..checks import require_method
 from ..description.readouts import Readout, readouts
 from ..errors import InvalidArgument
 from ..extras import require
@@ -64,7 +65,9 @@ def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
     """
     known = checked_track(track)
     require("pictures", "matplotlib", "plot")
-    if figure is None:
+    if figure is not None:
+        require_method("figure", figure, "subfigures", "a matplotlib figure, or None")
+    else:
         from matplotlib import pyplot
 
         figure = pyplot.figure(figsize=(11.5, 6.2), dpi=130, layout="constrained")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..answers.words import short_names
+from ..checks import require_method
 from ..errors import InvalidArgument
 from ..extras import require
 from ..travel import Reach, Travel
@@ -63,7 +64,9 @@ def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
     require("pictures", "matplotlib", "plot")
     kinds = {kind: _rows([each for each in found if each.kind == kind]) for kind in ("along", "about")}
     kinds = {kind: rows for kind, rows in kinds.items() if rows}
-    if figure is None:
+    if figure is not None:
+        require_method("figure", figure, "subplots", "a matplotlib figure, or None")
+    else:
         from matplotlib import pyplot
 
         height = 1.6 + HEIGHT * max(map(len, kinds.values()))

@@ -10,8 +10,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ..answers.solution import Solution
-from ..answers.starts import Start, start_of
+from ..answers.starts import Start, joint_vectors, start_of
 from ..arrays import Floats
+from ..checks import require_mapping
 from ..configuration import configuration
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..description.task import task_of
@@ -108,7 +109,8 @@ def _found(
 def _start(mechanism: Mechanism, start: Start | None) -> Solution | None:
     if start is None:
         return None
-    start_of(mechanism, start, np.shape(start)[:-1] if not isinstance(start, Solution) else start.shape)
+    shape = start.shape if isinstance(start, Solution) else joint_vectors(mechanism, start, "start")[1]
+    start_of(mechanism, start, shape)
     begin = start if isinstance(start, Solution) else configuration(mechanism, start)
     if begin.shape != () or begin.status > 1:
         found = f"batch shape {begin.shape}" if begin.shape else f"an answer that is {begin.status}"
@@ -136,7 +138,7 @@ def _ends(space: Space, within: Mapping[str, tuple[float, float]] | None) -> tup
     """Where the map ends, (d,) each: half a turn either way for angles, if not said otherwise."""
     half_turn = np.where(space.is_angle, math.pi, np.inf)
     lowest, highest = -half_turn, half_turn
-    for name, ends in (within or {}).items():
+    for name, ends in require_mapping("within", within, "ends by coordinate, such as {'z': (100, 200)}").items():
         if name not in space.names:
             raise UnknownName("coordinate", name, space.names)
         low, high = _pair(f"within['{name}']", ends)
@@ -149,7 +151,7 @@ def _pair(name: str, ends: Any) -> tuple[float, float]:
     expected = "two numbers, the smaller one first"
     try:
         low, high = (float(end) for end in ends)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidArgument(name, repr(ends), expected) from None
     if not low < high:
         raise InvalidArgument(name, repr(ends), expected)

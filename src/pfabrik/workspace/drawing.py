@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..checks import require_method
 from ..errors import InvalidArgument
 from ..extras import require
 
@@ -29,13 +30,15 @@ def axes_for(ax: Axes | None, d: int) -> Axes:
     MissingLibrary : matplotlib is not installed.
     """
     require("pictures", "matplotlib", "plot")
-    if ax is None:
+    if ax is not None:
+        require_method("ax", ax, "tick_params", "matplotlib axes, or None")
+    else:
         from matplotlib import pyplot
 
         figure = pyplot.figure(figsize=SIZE, dpi=150, layout="constrained")
         space: dict[str, Any] = {"projection": "3d", "elev": ELEVATION, "azim": AZIMUTH}
         ax = figure.add_subplot(**(space if d == 3 else {}))
-    elif d == 3 and not hasattr(ax, "get_zlim"):
+    if d == 3 and not hasattr(ax, "get_zlim"):
         expected = "three-dimensional ones, as of figure.add_subplot(projection='3d')"
         raise InvalidArgument("ax", "two-dimensional axes for a workspace of three coordinates", expected)
     ax.tick_params(labelsize=SMALL)

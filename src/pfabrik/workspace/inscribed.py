@@ -76,8 +76,8 @@ def inscribed(found: Region, kind: Kind, centre: ArrayLike | None, proportions: 
 def _extents(found: Region, kind: Kind, proportions: ArrayLike | None) -> Floats:
     """The shape of size one: how long it is along each coordinate, (d,)."""
     d = len(found.names)
-    if kind not in get_args(Kind):
-        raise UnknownName("shape", str(kind), get_args(Kind))
+    if not isinstance(kind, str) or kind not in get_args(Kind):
+        raise UnknownName("shape", kind, get_args(Kind))
     if kind == "cylinder" and d != 3:
         raise InvalidArgument("kind", "'cylinder'", "a sphere or a box: the workspace lies in a plane")
     alike = len(set(found.units[:2] if kind == "cylinder" else found.units)) == 1

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
-from .lattice import Lattice, codes, corners, ways
+from .lattice import MIDDLE, Lattice, codes, corners, ways
 from .numbering import Numbering
 
 GROWS = 0.5
@@ -114,8 +114,10 @@ def _first(lattice: Lattice, levels: int, reach: int) -> Cells:
 def _box(lattice: Lattice, width: int, reach: int) -> Cells:
     d, question = lattice.d, lattice.measure.question
     first, last = ((end - lattice.origin) / (lattice.step * width) for end in (question.lowest, question.highest))
-    low = np.maximum(np.floor(first) - 1, -reach).astype(np.int64)
-    high = np.minimum(np.ceil(last) + 1, reach).astype(np.int64)
+    farthest = min(HORIZON * reach, MIDDLE // width - 2 * reach)
+    middle = np.clip(np.round(np.clip(0.0, first, last)), -farthest, farthest)  # the start, or what is nearest to it
+    low = np.clip(np.floor(first) - 1, middle - reach, middle).astype(np.int64)
+    high = np.clip(np.ceil(last) + 1, middle, middle + reach).astype(np.int64)
     while True:
         axes = [np.arange(a, b + 1) * width for a, b in zip(low, high, strict=True)]
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)

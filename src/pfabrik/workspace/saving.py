@@ -6,12 +6,12 @@ import csv
 import io
 from collections.abc import Callable
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Ints
+from ..checks import require_path
 from ..errors import InvalidArgument
 from ..writing import whole_path
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def save(found: Region, path: str | PathLike[str]) -> None:
     """Write a workspace in the format that the ending says; the file is there whole, or not at all."""
-    write = _FORMATS.get(Path(path).suffix.lower())
+    write = _FORMATS.get(require_path("path", path).suffix.lower())
     if write is None:
         raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(ENDINGS)}")
     content = write(found)

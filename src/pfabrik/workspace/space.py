@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
+from ..checks import require_finite, require_mapping, require_names
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..errors import InvalidArgument, UnknownName
@@ -163,7 +164,7 @@ def _rotation(mechanism: Mechanism, orientation: Any, start: Floats) -> Floats:
         orientation = orientation.as_matrix()
     try:
         matrix = np.array(orientation, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         matrix = np.zeros(0)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or not is_rotation(matrix):
         raise InvalidArgument(
@@ -175,15 +176,11 @@ def _rotation(mechanism: Mechanism, orientation: Any, start: Floats) -> Floats:
 
 
 def _checked_fixed(fixed: Mapping[str, float] | None, known: Sequence[str]) -> dict[str, float]:
-    if fixed is not None and not isinstance(fixed, Mapping):
-        raise InvalidArgument("fixed", type(fixed).__name__, "coordinates by name, such as {'z': 200}")
     checked = {}
-    for name, value in (fixed or {}).items():
+    for name, value in require_mapping("fixed", fixed, "coordinates by name, such as {'z': 200}").items():
         if name not in known:
             raise UnknownName("coordinate", name, known)
-        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
-            raise InvalidArgument(f"fixed['{name}']", repr(value), "a finite number")
-        checked[name] = float(value)
+        checked[name] = require_finite(f"fixed['{name}']", value)
     return checked
 
 
@@ -192,10 +189,10 @@ def _checked_over(
 ) -> tuple[str, ...] | None:
     if over is None:
         return None
-    names = (over,) if isinstance(over, str) else tuple(over)
+    names = (over,) if isinstance(over, str) else require_names("over", over)
     for name in names:
         if name not in known:
-            raise UnknownName("coordinate", str(name), known)
+            raise UnknownName("coordinate", name, known)
         if name in fixed:
             raise InvalidArgument("over", f"'{name}', which is fixed", "coordinates that may vary")
     if len(set(names)) < len(names):
