@@ -301,6 +301,18 @@ def test_check_has_nothing_to_note_of_a_starting_file(run: Callable[..., Result]
     assert run("check", "my.toml").stderr == ""
 
 
+def test_machines_of_hundreds_of_legs_are_checked_and_shown_at_once(run: Callable[..., Result], tmp_path: Path) -> None:
+    """Freedoms are counted at a cost that grows with the cube of the joints: of so many, they are not."""
+    leg = pf.Leg("U-P*-S", base=[100, 0, 0], platform=[50, 10, 180], copies={"count": 100, "axis": (0, 0, 1)})
+    machine = pf.Mechanism.from_legs(leg, reference_point=(0, 0, 180))
+    pf.save(machine, tmp_path / "many.toml")
+    checked = run("check", tmp_path / "many.toml")
+    assert checked.exit_code == 0 and checked.stdout.startswith("ok: ")
+    assert "freedoms are not counted with more than 200 joints" in checked.stderr
+    assert "not counted with more than 200 joints" in run("info", tmp_path / "many.toml").stdout
+    assert json.loads(run("info", tmp_path / "many.toml", "--json").stdout)["mobility"] is None
+
+
 def test_check_names_every_fault_on_a_line_of_its_own(run: Callable[..., Result], tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     pf.save(pf.load("five_bar"), path)

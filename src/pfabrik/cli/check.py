@@ -19,6 +19,7 @@ from ..description.task import task_of
 from ..errors import InvalidMechanism
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
+from .info import NOT_COUNTED, counted_mobility
 from .mech import MECH, load
 
 if TYPE_CHECKING:
@@ -65,8 +66,23 @@ def check(mech: str, as_json: bool) -> int:
 
 def notes(mechanism: Mechanism) -> Iterator[str]:
     """What a description says that its author may not have meant."""
-    asked, there = sum(COUNTS[part] for part in mechanism.task), pf.mobility(mechanism).platform
-    task = task_of(mechanism)
+    counted = counted_mobility(mechanism)
+    if counted is None:
+        yield f"freedoms are {NOT_COUNTED}: whether they suffice for the task is not known"
+    else:
+        yield from task_notes(mechanism, counted.platform)
+    for _, joint, body in leaves(mechanism):
+        yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
+    widths = [width for joint in mechanism.joints for width in angular_widths(joint)]
+    if widths and mechanism.angle_unit == "rad" and max(widths) > 4 * FULL_TURN:
+        yield f"a range of {max(widths):.4g} rad is {max(widths) / FULL_TURN:.3g} turns; were degrees meant?"
+    if widths and mechanism.angle_unit == "deg" and max(widths) < math.radians(FULL_TURN):
+        yield f"no range of an angle is wider than {math.degrees(max(widths)):.3g} degrees; were radians meant?"
+
+
+def task_notes(mechanism: Mechanism, there: int) -> Iterator[str]:
+    """Whether a task asks for more than the end effector can do, which has so many freedoms."""
+    asked, task = sum(COUNTS[part] for part in mechanism.task), task_of(mechanism)
     directions = generic_of(mechanism).directions
     turns = [task.rotations > 1, task.rotations > 1, task.rotations > 0]
     counts = [*task.axes, *turns][: len(directions)]  # of a joint end effector, three
@@ -76,13 +92,6 @@ def notes(mechanism: Mechanism) -> Iterator[str]:
             f"the task {' '.join(mechanism.task)} asks for {asked} freedoms, and the end effector has {there}, from "
             "which the others follow: hardly any target can be reached; `task` says which count"
         )
-    for _, joint, body in leaves(mechanism):
-        yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
-    widths = [width for joint in mechanism.joints for width in angular_widths(joint)]
-    if widths and mechanism.angle_unit == "rad" and max(widths) > 4 * FULL_TURN:
-        yield f"a range of {max(widths):.4g} rad is {max(widths) / FULL_TURN:.3g} turns; were degrees meant?"
-    if widths and mechanism.angle_unit == "deg" and max(widths) < math.radians(FULL_TURN):
-        yield f"no range of an angle is wider than {math.degrees(max(widths)):.3g} degrees; were radians meant?"
 
 
 def angular_widths(joint: Joint) -> Iterator[float]:

@@ -16,6 +16,7 @@ import pfabrik as pf
 from ..answers.table import aligned
 from ..decomposition.leg_table import leg_table, legs_answer
 from ..description.joint_types import KINDS
+from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
 from ..description.readouts import Readout, readout
 from .mech import MECH, load
 
@@ -42,8 +43,10 @@ def info(mech: str, as_json: bool) -> int:
 
 
 def as_object(mechanism: Mechanism) -> dict[str, object]:
-    """The same as plain numbers, lists and dicts, angles in radians; a limit that is not there is None."""
-    counted = pf.mobility(mechanism)
+    """The same as plain numbers, lists and dicts, angles in radians; a limit that is not there is None, and so is the
+    mobility of more joints than it is counted for."""
+    counted = counted_mobility(mechanism)
+    mobility = None if counted is None else dataclasses.asdict(counted) | {"redundancy": counted.redundancy}
     return {
         "name": mechanism.name,
         "length_unit": mechanism.length_unit,
@@ -54,7 +57,7 @@ def as_object(mechanism: Mechanism) -> dict[str, object]:
         "task": mechanism.task,
         "actuators": mechanism.actuator_names,
         "coordinates": mechanism.coordinate_names,
-        "mobility": dataclasses.asdict(counted) | {"redundancy": counted.redundancy},
+        "mobility": mobility,
         "joints": [joint_as_object(joint, mechanism) for joint in mechanism.joints],
         "sub_chains": [
             {"notation": str(chain), "engine": shown_engine(mechanism), "why": why(mechanism)}
@@ -89,14 +92,24 @@ def summary(mechanism: Mechanism) -> str:
             f"end effector           {kind} {mechanism.end_effector}, reference point ({point})",
             f"task                   {' '.join(mechanism.task)}",
             f"actuators              {' '.join(mechanism.actuator_names)}",
-            *freedom(pf.mobility(mechanism)),
+            *freedom(counted_mobility(mechanism)),
             f"characteristic length  {length:.6g} {mechanism.length_unit}",
         ]
     )
 
 
-def freedom(counted: Mobility) -> list[str]:
+def counted_mobility(mechanism: Mechanism) -> Mobility | None:
+    """Its freedoms; None with so many joints that counting them would take minutes, or hours."""
+    return pf.mobility(mechanism) if len(mechanism.joints) <= MOST_JOINTS_FOR_FREEDOM else None
+
+
+NOT_COUNTED = f"not counted with more than {MOST_JOINTS_FOR_FREEDOM} joints"
+
+
+def freedom(counted: Mobility | None) -> list[str]:
     """What moves, what drives it, and what nothing holds; in general, where home may be special."""
+    if counted is None:
+        return [f"mobility               {NOT_COUNTED}"]
     parts = f"{counted.platform} of the end effector, {counted.internal} internal, {counted.idle} idle"
     lines = [
         f"mobility               {counted.mobility}: {parts}",
