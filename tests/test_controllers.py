@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import subprocess
 from pathlib import Path
@@ -157,6 +158,13 @@ def test_a_delta_that_hangs_from_its_arms_is_klipper_s_rotary_delta() -> None:
 def test_what_klipper_has_no_kinematics_for_is_refused(name: str) -> None:
     with pytest.raises(UnsupportedMechanism, match=r"cannot be exported: Klipper's delta has three upright rails"):
         klipper(pf.load(name))
+
+
+def test_a_unit_cannot_leave_the_comment_it_is_in() -> None:
+    unit = "mm */ setp x\nsetp y"
+    for write, name in ((linuxcnc, "stewart"), (linuxcnc, "five_bar"), (klipper, "linear_delta")):
+        text = write(dataclasses.replace(pf.load(name), length_unit=unit))
+        assert not re.search(r"^setp y", text, re.MULTILINE) and "*/ setp" not in text
 
 
 @needs_compiler

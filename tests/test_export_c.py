@@ -18,6 +18,7 @@ from pfabrik.description.joint_types import KINDS
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 from pfabrik.export.export_c import c_source
 from pfabrik.export.self_test import targets_around_home
+from pfabrik.export.wording import in_words
 from pfabrik.motion.displacements import columns
 from pfabrik.motion.limits import coned
 
@@ -242,6 +243,14 @@ def test_the_file_checks_itself_under_sanitizers(compiler: str, precision: str, 
     program = compiled(tmp_path, text, compiler, "-std=c11", "-fsanitize=address,undefined", driver=None)
     run = subprocess.run([str(program)], capture_output=True, text=True)
     assert (run.returncode, run.stdout, run.stderr) == (0, "50 poses, 0 wrong\n", "")
+
+
+@needs_compiler
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_numbers_too_small_for_single_precision_are_no_warning(compiler: str, tmp_path: Path) -> None:
+    text = c_source(machine("agile_eye"), precision="float")
+    compiled(tmp_path, text, compiler, driver=None)
+    assert in_words("a = 1e-60 + 2e-38 + 0.0;", "pfk", "float") == "a = 0.0f + 2e-38f + 0.0f;"
 
 
 @needs_compiler

@@ -3,6 +3,7 @@ name, against MuJoCo's own kinematics; and files that mean harm."""
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import json
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from in_mujoco import Model
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.interop import Imported, Loop, OpenMechanism, assemble, from_mjcf, from_urdf, verify
+from pfabrik.interop.robots import Rates, Robot, Wanted, mechanism_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
@@ -242,7 +244,7 @@ def test_a_delta_with_five_closures_and_a_wrist() -> None:
     found = from_mjcf(text, end_effector="tool", task=["x", "y", "z", "yaw"])
     assert found.gap <= 1e-15
     assert pf.mobility(found.mechanism).platform == 4
-    assert found.mechanism.actuator_names == ("q0", "wrist", "q1", "q2")
+    assert found.mechanism.actuator_names == ("q0", "q1", "q2", "wrist")  # as in its actuators
     agrees(found, Model.of(text), "tool", [(0.1, 0.5, -0.1, 0.2), (0.3, 0.0, 0.25, 0.2), (-0.2, -0.4, 0.1, 0.1)])
     plate = from_mjcf(text, task=["x", "y", "z"])
     assert plate.mechanism.end_effector == "plate"
@@ -373,6 +375,45 @@ def test_axes_that_a_few_digits_put_askew_do_not_lock_a_loop() -> None:
     assert "put straight" in told(found)
     assert pf.mobility(found.mechanism).platform == 2
     assert pf.solve_fk(found.mechanism, [0.2, 0.1])
+
+
+SLIDES = """<robot name="slides"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+    <joint name="turn" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+        <limit lower="-1" upper="1" effort="1" velocity="2"/></joint>
+    <joint name="slide" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+        <limit lower="-1" upper="1" effort="1" velocity="0.5"/></joint>
+    <joint name="free" type="continuous"><parent link="b"/><child link="c"/><axis xyz="1 0 0"/>
+        <limit effort="1" velocity="0"/></joint></robot>"""
+
+
+def test_speeds_are_read_of_what_is_driven_in_the_unit_asked_for() -> None:
+    driven = ("turn", "slide", "free")
+    every = from_urdf(SLIDES, end_effector="c", actuated=driven, length_unit="mm").mechanism
+    assert [every.joint(name).max_speed for name in driven] == [2.0, 500.0, None]
+    one = from_urdf(SLIDES, end_effector="c", actuated=["slide"], length_unit="mm").mechanism
+    assert [one.joint(name).max_speed for name in driven] == [None, 500.0, None]
+
+
+def test_actuators_come_in_the_order_of_the_file_as_fast_as_it_says() -> None:
+    joints = [pf.Joint("A", "spherical", ("base", "link"), at=(0, 0, 0))]
+    joints += [
+        pf.Joint(name, kind, (body, f"on {name}"), at=None if kind == "prismatic" else (0, 0, 0), axis=axis)
+        for name, kind, body, axis in (
+            ("turn", "revolute", "link", (1, 0, 0)),
+            ("C[0]", "revolute", "on turn", (0, 0, 1)),
+            ("C[1]", "prismatic", "on C[0]", (0, 0, 1)),
+            ("last", "revolute", "on C[1]", (0, 1, 0)),
+        )
+    ]
+    joints = [dataclasses.replace(joint, actuated=joint.name != "A") for joint in joints]
+    rates = {"C[0]": Rates(2.0, 3.0), "C[1]": Rates(0.5), "last": Rates(None, 7.0)}
+    places = {"on last": ("on last", np.zeros(3))}
+    robot = Robot("arm", joints, [], "base", places, order=("last", "C[0]", "C[1]"), rates=rates)
+    found = mechanism_of(robot, Wanted(None, "on last", None, (), "mm", None), []).mechanism
+    assert [joint.name for joint in found.joints] == ["A", "last", "C", "turn"]
+    assert found.actuator_names == ("last", "C[0]", "C[1]", "turn")
+    assert (found.joint("C").max_speed, found.joint("C").max_acceleration) == ((2.0, 500.0), None)
+    assert (found.joint("last").max_speed, found.joint("last").max_acceleration) == (None, 7.0)
 
 
 def urdf_delta() -> tuple[str, dict, list[tuple[str, str, list[float], list[float]]]]:

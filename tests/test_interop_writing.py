@@ -3,6 +3,7 @@ same."""
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 
@@ -113,13 +114,25 @@ def test_servos_that_are_asked_for_too_much_at_once_do_not_blow_up(name: str) ->
     assert not any(model.data.warning[kind].number for kind in range(len(model.data.warning)))
 
 
+def with_rates(mechanism: pf.Mechanism) -> pf.Mechanism:
+    """With a highest speed and acceleration of every actuator, in powers of two."""
+    joints = []
+    for number, joint in enumerate(mechanism.joints):
+        rates = (2.0 ** (number % 5), 8.0) if len(joint.driven) == 2 else 2.0 ** (number % 5)
+        joints.append(dataclasses.replace(joint, max_speed=rates, max_acceleration=rates) if joint.driven else joint)
+    return dataclasses.replace(mechanism, joints=joints)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_what_is_written_is_read_back_as_an_equal_machine(name: str) -> None:
-    mechanism = pf.load(name)
+    mechanism = with_rates(pf.load(name))
     back = from_mjcf(to_mjcf(mechanism), length_unit=mechanism.length_unit).mechanism
     again = from_mjcf(to_mjcf(back), length_unit=back.length_unit).mechanism
     assert pf.mobility(back) == pf.mobility(mechanism)
-    assert set(back.actuator_names) == set(mechanism.actuator_names)
+    assert back.actuator_names == mechanism.actuator_names
+    for one, other in zip(back.drives, mechanism.drives, strict=True):
+        for what in ("max_speed", "max_acceleration"):
+            np.testing.assert_allclose(getattr(one.joint, what), getattr(other.joint, what), rtol=1e-15)
     assert (back.base, back.end_effector, back.task) == (mechanism.base, mechanism.end_effector, mechanism.task)
     limited = {each.name: each for each in back.joints}
     for joint in mechanism.joints:
@@ -130,9 +143,8 @@ def test_what_is_written_is_read_back_as_an_equal_machine(name: str) -> None:
             assert limited[joint.name].cone.half_angle == joint.cone.half_angle
     assert {joint.name for joint in again.joints} == {joint.name for joint in back.joints}
     solution = reached_at_random(mechanism, 1, np.random.default_rng(2))[0]
-    order = [mechanism.actuator_names.index(each) for each in back.actuator_names]
     length = mechanism.characteristic_length
-    found = pf.solve_fk(back, solution.actuators[order], start=pf.solve_ik(back, solution.pose))
+    found = pf.solve_fk(back, solution.actuators, start=pf.solve_ik(back, solution.pose))
     assert found
     assert np.abs(found.pose - solution.pose).max() <= 1e-9 * max(length, 1.0)
 
@@ -171,7 +183,11 @@ def test_a_unit_of_length_that_nobody_knows_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(InvalidArgument, match="length_unit: found 'furlong'"):
         to_mjcf(mechanism, tmp_path / "rods.xml")
+    with pytest.raises(InvalidArgument, match="found 'inches'; did you mean 'inch'"):
+        to_mjcf(dataclasses.replace(mechanism, length_unit="inches"), tmp_path / "rods.xml")
     assert list(tmp_path.iterdir()) == []
+    models = [to_mjcf(dataclasses.replace(mechanism, length_unit=unit)) for unit in ("in", "inch")]
+    assert models[0].splitlines()[2:] == models[1].splitlines()[2:]
 
 
 def test_names_that_clash_in_a_model_are_told_apart() -> None:

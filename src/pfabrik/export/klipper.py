@@ -69,7 +69,7 @@ def _begun(mechanism: Mechanism, kind: str, more: Sequence[str] = ()) -> list[st
     """What Klipper cannot know, and the kind of printer."""
     unknown = ["pins, steps and currents of the steppers", "limits of the rods' joints", *more]
     if mechanism.length_unit != "mm":
-        unknown.append(f"lengths in {mechanism.length_unit}: it counts in mm")
+        unknown.append(f"lengths in {comment(mechanism.length_unit)}: it counts in mm")
     return [
         f"# '{comment(mechanism.name)}' for Klipper, written by pfabrik.",
         "# What it cannot know of this machine, or pfabrik of the printer:",

@@ -76,7 +76,7 @@ def _stand_at(angles: Sequence[float], wanted: Sequence[float]) -> bool:
 
 def _heading(mechanism: Mechanism, module: str) -> list[str]:
     return [
-        f"# '{comment(mechanism.name)}' for LinuxCNC, written by pfabrik. Lengths in {mechanism.length_unit}.",
+        f"# '{comment(mechanism.name)}' for LinuxCNC, written by pfabrik. Lengths in {comment(mechanism.length_unit)}.",
         f"# Joints in this order: {comment(', '.join(mechanism.actuator_names))}.",
         f"loadrt {module}",
     ]

@@ -95,7 +95,7 @@ def module(machine: Machine) -> str:
     return f"""\
 /* A kinematics module for LinuxCNC: halcompile --install pfabrikkins.c, then loadrt pfabrikkins.
    Joints in this order: {comment(", ".join(mechanism.actuator_names))}.
-   Lengths in {mechanism.length_unit}, angles in degrees.
+   Lengths in {comment(mechanism.length_unit)}, angles in degrees.
    X, Y, Z are the reference point; A, B, C turn about x, y and z, in this order. */
 #include "rtapi_app.h"
 #include "hal.h"

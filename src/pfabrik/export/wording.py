@@ -48,8 +48,16 @@ def in_words(text: str, name: str, precision: Precision) -> str:
     if precision == "double":
         return text
     parts = _COMMENT.split(text.replace("typedef double", "typedef float"))
-    parts[::2] = [_LITERAL.sub(r"\1f", _MATHS.sub(r"\1f(", part)) for part in parts[::2]]
+    parts[::2] = [_LITERAL.sub(_single, _MATHS.sub(r"\1f(", part)) for part in parts[::2]]
     return "".join(parts)
+
+
+def _single(match: re.Match[str]) -> str:
+    """A number in single precision; what is too small for it, which compilers warn of, is zero."""
+    return f"{match[1]}f" if abs(float(match[1])) >= SMALLEST or not float(match[1]) else "0.0f"
+
+
+SMALLEST = float(np.finfo(np.float32).tiny)
 
 
 def literal(value: Number) -> str:

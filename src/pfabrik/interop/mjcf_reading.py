@@ -18,7 +18,7 @@ from .cuts import unique
 from .mjcf_plain import plain_model
 from .mjcf_writing import NOTE
 from .opened import Loop, LoopType, Note
-from .robots import Robot, Wanted, mechanism_of
+from .robots import Rates, Robot, Wanted, mechanism_of
 from .xml_reading import fault, read_xml
 
 AXES = "xyz"
@@ -48,7 +48,8 @@ def from_mjcf(
     base : the body that rests. Default: what the file itself says if this library wrote it, else the world.
     end_effector : a body, a site (which is then the reference point), or a joint or equality (whose centre is moved).
         Default: what the file says, else the body at which most joints and equalities meet.
-    actuated : names of the joints that are driven. Default: those that an actuator drives.
+    actuated : names of the joints that are driven, in the order of the actuators. Default: those that an actuator
+        drives, in the order of these.
     fixed : names of joints to hold where they are.
     configuration : "qpos0", or the name of a keyframe: home.
     length_unit : the unit of the mechanism: "mm", "m", ...; a model has metres.
@@ -75,7 +76,7 @@ def from_mjcf(
     if site is not None and own.get("end_effector") in places:
         places[own["end_effector"]] = (own["end_effector"], site[1])
     joints, loops = list(model.joints(told)), list(model.loops(told))
-    robot = Robot(root.get("model", "mechanism"), joints, loops, model.body(0), places, **own)
+    robot = Robot(root.get("model", "mechanism"), joints, loops, model.body(0), places, order=model.driven, **own)
     return mechanism_of(robot, wanted, told)
 
 
@@ -112,6 +113,11 @@ class _Model:
     def joint(self, index: int) -> str:
         """Name of a joint; a number where it has none."""
         return str(self.model.joint(index).name) or f"joint_{index}"
+
+    @property
+    def driven(self) -> list[str]:
+        """Names of the joints that are driven, in the order of the actuators."""
+        return [self.joint(int(index)) for index in self.model.actuator_trnid[:, 0]]
 
     def joints(self, told: list[Note]) -> Iterator[Joint]:
         """Every joint, between its body and the parent's, or the bodies between that several joints on one need."""
@@ -212,4 +218,9 @@ def _own_notes(root: ET.Element) -> dict[str, Any]:
     found["cones"] = {
         name: Cone(list(map(float, parts[:3])), float(parts[3]), parts[4]) for name, parts in cones.items()
     }
+    fast, pushed = (
+        {name.removeprefix(what): float(data) for name, data in own.items() if name.startswith(what)}
+        for what in ("max_speed.", "max_acceleration.")
+    )
+    found["rates"] = {name: Rates(fast.get(name), pushed.get(name)) for name in {**fast, **pushed}}
     return found

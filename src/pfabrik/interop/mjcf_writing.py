@@ -39,7 +39,7 @@ def to_mjcf(
     coordinate [rad or m]. Loops are cut at ball joints, which become `connect`; a loop without one gets a twin of a
     body, of hardly any mass, welded to it. Sites are at all joints and at the reference point; actuated joints have
     position servos; there is a keyframe `home`. Cones, which MuJoCo does not know, are told in comments and kept in
-    custom elements, as are base, end effector and task.
+    custom elements, as are base, end effector and task, and highest speeds and accelerations.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
         root, "option", timestep=repr(STEP), integrator="implicitfast", tolerance="1e-12", gravity=vector(gravity)
     )
     custom = ET.SubElement(root, "custom")
-    for name, text in _notes(mechanism, names):
+    for name, text in _notes(mechanism, names, metres):
         ET.SubElement(custom, "text", name=NOTE + name, data=text)
     root.append(bodies(mechanism, tree, names, metres, physics))
     root.append(_equalities(tree, names, physics))
@@ -104,12 +104,18 @@ def _comments(mechanism: Mechanism, physics: Physics) -> Iterator[str]:
             yield f"a limit that MuJoCo does not keep: the cone of {joint.name}, {half_angle} about {joint.cone.axis}"
 
 
-def _notes(mechanism: Mechanism, names: Names) -> Iterator[tuple[str, str]]:
+def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[str, str]]:
     """What MuJoCo has no word for, for who reads the model back."""
     yield "base", mechanism.base
     yield "end_effector", mechanism.end_effector
     yield "reference_point", names.reference
     yield "task", " ".join(mechanism.task)
+    for what in ("max_speed", "max_acceleration"):
+        for drive in mechanism.drives:
+            most = getattr(drive.joint, what)
+            own = most[drive.place] if isinstance(most, tuple) else most
+            if own is not None:
+                yield f"{what}.{drive.name}", repr(own * (1.0 if drive.kind == "angle" else metres))
     for joint in mechanism.joints:
         if joint.cone is not None:
             cone = joint.cone

@@ -6,7 +6,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,13 @@ from .pruning import prune
 from .units import metres_of
 
 
+class Rates(NamedTuple):
+    """The highest speed and acceleration of a coordinate, None where not known."""
+
+    speed: float | None = None
+    acceleration: float | None = None
+
+
 @dataclass(frozen=True)
 class Robot:
     """A tree of bodies and what closes its loops, in metres and radians, in the frame of its root.
@@ -34,6 +41,8 @@ class Robot:
     root : the body that the others hang on.
     places : what an end effector may be called besides a joint -> its body, and the point of it that targets place [m].
     base, end_effector, task, cones : what the file says of a mechanism in it, if anything.
+    order : coordinates that are driven, in the order of the actuators; those that are not named come behind.
+    rates : coordinate -> its highest speed and acceleration [rad or m, per s and per s^2], None where not known.
     """
 
     name: str
@@ -45,6 +54,8 @@ class Robot:
     end_effector: str | None = None
     task: tuple[str, ...] | None = None
     cones: Mapping[str, Cone] = field(default_factory=dict)
+    order: Sequence[str] = ()
+    rates: Mapping[str, Rates] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -82,7 +93,33 @@ def mechanism_of(robot: Robot, wanted: Wanted, told: list[Note]) -> Imported:
         robot.cones,
     )
     found = assemble(prune(opened, told), told)
-    return dataclasses.replace(found, notes=(*found.notes, *_of_task(found.mechanism)))
+    mechanism = _as_driven(found.mechanism, robot, metres)
+    return dataclasses.replace(found, mechanism=mechanism, notes=(*found.notes, *_of_task(mechanism)))
+
+
+def _as_driven(mechanism: Mechanism, robot: Robot, metres: float) -> Mechanism:
+    """With its actuators in the order of the file, and as fast as it says."""
+    place = {name: index for index, name in enumerate(robot.order)}
+    drives = {joint.name: [each for each in mechanism.drives if each.joint is joint] for joint in mechanism.joints}
+
+    def rank(joint: Joint) -> int:
+        return min(place.get(drive.name, len(place)) for drive in drives[joint.name])
+
+    def most(joint: Joint, what: int) -> tuple[float, ...] | float | None:
+        found = []
+        for drive in drives[joint.name]:
+            value = robot.rates.get(drive.name, Rates())[what]
+            if value is None:
+                return None
+            found.append(value if drive.kind == "angle" else value / metres)
+        return tuple(found) if len(found) > 1 else found[0]
+
+    def rated(joint: Joint) -> Joint:
+        rates: dict[str, Any] = {"max_speed": most(joint, 0), "max_acceleration": most(joint, 1)}
+        return dataclasses.replace(joint, **rates)
+
+    driven = iter(sorted((joint for joint in mechanism.joints if joint.driven), key=rank))
+    return mechanism._with_joints(rated(next(driven)) if joint.driven else joint for joint in mechanism.joints)
 
 
 def _of_task(mechanism: Mechanism) -> Iterator[Note]:
@@ -113,13 +150,14 @@ def _locked(robot: Robot, fixed: Iterable[str]) -> Robot:
 
 
 def _driven(robot: Robot, actuated: Iterable[str] | None) -> Robot:
-    """With other joints actuated than the file says."""
+    """With other joints actuated than the file says, in the order in which they are named."""
     if actuated is None:
         return robot
+    order = require_names("actuated", actuated)
     able = [joint.name for joint in robot.joints if KINDS[joint.type].actuatable]
-    driven = _names("actuated", actuated, able)
+    driven = _names("actuated", order, able)
     joints = [dataclasses.replace(joint, actuated=joint.name in driven) for joint in robot.joints]
-    return dataclasses.replace(robot, joints=joints)
+    return dataclasses.replace(robot, joints=joints, order=order)
 
 
 def _bodies(robot: Robot) -> dict[str, None]:

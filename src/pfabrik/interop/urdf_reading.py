@@ -16,7 +16,7 @@ from ..rotations import from_rpy, square_to
 from .assembling import Imported
 from .loops_file import LoopsFile, read_loops
 from .opened import Note
-from .robots import Robot, Wanted, mechanism_of
+from .robots import Rates, Robot, Wanted, mechanism_of
 from .xml_reading import fault, read_xml
 
 UNTOLD = ("link", "joint", "transmission", "material", "gazebo")
@@ -47,7 +47,8 @@ def from_urdf(
         `name_mot`).
     base : the link that rests. Default: the root.
     end_effector : a link, or a joint or loop (whose centre is moved). Default: the link at which most joints meet.
-    actuated : names of the joints that are driven. Default: those of `loops`, else those with a transmission.
+    actuated : names of the joints that are driven, in the order of the actuators; a `velocity` that is not 0 is their
+        highest speed. Default: those of `loops`, else those with a transmission.
     fixed, length_unit, task : as of `from_mjcf`.
 
     Returns
@@ -76,6 +77,7 @@ def from_urdf(
         closing.loops(links.frames, links.link_of),
         links.root,
         {link: (link, frame[:3, 3]) for link, frame in links.frames.items()},
+        rates={element.get("name", ""): Rates(_speed(element)) for element in links.joints},
     )
     return mechanism_of(robot, wanted, told)
 
@@ -219,6 +221,12 @@ def _range(joint: ET.Element, name: str, told: list[Note]) -> tuple[float, float
         return low, high
     told.append(Note("a range in which nothing moves is left out, of", (name,)))
     return None
+
+
+def _speed(joint: ET.Element) -> float | None:
+    """A joint's highest speed [rad/s or m/s]; None where the file says none, or 0, which stands for none."""
+    speed = float(_numbers(joint.find("limit"), "velocity", "0")[0])
+    return speed if speed > 0.0 else None
 
 
 def _with_transmission(root: ET.Element) -> list[str]:

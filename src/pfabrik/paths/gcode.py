@@ -18,7 +18,8 @@ COMMENT = re.compile(r"\([^()]*\)|;.*")
 AXES = "XYZABC"
 OFFSETS = "IJK"
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
-MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "um": 1e-3, "µm": 1e-3}
+MILLIMETRES = {"m": 1000.0, "dm": 100.0, "cm": 10.0, "mm": 1.0, "um": 1e-3, "µm": 1e-3}
+MILLIMETRES |= {"in": 25.4, "inch": 25.4, "ft": 304.8}
 IGNORED = {4, 40, 49, 54, 61, 64, 80, 94}
 """Codes that change no position here: dwell, no compensation of the tool, the first work offset, feed per minute."""
 
