@@ -339,7 +339,7 @@ JOINT_FAULTS = [
     ({"range": 3}, "range", "3 -> two numbers"),
     ({"range": ()}, "range", "two numbers"),
     ({"range": (1, -1)}, "range", "(57.29577951 deg) to -1 rad"),
-    ({"range": (-math.inf, 1)}, "range", "two numbers, finite"),
+    ({"range": (-math.inf, 1)}, "range", "two numbers, finite: where nothing limits one end, a number that is never"),
     ({"range": ((-1, 1), (-1, 1))}, "range", "two numbers"),
     ({"range": (0.5, 1)}, "range", "a range that contains home, 0 rad (0 deg)"),
     ({"type": "cylindrical", "actuated": False, "range": (-1, 1)}, "range[0]", "two numbers"),

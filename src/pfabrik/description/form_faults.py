@@ -265,6 +265,9 @@ def _range_faults(place: str, joint: Joint) -> Iterator[Fault]:
 
 def _bounds_faults(place: str, bounds: Any, coordinate: Coordinate) -> Iterator[Fault]:
     faults = list(number_faults(place, bounds, 2))
+    if is_numbers(bounds, 2) and any(map(math.isinf, bounds)):
+        open_end = "two numbers, finite: where nothing limits one end, a number that is never reached"
+        faults = [Fault(place, range_text(bounds, coordinate), open_end)]
     yield from faults
     if not faults and bounds[0] > bounds[1]:
         yield Fault(place, range_text(bounds, coordinate), "the lowest value first, then the highest")
