@@ -92,6 +92,34 @@ def test_what_cannot_be_meant_is_told_by_the_argument(said: str) -> None:
         WRONG[said](pf.load("stewart"))
 
 
+SAID: dict[str, Callable[[pf.Mechanism], Any]] = {
+    r"joint 'BL1'\.range: found 280 to 150; expected the lowest": lambda machine: machine.with_limits(BL1=(280, 150)),
+    r"over: found \['x', 'w'\]; expected a Workspace or a Track; over coordinates by": lambda machine: (
+        pf.singularity_map(machine, ["x", "w"])
+    ),
+    r"over: found that of another mechanism of the same name, '6-UPS .*', with other joint BL1;": lambda machine: (
+        pf.singularity_map(machine, pf.track(machine.with_limits(BL1=None), machine.home_pose[None]))
+    ),
+    r"start: found an answer of another mechanism of the same name, .*, with other joint BL1;": lambda machine: (
+        pf.solve_ik(machine, ARRAY, start=pf.solve_ik(machine.with_limits(BL1=None), machine.home_pose))
+    ),
+    r"start: found an answer of another mechanism, 'Planar 5-bar';": lambda machine: pf.solve_ik(
+        machine, ARRAY, start=pf.solve_ik(five_bar := pf.load("five_bar"), five_bar.home_pose)
+    ),
+    r"\.: found a directory or device; expected a model in XML": lambda machine: pf.interop.from_urdf("."),
+    r"nothing\.xml: found no such file; expected a model in XML": lambda machine: pf.interop.kind_of("nothing.xml"),
+    r"points: found a number that is not finite": lambda machine: pf.workspace(
+        machine, over=["x", "y"], resolution=40.0
+    ).contains([np.nan, 0.0]),
+}
+
+
+@pytest.mark.parametrize("said", SAID)
+def test_messages_name_what_was_found(said: str) -> None:
+    with pytest.raises(PfabrikError, match=said):
+        SAID[said](pf.load("stewart"))
+
+
 def test_limits_that_are_not_named_stay() -> None:
     limits = np.array([1.0, np.inf])
     put_limits(limits, "speed", None, NAMES)

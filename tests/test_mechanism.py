@@ -284,7 +284,7 @@ class TestCones:
         if short < 1:
             machine.with_limits(A0=cone)
         else:
-            with pytest.raises(InvalidMechanism, match=r"joint\[0\].cone.half_angle: .* angle at home to 'C0'"):
+            with pytest.raises(InvalidMechanism, match=r"joint 'A0'.cone.half_angle: .* angle at home to 'C0'"):
                 machine.with_limits(A0=cone)
 
     def test_next_joint_at_the_same_place_is_a_fault(self):

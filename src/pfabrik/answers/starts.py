@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 from ..closure.close import measured
 from ..closure.configurations import Configurations
-from ..description.mechanism import Mechanism, checked_mechanism
+from ..description.mechanism import Mechanism, checked_mechanism, told_apart
 from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..motion.displacements import home_coordinates
@@ -37,7 +37,7 @@ def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) 
         _require_shape(own, shape)
         return engine_of(mechanism).at(measured(mechanism, deviations))
     if start.mechanism != mechanism:
-        found = f"an answer of another mechanism, '{start.mechanism.name}'"
+        found = f"an answer of {told_apart(start.mechanism, mechanism)}"
         raise InvalidArgument("start", found, f"one of '{mechanism.name}' itself, or joint coordinates")
     if (np.asarray(start.status) >= Status.FAILED).any():
         raise InvalidArgument("start", "an answer that is FAILED or INVALID", "a feasible configuration")

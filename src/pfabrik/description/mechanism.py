@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from numpy.typing import ArrayLike
 
 from ..checks import require_mapping
-from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning
+from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
 from .coercion import items
-from .faults import find_faults, in_order, merged
+from .faults import find_faults, in_order, joint_index, merged
 from .form_faults import joint_faults, shown
 from .home_mobility import end_effector_freedom, inexactness, is_held
 from .joint_types import JOINT_TYPES, JointType
@@ -23,7 +23,18 @@ from .legs import Leg, as_legs
 from .notebook import mechanism_html
 from .structure import Structure
 
-__all__ = ["JOINT_TYPES", "Cone", "Joint", "JointType", "Limit", "Mechanism", "Range", "Vector", "checked_mechanism"]
+__all__ = [
+    "JOINT_TYPES",
+    "Cone",
+    "Joint",
+    "JointType",
+    "Limit",
+    "Mechanism",
+    "Range",
+    "Vector",
+    "checked_mechanism",
+    "told_apart",
+]
 
 MOST_JOINTS_FOR_FREEDOM = 200
 """Most joints for which construction counts freedoms: the cost grows with the cube, and reaches a second here."""
@@ -184,9 +195,20 @@ class Mechanism(Structure):
         changes = {**require_mapping("limits", limits, "limits by the names of joints"), **by_name}
         for name in changes:
             self.joint(name)
-        return self._with_joints(
-            _limited(joint, changes[joint.name]) if joint.name in changes else joint for joint in self.joints
-        )
+        try:
+            return self._with_joints(
+                _limited(joint, changes[joint.name]) if joint.name in changes else joint for joint in self.joints
+            )
+        except InvalidMechanism as error:
+            raise InvalidMechanism([self._by_its_joint(fault) for fault in error.faults]) from None
+
+    def _by_its_joint(self, fault: Fault) -> Fault:
+        """A fault at the name of its joint, where the places of joints are not known."""
+        index = joint_index(fault.place)
+        if index < 0:
+            return fault
+        _, _, part = fault.place.partition("]")
+        return dataclasses.replace(fault, place=f"joint '{self.joints[index].name}'{part}")
 
     def without_limits(self) -> Mechanism:
         """A copy in which no joint has a range or a cone."""
@@ -205,6 +227,16 @@ def checked_mechanism(mechanism: Any) -> Mechanism:
     if not isinstance(mechanism, Mechanism):
         raise InvalidArgument("mechanism", type(mechanism).__name__, "a Mechanism, as `load` returns")
     return mechanism
+
+
+def told_apart(other: Mechanism, mechanism: Mechanism) -> str:
+    """Another mechanism, in words; where both have one name, with what they differ in."""
+    if other.name != mechanism.name:
+        return f"another mechanism, '{other.name}'"
+    same = set(mechanism.joints)
+    joints = [joint.name for joint in other.joints if joint not in same]
+    differ = f"joint{'s' * (len(joints) > 1)} {', '.join(joints[:5])}{', ...' * (len(joints) > 5)}"
+    return f"another mechanism of the same name, '{other.name}'{f', with other {differ}' if joints else ''}"
 
 
 def _limited(joint: Joint, limit: Limit) -> Joint:

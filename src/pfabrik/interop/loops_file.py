@@ -26,7 +26,7 @@ from ..errors import Fault, InvalidArgument, InvalidMechanism, near_miss
 from ..extras import require
 from ..rotations import square_to
 from .opened import Loop, LoopType
-from .xml_reading import fault
+from .xml_reading import fault, require_file
 
 LARGEST = 1_000_000
 """Largest file read [bytes]."""
@@ -109,8 +109,7 @@ def _parsed(path: str | os.PathLike[str]) -> Any:
     import yaml
 
     place = os.fspath(path)
-    if not Path(path).is_file():
-        raise fault(place, "no such file", "a YAML file")
+    require_file(Path(path), "a YAML file")
     with Path(path).open("rb") as file:
         content = file.read(LARGEST + 1)
     if len(content) > LARGEST:

@@ -66,6 +66,12 @@ def fault(place: str, found: str, expected: str) -> InvalidMechanism:
     return InvalidMechanism([Fault(place, found, expected)])
 
 
+def require_file(path: Path, expected: str) -> None:
+    """A fault where there is no file of this name."""
+    if not path.is_file():
+        raise fault(str(path), "a directory or device" if path.exists() else "no such file", expected)
+
+
 class _Budget:
     """How much may still be read."""
 
@@ -79,8 +85,7 @@ class _Budget:
         return content
 
     def read(self, path: Path) -> bytes:
-        if not path.is_file():
-            raise fault(str(path), "no such file", "a file")
+        require_file(path, "a model in XML")
         try:
             with path.open("rb") as file:
                 return self.spent(file.read(self.left + 1), str(path))

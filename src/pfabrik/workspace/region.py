@@ -129,6 +129,8 @@ class Region:
     def _points(self, name: str, points: ArrayLike) -> Floats:
         expected = f"finite numbers of shape (..., {len(self.names)}): {', '.join(self.names)}"
         array = as_floats(name, points, expected)
-        if array.shape[-1:] != (len(self.names),) or not np.isfinite(array).all():
+        if array.shape[-1:] != (len(self.names),):
             raise InvalidArgument(name, f"shape {array.shape}", expected)
+        if not np.isfinite(array).all():
+            raise InvalidArgument(name, "a number that is not finite", expected)
         return array

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING, cast, overload
@@ -14,7 +15,7 @@ from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats, Ints
 from ..checks import require_positive
-from ..description.mechanism import Mechanism, checked_mechanism
+from ..description.mechanism import Mechanism, checked_mechanism, told_apart
 from ..errors import InvalidArgument
 from ..ik import solve_ik
 from ..motion.singularities import Singularity, parallel_signs
@@ -141,9 +142,10 @@ def singularity_map(
     """
     checked_mechanism(mechanism)
     if not isinstance(over, Workspace | Track):
-        raise InvalidArgument("over", type(over).__name__, "a Workspace or a Track")
+        expected = "a Workspace or a Track; over coordinates by their names, `workspace` makes one"
+        raise InvalidArgument("over", reprlib.repr(over), expected)
     if over.mechanism != mechanism:
-        raise InvalidArgument("over", f"that of '{over.mechanism.name}'", f"one of '{mechanism.name}'")
+        raise InvalidArgument("over", f"that of {told_apart(over.mechanism, mechanism)}", f"one of '{mechanism.name}'")
     if isinstance(over, Track):
         return _along(over)
     question = over._question
