@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -170,6 +171,16 @@ def without_chance(text: str) -> list[str]:
 
 
 @pytest.mark.slow
+def test_the_page_of_the_command_line_lists_every_command_with_every_option() -> None:
+    rows = [line for line in CLI_PAGE.read_text(encoding="utf-8").splitlines() if line.startswith("| `pfabrik ")]
+    context = click.Context(main)
+    for name in main.list_commands(context):
+        command = main.get_command(context, name)
+        (row,) = (row.partition("` | ")[0] for row in rows if re.match(rf"\| `pfabrik {name}\b", row))
+        for option in (each for each in command.params if isinstance(each, click.Option)):
+            assert any(re.search(rf"(?<![-\w]){re.escape(said)}(?![-\w])", row) for said in option.opts), option.opts
+
+
 def test_json_is_one_object_that_says_what_the_library_does(run: Callable[..., Result]) -> None:
     stewart, bar = pf.load("stewart"), pf.load("five_bar")
     answers = {

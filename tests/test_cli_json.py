@@ -94,3 +94,13 @@ def test_ik_and_fk_give_the_fields_of_a_solution() -> None:
     assert back["status"] == "REACHED"
     assert np.array(back["pose"]) == pytest.approx(answer.pose, abs=1e-9)
     assert set(back) == set(answer.to_dict())
+
+
+def test_time_and_speed_are_objects_with_what_the_library_tells(tmp_path: Path) -> None:
+    mechanism = pf.load("linear_delta")
+    at = pf.solve_ik(mechanism, mechanism.reference_point)
+    told = printed("speed", "linear_delta", "--position", *map(str, mechanism.reference_point), "--speed", "300")
+    assert [each["speed"] for each in told["speeds"]] == [each.speed for each in pf.platform_speed(at, speed=300.0)]
+    path = tmp_path / "path.csv"
+    path.write_text("x,y,z\n0,0,5\n1,0,5\n", encoding="utf-8")
+    assert set(printed("time", "linear_delta", str(path), "--speed", "300")) == {"duration", "samples", "held_back"}

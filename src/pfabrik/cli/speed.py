@@ -19,7 +19,7 @@ from .target import Triple, target_of, targeted
 @click.argument("mech", type=MECH)
 @targeted
 @speed_option
-@click.option("--json", "as_json", is_flag=True, help="One JSON array on stdout; angles in radians.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
 def speed(
     mech: str,
     position: Triple | None,
@@ -39,7 +39,7 @@ def speed(
     found = pf.platform_speed(at, speed=speed_limits(mechanism, speeds) or None)
     if as_json:
         told = [each._asdict() | {"speed": each.speed if math.isfinite(each.speed) else None} for each in found]
-        click.echo(json.dumps(told, allow_nan=False))
+        click.echo(json.dumps({"speeds": told}, allow_nan=False))
         return 0
     rows = []
     for each in found:
