@@ -9,7 +9,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ import pytest
 from numba.core.caching import NullCache
 
 import pfabrik as pf
+from copied import copied
 from machines import MACHINES
 from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels import _jit, ahead
@@ -203,14 +204,6 @@ def test_calls_from_several_threads_answer_as_one_after_the_other() -> None:
         np.testing.assert_array_equal(other.actuators, one.actuators)
 
 
-def load_decorator(folder: Path) -> ModuleType:
-    """The decorator's module, run from a folder with copies of the kernels."""
-    spec = importlib.util.spec_from_file_location("copied_jit", folder / "_jit.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture
 def copies(tmp_path: Path) -> Path:
     for source in Path(_jit.__file__).parent.glob("*.py"):
@@ -221,7 +214,7 @@ def copies(tmp_path: Path) -> Path:
 def digest(folder: Path, name: str) -> str:
     """What the cache of a kernel in a file is keyed by."""
     function = SimpleNamespace(__code__=SimpleNamespace(co_filename=str(folder / name)))
-    return load_decorator(folder)._digest_for(function)
+    return copied(folder, "_cache").digest_for(function)
 
 
 def test_the_cache_is_keyed_by_the_text_of_all_that_a_kernel_is_made_of(copies: Path) -> None:
@@ -248,7 +241,7 @@ def loaded_kernel(copies: Path, caller: Path) -> Any:
     spec = importlib.util.spec_from_file_location("caller", caller)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    double = load_decorator(copies).kernel(module.double)
+    double = copied(copies, "_jit").kernel(module.double)
     assert double(2.0) == 4.0
     return double
 
@@ -307,8 +300,8 @@ def test_parts_become_machine_code_only_within_kernels(
     """That is most of what keeps compilation short; a Numba without the hooks for it compiles all the same."""
     if not hooked:
         monkeypatch.delattr("numba.core.codegen.JITCodeLibrary")
-    jit = load_decorator(copies)
-    monkeypatch.setattr(jit, "_KernelCache", lambda function: NullCache())
+    jit = copied(copies, "_jit")
+    monkeypatch.setattr(jit, "KernelCache", lambda function: NullCache())
     double = jit.routine(lambda x: 2.0 * x)
     pair = jit.allocator(lambda x: np.full(2, double(x)))
     quadruple = jit.kernel(lambda x: double(pair(x)[1]))

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 import pfabrik as pf
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument
-from pfabrik.kernels import _jit
+from pfabrik.kernels import _cache, _jit
 
 INTERPRETED = bool(_jit._config.DISABLE_JIT)
 
@@ -22,13 +22,13 @@ def test_afterwards_nothing_is_compiled_whatever_is_asked(monkeypatch: pytest.Mo
     assert told
     assert all(what and seconds >= 0.0 for what, seconds in told)
     asked: list[object] = []
-    load = _jit._KernelCache.load_overload
+    load = _cache.KernelCache.load_overload
 
-    def watched(self: _jit._KernelCache, signature: object, context: object) -> object:
+    def watched(self: _cache.KernelCache, signature: object, context: object) -> object:
         asked.append(signature)
         return load(self, signature, context)
 
-    monkeypatch.setattr(_jit._KernelCache, "load_overload", watched)
+    monkeypatch.setattr(_cache.KernelCache, "load_overload", watched)
     for name in pf.catalog():
         ask_everything(pf.load(name))
     assert asked == []

@@ -15,7 +15,6 @@ import click
 
 from ..writing import whole_path
 
-
 STANDARD = Path("-")
 """Standard input or output, in place of a file."""
 

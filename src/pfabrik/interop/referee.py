@@ -92,7 +92,8 @@ def verify(mechanism: Mechanism, *, poses: int = 100, seed: int = 0) -> Verifica
     InvalidArgument : less than one pose.
     """
     checked_mechanism(mechanism)
-    for name, value, least in (("poses", poses, 1), ("seed", seed, 0)):
+    given: tuple[tuple[str, Any, int], ...] = (("poses", poses, 1), ("seed", seed, 0))
+    for name, value, least in given:
         if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:
             raise InvalidArgument(name, reprlib.repr(value), f"an integer from {least} on")
     rng = np.random.default_rng(seed)

@@ -9,7 +9,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from ._jit import _config, _name_of
+from ._pipeline import name_of
 from .closure.close import close
 from .closure.descend import approach
 from .closure.first_order import first_order
@@ -28,6 +28,7 @@ from .reaching import plan as P
 from .reaching.solve import solve_by_passes
 from .timing import fastest, second_derivatives
 
+_config: Any = numba.config
 _typeof: Any = numba.typeof
 
 _PLAN_RECORDS = (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT)
@@ -104,4 +105,4 @@ def compile_all(report: Callable[[str, float], None] | None = None) -> None:
         began = time.perf_counter()
         kernel.compile(tuple(_typeof(argument) for argument in arguments))
         if report is not None:
-            report(_name_of(kernel.py_func), time.perf_counter() - began)
+            report(name_of(kernel.py_func), time.perf_counter() - began)

@@ -1,13 +1,76 @@
-"""From the address of a `Handle` to what it keeps."""
+"""NamedTuples of arrays by reference: how parts of kernels take them, and how kernels get them from a `Handle`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ._jit import Reference, _config, _extending, _typeof, _types
+import numba
+from llvmlite import ir
+from numba import extending
+from numba.core import cgutils, imputils, types
+from numba.core.typing.templates import AttributeTemplate
+
+_ir: Any = ir
+_types: Any = types
+_cgutils: Any = cgutils
+_imputils: Any = imputils
+_extending: Any = extending
+_AttributeTemplate: Any = AttributeTemplate
+_config: Any = numba.config
+_typeof: Any = numba.typeof
 
 R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays
+
+
+class Reference(_types.Type):
+    """Numba's type of a NamedTuple of arrays taken by reference: a pointer to what its owner keeps alive.
+
+    In compiled code it reads like the NamedTuple; whoever calls a part with one converts it. By value, every array
+    would be seven or more arguments of every function that it goes through.
+    """
+
+    def __init__(self, record: Any) -> None:
+        self.record = record
+        super().__init__(f"Reference({record.name})")
+
+
+@_extending.register_model(Reference)
+class _ReferenceModel(_extending.models.PrimitiveModel):
+    def __init__(self, manager: Any, reference: Any) -> None:
+        super().__init__(manager, reference, manager.lookup(reference.record).get_value_type().as_pointer())
+
+
+@_extending.infer_getattr
+class _ReferenceAttribute(_AttributeTemplate):
+    key = Reference
+
+    def generic_resolve(self, reference: Any, name: str) -> Any:
+        fields = reference.record.fields
+        return argument_type(reference.record.types[fields.index(name)]) if name in fields else None
+
+
+@_extending.lower_getattr_generic(Reference)
+def _load_field(context: Any, builder: Any, reference: Any, pointer: Any, name: str) -> Any:
+    place = reference.record.fields.index(name)
+    own, field = reference.record.types[place], _cgutils.gep_inbounds(builder, pointer, 0, place)
+    if isinstance(own, _types.BaseNamedTuple):
+        return field
+    return _imputils.impl_ret_borrowed(context, builder, own, builder.load(field))
+
+
+@_extending.lower_cast(_types.BaseNamedTuple, Reference)
+def _refer(context: Any, builder: Any, record: Any, reference: Any, value: Any) -> Any:
+    """Where a NamedTuple is, if it was loaded from somewhere; LLVM takes long to copy it, array by array."""
+    if isinstance(value, _ir.LoadInstr) and isinstance(value.operands[0], _ir.AllocaInstr):
+        return value.operands[0]
+    return _cgutils.alloca_once_value(builder, value)
+
+
+def argument_type(given: Any) -> Any:
+    """The type by which a part takes an argument: a number's value is not part of it, a NamedTuple is a reference."""
+    given = _types.unliteral(given)
+    return Reference(given) if isinstance(given, _types.BaseNamedTuple) else given
 
 
 def opener(sample: R) -> Callable[[Any], R]:

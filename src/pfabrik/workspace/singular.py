@@ -141,9 +141,10 @@ def singularity_map(
     InvalidArgument : a workspace or path of another mechanism, or one of positions with any orientation or several.
     """
     checked_mechanism(mechanism)
-    if not isinstance(over, Workspace | Track):
+    given: object = over
+    if not isinstance(given, Workspace | Track):
         expected = "a Workspace or a Track; over coordinates by their names, `workspace` makes one"
-        raise InvalidArgument("over", reprlib.repr(over), expected)
+        raise InvalidArgument("over", reprlib.repr(given), expected)
     if over.mechanism != mechanism:
         raise InvalidArgument("over", f"that of {told_apart(over.mechanism, mechanism)}", f"one of '{mechanism.name}'")
     if isinstance(over, Track):

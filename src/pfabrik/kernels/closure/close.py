@@ -173,7 +173,14 @@ def is_close(problem: ClosureProblem, eq: Equations) -> bool:
 
 @routine
 def close_row(
-    loops: Loops, layout: Layout, problem: ClosureProblem, row: int, best: State, trial: State, eq: Equations, closed: Closed
+    loops: Loops,
+    layout: Layout,
+    problem: ClosureProblem,
+    row: int,
+    best: State,
+    trial: State,
+    eq: Equations,
+    closed: Closed,
 ) -> int:
     """Close the loops of a row, from `trial`, into `best`; how many steps it took."""
     plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED

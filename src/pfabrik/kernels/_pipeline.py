@@ -1,0 +1,205 @@
+"""How Numba compiles kernels here: parts once, optimised with what they go into, without what gives nothing."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partialmethod
+from types import SimpleNamespace
+from typing import Any
+
+from numba.core import codegen, compiler, types
+
+# Numba is typed in some versions and not in others, and never for the options below the public ones.
+_Library: Any = getattr(codegen, "JITCodeLibrary", object)
+_Codegen: Any = getattr(codegen, "CPUCodegen", object)
+_Compiler: Any = getattr(compiler, "Compiler", object)
+_Flags: Any = getattr(compiler, "Flags", object)
+_Function: Any = getattr(types, "BaseFunction", object)
+
+# Numba promises these to nobody: with a version that has others, all is compiled in its own way, which takes longer.
+_HOOKS = (
+    (_Library, "_optimize_functions _optimize_final_module _finalize_final_module codegen"),
+    (_Codegen, "_function_pass_manager _module_pass_manager"),
+    (_Compiler, "define_pipelines"),
+    (_Flags, "summary copy"),
+    (_Function, "get_call_type"),
+)
+IS_HOOKED = all(hasattr(owner, name) for owner, names in _HOOKS for name in names.split())
+
+LARGE = 150
+"""Instructions of a part, before it is optimised, beyond which a search does not take it in whole."""
+
+TICK = 2.0
+"""Seconds between two signs of life while a kernel compiles."""
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    """A kernel as it is announced: its folder and its name."""
+    return f"{function.__module__.rpartition('.')[0].rpartition('.')[2]}.{function.__name__}".lstrip(".")
+
+
+def compile_announced(name: str, original: Callable[..., Any], *arguments: Any) -> Any:
+    """Compile a kernel, saying so on standard error before, and afterwards how long it took.
+
+    Numba calls this for what is not in the cache, with its lock held: one thread compiles, others wait for it.
+    """
+    _say(f"pfabrik: compiling {name} ...")
+    began, done = time.perf_counter(), threading.Event()
+    threading.Thread(target=_tick, args=(done,), daemon=True).start()
+    try:
+        with in_haste():
+            return original(*arguments)
+    finally:
+        done.set()
+        _say(f" {time.perf_counter() - began:.1f} s\n")
+
+
+def _tick(done: threading.Event) -> None:
+    """A dot on standard error every few seconds, until it is done."""
+    while not done.wait(TICK):
+        _say(".")
+
+
+def _say(text: str) -> None:
+    """Write on standard error at once, where there is one: a program without a terminal may have closed it."""
+    if sys.stderr is not None:
+        sys.stderr.write(text)
+        sys.stderr.flush()
+
+
+@contextmanager
+def in_haste() -> Iterator[None]:
+    """Without what takes Numba long and gives nothing here, for as long as it compiles.
+
+    Collecting garbage among so many objects is a tenth of its time. Another is to find out what an operator means for
+    arguments of some types, at each place anew, by trying all that it could mean.
+    """
+    collects, find = gc.isenabled(), getattr(_Function, "get_call_type", None)
+    gc.disable()
+    if IS_HOOKED:
+        _Function.get_call_type = partialmethod(_find_once, find)
+    try:
+        yield
+    finally:
+        if IS_HOOKED:
+            _Function.get_call_type = find
+        if collects:
+            gc.enable()
+
+
+_FOUND: dict[Any, Any] = {}
+
+
+def _find_once(function: Any, find: Callable[..., Any], context: Any, arguments: Any, keywords: Any) -> Any:
+    """What a function of Numba's means for arguments of some types, found before or now."""
+    asked = function, context, arguments, tuple(keywords.items())
+    if asked not in _FOUND:
+        _FOUND[asked] = find(function, context, arguments, keywords)
+    return _FOUND[asked]
+
+
+class _PartLibrary(_Library):
+    """The code of a part, not optimised and no machine code: each kernel that it goes into does both, for the whole."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Tidy each function by itself, all with the same passes; Numba makes them anew for each, also for those that
+        are only declared."""
+        module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager()
+        for function in module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    @property
+    def codegen(self) -> Any:
+        """What Numba asks, with the code in place, to note its Python environment there; here it is in no place."""
+        return SimpleNamespace(set_env=lambda name, environment: None)
+
+
+class _KernelLibrary(_Library):
+    """The code of a kernel with all its parts; nobody else can call them, so arguments that go unused are dropped.
+
+    A mechanism by value is more than fifty arguments, of which most parts use a few. Optimised once: Numba does it
+    twice, for the sake of counts of references, of which there are hardly any here; that is a sixth of all its time.
+    """
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage.name == "linkonce_odr":
+                function.linkage = "internal"
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
+
+class _SearchLibrary(_KernelLibrary):
+    """The code of a search, whose large parts are called where they are used, and not taken in whole at each place."""
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if str(function).count("\n  ") > LARGE and not any(b"alwaysinline" in each for each in function.attributes):
+                function.add_function_attribute("noinline")
+        super()._optimize_final_module()
+
+
+class _StackedOptions(_Flags):
+    """Options of a function being compiled, equal to themselves alone."""
+
+    __hash__ = object.__hash__
+    __eq__ = object.__eq__
+
+
+_STACKED: dict[str, _StackedOptions] = {}
+
+
+class _Options(_Flags):
+    """Options of a function, which give one object for all that are equal.
+
+    Numba takes a copy along while it compiles the function, and compares it, option by option, for every expression
+    and everything that the expression could mean: a tenth of its time.
+    """
+
+    def copy(self) -> Any:
+        return _STACKED.setdefault(self.summary(), _StackedOptions(self))
+
+
+_NEEDLESS = {"WithLifting", "InlineClosureLikes", "InlineInlinables", "InlineOverloads", "NopythonRewrites"}
+"""Numba's passes for what no kernel has: `with`, closures and comprehensions, arithmetic of whole arrays."""
+
+
+class KernelCompiler(_Compiler):
+    """Numba's compiler, which otherwise optimises a part by itself and again in every function above it."""
+
+    library: Any = _KernelLibrary
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self.state.flags = _Options(self.state.flags)
+
+    def define_pipelines(self) -> Any:
+        if self.state.library is None:
+            self.state.library = self.library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+            self.state.library.enable_object_caching()
+        pipelines = super().define_pipelines()
+        for pipeline in pipelines:
+            pipeline.passes = [each for each in pipeline.passes if each[0].__name__ not in _NEEDLESS]
+            pipeline.finalize()
+        return pipelines
+
+
+class SearchCompiler(KernelCompiler):
+    library = _SearchLibrary
+
+
+class PartCompiler(KernelCompiler):
+    library = _PartLibrary
