@@ -13,7 +13,6 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..writing import whole_path
 from .machine import Machine
-from .self_test import self_test
 from .source import source
 from .wording import Precision
 
@@ -72,5 +71,4 @@ def c_source(
     if "fk" in parts and machine.uncontrolled:
         left = f"its actuators leave the end effector {machine.uncontrolled} freedoms: leave 'fk' out"
         raise UnsupportedMechanism(mechanism.name, [left], "exported")
-    test = self_test(machine, precision, "limits" in parts, "fk" in parts) if "ik" in parts else ""
-    return source(machine, name, precision, parts, test)
+    return source(machine, name, precision, parts)

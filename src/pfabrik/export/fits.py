@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats
+from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
-from .legs import LegCode, RodShape
-from .machine import Coordinate, Machine
+from .machine import Coordinate, Leg, Machine
 
 
 class Tower(NamedTuple):
@@ -52,36 +52,42 @@ def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
     """Ends of six struts, on the base and on the platform, and what their actuators add to lengths; None for others."""
     mechanism = machine.mechanism
     whole = not machine.unset and not mechanism.end_effector_is_joint
-    if not whole or len(machine.codes) != 6 or [each.drive.what for each in machine.driven] != ["slide"] * 6:
+    if not whole or len(machine.legs) != 6 or machine.equations:
         return None
-    found = []
-    for each in machine.driven:
-        code = machine.codes[each.leg]
-        shape = code.shape
-        if not isinstance(shape, RodShape) or shape.is_reversed or shape.carrier or machine.rows:
-            return None
-        found.append((np.asarray(code.numbers["foot"]), np.asarray(code.numbers["head"]), each.home - _length(code)))
-    return found
+    legs = [machine.legs[each.leg] for each in machine.driven]
+    rods = [leg.record["kind"] == K.ROD and leg.record["carrier"] == K.NO_CARRIER for leg in legs]
+    if [each.place for each in machine.driven] != [K.SLIDE] * 6 or not all(rods):
+        return None
+    if any(leg.record["reversed"] for leg in legs):
+        return None
+    ends = [(np.asarray(leg.numbers["foot"]), np.asarray(leg.numbers["head"])) for leg in legs]
+    added = [each.home - _length(leg) for each, leg in zip(machine.driven, legs, strict=True)]
+    return [(*each, more) for each, more in zip(ends, added, strict=True)]
 
 
-def _length(code: LegCode) -> float:
-    return float(np.asarray(code.numbers["length"]))
+def _length(leg: Leg) -> float:
+    return float(np.asarray(leg.numbers["length"]))
+
+
+def _pair(machine: Machine, driven: Coordinate, carrier: int) -> tuple[Leg, Leg] | None:
+    """The two rods on what an actuator carries, if that is a crank, or a carriage."""
+    pair = [leg for leg in machine.legs if leg.main == driven.leg]
+    return (pair[0], pair[1]) if len(pair) == 2 and pair[0].record["carrier"] == carrier else None
 
 
 def towers_of(machine: Machine) -> list[Tower] | None:
     """The rails of a delta in the order of its actuators; None for other machines."""
     mechanism, size = machine.mechanism, machine.mechanism.characteristic_length
-    if set(mechanism.task) != {"x", "y", "z"} or len(machine.driven) != 3 or len(machine.codes) != 6:
+    if set(mechanism.task) != {"x", "y", "z"} or len(machine.driven) != 3 or len(machine.legs) != 6:
         return None
     towers = []
     for each in machine.driven:
-        pair = [code for code in machine.codes if code.main == each.leg]
-        shapes = [code.shape for code in pair]
-        if len(pair) != 2 or not all(isinstance(s, RodShape) and s.carrier == "carriage" for s in shapes):
+        pair = _pair(machine, each, K.CARRIAGE)
+        if pair is None:
             return None
         axis = np.asarray(pair[0].numbers["axis"]) * each.sense
-        spans = [np.asarray(code.numbers["foot"]) - np.asarray(code.numbers["head"]) for code in pair]
-        lengths = [_length(code) for code in pair]
+        spans = [np.asarray(leg.numbers["foot"]) - np.asarray(leg.numbers["head"]) for leg in pair]
+        lengths = [_length(leg) for leg in pair]
         off = max(np.abs(spans[0] - spans[1]).max() / size, abs(lengths[0] - lengths[1]) / size)
         if (
             off > TOLERANCES.alignment
@@ -104,7 +110,7 @@ def thighs_of(machine: Machine) -> list[Thigh] | None:
     Their axes are level and square to the way outward, they go down with their actuators, and their knees are outside.
     """
     mechanism = machine.mechanism
-    if set(mechanism.task) != {"x", "y", "z"} or len(machine.driven) != 3 or len(machine.codes) != 6:
+    if set(mechanism.task) != {"x", "y", "z"} or len(machine.driven) != 3 or len(machine.legs) != 6:
         return None
     found = [_thigh(machine, each) for each in machine.driven]
     known = [each for each in found if each is not None]
@@ -113,12 +119,12 @@ def thighs_of(machine: Machine) -> list[Thigh] | None:
 
 def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
     size, near = machine.mechanism.characteristic_length, TOLERANCES.alignment
-    pair = [code for code in machine.codes if code.main == driven.leg]
-    if len(pair) != 2 or not all(isinstance(code.shape, RodShape) and code.shape.carrier == "crank" for code in pair):
+    pair = _pair(machine, driven, K.CRANK)
+    if pair is None:
         return None
     axis, spoke = (np.asarray(pair[0].numbers[name]) for name in ("axis", "spoke"))
-    knees = [np.asarray(code.numbers["foot"]) for code in pair]
-    ankles = [np.asarray(code.numbers["head"]) for code in pair]
+    knees = [np.asarray(leg.numbers["foot"]) for leg in pair]
+    ankles = [np.asarray(leg.numbers["head"]) for leg in pair]
     aside = np.cross(axis, knees[1] - knees[0])
     off = max(np.abs((knees[1] - knees[0]) - (ankles[1] - ankles[0])).max(), np.linalg.norm(aside)) / size
     knee, ankle = 0.5 * (knees[0] + knees[1]), 0.5 * (ankles[0] + ankles[1])

@@ -91,7 +91,7 @@ void rtapi_app_exit(void)
 def module(machine: Machine) -> str:
     """A kinematics module for halcompile, around the machine's own C."""
     mechanism = machine.mechanism
-    angles = ["1.0" if each.unit == "length" else "57.295779513082323" for each in machine.driven]
+    angles = ["1.0" if each.is_length else "57.295779513082323" for each in machine.driven]
     return f"""\
 /* A kinematics module for LinuxCNC: halcompile --install pfabrikkins.c, then loadrt pfabrikkins.
    Joints in this order: {comment(", ".join(mechanism.actuator_names))}.

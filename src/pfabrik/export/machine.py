@@ -1,58 +1,70 @@
-"""What an exported file says of a machine: its legs, what their coordinates are in C, and what is asked of them."""
+"""What an exported file says of a machine: its legs, in the mechanism's unit of length, and what is asked of them."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
+from ..decomposition.leg_forms import Rod
+from ..decomposition.leg_records import row_counts
 from ..decomposition.leg_table import LegTable, table_of_poses
 from ..description.mechanism import Mechanism
-from ..description.task import Task, task_of
 from ..errors import UnsupportedMechanism
 from ..kernels.legs import records as K
+from ..kernels.legs.records import Record
 from ..motion.mobility import generic_of
-from ..tolerances import TOLERANCES
-from .equations import Drive, Unit, drive_unit, units
-from .legs import LegCode, PivotShape, RodShape, leg_codes
-from .placing import Needs
+from ..rotations import square_to
+
+Number = float | Floats
 
 
-@dataclass(frozen=True)
-class Coordinate:
-    """A coordinate of a leg as it stands in C.
+class Coordinate(NamedTuple):
+    """A coordinate of a leg, and what is said of its deviation from home.
 
     Attributes
     ----------
-    value : C expression of the deviation from home.
+    place : in the leg's values.
+    turns : whether it is an angle that counts into its range by whole turns.
     lo, hi : of the deviation [length or rad].
     home : [length or rad].
     """
 
     leg: int
-    drive: Drive
-    value: str
-    sense: float
+    place: int
+    is_length: bool
     turns: bool
+    sense: float
     lo: float
     hi: float
     home: float
-    unit: Unit
 
     @property
     def may_turn(self) -> bool:
         """Whether it may turn more than once."""
-        return self.turns and self.hi - self.lo > 2.0 * math.pi
+        return self.turns and self.hi - self.lo > 2.0 * np.pi
 
 
-@dataclass(frozen=True)
-class Row:
-    """An equation: the leg it is of, and what it is measured in."""
+class Leg(NamedTuple):
+    """A leg as it is written.
 
-    leg: int
-    unit: Unit
+    Attributes
+    ----------
+    main : the leg whose carrier it is on; its own place if it shares none.
+    record : as in `LegTable.legs`; lengths in L.
+    numbers : constants by the name of their field in C, in the mechanism's unit.
+    """
+
+    main: int
+    record: Record
+    numbers: dict[str, Number]
+    joints: tuple[str, ...]
+
+    @property
+    def has_carrier(self) -> bool:
+        """Whether it is a rod on a carrier of its own."""
+        return bool(self.record["kind"] == K.ROD and self.record["carrier"] in (K.CRANK, K.CARRIAGE))
 
 
 class Machine:
@@ -60,11 +72,10 @@ class Machine:
 
     Attributes
     ----------
-    codes : its legs.
-    letters : of each shape of leg, how its functions are called.
     limited, driven : coordinates with a range, and those of the actuators in their order.
+    cones : records, as in `LegTable`.
     limits : (joint, bound) of every limit: two of each range, then cones.
-    rows, drive_rows : the legs' equations, and those that driven coordinates add in forward kinematics.
+    axes, rotations, unset : what the task sets, and how many coordinates of a pose it leaves open; see `K.TASK`.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -74,123 +85,80 @@ class Machine:
         if len(table.arms):
             reason = f"other legs are on joints {', '.join(table.arm_joints)}"
             raise UnsupportedMechanism(mechanism.name, [reason], "exported")
-        self.mechanism = mechanism
-        self.table = table
-        self.task: Task = task_of(mechanism)
-        if self.task.rotations == 1:
+        self.mechanism, self.limits, self.cones = mechanism, table.limits, table.cones
+        task = table.task[0]
+        self.axes, self.rotations, self.unset = task["axes"].tolist(), int(task["rotations"]), int(task["unset"])
+        if self.rotations == 1:
             raise UnsupportedMechanism(mechanism.name, ["its task sets the yaw alone of the rotation"], "exported")
-        self.codes = leg_codes(mechanism, table)
-        shapes = dict.fromkeys(code.shape for code in self.codes)
-        self.letters = {shape: chr(ord("a") + place) for place, shape in enumerate(shapes)}
-        self.limited = [self._coordinate(record) for record in table.limited]
+        self.legs = _legs(mechanism, table)
         ordered = table.driven[np.argsort(table.driven["column"])]
-        self.driven = [self._coordinate(record) for record in ordered]
-        self.limits = table.limits
-        self.rows = [Row(place, unit) for place, code in enumerate(self.codes) for unit in units(code.shape)]
-        self.drive_rows = [
-            Row(each.leg, drive_unit(self.codes[each.leg].shape, each.drive))
-            for each in self.driven
-            if each.drive.what != "carrier"
-        ]
+        self.limited = [_coordinate(each, mechanism.coordinates[each["column"]].kind) for each in table.limited]
+        self.driven = [_coordinate(each, mechanism.drives[each["column"]].kind) for each in ordered]
+        self.equations = sum(row_counts(table.legs)) + sum(leg.has_carrier for leg in self.legs)
 
     @property
-    def unset(self) -> int:
-        """How many coordinates of a pose its task leaves open."""
-        if self.mechanism.end_effector_is_joint:
-            return 0
-        return 6 - sum(self.task.axes) - self.task.rotations
-
-    @property
-    def rows_at_rest(self) -> list[int]:
-        """Places of the equations that a whole pose may break: all but the length of a rod that a carrier is on."""
-        found, place = [], 0
-        for code in self.codes:
-            for own in range(len(units(code.shape))):
-                shape = code.shape
-                carries = isinstance(shape, RodShape) and bool(shape.carrier) and not shape.is_shared
-                if not (own == 0 and carries):
-                    found.append(place)
-                place += 1
-        return found
+    def drive_equations(self) -> int:
+        """How many equations there are more where actuators are given: of all but those that carry a rod."""
+        return sum(not (self.legs[each.leg].has_carrier and each.place == K.CARRIER) for each in self.driven)
 
     @property
     def uncontrolled(self) -> int:
         """Freedoms of the end effector that its actuators leave."""
         return generic_of(self.mechanism).mobility.uncontrolled
 
-    def needs(self, shape: RodShape | PivotShape, forward: bool) -> Needs:
-        """What is asked of the legs of a shape."""
-        own = {place for place, code in enumerate(self.codes) if code.shape == shape}
-        lines = {"foot" if cone["place"] == K.FOOT_LINE else "head" for cone in self.table.cones if cone["leg"] in own}
-        asked = {each.drive.what for each in (*self.limited, *self.driven) if each.leg in own}
-        angles = {end for end in ("foot", "head") if end in asked}
-        if isinstance(shape, RodShape):
-            for place in own:
-                for end in ("foot", "head"):
-                    if getattr(shape, end) == "cross" and (shape.twists or _may_miss(self.codes[place], end)):
-                        angles.add(end)
-        elif shape.ending == "triple":
-            angles.add("foot")
-        given = forward and any(each.leg in own and each.drive.what == "carrier" for each in self.driven)
-        return Needs(given, frozenset(lines), frozenset(angles))
 
-    def _coordinate(self, record: NDArray[np.void]) -> Coordinate:
-        leg, unit = int(record["leg"]), float(record["unit"])
-        drive = self._drive(leg, int(record["place"]))
-        own = f"leg[{leg}]"
-        value = {
-            "carrier": f"{own}.carrier",
-            "slide": f"({own}.length - pfk_rods[{self.table_place(leg)}].length)",
-            "pivot slide": f"{own}.slide[{drive.place}]",
-        }.get(drive.what, f"{own}.{drive.what}_angle[{drive.place}]")
-        sense, turns = float(record["sense"]), bool(record["turns"])
-        lo, hi = float(record["lo"]) * unit, float(record["hi"]) * unit
-        signed = value if sense > 0 else f"-{value}"
-        is_length = drive.what in ("slide", "pivot slide") or self._is_carriage(leg, drive)
-        return Coordinate(
-            leg,
-            drive,
-            _within(signed, lo, hi) if turns else signed,
-            sense,
-            turns,
-            lo,
-            hi,
-            float(record["home"]),
-            "length" if is_length else "angle",
-        )
-
-    def _is_carriage(self, leg: int, drive: Drive) -> bool:
-        shape = self.codes[leg].shape
-        return drive.what == "carrier" and isinstance(shape, RodShape) and shape.carrier == "carriage"
-
-    def _drive(self, leg: int, place: int) -> Drive:
-        """What a place in a leg's values is."""
-        is_pivot = isinstance(self.codes[leg].shape, PivotShape)
-        if place >= K.HEAD:
-            return Drive("pivot slide" if is_pivot else "head", place - K.HEAD)
-        if place == K.SLIDE:
-            return Drive("slide", 0)
-        return Drive("foot", place - K.FOOT) if place >= K.FOOT else Drive("carrier", 0)
-
-    def cone_line(self, cone: NDArray[np.void]) -> str:
-        """C expression of the direction that a cone limits."""
-        return f"leg[{int(cone['leg'])}].{'foot' if cone['place'] == K.FOOT_LINE else 'head'}_line"
-
-    def table_place(self, leg: int) -> int:
-        """A leg's place among the rods, or among the pivots."""
-        kind = type(self.codes[leg].shape)
-        return sum(isinstance(code.shape, kind) for code in self.codes[:leg])
+def _coordinate(record: Record, kind: str) -> Coordinate:
+    unit = float(record["unit"])
+    return Coordinate(
+        leg=int(record["leg"]),
+        place=int(record["place"]),
+        is_length=kind != "angle",
+        turns=bool(record["turns"]),
+        sense=float(record["sense"]),
+        lo=float(record["lo"]) * unit,
+        hi=float(record["hi"]) * unit,
+        home=float(record["home"]),
+    )
 
 
-def _may_miss(code: LegCode, end: str) -> bool:
-    """Whether there are directions that two crossed hinges cannot point their rod in."""
-    outer, inner, _ = np.asarray(code.numbers[f"{end}_axes"])
-    line = np.asarray(code.numbers["line"])
-    return bool(max(abs(outer @ inner), abs(inner @ line)) > TOLERANCES.alignment)
+def _legs(mechanism: Mechanism, table: LegTable) -> list[Leg]:
+    legs: list[Leg] = []
+    main, length = 0, mechanism.characteristic_length
+    for place, (form, record) in enumerate(zip(table.forms, table.legs, strict=True)):
+        main = main if record["carrier"] == K.SHARED else place
+        numbers = _rod_numbers(form, record, length) if isinstance(form, Rod) else _pivot_numbers(record, length)
+        legs.append(Leg(main, record, numbers, tuple(dict.fromkeys(item.joint.name for item in form.items))))
+    return legs
 
 
-def _within(value: str, lo: float, hi: float) -> str:
-    """An angle counted into its range by whole turns."""
-    if hi - lo <= 2.0 * math.pi:
-        return f"pfk_wrap({value}, {0.5 * (lo + hi)!r})"
-    return f"pfk_wrap_into({value}, {lo!r}, {hi!r})" if math.isfinite(hi - lo) else f"pfk_wrap({value}, 0.0)"
+def _numbers(record: Record, length: float, lengths: tuple[str, ...], others: tuple[str, ...]) -> dict[str, Number]:
+    """Fields of a record that have the same name in C."""
+    return {name: record[name] * length for name in lengths} | {name: record[name] for name in others}
+
+
+def _rod_numbers(rod: Rod, record: Record, length: float) -> dict[str, Number]:
+    """What is to be reached at home counts from a crank's axis, or from the foot on a carriage."""
+    numbers: dict[str, Number] = {"foot": record["foot_point"] * length, "head": record["head_point"] * length}
+    numbers |= {name: record[name] for name in ("line", "foot_side", "head_side", "twist")}
+    numbers |= {f"{end}_axes": record[f"{end}_axes"] for end in ("foot", "head") if record[end] in (K.HINGE, K.CROSS)}
+    numbers["length"] = record["length"] * length
+    if rod.carrier is not None:
+        begin = record["carrier_point"] if record["carrier"] == K.CRANK else rod.foot
+        numbers |= {"axis": record["carrier_axis"], "side": record["side"], "reach": (rod.head - begin) * length}
+        fields = {"centre": "carrier_point", "spoke": "spoke", "across": "spoke_across"}
+        numbers |= {name: record[field] * length for name, field in fields.items()}
+    return numbers
+
+
+def _pivot_numbers(record: Record, length: float) -> dict[str, Number]:
+    slides, last = int(record["slides"]), {K.CROSS: 1, K.TRIPLE: 2}.get(int(record["foot"]))
+    return {
+        "foot": record["foot_point"] * length,
+        "head": record["head_point"] * length,
+        "foot_axes": record["foot_axes"],
+        "side": record["side"],
+        "rows": np.concatenate([record["slide_rows"][:slides], record["fixed_rows"][: 3 - slides]]),
+        "kept": record["kept"],
+        "moved": record["moved"],
+        "square": np.zeros(3) if last is None else square_to(record["foot_axes"][last])[0],
+    }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +14,7 @@ from ..ik import solve_ik
 from ..motion.mobility import generic_of
 from ..options import Options
 from ..poses import pose
-from .machine import Machine
-from .wording import Precision, literal
+from .wording import Precision
 
 POSES = 50
 FARTHEST = (0.3, 0.5)
@@ -75,64 +73,3 @@ def least_margins(mechanism: Mechanism, q: Floats) -> Floats:
         return np.zeros(0)
     found = margins(configuration(mechanism, q))
     return np.asarray(np.min([np.ones(len(q)), *(np.asarray(each) for each in found.values())], axis=0))
-
-
-def self_test(machine: Machine, precision: Precision, limits: bool, forward: bool) -> str:
-    """A `main` that compares the file's answers with the library's."""
-    return "\n".join(_main(machine, checks_of(machine.mechanism, limits), EXACT[precision], forward))
-
-
-def _main(machine: Machine, checks: Checks, exact: float, forward: bool) -> Iterator[str]:
-    count = len(checks.targets)
-    sizes = ["PFK_SIZE" if each.unit == "length" else "1.0" for each in machine.driven]
-    yield "#ifdef PFK_SELF_TEST"
-    yield ""
-    yield "#include <stdio.h>"
-    yield ""
-    yield f"/* {count} poses: where they are, the actuators there, and whether those are within all limits. */"
-    yield "static const struct {"
-    yield "    pfk_pose target;"
-    yield "    pfk_real actuators[PFK_ACTUATORS];"
-    yield "    int kept;"
-    yield f"}} pfk_checks[{count}] = {{"
-    for target, actuators, kept in zip(*checks, strict=True):
-        own = f"{{{literal(target[:3, 3])}, {literal(target[:3, :3])}}}"
-        yield f"    {{{own}, {literal(actuators)}, {int(kept)}}},"
-    yield "};"
-    yield ""
-    yield "int main(void)"
-    yield "{"
-    yield f"    static const pfk_real size[PFK_ACTUATORS] = {{{', '.join(sizes)}}};"
-    yield "    pfk_real found[PFK_ACTUATORS];"
-    yield f"    pfk_pose pose{', back' if forward else ''};"
-    yield "    int i, j, code, wrong = 0;"
-    yield f"    for (i = 0; i < {count}; ++i) {{"
-    yield "        pfk_home(&pose);"
-    yield "        code = pfk_ik(&pfk_checks[i].target, &pose, found);"
-    yield "        if ((code == 0) != pfk_checks[i].kept) {"
-    yield '            printf("pose %d: %s\\n", i, pfk_what(code));'
-    yield "            ++wrong;"
-    yield "        }"
-    yield "        for (j = 0; code == 0 && j < PFK_ACTUATORS; ++j)"
-    yield f"            if (!(fabs(found[j] - pfk_checks[i].actuators[j]) <= {literal(exact)} * size[j])) {{"
-    yield '                printf("pose %d, actuator %d: %.9g\\n", i, j, (double)found[j]);'
-    yield "                ++wrong;"
-    yield "            }"
-    if forward:
-        yield "        back = pose;"
-        yield "        if (code == 0 && pfk_fk(found, &back, 0) != 0) {"
-        yield '            printf("pose %d: no way back\\n", i);'
-        yield "            ++wrong;"
-        yield "        }"
-        yield "        for (j = 0; code == 0 && j < 3; ++j)"
-        yield f"            if (!(fabs(back.p[j] - pose.p[j]) <= {literal(exact)} * PFK_SIZE)) {{"
-        yield '                printf("pose %d, back: %.9g\\n", i, (double)back.p[j]);'
-        yield "                ++wrong;"
-        yield "            }"
-    yield "    }"
-    yield f'    printf("{count} poses, %d wrong\\n", wrong);'
-    yield "    return wrong != 0;"
-    yield "}"
-    yield ""
-    yield "#endif"
-    yield ""

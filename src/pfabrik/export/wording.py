@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from .legs import Number
+from .machine import Number
 
 Precision = Literal["double", "float"]
 

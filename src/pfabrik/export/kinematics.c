@@ -1,0 +1,1358 @@
+/* What every exported file has in common: it reads legs out of tables. `source.py` puts what is the machine's own in
+   place of the three files that are included, keeps the blocks between #if and #endif that a machine has a use for, and
+   writes names and numbers with the prefix and in the precision that are asked for. */
+
+#ifndef PFK_H
+#define PFK_H
+
+typedef double pfk_real;
+
+typedef struct {
+    pfk_real p[3];
+    pfk_real R[3][3];
+} pfk_pose;
+
+/* What functions return: 0 where all is well, the number of the limit that is exceeded most, PFK_LEG + the number of a
+   leg that does not reach or close, or one of those below. */
+enum {
+    PFK_LEG = 1000,
+    PFK_NO_POSE = -1,      /* not finite, or not a rotation */
+    PFK_NO_ACTUATORS = -2, /* not finite */
+    PFK_OTHER_MODE = -3    /* closed, but not in the working mode of home */
+};
+
+#include "machine.h"
+
+/* The pose at home. */
+void pfk_home(pfk_pose *pose);
+/* A pose from a position and from turns about the fixed x, y and z axes, in this order [rad]. */
+void pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose *pose);
+/* The angles of a pose: roll, pitch, yaw [rad]. */
+void pfk_rpy(const pfk_pose *pose, pfk_real angles[3]);
+/* What a code that was returned means, in words. */
+const char *pfk_what(int code);
+#if IK
+/* Actuators for a target. `pose` must hold a pose, the last one or home: what the task leaves open is completed from
+   there, and it becomes the pose that is reached. Nothing is written unless 0 is returned. */
+int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS]);
+#endif
+#if TURNS
+/* Counts actuators that may turn more than once on from where they were. */
+void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS]);
+#endif
+#if LIMITS
+/* Fills how far a whole pose is inside each of PFK_LIMITS limits, negative beyond it [length or rad]. */
+int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
+#endif
+#if FK
+/* The pose at which actuators are, by Newton's method from `pose`, in at most 40 steps; `steps` may be 0, or is told
+   how many there were. Limits are not asked for. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is
+   returned. */
+int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
+#endif
+
+#endif
+
+#ifndef PFK_DECLARATIONS_ONLY
+
+#include <math.h>
+
+#define PFK_TURN 6.283185307179586
+#define PFK_FARTHEST 2.0     /* what a task leaves open goes no farther than this [L or rad] */
+#define PFK_LONGEST_STEP 0.5 /* [L or rad] */
+#define PFK_MODE_APART 1e-3  /* nearer to each other actuators of two working modes meet [L or rad] */
+enum {
+    PFK_IK_STEPS = 20,
+    PFK_PARTS = 8, /* of the way to a target that is not completed at once */
+    PFK_FK_STEPS = 40
+};
+
+/* A rod is [what carries it] + ending of its foot + rigid or sliding rod + ending of its head; a pivot is [slides] +
+   one ending of no length. A leg is read from the base to the platform, or, its foot there, from the platform to the
+   base: then its numbers are as the platform sees them. */
+enum { PFK_ROD, PFK_PIVOT };
+enum { PFK_FROM_BASE, PFK_FROM_PLATFORM };
+/* What carries a foot: nothing, a hinge, a slide, or what carries the rod before. */
+enum { PFK_NO_CARRIER, PFK_CRANK, PFK_CARRIAGE, PFK_SHARED };
+/* Endings: a weld, a hinge, two hinges that cross, three through a point, a ball. */
+enum { PFK_WELD, PFK_HINGE, PFK_CROSS, PFK_TRIPLE, PFK_BALL };
+/* Coordinates of a leg: of what carries it, angles at its foot, how much longer it is, angles at its head or slides. */
+enum { PFK_CARRIER = 0, PFK_FOOT = 1, PFK_SLIDE = 4, PFK_HEAD = 5, PFK_VALUES = 8 };
+
+/* What a leg is, at home. */
+typedef struct {
+    int kind, frame;
+    int main; /* the leg whose carrier it is on: mostly its own place */
+    int carrier, slides;
+    int twists; /* 1: both ends keep the rod from spinning about itself */
+    int foot_end, head_end;
+    int foot_aimed, head_aimed; /* 1: the angles of this end are asked for */
+    pfk_real foot[3];
+    pfk_real head[3]; /* seen from the reference point; of a leg read from the platform, from the base's origin */
+    pfk_real length, line[3]; /* the direction from foot to head */
+    pfk_real foot_axes[3][3], head_axes[3][3]; /* hinges, from the body that the end is on */
+    pfk_real foot_side, head_side; /* which of the two ways to aim crossed hinges is home's */
+    pfk_real twist; /* angle about the line between marks of the two ends */
+    pfk_real axis[3]; /* of what carries it */
+    pfk_real centre[3], spoke[3], across[3]; /* of a crank: from its centre to the foot, and that a quarter turn on */
+    pfk_real reach[3]; /* from centre, or from the foot on a carriage, to the head */
+    pfk_real side; /* which of two solutions is home's */
+#if PIVOTS
+    pfk_real rows[3][3]; /* from the centre's displacement: first what slides say, then what has to stay 0 */
+    int pairs, upright; /* how many of: conditions kept . R moved; hinges that must not turn over */
+    pfk_real kept[3][3], moved[3][3];
+    pfk_real square[3]; /* to the last hinge */
+#endif
+} pfk_leg;
+
+/* A coordinate of a leg: its deviation from home is sense * value. */
+typedef struct {
+    int leg, place, is_length;
+    int turns; /* 1: an angle that counts into its range by whole turns */
+    pfk_real sense, lo, hi, home; /* lo and hi of the deviation */
+} pfk_coordinate;
+
+#if CONES
+/* A rod keeps within a half angle of an axis of what its foot, or its head, is on. */
+typedef struct {
+    int leg, is_head;
+    pfk_real axis[3], half_angle;
+} pfk_cone;
+#endif
+
+#include "tables.h"
+
+/* The platform as a foot on the base sees it, or the base as one on the platform does: points map to R x + p. */
+typedef struct {
+    pfk_real R[3][3], p[3];
+    pfk_real moved[3]; /* p less what it is at home */
+    pfk_real centre[3]; /* about which the platform turns */
+} pfk_frame;
+
+/* Where a leg is. */
+typedef struct {
+    pfk_real foot[3], head[3], span[3], u[3], length;
+    pfk_real foot_line[3], head_line[3]; /* u as what the foot, or the head, is on sees it */
+    pfk_real value[PFK_VALUES], cosine, sine;
+    int is_given; /* 1: what carries it has the coordinate that it is given */
+    int is_held; /* 1: what carries it does not follow the head */
+    pfk_real follow[6]; /* derivative of the carrier's coordinate by the pose */
+} pfk_placed;
+
+typedef struct {
+    pfk_frame frame[2];
+    pfk_placed leg[PFK_LEGS];
+} pfk_state;
+
+#if SOLVES
+/* An equation of a leg, 0 where it closes [L or rad]; its derivative by the velocity and the angular velocity of the
+   platform. */
+typedef struct {
+    int leg;
+    pfk_real off, slope[6];
+} pfk_row;
+#endif
+
+static const pfk_real pfk_zero[3] = {0.0, 0.0, 0.0};
+
+static pfk_real pfk_dot(const pfk_real a[3], const pfk_real b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static pfk_real pfk_norm(const pfk_real a[3])
+{
+    return sqrt(pfk_dot(a, a));
+}
+
+/* `out` is neither of the two. */
+static void pfk_cross(const pfk_real a[3], const pfk_real b[3], pfk_real out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static void pfk_copy(const pfk_real a[3], pfk_real out[3])
+{
+    int i;
+    for (i = 0; i < 3; ++i)
+        out[i] = a[i];
+}
+
+/* a + k b; `out` may be one of them. */
+static void pfk_along(const pfk_real a[3], pfk_real k, const pfk_real b[3], pfk_real out[3])
+{
+    int i;
+    for (i = 0; i < 3; ++i)
+        out[i] = a[i] + k * b[i];
+}
+
+static void pfk_rotate(const pfk_frame *frame, const pfk_real v[3], pfk_real out[3])
+{
+    int i;
+    for (i = 0; i < 3; ++i)
+        out[i] = pfk_dot(frame->R[i], v);
+}
+
+static void pfk_rotate_back(const pfk_frame *frame, const pfk_real v[3], pfk_real out[3])
+{
+    int i;
+    for (i = 0; i < 3; ++i)
+        out[i] = frame->R[0][i] * v[0] + frame->R[1][i] * v[1] + frame->R[2][i] * v[2];
+}
+
+static void pfk_map(const pfk_frame *frame, const pfk_real point[3], pfk_real out[3])
+{
+    pfk_rotate(frame, point, out);
+    pfk_along(out, 1.0, frame->p, out);
+}
+
+/* The platform as seen from the base, and the base as seen from the platform. */
+static void pfk_frames(const pfk_pose *pose, pfk_frame *forward, pfk_frame *back)
+{
+    pfk_real moved[3];
+    int i, j;
+    pfk_along(pose->p, -1.0, pfk_reference, moved);
+    for (i = 0; i < 3; ++i) {
+        forward->p[i] = forward->centre[i] = pose->p[i];
+        forward->moved[i] = moved[i];
+        back->centre[i] = pfk_reference[i];
+        back->moved[i] = 0.0;
+        for (j = 0; j < 3; ++j) {
+            forward->R[i][j] = pose->R[i][j];
+            back->R[i][j] = pose->R[j][i];
+            back->moved[i] -= pose->R[j][i] * moved[j] + (pose->R[j][i] - (i == j ? 1.0 : 0.0)) * pfk_reference[j];
+        }
+        back->p[i] = back->moved[i];
+    }
+}
+
+/* How far a point of the platform has moved since home. */
+static void pfk_displaced(const pfk_frame *frame, const pfk_real point[3], pfk_real out[3])
+{
+    int i;
+    for (i = 0; i < 3; ++i)
+        out[i] = frame->moved[i] + (frame->R[i][0] - (i == 0 ? 1.0 : 0.0)) * point[0]
+                 + (frame->R[i][1] - (i == 1 ? 1.0 : 0.0)) * point[1]
+                 + (frame->R[i][2] - (i == 2 ? 1.0 : 0.0)) * point[2];
+}
+
+/* v turned about a unit vector; `out` is not v. */
+static void pfk_about(const pfk_real v[3], const pfk_real axis[3], pfk_real cosine, pfk_real sine, pfk_real out[3])
+{
+    const pfk_real rest = (1.0 - cosine) * pfk_dot(axis, v);
+    int i;
+    pfk_cross(axis, v, out);
+    for (i = 0; i < 3; ++i)
+        out[i] = cosine * v[i] + sine * out[i] + rest * axis[i];
+}
+
+#if TWISTS || PIVOTS || MOVES
+static void pfk_about_angle(const pfk_real v[3], const pfk_real axis[3], pfk_real angle, pfk_real out[3])
+{
+    pfk_about(v, axis, cos(angle), sin(angle), out);
+}
+
+#endif
+/* Angle from u to w about a unit vector; what lies along it does not count. */
+static pfk_real pfk_angle(const pfk_real axis[3], const pfk_real u[3], const pfk_real w[3])
+{
+    pfk_real across[3];
+    pfk_cross(u, w, across);
+    return atan2(pfk_dot(axis, across), pfk_dot(u, w) - pfk_dot(axis, u) * pfk_dot(axis, w));
+}
+
+/* The same angle within half a turn of `centre`. */
+static pfk_real pfk_wrap(pfk_real angle, pfk_real centre)
+{
+    return angle - PFK_TURN * floor((angle - centre) / PFK_TURN + 0.5);
+}
+
+/* One of the two solutions of A cos q + B sin q = C, where over = A - C; how far it is from the double root, negative
+   where there is none: then the angle is that of the double root. */
+static pfk_real pfk_either(pfk_real A, pfk_real B, pfk_real C, pfk_real over, pfk_real side, pfk_real *cosine,
+                           pfk_real *sine)
+{
+    const pfk_real square = A * A + B * B, size = sqrt(square), rest = over * (A + C) + B * B;
+    const pfk_real root = rest > 0.0 ? side * sqrt(rest) : 0.0;
+    *cosine = 1.0;
+    *sine = 0.0;
+    if (!(square > 0.0))
+        return -1.0;
+    if (rest < 0.0)
+        C = C < 0.0 ? -size : size;
+    *cosine = (A * C - B * root) / square;
+    *sine = (B * C + A * root) / square;
+    return rest / square;
+}
+
+/* Angles of two crossed hinges that turn u, given at home, into w; how sure they are, as above. */
+static pfk_real pfk_aim(const pfk_real axes[3][3], const pfk_real u[3], const pfk_real w[3], pfk_real side,
+                        pfk_real angles[])
+{
+    const pfk_real *a = axes[0], *b = axes[1], bu = pfk_dot(b, u);
+    pfk_real flat[3], across[3], turned[3], A, C, cosine, sine, sure;
+    pfk_along(u, -bu, b, flat);
+    pfk_cross(b, u, across);
+    A = pfk_dot(a, flat);
+    C = pfk_dot(a, w) - pfk_dot(a, b) * bu;
+    sure = pfk_either(A, pfk_dot(a, across), C, A - C, side, &cosine, &sine);
+    pfk_about(u, b, cosine, sine, turned);
+    angles[0] = pfk_angle(a, turned, w);
+    angles[1] = atan2(sine, cosine);
+    return sure;
+}
+
+#if PIVOTS
+/* Angle of a rotation about its own axis. */
+static pfk_real pfk_spin_angle(const pfk_frame *frame, const pfk_real axis[3])
+{
+    const pfk_real sine = axis[0] * (frame->R[2][1] - frame->R[1][2]) + axis[1] * (frame->R[0][2] - frame->R[2][0])
+                          + axis[2] * (frame->R[1][0] - frame->R[0][1]);
+    return atan2(sine, frame->R[0][0] + frame->R[1][1] + frame->R[2][2] - 1.0);
+}
+
+/* Angle about the last of a pivot's hinges, once the `before` ones have turned. */
+static pfk_real pfk_last_angle(const pfk_frame *frame, const pfk_leg *pivot, const pfk_real angles[], int before)
+{
+    pfk_real now[3], back[3];
+    int i;
+    pfk_rotate(frame, pivot->square, now);
+    for (i = 0; i < before; ++i) {
+        pfk_about_angle(now, pivot->foot_axes[i], -angles[i], back);
+        pfk_copy(back, now);
+    }
+    return pfk_angle(pivot->foot_axes[before], pivot->square, now);
+}
+
+#endif
+/* Turns a crank until its rod reaches the head, or to where it comes nearest; whether it is near a dead point. What
+   the head has moved since home tells more digits than where it is: with x = reach + moved, C = spoke . reach + c. */
+static int pfk_turn_crank(const pfk_leg *rod, const pfk_real moved[3], pfk_placed *own)
+{
+    const pfk_real a = pfk_dot(rod->spoke, moved), B = pfk_dot(rod->across, rod->reach) + pfk_dot(rod->across, moved);
+    const pfk_real c = pfk_dot(moved, rod->reach) + 0.5 * pfk_dot(moved, moved), A = pfk_dot(rod->spoke, rod->reach);
+    const pfk_real sure = pfk_either(A + a, B, A + c, a - c, rod->side, &own->cosine, &own->sine);
+    own->value[PFK_CARRIER] = atan2(own->sine, own->cosine);
+    return !(sure > PFK_DEAD);
+}
+
+/* Moves a carriage until its rod reaches the head, or to where it comes nearest; whether it is near a dead point. */
+static int pfk_move_carriage(const pfk_leg *rod, const pfk_real moved[3], pfk_placed *own)
+{
+    const pfk_real middle = pfk_dot(rod->reach, rod->axis) + pfk_dot(moved, rod->axis);
+    const pfk_real rest = middle * middle - 2.0 * pfk_dot(moved, rod->reach) - pfk_dot(moved, moved);
+    own->value[PFK_CARRIER] = middle + (rest > 0.0 ? rod->side * sqrt(rest) : 0.0);
+    return !(rest > PFK_DEAD * rod->length * rod->length);
+}
+
+static int pfk_has_carrier(const pfk_leg *leg)
+{
+    return leg->carrier == PFK_CRANK || leg->carrier == PFK_CARRIAGE;
+}
+
+/* A direction of what a foot is on, turned with the crank `main`, as `lead` has it; or back (sense -1). */
+static void pfk_carried(const pfk_leg *main, const pfk_placed *lead, pfk_real sense, const pfk_real v[3],
+                        pfk_real out[3])
+{
+    if (main->carrier == PFK_CRANK)
+        pfk_about(v, main->axis, lead->cosine, sense * lead->sine, out);
+    else
+        pfk_copy(v, out);
+}
+
+/* Where a foot is, on what carries it. */
+static void pfk_place_foot(const pfk_leg *rod, const pfk_leg *main, const pfk_placed *lead, pfk_real foot[3])
+{
+    pfk_real arm[3];
+    if (main->carrier == PFK_CARRIAGE) {
+        pfk_along(rod->foot, lead->value[PFK_CARRIER], main->axis, foot);
+    } else if (main->carrier != PFK_CRANK) {
+        pfk_copy(rod->foot, foot);
+    } else if (rod->carrier == PFK_SHARED) {
+        pfk_along(rod->foot, -1.0, main->centre, arm);
+        pfk_about(arm, main->axis, lead->cosine, lead->sine, foot);
+        pfk_along(foot, 1.0, main->centre, foot);
+    } else {
+        pfk_along(rod->centre, lead->cosine, rod->spoke, foot);
+        pfk_along(foot, lead->sine, rod->across, foot);
+    }
+}
+
+/* Angles of the hinges at an end of a rod that has to point along `line`; how sure they are, see pfk_aim. */
+static pfk_real pfk_aim_end(int end, const pfk_real axes[3][3], const pfk_real home[3], const pfk_real line[3],
+                            pfk_real side, pfk_real angles[])
+{
+    if (end != PFK_HINGE)
+        return pfk_aim(axes, home, line, side, angles);
+    angles[0] = pfk_angle(axes[0], home, line);
+    return 1.0;
+}
+
+#if TWISTS
+/* A direction that goes with an end of a rod, as what the end is on sees it: its last hinge. */
+static void pfk_mark(int end, const pfk_real axes[3][3], const pfk_real angles[], pfk_real out[3])
+{
+    if (end == PFK_HINGE)
+        pfk_copy(axes[0], out);
+    else
+        pfk_about_angle(axes[1], axes[0], angles[0], out);
+}
+
+/* The angle about a rod between the marks of its ends, less home's; fills the marks in base coordinates. */
+static pfk_real pfk_twist(const pfk_frame *frame, const pfk_leg *rod, const pfk_leg *main, const pfk_placed *lead,
+                          const pfk_placed *own, pfk_real foot_mark[3], pfk_real head_mark[3])
+{
+    pfk_real mark[3];
+    pfk_mark(rod->foot_end, rod->foot_axes, &own->value[PFK_FOOT], mark);
+    pfk_carried(main, lead, 1.0, mark, foot_mark);
+    pfk_mark(rod->head_end, rod->head_axes, &own->value[PFK_HEAD], mark);
+    pfk_rotate(frame, mark, head_mark);
+    return pfk_wrap(pfk_angle(own->u, foot_mark, head_mark) - rod->twist, 0.0);
+}
+
+#endif
+/* Fills where a rod is at a pose; how far it is from reaching [L]. `lead` is where that leg is whose carrier it is on.
+   Two crossed hinges aim a rod in either of two ways, half a turn about it apart: those of home, unless the two ends
+   then hold the rod the other way around. */
+static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const pfk_placed *lead, pfk_placed *own)
+{
+    const pfk_leg *main = &pfk_legs[rod->main];
+    pfk_real moved[3], sure, gap = 0.0;
+    pfk_map(frame, rod->head, own->head);
+    if (pfk_has_carrier(rod)) {
+        if (own->is_given) {
+            own->is_held = 1;
+            own->cosine = cos(own->value[PFK_CARRIER]);
+            own->sine = sin(own->value[PFK_CARRIER]);
+        } else {
+            pfk_displaced(frame, rod->head, moved);
+            own->is_held = rod->carrier == PFK_CRANK ? pfk_turn_crank(rod, moved, own)
+                                                     : pfk_move_carriage(rod, moved, own);
+        }
+    }
+    pfk_place_foot(rod, main, lead, own->foot);
+    pfk_along(own->head, -1.0, own->foot, own->span);
+    own->length = pfk_norm(own->span);
+    own->value[PFK_SLIDE] = own->length - rod->length;
+    if (!(own->length > 0.0))
+        return 1.0;
+    pfk_along(pfk_zero, 1.0 / own->length, own->span, own->u);
+    pfk_carried(main, lead, -1.0, own->u, own->foot_line);
+    pfk_rotate_back(frame, own->u, own->head_line);
+    if (pfk_has_carrier(rod) && own->is_held && !own->is_given)
+        gap = fabs(own->value[PFK_SLIDE]) / PFK_SIZE;
+    if (rod->foot_aimed) {
+        sure = pfk_aim_end(rod->foot_end, rod->foot_axes, rod->line, own->foot_line, rod->foot_side,
+                           &own->value[PFK_FOOT]);
+        gap = -sure > gap ? -sure : gap;
+    }
+    if (rod->head_aimed) {
+        sure = pfk_aim_end(rod->head_end, rod->head_axes, rod->line, own->head_line, rod->head_side,
+                           &own->value[PFK_HEAD]);
+        gap = -sure > gap ? -sure : gap;
+    }
+#if TWISTS
+    if (rod->twists && (rod->foot_end == PFK_CROSS || rod->head_end == PFK_CROSS)) {
+        pfk_real foot_mark[3], head_mark[3];
+        if (fabs(pfk_twist(frame, rod, main, lead, own, foot_mark, head_mark)) > 0.25 * PFK_TURN) {
+            if (rod->head_end == PFK_CROSS)
+                pfk_aim(rod->head_axes, rod->line, own->head_line, -rod->head_side, &own->value[PFK_HEAD]);
+            else
+                pfk_aim(rod->foot_axes, rod->line, own->foot_line, -rod->foot_side, &own->value[PFK_FOOT]);
+        }
+    }
+#endif
+    return gap;
+}
+
+#if PIVOTS
+/* Fills where a pivot is at a pose; how far it is from reaching. */
+static pfk_real pfk_place_pivot(const pfk_frame *frame, const pfk_leg *pivot, pfk_placed *own)
+{
+    pfk_real last[3], sure, *angles = &own->value[PFK_FOOT];
+    int i;
+    pfk_map(frame, pivot->head, own->head);
+    pfk_along(own->head, -1.0, pivot->foot, own->span);
+    for (i = 0; i < pivot->slides; ++i)
+        own->value[PFK_HEAD + i] = pfk_dot(pivot->rows[i], own->span);
+    if (pivot->foot_end == PFK_HINGE) {
+        angles[0] = pfk_spin_angle(frame, pivot->foot_axes[0]);
+    } else if (pivot->foot_end == PFK_CROSS) {
+        pfk_rotate(frame, pivot->foot_axes[1], last);
+        angles[0] = pfk_angle(pivot->foot_axes[0], pivot->foot_axes[1], last);
+        angles[1] = pfk_last_angle(frame, pivot, angles, 1);
+    } else if (pivot->foot_end == PFK_TRIPLE) {
+        pfk_rotate(frame, pivot->foot_axes[2], last);
+        sure = pfk_aim(pivot->foot_axes, pivot->foot_axes[2], last, pivot->side, angles);
+        angles[2] = pfk_last_angle(frame, pivot, angles, 2);
+        return sure < 0.0 ? -sure : 0.0;
+    }
+    return 0.0;
+}
+
+#endif
+/* Places all legs at a pose, with driven carriers as they are given, if they are; 0, or the number of the leg that is
+   farthest from reaching. */
+static int pfk_place(const pfk_pose *pose, const pfk_real *given, pfk_state *state)
+{
+    pfk_real gap, worst = PFK_CLOSE;
+    int i, k, missing = 0;
+    pfk_frames(pose, &state->frame[PFK_FROM_BASE], &state->frame[PFK_FROM_PLATFORM]);
+    for (k = 0; k < PFK_LEGS; ++k)
+        state->leg[k].is_given = 0;
+    for (i = 0; given && i < PFK_ACTUATORS; ++i) {
+        const pfk_coordinate *driven = &pfk_driven[i];
+        if (pfk_legs[driven->leg].kind == PFK_ROD && driven->place == PFK_CARRIER) {
+            state->leg[driven->leg].is_given = 1;
+            state->leg[driven->leg].value[PFK_CARRIER] = given[i];
+        }
+    }
+    for (k = 0; k < PFK_LEGS; ++k) {
+        const pfk_leg *leg = &pfk_legs[k];
+        const pfk_frame *frame = &state->frame[leg->frame];
+#if PIVOTS
+        if (leg->kind == PFK_PIVOT)
+            gap = pfk_place_pivot(frame, leg, &state->leg[k]);
+        else
+#endif
+            gap = pfk_place_rod(frame, leg, &state->leg[leg->main], &state->leg[k]);
+        if (!(gap <= worst)) {
+            worst = gap;
+            missing = k + 1;
+        }
+    }
+    return missing;
+}
+
+/* A coordinate's deviation from home, angles counted into their range: near its middle, or near 0 where it spans more
+   than a turn. */
+static pfk_real pfk_deviation(const pfk_coordinate *coordinate, const pfk_state *state)
+{
+    const pfk_real lo = coordinate->lo, hi = coordinate->hi;
+    pfk_real value = coordinate->sense * state->leg[coordinate->leg].value[coordinate->place];
+    if (!coordinate->turns)
+        return value;
+    if (hi - lo <= PFK_TURN)
+        return pfk_wrap(value, 0.5 * (lo + hi));
+    value = pfk_wrap(value, 0.0);
+    if (value > hi + PFK_KEPT)
+        return value - PFK_TURN;
+    return value < lo - PFK_KEPT ? value + PFK_TURN : value;
+}
+
+#if SOLVES
+/* Derivative of a . H + c . w by the velocity and the angular velocity of the platform; H is the head, w the angular
+   velocity of what it is on, as `frame` has them. */
+static void pfk_slope(const pfk_frame *frame, int is_back, const pfk_real head[3], const pfk_real a[3],
+                      const pfk_real c[3], pfk_real slope[6])
+{
+    pfk_real arm[3], spin[3];
+    int i;
+    pfk_along(head, -1.0, frame->centre, arm);
+    pfk_cross(arm, a, spin);
+    pfk_along(spin, 1.0, c, spin);
+    if (is_back) {
+        pfk_rotate_back(frame, a, slope);
+        pfk_rotate_back(frame, spin, slope + 3);
+        for (i = 0; i < 6; ++i)
+            slope[i] = -slope[i];
+        return;
+    }
+    pfk_copy(a, slope);
+    pfk_copy(spin, slope + 3);
+}
+
+/* Derivative of - a . F + b . W by the coordinate of a carrier; F is a foot on it, W its angular velocity. */
+static pfk_real pfk_carrier_rate(const pfk_leg *main, const pfk_real foot[3], const pfk_real a[3], const pfk_real b[3])
+{
+    pfk_real arm[3], moved[3];
+    if (main->carrier == PFK_CARRIAGE)
+        return -pfk_dot(a, main->axis);
+    pfk_along(foot, -1.0, main->centre, arm);
+    pfk_cross(main->axis, arm, moved);
+    return pfk_dot(b, main->axis) - pfk_dot(a, moved);
+}
+
+/* Derivative of the coordinate of a carrier that follows the head, so that its rod keeps its length. */
+static void pfk_follow(const pfk_frame *frame, const pfk_leg *rod, pfk_placed *own)
+{
+    pfk_real rate;
+    int i;
+    for (i = 0; i < 6; ++i)
+        own->follow[i] = 0.0;
+    if (own->is_held)
+        return;
+    rate = pfk_carrier_rate(rod, own->foot, own->u, pfk_zero);
+    pfk_slope(frame, rod->frame == PFK_FROM_PLATFORM, own->head, own->u, pfk_zero, own->follow);
+    for (i = 0; i < 6; ++i)
+        own->follow[i] /= -rate;
+}
+
+/* Fills an equation of leg k; `off` and a . (dH - dF) + b . W + c . w, its derivative, are in `unit`. F and H are foot
+   and head, W and w the angular velocities of what they are on. Where row->slope is asked for, it is `sloped`. */
+static pfk_row *pfk_put(const pfk_state *state, int k, pfk_real unit, pfk_real off, const pfk_real a[3],
+                        const pfk_real b[3], const pfk_real c[3], int sloped, pfk_row *row)
+{
+    const pfk_leg *leg = &pfk_legs[k], *main = &pfk_legs[leg->main];
+    const pfk_placed *own = &state->leg[k];
+    pfk_real rate;
+    int i;
+    row->leg = k + 1;
+    row->off = off / unit;
+    if (!sloped)
+        return row + 1;
+    pfk_slope(&state->frame[leg->frame], leg->frame == PFK_FROM_PLATFORM, own->head, a, c, row->slope);
+    if (main->carrier != PFK_NO_CARRIER) {
+        rate = pfk_carrier_rate(main, own->foot, a, b);
+        for (i = 0; i < 6; ++i)
+            row->slope[i] += rate * state->leg[leg->main].follow[i];
+    }
+    for (i = 0; i < 6; ++i)
+        row->slope[i] /= unit;
+    return row + 1;
+}
+
+#if TWISTS
+/* Rate at which an end of a rod spins about u, by du and by the angular velocity of its body: of a hinge the part of
+   it across u; of two crossed ones, `first` and `last`, the rod itself. */
+static void pfk_spin_rate(int end, const pfk_real first[3], const pfk_real last[3], const pfk_real u[3],
+                          pfk_real by_line[3], pfk_real by_body[3])
+{
+    const pfk_real lengthwise = pfk_dot(first, u);
+    pfk_real flat[3], across[3], D;
+    int i;
+    if (end == PFK_HINGE) {
+        pfk_along(first, -lengthwise, u, flat);
+        pfk_cross(u, flat, across);
+        D = pfk_dot(flat, flat);
+        for (i = 0; i < 3; ++i) {
+            across[i] /= D;
+            by_line[i] = -lengthwise * across[i];
+        }
+        pfk_cross(first, across, by_body);
+        return;
+    }
+    pfk_cross(first, u, across);
+    D = pfk_dot(across, last);
+    for (i = 0; i < 3; ++i)
+        by_line[i] = (lengthwise * last[i] - pfk_dot(last, u) * first[i]) / D;
+    pfk_cross(u, by_line, by_body);
+    pfk_along(u, -1.0, by_body, by_body);
+}
+
+/* The equation of a rod that both ends keep from spinning. */
+static pfk_row *pfk_twist_row(const pfk_state *state, int k, int sloped, pfk_row *row)
+{
+    const pfk_leg *rod = &pfk_legs[k], *main = &pfk_legs[rod->main];
+    const pfk_placed *own = &state->leg[k], *lead = &state->leg[rod->main];
+    const pfk_frame *frame = &state->frame[rod->frame];
+    pfk_real foot_mark[3], head_mark[3], first[3], by_foot[3], by_head[3], foot_body[3], head_body[3];
+    const pfk_real off = pfk_twist(frame, rod, main, lead, own, foot_mark, head_mark);
+    pfk_carried(main, lead, 1.0, rod->foot_axes[0], first);
+    pfk_spin_rate(rod->foot_end, first, foot_mark, own->u, by_foot, foot_body);
+    pfk_rotate(frame, rod->head_axes[0], first);
+    pfk_spin_rate(rod->head_end, first, head_mark, own->u, by_head, head_body);
+    pfk_along(by_head, -1.0, by_foot, by_head);
+    pfk_along(pfk_zero, -1.0, foot_body, foot_body);
+    pfk_along(by_head, -pfk_dot(by_head, own->u), own->u, by_head);
+    pfk_along(pfk_zero, 1.0 / own->length, by_head, by_head);
+    return pfk_put(state, k, 1.0, off, by_head, foot_body, head_body, sloped, row);
+}
+
+#endif
+/* The equations of a rod with foot F, head H, l = H - F: |l| = length; n . l = 0 for a foot on one hinge n, m . l = 0
+   for a head on one hinge m; and the angle about l between marks of its ends, where both keep it from spinning. */
+static pfk_row *pfk_rod_rows(pfk_state *state, int k, int sloped, pfk_row *row)
+{
+    const pfk_leg *rod = &pfk_legs[k];
+    const pfk_frame *frame = &state->frame[rod->frame];
+    const pfk_placed *own = &state->leg[k];
+    pfk_real n[3], across[3];
+    if (sloped && pfk_has_carrier(rod))
+        pfk_follow(frame, rod, &state->leg[k]);
+    if (!rod->slides)
+        row = pfk_put(state, k, PFK_SIZE, own->value[PFK_SLIDE], own->u, pfk_zero, pfk_zero, sloped, row);
+    if (rod->foot_end == PFK_HINGE) {
+        pfk_carried(&pfk_legs[rod->main], &state->leg[rod->main], 1.0, rod->foot_axes[0], n);
+        pfk_cross(n, own->span, across);
+        row = pfk_put(state, k, PFK_SIZE, pfk_dot(n, own->span), n, across, pfk_zero, sloped, row);
+    }
+    if (rod->head_end == PFK_HINGE) {
+        pfk_rotate(frame, rod->head_axes[0], n);
+        pfk_cross(n, own->span, across);
+        row = pfk_put(state, k, PFK_SIZE, pfk_dot(n, own->span), n, pfk_zero, across, sloped, row);
+    }
+#if TWISTS
+    if (rod->twists)
+        row = pfk_twist_row(state, k, sloped, row);
+#endif
+    return row;
+}
+
+#if PIVOTS
+/* kept . R moved + more = 0, for directions that what the foot and what the head is on have. */
+static pfk_row *pfk_pair_row(const pfk_state *state, int k, const pfk_real kept[3], const pfk_real moved[3],
+                             pfk_real more, int sloped, pfk_row *row)
+{
+    pfk_real turned[3], across[3];
+    pfk_rotate(&state->frame[pfk_legs[k].frame], moved, turned);
+    pfk_cross(turned, kept, across);
+    return pfk_put(state, k, 1.0, pfk_dot(kept, turned) + more, pfk_zero, pfk_zero, across, sloped, row);
+}
+
+/* The equations of a pivot: its centre keeps to its slides, and pairs of directions keep their angle. */
+static pfk_row *pfk_pivot_rows(const pfk_state *state, int k, int sloped, pfk_row *row)
+{
+    const pfk_leg *pivot = &pfk_legs[k];
+    pfk_real turned[3], over = 0.0;
+    int i;
+    for (i = pivot->slides; i < 3; ++i)
+        row = pfk_put(state, k, PFK_SIZE, pfk_dot(pivot->rows[i], state->leg[k].span), pivot->rows[i], pfk_zero,
+                      pfk_zero, sloped, row);
+    for (i = 0; i < pivot->upright; ++i) { /* an axis that is turned over meets the conditions too */
+        pfk_rotate(&state->frame[pivot->frame], pivot->foot_axes[i], turned);
+        over = pfk_dot(turned, pivot->foot_axes[i]) < 0.0 ? 2.0 : over;
+    }
+    for (i = 0; i < pivot->pairs; ++i)
+        row = pfk_pair_row(state, k, pivot->kept[i], pivot->moved[i], over - pfk_dot(pivot->kept[i], pivot->moved[i]),
+                           sloped, row);
+    return row;
+}
+
+#endif
+#if FK
+/* The equation of hinges at an end of a rod, of which the coordinate at `place` is given: kept . u = value, kept a
+   direction of what they are on. Of one hinge n it is n x line turned by the angle; of two, a and b, the first turns b,
+   the second leaves a. */
+static pfk_row *pfk_hinge_row(const pfk_state *state, int k, int place, pfk_real given, pfk_row *row)
+{
+    const pfk_leg *rod = &pfk_legs[k];
+    const pfk_placed *own = &state->leg[k];
+    const int at_head = place >= PFK_HEAD, end = at_head ? rod->head_end : rod->foot_end;
+    const pfk_real (*axes)[3] = at_head ? rod->head_axes : rod->foot_axes;
+    pfk_real turned[3], across[3], kept[3], off, value = 0.0;
+    if (end == PFK_HINGE) {
+        pfk_cross(axes[0], rod->line, across);
+        pfk_about_angle(across, axes[0], given, turned);
+    } else if (place == PFK_FOOT || place == PFK_HEAD) {
+        pfk_about_angle(axes[1], axes[0], given, turned);
+        value = pfk_dot(axes[1], rod->line);
+    } else {
+        pfk_about_angle(rod->line, axes[1], given, across);
+        pfk_copy(axes[0], turned);
+        value = pfk_dot(turned, across);
+    }
+    if (at_head)
+        pfk_rotate(&state->frame[rod->frame], turned, kept);
+    else
+        pfk_carried(&pfk_legs[rod->main], &state->leg[rod->main], 1.0, turned, kept);
+    pfk_cross(kept, own->span, across);
+    off = pfk_dot(kept, own->span) - value * own->length;
+    pfk_along(kept, -value, own->u, kept);
+    return pfk_put(state, k, PFK_SIZE, off, kept, at_head ? pfk_zero : across, at_head ? across : pfk_zero, 1, row);
+}
+
+#if PIVOTS
+/* The same of hinges a, b, c of a pivot, R = Rot(a) [Rot(b) [Rot(c)]]: kept . R moved = value, with one of both turned
+   by the angle. */
+static pfk_row *pfk_pivot_hinge_row(const pfk_state *state, int k, int place, pfk_real given, pfk_row *row)
+{
+    const pfk_leg *pivot = &pfk_legs[k];
+    const pfk_real *a = pivot->foot_axes[0], *b = pivot->foot_axes[1], *c = pivot->foot_axes[2];
+    pfk_real across[3], turned[3];
+    if (pivot->foot_end == PFK_HINGE) {
+        pfk_about_angle(pivot->kept[0], a, given, turned);
+        return pfk_pair_row(state, k, turned, pivot->kept[1], 0.0, 1, row);
+    }
+    if (pivot->foot_end == PFK_CROSS) {
+        pfk_cross(a, b, across);
+        pfk_about_angle(across, place == PFK_FOOT ? a : b, place == PFK_FOOT ? given : -given, turned);
+        return place == PFK_FOOT ? pfk_pair_row(state, k, turned, b, 0.0, 1, row)
+                                 : pfk_pair_row(state, k, a, turned, 0.0, 1, row);
+    }
+    if (place == PFK_FOOT) {
+        pfk_about_angle(b, a, given, turned);
+        return pfk_pair_row(state, k, turned, c, -pfk_dot(b, c), 1, row);
+    }
+    if (place == PFK_FOOT + 1) {
+        pfk_about_angle(c, b, given, turned);
+        return pfk_pair_row(state, k, a, c, -pfk_dot(a, turned), 1, row);
+    }
+    pfk_about_angle(b, c, -given, turned);
+    return pfk_pair_row(state, k, a, turned, -pfk_dot(a, b), 1, row);
+}
+
+#endif
+/* The equation of an actuator whose coordinate is given, unless it is one that a carrier has. */
+static pfk_row *pfk_drive_row(const pfk_state *state, const pfk_coordinate *driven, pfk_real given, pfk_row *row)
+{
+    const int k = driven->leg, place = driven->place;
+    const pfk_placed *own = &state->leg[k];
+#if PIVOTS
+    if (pfk_legs[k].kind == PFK_PIVOT) {
+        const pfk_real *slide = pfk_legs[k].rows[place >= PFK_HEAD ? place - PFK_HEAD : 0];
+        if (place < PFK_HEAD)
+            return pfk_pivot_hinge_row(state, k, place, given, row);
+        return pfk_put(state, k, PFK_SIZE, pfk_dot(slide, own->span) - given, slide, pfk_zero, pfk_zero, 1, row);
+    }
+#endif
+    if (place == PFK_CARRIER)
+        return row;
+    if (place == PFK_SLIDE)
+        return pfk_put(state, k, PFK_SIZE, own->value[PFK_SLIDE] - given, own->u, pfk_zero, pfk_zero, 1, row);
+    return pfk_hinge_row(state, k, place, given, row);
+}
+
+#endif
+/* Fills the equations of all legs, and those of actuators, if they are given; their derivatives if `sloped`. The leg
+   whose equation is farthest from closed, and how far it is. */
+static int pfk_equations(pfk_state *state, const pfk_real *given, int sloped, pfk_row row[PFK_ROWS], pfk_real *worst)
+{
+    pfk_row *end = row;
+    int i, open = 0;
+    for (i = 0; i < PFK_LEGS; ++i) {
+#if PIVOTS
+        if (pfk_legs[i].kind == PFK_PIVOT)
+            end = pfk_pivot_rows(state, i, sloped, end);
+        else
+#endif
+            end = pfk_rod_rows(state, i, sloped, end);
+    }
+#if FK
+    for (i = 0; given && i < PFK_ACTUATORS; ++i)
+        end = pfk_drive_row(state, &pfk_driven[i], given[i], end);
+#else
+    (void)given;
+#endif
+    *worst = 0.0;
+    for (; row < end; ++row) {
+        if (!(fabs(row->off) <= 1e6)) {
+            *worst = 1e6;
+            return row->leg;
+        }
+        if (fabs(row->off) > *worst) {
+            *worst = fabs(row->off);
+            open = row->leg;
+        }
+    }
+    return open;
+}
+
+#endif
+#if MOVES
+/* Solves m x = right by least squares, with reflections: `m` holds the right side in its last column and is used up.
+   0 where it tells x; 1 where it does not, or is not of numbers. */
+static int pfk_least_squares(pfk_real m[PFK_ROWS][PFK_UNKNOWNS + 1], int rows, int unknowns, pfk_real x[PFK_UNKNOWNS])
+{
+    pfk_real size, part, share, largest = 0.0;
+    int i, j, k;
+    for (k = 0; k < unknowns; ++k) {
+        size = 0.0;
+        for (i = k; i < rows; ++i)
+            size += m[i][k] * m[i][k];
+        size = m[k][k] > 0.0 ? -sqrt(size) : sqrt(size);
+        largest = fabs(size) > largest ? fabs(size) : largest;
+        if (!(fabs(size) > PFK_RANK * largest))
+            return 1;
+        part = size * (size - m[k][k]);
+        m[k][k] -= size;
+        for (j = k + 1; j <= unknowns; ++j) {
+            share = 0.0;
+            for (i = k; i < rows; ++i)
+                share += m[i][k] * m[i][j];
+            for (i = k; i < rows; ++i)
+                m[i][j] -= share / part * m[i][k];
+        }
+        m[k][k] = size;
+    }
+    for (k = unknowns - 1; k >= 0; --k) {
+        x[k] = m[k][unknowns];
+        for (j = k + 1; j < unknowns; ++j)
+            x[k] -= m[k][j] * x[j];
+        x[k] /= m[k][k];
+    }
+    return 0;
+}
+
+/* Turns a pose by a rotation vector, in base coordinates. */
+static void pfk_spin(pfk_pose *pose, const pfk_real vector[3])
+{
+    const pfk_real angle = pfk_norm(vector);
+    pfk_real axis[3], column[3], turned[3];
+    int i, j;
+    if (!(angle > 0.0))
+        return;
+    for (i = 0; i < 3; ++i)
+        axis[i] = vector[i] / angle;
+    for (j = 0; j < 3; ++j) {
+        for (i = 0; i < 3; ++i)
+            column[i] = pose->R[i][j];
+        pfk_about_angle(column, axis, angle, turned);
+        for (i = 0; i < 3; ++i)
+            pose->R[i][j] = turned[i];
+    }
+}
+
+/* Gives a pose the opposite of the turn that it has made since the start. */
+static void pfk_turn_back(const pfk_pose *start, pfk_pose *pose)
+{
+    pfk_pose turned;
+    int i, j, k, n;
+    for (i = 0; i < 3; ++i)
+        for (j = 0; j < 3; ++j) {
+            turned.R[i][j] = 0.0;
+            for (k = 0; k < 3; ++k)
+                for (n = 0; n < 3; ++n)
+                    turned.R[i][j] += start->R[i][k] * pose->R[n][k] * start->R[n][j];
+        }
+    for (i = 0; i < 3; ++i)
+        for (j = 0; j < 3; ++j)
+            pose->R[i][j] = turned.R[i][j];
+}
+
+/* Fills the motions of what a task leaves open of a pose, or of all of it: how many. */
+static int pfk_motions(const pfk_pose *pose, int all, pfk_real motion[PFK_UNKNOWNS][6])
+{
+    int i, j, count = 0;
+    for (i = 0; i < PFK_UNKNOWNS; ++i)
+        for (j = 0; j < 6; ++j)
+            motion[i][j] = 0.0;
+    for (i = 0; i < 3; ++i)
+        if (all || !pfk_axes[i])
+            motion[count++][i] = PFK_SIZE;
+    if (all ? PFK_TURNING : PFK_ROTATIONS == 0) {
+        for (i = 0; i < 3; ++i)
+            motion[count++][3 + i] = 1.0;
+    } else if (!all && PFK_ROTATIONS == 2) {
+        for (i = 0; i < 3; ++i)
+            motion[count][3 + i] = pose->R[i][2];
+        ++count;
+    }
+    return count;
+}
+
+/* Moves what is open of a pose until all legs close, in no more than `most` steps, by Newton's method: 0, or the number
+   of a leg that does not. All of it is open where actuators are given. Where it is strict all legs must reach at every
+   step. */
+static int pfk_settle(pfk_pose *pose, const pfk_real *given, int most, int strict, pfk_state *state, int *steps)
+{
+    const int rows = given ? PFK_ROWS : PFK_OWN_ROWS;
+    const pfk_pose start = *pose;
+    pfk_row row[PFK_ROWS];
+    pfk_real system[PFK_ROWS][PFK_UNKNOWNS + 1], motion[PFK_UNKNOWNS][6], x[PFK_UNKNOWNS], twist[6];
+    pfk_real worst, last = 0.0, gone = 0.0, size, share;
+    int i, j, k, open, missing, count, turned = 0;
+    for (*steps = 0;; ++*steps) {
+        missing = pfk_place(pose, given, state);
+        if (missing && strict)
+            return missing;
+        open = pfk_equations(state, given, 1, row, &worst);
+        if (worst <= PFK_CLOSED || (*steps && worst <= PFK_CLOSE && worst > 0.25 * last))
+            return missing;
+        if (*steps == most || (!given && gone > PFK_FARTHEST))
+            return open;
+        last = worst;
+        count = pfk_motions(pose, given != 0, motion);
+        for (i = 0; i < rows; ++i) {
+            for (j = 0; j < count; ++j) {
+                system[i][j] = 0.0;
+                for (k = 0; k < 6; ++k)
+                    system[i][j] += row[i].slope[k] * motion[j][k];
+            }
+            system[i][count] = -row[i].off;
+        }
+        if (pfk_least_squares(system, rows, count, x))
+            return open;
+        for (k = 0; k < 6; ++k) {
+            twist[k] = 0.0;
+            for (j = 0; j < count; ++j)
+                twist[k] += x[j] * motion[j][k];
+        }
+        size = pfk_norm(twist) / PFK_SIZE;
+        size = pfk_norm(twist + 3) > size ? pfk_norm(twist + 3) : size;
+        /* at rest but open, as more actuators than freedoms can be: once more, turned the other way */
+        if (given && !turned && size < 0.1 * worst) {
+            turned = 1;
+            pfk_turn_back(&start, pose);
+            continue;
+        }
+        share = size > PFK_LONGEST_STEP ? PFK_LONGEST_STEP / size : 1.0;
+        gone += share * size;
+        for (k = 0; k < 6; ++k)
+            twist[k] *= share;
+        pfk_along(pose->p, 1.0, twist, pose->p);
+        pfk_spin(pose, twist + 3);
+    }
+}
+
+#endif
+/* Makes the rotation of a pose the nearest that is orthonormal; 1 where it is no rotation, or not of finite numbers. */
+static int pfk_make_exact(pfk_pose *pose)
+{
+    pfk_real gram[3][3], turned[3], off = 0.0;
+    int i, j, k, step;
+    for (step = 0; step < 2; ++step) {
+        for (i = 0; i < 3; ++i)
+            for (j = 0; j < 3; ++j) {
+                gram[i][j] = i == j ? -1.0 : 0.0;
+                for (k = 0; k < 3; ++k)
+                    gram[i][j] += pose->R[k][i] * pose->R[k][j];
+                if (step == 0)
+                    off += fabs(gram[i][j]);
+            }
+        for (k = 0; k < 3; ++k) {
+            for (j = 0; j < 3; ++j)
+                turned[j] = 0.5 * pfk_dot(pose->R[k], gram[j]);
+            for (j = 0; j < 3; ++j)
+                pose->R[k][j] -= turned[j];
+        }
+    }
+    off += fabs(0.0 * (pose->p[0] + pose->p[1] + pose->p[2]));
+    pfk_cross(pose->R[0], pose->R[1], turned);
+    return !(off <= PFK_NO_ROTATION && pfk_dot(turned, pose->R[2]) > 0.0);
+}
+
+void pfk_home(pfk_pose *pose)
+{
+    int i, j;
+    for (i = 0; i < 3; ++i) {
+        pose->p[i] = pfk_reference[i];
+        for (j = 0; j < 3; ++j)
+            pose->R[i][j] = i == j ? 1.0 : 0.0;
+    }
+}
+
+void pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose *pose)
+{
+    const pfk_real cr = cos(roll), sr = sin(roll), cp = cos(pitch), sp = sin(pitch), cy = cos(yaw), sy = sin(yaw);
+    pose->p[0] = x;
+    pose->p[1] = y;
+    pose->p[2] = z;
+    pose->R[0][0] = cy * cp;
+    pose->R[0][1] = cy * sp * sr - sy * cr;
+    pose->R[0][2] = cy * sp * cr + sy * sr;
+    pose->R[1][0] = sy * cp;
+    pose->R[1][1] = sy * sp * sr + cy * cr;
+    pose->R[1][2] = sy * sp * cr - cy * sr;
+    pose->R[2][0] = -sp;
+    pose->R[2][1] = cp * sr;
+    pose->R[2][2] = cp * cr;
+}
+
+void pfk_rpy(const pfk_pose *pose, pfk_real angles[3])
+{
+    const pfk_real level = sqrt(pose->R[0][0] * pose->R[0][0] + pose->R[1][0] * pose->R[1][0]);
+    angles[0] = atan2(pose->R[2][1], pose->R[2][2]);
+    angles[1] = atan2(-pose->R[2][0], level);
+    angles[2] = atan2(pose->R[1][0], pose->R[0][0]);
+}
+
+const char *pfk_what(int code)
+{
+    if (code == 0)
+        return "reached";
+    if (code == PFK_NO_POSE)
+        return "not a pose";
+    if (code == PFK_NO_ACTUATORS)
+        return "actuators that are not finite";
+    if (code == PFK_OTHER_MODE)
+        return "closed, but not in the working mode of home";
+#if LIMITS
+    if (code > 0 && code <= PFK_LIMITS)
+        return pfk_limit_words[code - 1];
+#endif
+    if (code > PFK_LEG && code <= PFK_LEG + PFK_LEGS)
+        return pfk_leg_words[code - PFK_LEG - 1];
+    return "no code of this file";
+}
+
+#if RESTS
+/* Places legs at a whole pose: 0, or the number of a leg that does not reach or close. */
+static int pfk_rest(const pfk_pose *pose, pfk_state *state)
+{
+    int code = pfk_place(pose, 0, state);
+#if SOLVES
+    if (!code) {
+        pfk_row row[PFK_ROWS];
+        pfk_real worst;
+        code = pfk_equations(state, 0, 0, row, &worst);
+        code = worst <= PFK_CLOSE ? 0 : code;
+    }
+#endif
+    return code;
+}
+
+#endif
+#if LIMITS
+#if CONES
+/* Angle between two directions. */
+static pfk_real pfk_angle_between(const pfk_real a[3], const pfk_real b[3])
+{
+    pfk_real across[3];
+    pfk_cross(a, b, across);
+    return atan2(pfk_norm(across), pfk_dot(a, b));
+}
+
+#endif
+/* Fills the room that is left before every limit; 0, or the number of the one that is exceeded most. */
+static int pfk_slacks(const pfk_state *state, pfk_real slack[])
+{
+    pfk_real value, unit, worst = PFK_KEPT;
+    int i, exceeded = 0;
+    for (i = 0; i < PFK_RANGES; ++i) {
+        value = pfk_deviation(&pfk_limited[i], state);
+        slack[2 * i] = value - pfk_limited[i].lo;
+        slack[2 * i + 1] = pfk_limited[i].hi - value;
+    }
+#if CONES
+    for (i = 0; i < PFK_CONES; ++i) {
+        const pfk_placed *leg = &state->leg[pfk_cones[i].leg];
+        const pfk_real *line = pfk_cones[i].is_head ? leg->head_line : leg->foot_line;
+        slack[2 * PFK_RANGES + i] = pfk_cones[i].half_angle - pfk_angle_between(pfk_cones[i].axis, line);
+    }
+#endif
+    for (i = 0; i < PFK_LIMITS; ++i) {
+        unit = i < 2 * PFK_RANGES && pfk_limited[i / 2].is_length ? PFK_SIZE : 1.0;
+        if (!(-slack[i] / unit <= worst)) {
+            worst = -slack[i] / unit;
+            exceeded = i + 1;
+        }
+    }
+    return exceeded;
+}
+
+int pfk_limits(const pfk_pose *pose, pfk_real slack[])
+{
+    pfk_state state;
+    pfk_pose own = *pose;
+    int code;
+    if (pfk_make_exact(&own))
+        return PFK_NO_POSE;
+    code = pfk_rest(&own, &state);
+    return code ? PFK_LEG + code : pfk_slacks(&state, slack);
+}
+
+#endif
+#if IK || FK
+/* What the actuators are where legs are placed. */
+static void pfk_read(const pfk_state *state, pfk_real actuators[PFK_ACTUATORS])
+{
+    int i;
+    for (i = 0; i < PFK_ACTUATORS; ++i)
+        actuators[i] = pfk_driven[i].home + pfk_deviation(&pfk_driven[i], state);
+}
+
+#endif
+#if COMPLETES
+/* Turns a pose a share of the way to another. */
+static void pfk_turn_toward(pfk_pose *pose, const pfk_pose *target, pfk_real share)
+{
+    pfk_real off[3][3], turn[3], sine, cosine;
+    int i, j;
+    for (i = 0; i < 3; ++i)
+        for (j = 0; j < 3; ++j)
+            off[i][j] = pfk_dot(target->R[i], pose->R[j]);
+    for (i = 0; i < 3; ++i)
+        turn[i] = 0.5 * (off[(i + 2) % 3][(i + 1) % 3] - off[(i + 1) % 3][(i + 2) % 3]);
+    sine = pfk_norm(turn);
+    cosine = 0.5 * (off[0][0] + off[1][1] + off[2][2] - 1.0);
+    for (i = 0; i < 3 && sine > 0.0; ++i)
+        turn[i] *= share * atan2(sine, cosine) / sine;
+    if (share < 1.0)
+        pfk_spin(pose, turn);
+    for (i = 0; i < 3 && !(share < 1.0); ++i)
+        for (j = 0; j < 3; ++j)
+            pose->R[i][j] = target->R[i][j];
+}
+
+/* Turns a pose a share of the shortest way that brings its z axis to a target's; 1 where that is turned over. */
+static int pfk_lean_toward(pfk_pose *pose, const pfk_pose *target, pfk_real share)
+{
+    pfk_real now[3], aim[3], turn[3], sine, cosine;
+    int i;
+    for (i = 0; i < 3; ++i) {
+        now[i] = pose->R[i][2];
+        aim[i] = target->R[i][2];
+    }
+    pfk_cross(now, aim, turn);
+    sine = pfk_norm(turn);
+    cosine = pfk_dot(now, aim);
+    for (i = 0; i < 3 && sine > 0.0; ++i)
+        turn[i] *= share * atan2(sine, cosine) / sine;
+    pfk_spin(pose, turn);
+    return !(cosine > PFK_RANK - 1.0);
+}
+
+/* Leads a pose to a target in so many parts, each completed from the one before: 0, PFK_NO_POSE, or the number of a leg
+   that does not reach or close. */
+static int pfk_lead(const pfk_pose *target, int parts, pfk_pose *own, pfk_state *state)
+{
+    int i, left, steps, code = 0;
+    pfk_real share;
+    for (left = parts; left > 0 && !code; --left) {
+        share = 1.0 / (pfk_real)left;
+        for (i = 0; i < 3; ++i)
+            if (pfk_axes[i])
+                own->p[i] = left > 1 ? own->p[i] + share * (target->p[i] - own->p[i]) : target->p[i];
+        if (PFK_ROTATIONS == 3)
+            pfk_turn_toward(own, target, share);
+        else if (PFK_ROTATIONS == 2 && pfk_lean_toward(own, target, share))
+            return PFK_NO_POSE;
+        code = pfk_settle(own, 0, PFK_IK_STEPS, parts == 1, state, &steps);
+    }
+    return code;
+}
+
+#endif
+#if IK
+int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS])
+{
+    pfk_state state;
+    pfk_pose own, wanted = *target;
+    int i, code;
+    pfk_home(&own);
+    for (i = 0; i < 3; ++i)
+        wanted.p[i] = pfk_axes[i] ? wanted.p[i] : own.p[i];
+    for (i = 0; i < 9 && PFK_ROTATIONS == 0; ++i)
+        wanted.R[i / 3][i % 3] = own.R[i / 3][i % 3];
+    if (pfk_make_exact(&wanted))
+        return PFK_NO_POSE;
+#if COMPLETES
+    own = *pose;
+    if (pfk_make_exact(&own))
+        return PFK_NO_POSE;
+    code = pfk_lead(&wanted, 1, &own, &state);
+    if (code > 0) { /* there may be a way in small steps */
+        own = *pose;
+        pfk_make_exact(&own);
+        code = pfk_lead(&wanted, PFK_PARTS, &own, &state);
+    }
+    if (code < 0)
+        return code;
+#else
+    own = wanted;
+    code = pfk_rest(&own, &state);
+#endif
+    if (code)
+        return PFK_LEG + code;
+#if LIMITS
+    {
+        pfk_real slack[PFK_LIMITS + 1];
+        code = pfk_slacks(&state, slack);
+        if (code)
+            return code;
+    }
+#endif
+    *pose = own;
+    pfk_read(&state, actuators);
+    return 0;
+}
+
+#endif
+#if TURNS
+void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS])
+{
+    pfk_real near;
+    int i;
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        const pfk_coordinate *driven = &pfk_driven[i];
+        near = pfk_wrap(now[i], before[i]);
+        if (driven->turns && driven->hi - driven->lo > PFK_TURN && near >= driven->home + driven->lo
+            && near <= driven->home + driven->hi)
+            now[i] = near;
+    }
+}
+
+#endif
+#if FK
+int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
+{
+    pfk_state state;
+    pfk_pose own = *pose;
+    pfk_real given[PFK_ACTUATORS], off;
+    int i, code, count = 0;
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        given[i] = pfk_driven[i].sense * (actuators[i] - pfk_driven[i].home);
+        if (!(fabs(0.0 * given[i]) <= 0.0))
+            return PFK_NO_ACTUATORS;
+    }
+    if (pfk_make_exact(&own))
+        return PFK_NO_POSE;
+    code = pfk_settle(&own, given, PFK_FK_STEPS, 0, &state, &count);
+    if (steps)
+        *steps = count;
+    if (code)
+        return PFK_LEG + code;
+    pfk_make_exact(&own);
+    *pose = own;
+    code = pfk_place(&own, 0, &state);
+    if (code)
+        return PFK_OTHER_MODE;
+    pfk_read(&state, given);
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        off = given[i] - actuators[i];
+        off = pfk_driven[i].is_length ? off / PFK_SIZE : pfk_wrap(off, 0.0);
+        if (!(fabs(off) <= PFK_MODE_APART))
+            return PFK_OTHER_MODE;
+    }
+    return 0;
+}
+
+#endif
+#if IK
+#ifdef PFK_SELF_TEST
+
+#include <stdio.h>
+
+/* A pose, the actuators there, and whether those are within all limits. */
+typedef struct {
+    pfk_pose target;
+    pfk_real actuators[PFK_ACTUATORS];
+    int kept;
+} pfk_check;
+
+#include "checks.h"
+
+int main(void)
+{
+    pfk_real found[PFK_ACTUATORS], size;
+    pfk_pose pose;
+    int i, j, code, wrong = 0;
+    for (i = 0; i < PFK_CHECKS; ++i) {
+        pfk_home(&pose);
+        code = pfk_ik(&pfk_checks[i].target, &pose, found);
+        if ((code == 0) != pfk_checks[i].kept) {
+            printf("pose %d: %s\n", i, pfk_what(code));
+            ++wrong;
+        }
+        for (j = 0; code == 0 && j < PFK_ACTUATORS; ++j) {
+            size = pfk_driven[j].is_length ? PFK_SIZE : 1.0;
+            if (!(fabs(found[j] - pfk_checks[i].actuators[j]) <= PFK_EXACT * size)) {
+                printf("pose %d, actuator %d: %.9g\n", i, j, (double)found[j]);
+                ++wrong;
+            }
+        }
+#if FK
+        if (code == 0) {
+            pfk_pose back = pose;
+            if (pfk_fk(found, &back, 0) != 0) {
+                printf("pose %d: no way back\n", i);
+                ++wrong;
+            }
+            for (j = 0; j < 3; ++j)
+                if (!(fabs(back.p[j] - pose.p[j]) <= PFK_EXACT * PFK_SIZE)) {
+                    printf("pose %d, back: %.9g\n", i, (double)back.p[j]);
+                    ++wrong;
+                }
+        }
+#endif
+    }
+    printf("%d poses, %d wrong\n", PFK_CHECKS, wrong);
+    return wrong != 0;
+}
+
+#endif
+#endif
+#endif
