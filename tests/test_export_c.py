@@ -30,10 +30,11 @@ PRECISIONS = {"double": 1e-12, "float": 1e-5}
 ROUNDED = 1e-6
 """How far a pose is off in single precision after some ten roundings [L or rad]."""
 
-REFUSED = {"nrpm": "A1, B1", "serial_arm": "J3"}
-"""Machines of the catalogue that have no code, and what the refusal names."""
+REFUSED = {"nrpm": "poses leave joints A1, B1", "H4": "singular at home, where joints Q1, Q2"}
+"""Machines that have no code, and what the refusal says."""
 
 CATALOGUE = [name for name in pf.catalog() if name not in REFUSED]
+ON_ARMS = {name: made for name, made in closure.ON_ARMS.items() if name not in REFUSED}
 OTHERS = {
     "exechon": closure.exechon,
     "upu": closure.upu,
@@ -44,12 +45,16 @@ OTHERS = {
     "hinge": closure.hinge,
     "slider": closure.slider,
     "seven_struts": published.seven_struts,
+    **ON_ARMS,
 }
+AMBIGUOUS = "R + 3-RPS + RR"
+"""A machine far from whose home arms follow from poses in more than one way."""
 
 
 @lru_cache
 def machine(name: str) -> pf.Mechanism:
-    return OTHERS[name]() if name in OTHERS else pf.load(name)
+    made = OTHERS.get(name) or closure.ON_ARMS.get(name)
+    return made() if made else pf.load(name)
 
 
 class Answers(NamedTuple):
@@ -194,12 +199,13 @@ def check(name: str, precision: str, told: Answers, known: Truth) -> float:
     places = np.where(beyond, told.limits - 1, 0)[:, None]
     worst = np.take_along_axis(known.slack, places, axis=1)[:, 0] if beyond.any() else least
     assert (worst[beyond] <= least[beyond] + 10 * exact).all()
-    # back to a pose that has these actuators: mostly the same one, else another assembly
-    assert (told.fk[both] == 0).mean() > 0.98
+    # back to a pose that has these actuators: mostly the same one, else another assembly; arms have more of these
+    least_back, most_others = (0.95, 0.3) if name in ON_ARMS else (0.98, 0.1)
+    assert (told.fk[both] == 0).mean() > least_back
     back = both & (told.fk == 0)
     seen = slice(3) if mechanism.end_effector_is_joint else slice(12)
     other = np.flatnonzero(back & (np.abs(told.back - told.poses)[:, seen].max(axis=1) > 10 * exact))
-    assert len(other) <= 0.1 * back.sum()
+    assert len(other) <= most_others * back.sum()
     if len(other) and precision == "double":
         poses = np.tile(np.eye(4), (len(other), 1, 1))
         poses[:, :3, 3] = told.back[other, :3] * mechanism.characteristic_length
@@ -215,6 +221,7 @@ def check(name: str, precision: str, told: Answers, known: Truth) -> float:
     [
         *("stewart", "delta", "canfield", "five_bar", "agile_eye", "rps", "orthoglide"),
         *("tricept_of_legs", "upu", "planar_4rpr"),
+        *("serial_arm", "6-RRPS", "3-CRU", "delta with a shaft", "Tricept with a wrist"),
     ],
 )
 def test_the_file_answers_as_the_library_does(name: str, tmp_path: Path) -> None:
@@ -228,7 +235,7 @@ def test_the_file_answers_as_the_library_does(name: str, tmp_path: Path) -> None
 @needs_compiler
 @pytest.mark.campaign
 @pytest.mark.parametrize("precision", PRECISIONS)
-@pytest.mark.parametrize("name", [*CATALOGUE, *OTHERS])
+@pytest.mark.parametrize("name", [name for name in (*CATALOGUE, *OTHERS) if name != AMBIGUOUS])
 def test_the_file_answers_as_the_library_does_on_many_poses(name: str, precision: str, tmp_path: Path) -> None:
     known, text = truth(name, 20_000), c_source(machine(name), precision=precision)
     for compiler in COMPILERS:
@@ -255,6 +262,12 @@ def test_numbers_too_small_for_single_precision_are_no_warning(compiler: str, tm
     text = c_source(machine("agile_eye"), precision="float")
     compiled(tmp_path, text, compiler, driver=None)
     assert in_words("a = 1e-60 + 2e-38 + 0.0;", "pfk", "float") == "a = 0.0f + 2e-38f + 0.0f;"
+
+
+@needs_compiler
+def test_arms_that_follow_in_more_than_one_way_do_so_in_home_s(tmp_path: Path) -> None:
+    program = compiled(tmp_path, c_source(machine(AMBIGUOUS)), COMPILERS[0], driver=None)
+    assert subprocess.run([str(program)], capture_output=True, text=True).stdout == "50 poses, 0 wrong\n"
 
 
 @needs_compiler
@@ -288,17 +301,18 @@ def test_parts_that_are_not_asked_for_are_not_there() -> None:
 @needs_compiler
 @pytest.mark.parametrize("parts", [("ik",), ("limits",), ("fk",), ("ik", "limits"), ("limits", "fk"), ("ik", "fk")])
 def test_any_choice_of_parts_compiles_without_a_warning(parts: Any, tmp_path: Path) -> None:
-    for name in ("stewart", "prs"):
+    for name in ("stewart", "prs", "delta with a shaft"):
         exported = tmp_path / "exported.c"
         exported.write_text(c_source(machine(name), parts=parts))
         command = [COMPILERS[0], "-std=c99", *STRICT, "-c", str(exported), "-o", str(tmp_path / "exported.o")]
         assert subprocess.run(command, capture_output=True, text=True).stderr == ""
 
 
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 @pytest.mark.parametrize(("name", "said"), REFUSED.items())
 def test_chains_without_code_are_refused_by_name_and_nothing_is_written(name: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(UnsupportedMechanism) as caught:
-        pf.export_c(pf.load(name), tmp_path / "machine.c")
+        pf.export_c(machine(name), tmp_path / "machine.c")
     assert said in str(caught.value)
     assert "cannot be exported" in str(caught.value)
     assert not list(tmp_path.iterdir())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from pfabrik.closure.close import closure_of
 from pfabrik.closure.solve import ClosureEngine
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.engine import engine_of
-from pfabrik.errors import UnsupportedMechanism
 from pfabrik.options import Options
 from pfabrik.platform.solve import LegsEngine
 
@@ -155,11 +153,9 @@ def test_a_home_at_dead_points_is_one_to_search_from() -> None:
     assert_as_on_joint_coordinates(mechanism, wanted, answers, at_most=2e-5)
 
 
-def test_maps_know_arms_that_follow_and_code_for_controllers_says_that_it_does_not(tmp_path: Path) -> None:
+def test_maps_know_arms_that_follow() -> None:
     mechanism = machine("H4")
     wanted = targets(mechanism, 200, 0.4, 0.8, (0, 0, 1))
     margin = pf.feasibility(mechanism, wanted).margin
     reached = np.asarray(pf.solve_ik(mechanism, wanted[margin > 0.0]).status) == pf.Status.REACHED
     assert reached.all() and 20 < len(reached) < 200
-    with pytest.raises(UnsupportedMechanism, match="on joints Q1, Q2"):
-        pf.export_c(mechanism, tmp_path / "h4.c")

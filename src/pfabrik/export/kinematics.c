@@ -58,7 +58,6 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #include <math.h>
 
 #define PFK_TURN 6.283185307179586
-#define PFK_FARTHEST 2.0     /* what a task leaves open goes no farther than this [L or rad] */
 #define PFK_LONGEST_STEP 0.5 /* [L or rad] */
 #define PFK_MODE_APART 1e-3  /* nearer to each other actuators of two working modes meet [L or rad] */
 enum {
@@ -68,10 +67,11 @@ enum {
 };
 
 /* A rod is [what carries it] + ending of its foot + rigid or sliding rod + ending of its head; a pivot is [slides] +
-   one ending of no length. A leg is read from the base to the platform, or, its foot there, from the platform to the
-   base: then its numbers are as the platform sees them. */
-enum { PFK_ROD, PFK_PIVOT };
-enum { PFK_FROM_BASE, PFK_FROM_PLATFORM };
+   one ending of no length; an arm is a hinge or slide that other legs are on. A leg is read from the base to the
+   platform, or, its foot there, from the platform to the base: then its numbers are as the platform sees them. */
+enum { PFK_ROD, PFK_PIVOT, PFK_ARM };
+/* Frames that legs are read in; the arms' follow. */
+enum { PFK_FROM_BASE, PFK_FROM_PLATFORM, PFK_FROM_ITSELF };
 /* What carries a foot: nothing, a hinge, a slide, or what carries the rod before. */
 enum { PFK_NO_CARRIER, PFK_CRANK, PFK_CARRIAGE, PFK_SHARED };
 /* Endings: a weld, a hinge, two hinges that cross, three through a point, a ball. */
@@ -82,6 +82,7 @@ enum { PFK_CARRIER = 0, PFK_FOOT = 1, PFK_SLIDE = 4, PFK_HEAD = 5, PFK_VALUES = 
 /* What a leg is, at home. */
 typedef struct {
     int kind, frame;
+    int is_back; /* 1: its foot is on the platform */
     int main; /* the leg whose carrier it is on: mostly its own place */
     int carrier, slides;
     int twists; /* 1: both ends keep the rod from spinning about itself */
@@ -102,6 +103,16 @@ typedef struct {
     int pairs, upright; /* how many of: conditions kept . R moved; hinges that must not turn over */
     pfk_real kept[3][3], moved[3][3];
     pfk_real square[3]; /* to the last hinge */
+#endif
+#if ARMS
+    int on; /* the number of the arm that it is on, 0 if on none */
+    int is_inner; /* 1: it is between bodies that arms on the platform place, and says nothing of the pose */
+    /* of an arm */
+    int makes; /* the frame that it makes */
+    int column; /* which coordinate of arms it has: its own, or that of another where `is_twin` */
+    int is_twin, at_head; /* at_head: it moves the body that heads are on, not the one that feet are on */
+    int by_plane; /* 1: it brings the hinge at the foot of the rod after it to face the head */
+    int bears; /* 1: a leg on it has an equation */
 #endif
 } pfk_leg;
 
@@ -127,6 +138,7 @@ typedef struct {
     pfk_real R[3][3], p[3];
     pfk_real moved[3]; /* p less what it is at home */
     pfk_real centre[3]; /* about which the platform turns */
+    pfk_real feet[3][3]; /* turns directions of what the feet are on to those of the base */
 } pfk_frame;
 
 /* Where a leg is. */
@@ -136,20 +148,24 @@ typedef struct {
     pfk_real value[PFK_VALUES], cosine, sine;
     int is_given; /* 1: what carries it has the coordinate that it is given */
     int is_held; /* 1: what carries it does not follow the head */
-    pfk_real follow[6]; /* derivative of the carrier's coordinate by the pose */
+    pfk_real follow[6]; /* derivative of the carrier's coordinate by the pose; of an arm, the velocity and the angular
+                           velocity of the platform that would change as much in its frame */
 } pfk_placed;
 
 typedef struct {
-    pfk_frame frame[2];
+    pfk_frame frame[PFK_FRAMES];
     pfk_placed leg[PFK_LEGS];
+#if ARMS
+    pfk_real arm[PFK_ARMS]; /* their coordinates */
+#endif
 } pfk_state;
 
 #if SOLVES
 /* An equation of a leg, 0 where it closes [L or rad]; its derivative by the velocity and the angular velocity of the
-   platform. */
+   platform, then by the coordinates of arms. */
 typedef struct {
     int leg;
-    pfk_real off, slope[6];
+    pfk_real off, slope[PFK_COLUMNS];
 } pfk_row;
 #endif
 
@@ -208,9 +224,10 @@ static void pfk_map(const pfk_frame *frame, const pfk_real point[3], pfk_real ou
     pfk_along(out, 1.0, frame->p, out);
 }
 
-/* The platform as seen from the base, and the base as seen from the platform. */
-static void pfk_frames(const pfk_pose *pose, pfk_frame *forward, pfk_frame *back)
+/* The platform as seen from the base, and the base as seen from the platform; those of arms follow. */
+static void pfk_frames(const pfk_pose *pose, pfk_frame frame[PFK_FRAMES])
 {
+    pfk_frame *forward = &frame[PFK_FROM_BASE], *back = &frame[PFK_FROM_PLATFORM];
     pfk_real moved[3];
     int i, j;
     pfk_along(pose->p, -1.0, pfk_reference, moved);
@@ -220,11 +237,17 @@ static void pfk_frames(const pfk_pose *pose, pfk_frame *forward, pfk_frame *back
         back->centre[i] = pfk_reference[i];
         back->moved[i] = 0.0;
         for (j = 0; j < 3; ++j) {
-            forward->R[i][j] = pose->R[i][j];
+            forward->R[i][j] = back->feet[i][j] = pose->R[i][j];
+            forward->feet[i][j] = i == j ? 1.0 : 0.0;
             back->R[i][j] = pose->R[j][i];
             back->moved[i] -= pose->R[j][i] * moved[j] + (pose->R[j][i] - (i == j ? 1.0 : 0.0)) * pfk_reference[j];
         }
         back->p[i] = back->moved[i];
+#if ARMS
+        for (j = 0; j < 3; ++j)
+            frame[PFK_FROM_ITSELF].R[i][j] = frame[PFK_FROM_ITSELF].feet[i][j] = i == j ? 1.0 : 0.0;
+        frame[PFK_FROM_ITSELF].p[i] = frame[PFK_FROM_ITSELF].moved[i] = frame[PFK_FROM_ITSELF].centre[i] = 0.0;
+#endif
     }
 }
 
@@ -493,25 +516,122 @@ static pfk_real pfk_place_pivot(const pfk_frame *frame, const pfk_leg *pivot, pf
 }
 
 #endif
+#if ARMS
+/* Brings an arm to where the hinge n at the foot F of the rod after it faces the head H; how sure it is, see pfk_either.
+   With the arm's axis a through o: (Rot n) . (H - o) = n . (F - o), or n . (H - F - q a) = 0; at home n . (H - F) = 0. */
+static pfk_real pfk_face(const pfk_frame *frame, const pfk_leg *arm, const pfk_leg *rod, pfk_real *q)
+{
+    const pfk_real *n = rod->foot_axes[0], lean = pfk_dot(arm->axis, n);
+    pfk_real head[3], moved[3], foot[3], across[3], over, C, cosine, sine, sure;
+    pfk_displaced(frame, rod->head, moved);
+    over = pfk_dot(n, moved);
+    if (arm->carrier == PFK_CARRIAGE) {
+        *q = over / lean;
+        return 1.0;
+    }
+    pfk_map(frame, rod->head, head);
+    pfk_along(head, -1.0, arm->centre, head);
+    pfk_along(rod->foot, -1.0, arm->centre, foot);
+    pfk_cross(arm->axis, n, across);
+    C = pfk_dot(n, foot) - lean * pfk_dot(arm->axis, head);
+    sure = pfk_either(over + C, pfk_dot(across, head), C, over, arm->side, &cosine, &sine);
+    *q = atan2(sine, cosine);
+    return sure;
+}
+
+/* Fills the frame that an arm makes, its coordinate given, and how it moves what is in its frame. */
+static void pfk_place_arm(const pfk_frame *before, const pfk_leg *arm, pfk_real q, pfk_frame *after, pfk_placed *own)
+{
+    const int is_hinge = arm->carrier == PFK_CRANK;
+    const pfk_real cosine = is_hinge ? cos(q) : 1.0, sine = is_hinge ? sin(q) : 0.0;
+    const pfk_real sense = arm->at_head != arm->is_back ? 1.0 : -1.0;
+    pfk_real axis[3], at[3], turned[3], from[3], velocity[3];
+    int i, j;
+    own->value[PFK_CARRIER] = q;
+    pfk_copy(arm->axis, axis);
+    pfk_copy(arm->centre, at);
+    if (arm->at_head) {
+        pfk_rotate(before, arm->axis, axis);
+        pfk_map(before, arm->centre, at);
+    }
+    pfk_along(before->centre, -1.0, at, from);
+    pfk_cross(axis, from, velocity);
+    for (i = 0; i < 3; ++i) {
+        own->follow[i] = sense * pfk_dot(before->feet[i], is_hinge ? velocity : axis);
+        own->follow[3 + i] = is_hinge ? sense * pfk_dot(before->feet[i], axis) : 0.0;
+    }
+    *after = *before;
+    /* `axis` and `at` are as the feet's body sees them: a turn there moves heads about them, or feet the other way */
+    for (j = 0; j < 3; ++j) {
+        for (i = 0; i < 3; ++i)
+            from[i] = before->R[i][j];
+        pfk_about(from, axis, cosine, arm->at_head ? sine : -sine, turned);
+        for (i = 0; i < 3; ++i)
+            after->R[i][j] = turned[i];
+        pfk_about(before->feet[j], axis, cosine, -sine, turned);
+        if (!arm->at_head)
+            pfk_copy(turned, after->feet[j]);
+    }
+    if (!is_hinge) {
+        q = arm->at_head ? q : -q;
+        pfk_along(before->p, q, axis, after->p);
+        pfk_along(before->moved, q, axis, after->moved);
+        if (!arm->at_head)
+            pfk_along(before->centre, q, axis, after->centre);
+        return;
+    }
+    pfk_along(before->p, -1.0, at, from);
+    pfk_about(from, axis, cosine, arm->at_head ? sine : -sine, turned);
+    pfk_along(at, 1.0, turned, after->p);
+    pfk_along(turned, -1.0, from, turned);
+    pfk_along(before->moved, 1.0, turned, after->moved);
+    if (!arm->at_head) {
+        pfk_along(before->centre, -1.0, at, from);
+        pfk_about(from, axis, cosine, -sine, turned);
+        pfk_along(at, 1.0, turned, after->centre);
+    }
+}
+
+/* Arms are found from where they are at home. */
+static void pfk_start(pfk_state *state)
+{
+    int i;
+    for (i = 0; i < PFK_ARMS; ++i)
+        state->arm[i] = 0.0;
+}
+
+#endif
 /* Places all legs at a pose, with driven carriers as they are given, if they are; 0, or the number of the leg that is
    farthest from reaching. */
 static int pfk_place(const pfk_pose *pose, const pfk_real *given, pfk_state *state)
 {
     pfk_real gap, worst = PFK_CLOSE;
     int i, k, missing = 0;
-    pfk_frames(pose, &state->frame[PFK_FROM_BASE], &state->frame[PFK_FROM_PLATFORM]);
+    pfk_frames(pose, state->frame);
     for (k = 0; k < PFK_LEGS; ++k)
         state->leg[k].is_given = 0;
     for (i = 0; given && i < PFK_ACTUATORS; ++i) {
         const pfk_coordinate *driven = &pfk_driven[i];
-        if (pfk_legs[driven->leg].kind == PFK_ROD && driven->place == PFK_CARRIER) {
+        if (driven->place == PFK_CARRIER) {
             state->leg[driven->leg].is_given = 1;
             state->leg[driven->leg].value[PFK_CARRIER] = given[i];
+#if ARMS
+            if (pfk_legs[driven->leg].kind == PFK_ARM)
+                state->arm[pfk_legs[driven->leg].column] = given[i];
+#endif
         }
     }
     for (k = 0; k < PFK_LEGS; ++k) {
         const pfk_leg *leg = &pfk_legs[k];
         const pfk_frame *frame = &state->frame[leg->frame];
+#if ARMS
+        if (leg->kind == PFK_ARM) {
+            pfk_real q = state->arm[leg->column];
+            gap = leg->by_plane && !given ? -pfk_face(frame, leg, leg + 1, &q) : 0.0;
+            state->arm[leg->column] = q;
+            pfk_place_arm(frame, leg, q, &state->frame[leg->makes], &state->leg[k]);
+        } else
+#endif
 #if PIVOTS
         if (leg->kind == PFK_PIVOT)
             gap = pfk_place_pivot(frame, leg, &state->leg[k]);
@@ -544,24 +664,25 @@ static pfk_real pfk_deviation(const pfk_coordinate *coordinate, const pfk_state 
 
 #if SOLVES
 /* Derivative of a . H + c . w by the velocity and the angular velocity of the platform; H is the head, w the angular
-   velocity of what it is on, as `frame` has them. */
-static void pfk_slope(const pfk_frame *frame, int is_back, const pfk_real head[3], const pfk_real a[3],
-                      const pfk_real c[3], pfk_real slope[6])
+   velocity of what it is on, as the leg's frame has them. */
+static void pfk_slope(const pfk_leg *leg, const pfk_frame *frame, const pfk_real head[3], const pfk_real a[3],
+                      const pfk_real c[3], pfk_real slope[])
 {
+    const pfk_real sense = leg->is_back ? -1.0 : 1.0;
     pfk_real arm[3], spin[3];
     int i;
     pfk_along(head, -1.0, frame->centre, arm);
     pfk_cross(arm, a, spin);
     pfk_along(spin, 1.0, c, spin);
-    if (is_back) {
-        pfk_rotate_back(frame, a, slope);
-        pfk_rotate_back(frame, spin, slope + 3);
-        for (i = 0; i < 6; ++i)
-            slope[i] = -slope[i];
+    if (leg->frame == PFK_FROM_BASE) {
+        pfk_copy(a, slope);
+        pfk_copy(spin, slope + 3);
         return;
     }
-    pfk_copy(a, slope);
-    pfk_copy(spin, slope + 3);
+    for (i = 0; i < 3; ++i) {
+        slope[i] = sense * pfk_dot(frame->feet[i], a);
+        slope[3 + i] = sense * pfk_dot(frame->feet[i], spin);
+    }
 }
 
 /* Derivative of - a . F + b . W by the coordinate of a carrier; F is a foot on it, W its angular velocity. */
@@ -585,7 +706,7 @@ static void pfk_follow(const pfk_frame *frame, const pfk_leg *rod, pfk_placed *o
     if (own->is_held)
         return;
     rate = pfk_carrier_rate(rod, own->foot, own->u, pfk_zero);
-    pfk_slope(frame, rod->frame == PFK_FROM_PLATFORM, own->head, own->u, pfk_zero, own->follow);
+    pfk_slope(rod, frame, own->head, own->u, pfk_zero, own->follow);
     for (i = 0; i < 6; ++i)
         own->follow[i] /= -rate;
 }
@@ -603,13 +724,22 @@ static pfk_row *pfk_put(const pfk_state *state, int k, pfk_real unit, pfk_real o
     row->off = off / unit;
     if (!sloped)
         return row + 1;
-    pfk_slope(&state->frame[leg->frame], leg->frame == PFK_FROM_PLATFORM, own->head, a, c, row->slope);
+    pfk_slope(leg, &state->frame[leg->frame], own->head, a, c, row->slope);
     if (main->carrier != PFK_NO_CARRIER) {
         rate = pfk_carrier_rate(main, own->foot, a, b);
         for (i = 0; i < 6; ++i)
             row->slope[i] += rate * state->leg[leg->main].follow[i];
     }
-    for (i = 0; i < 6; ++i)
+#if ARMS
+    for (i = 6; i < PFK_COLUMNS; ++i)
+        row->slope[i] = 0.0;
+    for (i = leg->on; i > 0; i = pfk_legs[i - 1].on)
+        row->slope[6 + pfk_legs[i - 1].column] += pfk_dot(row->slope, state->leg[i - 1].follow)
+                                                  + pfk_dot(row->slope + 3, state->leg[i - 1].follow + 3);
+    for (i = 0; i < 6 && leg->is_inner; ++i)
+        row->slope[i] = 0.0;
+#endif
+    for (i = 0; i < PFK_COLUMNS; ++i)
         row->slope[i] /= unit;
     return row + 1;
 }
@@ -816,8 +946,8 @@ static int pfk_equations(pfk_state *state, const pfk_real *given, int sloped, pf
 #if PIVOTS
         if (pfk_legs[i].kind == PFK_PIVOT)
             end = pfk_pivot_rows(state, i, sloped, end);
-        else
 #endif
+        if (pfk_legs[i].kind == PFK_ROD)
             end = pfk_rod_rows(state, i, sloped, end);
     }
 #if FK
@@ -842,6 +972,46 @@ static int pfk_equations(pfk_state *state, const pfk_real *given, int sloped, pf
 
 #endif
 #if MOVES
+/* Turns a pose by a rotation vector, in base coordinates. */
+static void pfk_spin(pfk_pose *pose, const pfk_real vector[3])
+{
+    const pfk_real angle = pfk_norm(vector);
+    pfk_real axis[3], column[3], turned[3];
+    int i, j;
+    if (!(angle > 0.0))
+        return;
+    for (i = 0; i < 3; ++i)
+        axis[i] = vector[i] / angle;
+    for (j = 0; j < 3; ++j) {
+        for (i = 0; i < 3; ++i)
+            column[i] = pose->R[i][j];
+        pfk_about_angle(column, axis, angle, turned);
+        for (i = 0; i < 3; ++i)
+            pose->R[i][j] = turned[i];
+    }
+}
+
+#if YAW
+/* The twist of a rotation about z: of R = S Rz(yaw), where S turns z the shortest way. */
+static pfk_real pfk_yaw(const pfk_pose *pose)
+{
+    const pfk_real(*R)[3] = pose->R;
+    const int about_x = R[0][0] >= R[1][1];
+    const pfk_real z = about_x ? R[2][0] + R[0][2] : R[2][1] + R[1][2];
+    const pfk_real w = about_x ? R[2][1] - R[1][2] : R[0][2] - R[2][0];
+    if (R[2][2] >= 0.0)
+        return atan2(R[1][0] - R[0][1], R[0][0] + R[1][1]);
+    return atan2(2.0 * z * w, w * w - z * z); /* here nothing cancels */
+}
+
+/* Turns a pose about the base's z axis until its yaw is this. */
+static void pfk_bring_yaw(pfk_pose *pose, pfk_real yaw)
+{
+    const pfk_real turn[3] = {0.0, 0.0, yaw - pfk_yaw(pose)};
+    pfk_spin(pose, turn);
+}
+
+#endif
 /* Solves m x = right by least squares, with reflections: `m` holds the right side in its last column and is used up.
    0 where it tells x; 1 where it does not, or is not of numbers. */
 static int pfk_least_squares(pfk_real m[PFK_ROWS][PFK_UNKNOWNS + 1], int rows, int unknowns, pfk_real x[PFK_UNKNOWNS])
@@ -876,25 +1046,6 @@ static int pfk_least_squares(pfk_real m[PFK_ROWS][PFK_UNKNOWNS + 1], int rows, i
     return 0;
 }
 
-/* Turns a pose by a rotation vector, in base coordinates. */
-static void pfk_spin(pfk_pose *pose, const pfk_real vector[3])
-{
-    const pfk_real angle = pfk_norm(vector);
-    pfk_real axis[3], column[3], turned[3];
-    int i, j;
-    if (!(angle > 0.0))
-        return;
-    for (i = 0; i < 3; ++i)
-        axis[i] = vector[i] / angle;
-    for (j = 0; j < 3; ++j) {
-        for (i = 0; i < 3; ++i)
-            column[i] = pose->R[i][j];
-        pfk_about_angle(column, axis, angle, turned);
-        for (i = 0; i < 3; ++i)
-            pose->R[i][j] = turned[i];
-    }
-}
-
 /* Gives a pose the opposite of the turn that it has made since the start. */
 static void pfk_turn_back(const pfk_pose *start, pfk_pose *pose)
 {
@@ -912,38 +1063,69 @@ static void pfk_turn_back(const pfk_pose *start, pfk_pose *pose)
             pose->R[i][j] = turned.R[i][j];
 }
 
-/* Fills the motions of what a task leaves open of a pose, or of all of it: how many. */
-static int pfk_motions(const pfk_pose *pose, int all, pfk_real motion[PFK_UNKNOWNS][6])
+/* What moves until legs close: nothing of the pose, what the task leaves open of it, all of it; and arms. */
+enum { PFK_ARMS_ALONE, PFK_WHAT_IS_LEFT, PFK_ALL };
+
+/* Fills the motions of what moves of a pose: how many. */
+static int pfk_motions(const pfk_pose *pose, int moves, pfk_real motion[PFK_UNKNOWNS][PFK_COLUMNS])
 {
     int i, j, count = 0;
     for (i = 0; i < PFK_UNKNOWNS; ++i)
-        for (j = 0; j < 6; ++j)
+        for (j = 0; j < PFK_COLUMNS; ++j)
             motion[i][j] = 0.0;
-    for (i = 0; i < 3; ++i)
-        if (all || !pfk_axes[i])
+    for (i = 0; i < 3 && moves != PFK_ARMS_ALONE; ++i)
+        if (moves == PFK_ALL || !pfk_axes[i])
             motion[count++][i] = PFK_SIZE;
-    if (all ? PFK_TURNING : PFK_ROTATIONS == 0) {
+    if (moves == PFK_ALL ? PFK_TURNING : moves == PFK_WHAT_IS_LEFT && PFK_ROTATIONS == 0) {
         for (i = 0; i < 3; ++i)
             motion[count++][3 + i] = 1.0;
-    } else if (!all && PFK_ROTATIONS == 2) {
+    } else if (moves == PFK_WHAT_IS_LEFT && PFK_ROTATIONS == 2) {
         for (i = 0; i < 3; ++i)
             motion[count][3 + i] = pose->R[i][2];
         ++count;
+#if YAW
+    } else if (moves == PFK_WHAT_IS_LEFT) { /* about axes square to the mean of both z axes it turns without yaw */
+        const pfk_real mean[3] = {pose->R[0][2], pose->R[1][2], pose->R[2][2] + 1.0}, x[3] = {1.0, 0.0, 0.0};
+        pfk_real *first = motion[count++] + 3, *second = motion[count++] + 3;
+        pfk_cross(x, mean, first);
+        pfk_cross(mean, first, second);
+        pfk_along(pfk_zero, 1.0 / pfk_norm(first), first, first);
+        pfk_along(pfk_zero, 1.0 / pfk_norm(second), second, second);
+#endif
     }
     return count;
 }
 
-/* Moves what is open of a pose until all legs close, in no more than `most` steps, by Newton's method: 0, or the number
-   of a leg that does not. All of it is open where actuators are given. Where it is strict all legs must reach at every
+#if ARMS
+/* Adds those of arms that are not given to so many of the pose: how many there are now. */
+static int pfk_arm_motions(const pfk_state *state, int count, pfk_real motion[PFK_UNKNOWNS][PFK_COLUMNS])
+{
+    int k;
+    for (k = 0; k < PFK_LEGS; ++k) {
+        const pfk_leg *arm = &pfk_legs[k];
+        if (arm->kind == PFK_ARM && arm->bears && !arm->is_twin && !state->leg[k].is_given)
+            motion[count++][6 + arm->column] = arm->carrier == PFK_CRANK ? 1.0 : PFK_SIZE;
+    }
+    return count;
+}
+
+#endif
+
+/* Moves what is open until all legs close, in no more than `most` steps, by Newton's method: 0, or the number of a leg
+   that does not. All of the pose is open where actuators are given. Where it is strict all legs must reach at every
    step. */
-static int pfk_settle(pfk_pose *pose, const pfk_real *given, int most, int strict, pfk_state *state, int *steps)
+static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most, int strict, pfk_state *state,
+                      int *steps)
 {
     const int rows = given ? PFK_ROWS : PFK_OWN_ROWS;
     const pfk_pose start = *pose;
     pfk_row row[PFK_ROWS];
-    pfk_real system[PFK_ROWS][PFK_UNKNOWNS + 1], motion[PFK_UNKNOWNS][6], x[PFK_UNKNOWNS], twist[6];
-    pfk_real worst, last = 0.0, gone = 0.0, size, share;
+    pfk_real system[PFK_ROWS][PFK_UNKNOWNS + 1], motion[PFK_UNKNOWNS][PFK_COLUMNS], x[PFK_UNKNOWNS];
+    pfk_real twist[PFK_COLUMNS], worst, last = 0.0, gone = 0.0, size, share;
     int i, j, k, open, missing, count, turned = 0;
+#if ARMS
+    int arms_from;
+#endif
     for (*steps = 0;; ++*steps) {
         missing = pfk_place(pose, given, state);
         if (missing && strict)
@@ -954,24 +1136,32 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int most, int stric
         if (*steps == most || (!given && gone > PFK_FARTHEST))
             return open;
         last = worst;
-        count = pfk_motions(pose, given != 0, motion);
+        count = pfk_motions(pose, moves, motion);
+#if ARMS
+        arms_from = count;
+        count = pfk_arm_motions(state, count, motion);
+#endif
         for (i = 0; i < rows; ++i) {
             for (j = 0; j < count; ++j) {
                 system[i][j] = 0.0;
-                for (k = 0; k < 6; ++k)
+                for (k = 0; k < PFK_COLUMNS; ++k)
                     system[i][j] += row[i].slope[k] * motion[j][k];
             }
             system[i][count] = -row[i].off;
         }
         if (pfk_least_squares(system, rows, count, x))
             return open;
-        for (k = 0; k < 6; ++k) {
+        for (k = 0; k < PFK_COLUMNS; ++k) {
             twist[k] = 0.0;
             for (j = 0; j < count; ++j)
                 twist[k] += x[j] * motion[j][k];
         }
         size = pfk_norm(twist) / PFK_SIZE;
         size = pfk_norm(twist + 3) > size ? pfk_norm(twist + 3) : size;
+#if ARMS
+        for (j = arms_from; j < count; ++j)
+            size = fabs(x[j]) > size ? fabs(x[j]) : size;
+#endif
         /* at rest but open, as more actuators than freedoms can be: once more, turned the other way */
         if (given && !turned && size < 0.1 * worst) {
             turned = 1;
@@ -980,10 +1170,21 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int most, int stric
         }
         share = size > PFK_LONGEST_STEP ? PFK_LONGEST_STEP / size : 1.0;
         gone += share * size;
-        for (k = 0; k < 6; ++k)
+        for (k = 0; k < PFK_COLUMNS; ++k)
             twist[k] *= share;
         pfk_along(pose->p, 1.0, twist, pose->p);
-        pfk_spin(pose, twist + 3);
+#if YAW
+        if (moves == PFK_WHAT_IS_LEFT) {
+            const pfk_real yaw = pfk_yaw(pose);
+            pfk_spin(pose, twist + 3);
+            pfk_bring_yaw(pose, yaw);
+        } else
+#endif
+            pfk_spin(pose, twist + 3);
+#if ARMS
+        for (k = 0; k < PFK_ARMS; ++k)
+            state->arm[k] += twist[6 + k];
+#endif
     }
 }
 
@@ -1068,11 +1269,94 @@ const char *pfk_what(int code)
     return "no code of this file";
 }
 
+#if LEADS
+/* Turns a pose a share of the way to another. */
+static void pfk_turn_toward(pfk_pose *pose, const pfk_pose *target, pfk_real share)
+{
+    pfk_real off[3][3], turn[3], sine, cosine;
+    int i, j;
+    for (i = 0; i < 3; ++i)
+        for (j = 0; j < 3; ++j)
+            off[i][j] = pfk_dot(target->R[i], pose->R[j]);
+    for (i = 0; i < 3; ++i)
+        turn[i] = 0.5 * (off[(i + 2) % 3][(i + 1) % 3] - off[(i + 1) % 3][(i + 2) % 3]);
+    sine = pfk_norm(turn);
+    cosine = 0.5 * (off[0][0] + off[1][1] + off[2][2] - 1.0);
+    for (i = 0; i < 3 && sine > 0.0; ++i)
+        turn[i] *= share * atan2(sine, cosine) / sine;
+    if (share < 1.0)
+        pfk_spin(pose, turn);
+    for (i = 0; i < 3 && !(share < 1.0); ++i)
+        for (j = 0; j < 3; ++j)
+            pose->R[i][j] = target->R[i][j];
+}
+
+/* Turns a pose a share of the shortest way that brings its z axis to a target's; 1 where that is turned over. */
+static int pfk_lean_toward(pfk_pose *pose, const pfk_pose *target, pfk_real share)
+{
+    pfk_real now[3], aim[3], turn[3], sine, cosine;
+    int i;
+    for (i = 0; i < 3; ++i) {
+        now[i] = pose->R[i][2];
+        aim[i] = target->R[i][2];
+    }
+    pfk_cross(now, aim, turn);
+    sine = pfk_norm(turn);
+    cosine = pfk_dot(now, aim);
+    for (i = 0; i < 3 && sine > 0.0; ++i)
+        turn[i] *= share * atan2(sine, cosine) / sine;
+    pfk_spin(pose, turn);
+    return !(cosine > PFK_RANK - 1.0);
+}
+
+/* Leads what a task sets of a pose, or all of it where arms alone follow, to a target in so many parts, each completed
+   from the one before: 0, PFK_NO_POSE, or the number of a leg that does not reach or close. */
+static int pfk_lead(const pfk_pose *target, int moves, int parts, pfk_pose *own, pfk_state *state)
+{
+    const int is_whole = moves == PFK_ARMS_ALONE;
+    int i, left, steps, code = 0;
+    pfk_real share;
+#if ARMS
+    pfk_start(state);
+#endif
+    for (left = parts; left > 0 && (is_whole || !code); --left) {
+        share = 1.0 / (pfk_real)left;
+        for (i = 0; i < 3; ++i)
+            if (is_whole || pfk_axes[i])
+                own->p[i] = left > 1 ? own->p[i] + share * (target->p[i] - own->p[i]) : target->p[i];
+        if (is_whole || PFK_ROTATIONS == 3)
+            pfk_turn_toward(own, target, share);
+        else if (PFK_ROTATIONS == 2 && pfk_lean_toward(own, target, share))
+            return PFK_NO_POSE;
+#if YAW
+        else if (!(own->R[2][2] > PFK_RANK - 1.0 && target->R[2][2] > PFK_RANK - 1.0))
+            return PFK_NO_POSE; /* upside down there is no yaw */
+        else
+            pfk_bring_yaw(own, pfk_yaw(own) + share * pfk_wrap(pfk_yaw(target) - pfk_yaw(own), 0.0));
+#endif
+        code = pfk_settle(own, 0, moves, PFK_IK_STEPS, parts == 1, state, &steps);
+    }
+    return code;
+}
+
+#endif
 #if RESTS
 /* Places legs at a whole pose: 0, or the number of a leg that does not reach or close. */
 static int pfk_rest(const pfk_pose *pose, pfk_state *state)
 {
-    int code = pfk_place(pose, 0, state);
+    int code;
+#if LED
+    pfk_pose own = *pose;
+    code = pfk_lead(pose, PFK_ARMS_ALONE, 1, &own, state);
+    if (code) {
+        pfk_home(&own);
+        code = pfk_lead(pose, PFK_ARMS_ALONE, PFK_PARTS, &own, state);
+    }
+#else
+#if ARMS
+    pfk_start(state);
+#endif
+    code = pfk_place(pose, 0, state);
 #if SOLVES
     if (!code) {
         pfk_row row[PFK_ROWS];
@@ -1080,6 +1364,7 @@ static int pfk_rest(const pfk_pose *pose, pfk_state *state)
         code = pfk_equations(state, 0, 0, row, &worst);
         code = worst <= PFK_CLOSE ? 0 : code;
     }
+#endif
 #endif
     return code;
 }
@@ -1145,67 +1430,6 @@ static void pfk_read(const pfk_state *state, pfk_real actuators[PFK_ACTUATORS])
 }
 
 #endif
-#if COMPLETES
-/* Turns a pose a share of the way to another. */
-static void pfk_turn_toward(pfk_pose *pose, const pfk_pose *target, pfk_real share)
-{
-    pfk_real off[3][3], turn[3], sine, cosine;
-    int i, j;
-    for (i = 0; i < 3; ++i)
-        for (j = 0; j < 3; ++j)
-            off[i][j] = pfk_dot(target->R[i], pose->R[j]);
-    for (i = 0; i < 3; ++i)
-        turn[i] = 0.5 * (off[(i + 2) % 3][(i + 1) % 3] - off[(i + 1) % 3][(i + 2) % 3]);
-    sine = pfk_norm(turn);
-    cosine = 0.5 * (off[0][0] + off[1][1] + off[2][2] - 1.0);
-    for (i = 0; i < 3 && sine > 0.0; ++i)
-        turn[i] *= share * atan2(sine, cosine) / sine;
-    if (share < 1.0)
-        pfk_spin(pose, turn);
-    for (i = 0; i < 3 && !(share < 1.0); ++i)
-        for (j = 0; j < 3; ++j)
-            pose->R[i][j] = target->R[i][j];
-}
-
-/* Turns a pose a share of the shortest way that brings its z axis to a target's; 1 where that is turned over. */
-static int pfk_lean_toward(pfk_pose *pose, const pfk_pose *target, pfk_real share)
-{
-    pfk_real now[3], aim[3], turn[3], sine, cosine;
-    int i;
-    for (i = 0; i < 3; ++i) {
-        now[i] = pose->R[i][2];
-        aim[i] = target->R[i][2];
-    }
-    pfk_cross(now, aim, turn);
-    sine = pfk_norm(turn);
-    cosine = pfk_dot(now, aim);
-    for (i = 0; i < 3 && sine > 0.0; ++i)
-        turn[i] *= share * atan2(sine, cosine) / sine;
-    pfk_spin(pose, turn);
-    return !(cosine > PFK_RANK - 1.0);
-}
-
-/* Leads a pose to a target in so many parts, each completed from the one before: 0, PFK_NO_POSE, or the number of a leg
-   that does not reach or close. */
-static int pfk_lead(const pfk_pose *target, int parts, pfk_pose *own, pfk_state *state)
-{
-    int i, left, steps, code = 0;
-    pfk_real share;
-    for (left = parts; left > 0 && !code; --left) {
-        share = 1.0 / (pfk_real)left;
-        for (i = 0; i < 3; ++i)
-            if (pfk_axes[i])
-                own->p[i] = left > 1 ? own->p[i] + share * (target->p[i] - own->p[i]) : target->p[i];
-        if (PFK_ROTATIONS == 3)
-            pfk_turn_toward(own, target, share);
-        else if (PFK_ROTATIONS == 2 && pfk_lean_toward(own, target, share))
-            return PFK_NO_POSE;
-        code = pfk_settle(own, 0, PFK_IK_STEPS, parts == 1, state, &steps);
-    }
-    return code;
-}
-
-#endif
 #if IK
 int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS])
 {
@@ -1223,11 +1447,15 @@ int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUAT
     own = *pose;
     if (pfk_make_exact(&own))
         return PFK_NO_POSE;
-    code = pfk_lead(&wanted, 1, &own, &state);
+    code = pfk_lead(&wanted, PFK_WHAT_IS_LEFT, 1, &own, &state);
     if (code > 0) { /* there may be a way in small steps */
+#if ARMS
+        pfk_home(&own); /* where it is known where arms are */
+#else
         own = *pose;
         pfk_make_exact(&own);
-        code = pfk_lead(&wanted, PFK_PARTS, &own, &state);
+#endif
+        code = pfk_lead(&wanted, PFK_WHAT_IS_LEFT, PFK_PARTS, &own, &state);
     }
     if (code < 0)
         return code;
@@ -1280,14 +1508,21 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
     }
     if (pfk_make_exact(&own))
         return PFK_NO_POSE;
-    code = pfk_settle(&own, given, PFK_FK_STEPS, 0, &state, &count);
+#if ARMS
+    pfk_rest(&own, &state); /* arms begin where the pose has them */
+#endif
+    code = pfk_settle(&own, given, PFK_ALL, PFK_FK_STEPS, 0, &state, &count);
     if (steps)
         *steps = count;
     if (code)
         return PFK_LEG + code;
     pfk_make_exact(&own);
     *pose = own;
+#if LED
+    code = pfk_settle(&own, 0, PFK_ARMS_ALONE, PFK_IK_STEPS, 0, &state, &i);
+#else
     code = pfk_place(&own, 0, &state);
+#endif
     if (code)
         return PFK_OTHER_MODE;
     pfk_read(&state, given);

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats
-from ..decomposition.leg_forms import Rod
+from ..decomposition.leg_forms import Arm, Rod
 from ..decomposition.leg_records import row_counts
 from ..decomposition.leg_table import LegTable, table_of_poses
 from ..description.mechanism import Mechanism
@@ -74,6 +74,7 @@ class Machine:
     ----------
     limited, driven : coordinates with a range, and those of the actuators in their order.
     cones : records, as in `LegTable`.
+    n_arms, leads_arms : how many coordinates arms have; whether some follow from where they were.
     limits : (joint, bound) of every limit: two of each range, then cones.
     axes, rotations, unset : what the task sets, and how many coordinates of a pose it leaves open; see `K.TASK`.
     """
@@ -82,14 +83,13 @@ class Machine:
         table = table_of_poses(mechanism)
         if not isinstance(table, LegTable):
             raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"], "exported")
-        if len(table.arms):
-            reason = f"other legs are on joints {', '.join(table.arm_joints)}"
-            raise UnsupportedMechanism(mechanism.name, [reason], "exported")
         self.mechanism, self.limits, self.cones = mechanism, table.limits, table.cones
         task = table.task[0]
         self.axes, self.rotations, self.unset = task["axes"].tolist(), int(task["rotations"]), int(task["unset"])
-        if self.rotations == 1:
-            raise UnsupportedMechanism(mechanism.name, ["its task sets the yaw alone of the rotation"], "exported")
+        self.n_arms, self.leads_arms = len(table.arms), table.leads_arms
+        if self.leads_arms and generic_of(mechanism).home_is_singular:
+            reason = f"its loops are singular at home, where joints {', '.join(table.arm_joints)} follow from no pose"
+            raise UnsupportedMechanism(mechanism.name, [reason], "exported")
         self.legs = _legs(mechanism, table)
         ordered = table.driven[np.argsort(table.driven["column"])]
         self.limited = [_coordinate(each, mechanism.coordinates[each["column"]].kind) for each in table.limited]
@@ -97,9 +97,15 @@ class Machine:
         self.equations = sum(row_counts(table.legs)) + sum(leg.has_carrier for leg in self.legs)
 
     @property
+    def n_frames(self) -> int:
+        """How many frames legs are read in, see `kernels.legs.frames`."""
+        frames = [2, *(int(leg.record["makes"]) + 1 for leg in self.legs)]
+        return max(frames)
+
+    @property
     def drive_equations(self) -> int:
-        """How many equations there are more where actuators are given: of all but those that carry a rod."""
-        return sum(not (self.legs[each.leg].has_carrier and each.place == K.CARRIER) for each in self.driven)
+        """How many equations there are more where actuators are given: of all but what carries rods."""
+        return sum(each.place != K.CARRIER for each in self.driven)
 
     @property
     def uncontrolled(self) -> int:
@@ -126,14 +132,12 @@ def _legs(mechanism: Mechanism, table: LegTable) -> list[Leg]:
     main, length = 0, mechanism.characteristic_length
     for place, (form, record) in enumerate(zip(table.forms, table.legs, strict=True)):
         main = main if record["carrier"] == K.SHARED else place
-        numbers = _rod_numbers(form, record, length) if isinstance(form, Rod) else _pivot_numbers(record, length)
+        if isinstance(form, Rod):
+            numbers = _rod_numbers(form, record, length)
+        else:
+            numbers = (_arm_numbers if isinstance(form, Arm) else _pivot_numbers)(record, length)
         legs.append(Leg(main, record, numbers, tuple(dict.fromkeys(item.joint.name for item in form.items))))
     return legs
-
-
-def _numbers(record: Record, length: float, lengths: tuple[str, ...], others: tuple[str, ...]) -> dict[str, Number]:
-    """Fields of a record that have the same name in C."""
-    return {name: record[name] * length for name in lengths} | {name: record[name] for name in others}
 
 
 def _rod_numbers(rod: Rod, record: Record, length: float) -> dict[str, Number]:
@@ -148,6 +152,10 @@ def _rod_numbers(rod: Rod, record: Record, length: float) -> dict[str, Number]:
         fields = {"centre": "carrier_point", "spoke": "spoke", "across": "spoke_across"}
         numbers |= {name: record[field] * length for name, field in fields.items()}
     return numbers
+
+
+def _arm_numbers(record: Record, length: float) -> dict[str, Number]:
+    return {"axis": record["carrier_axis"], "centre": record["carrier_point"] * length, "side": record["side"]}
 
 
 def _pivot_numbers(record: Record, length: float) -> dict[str, Number]:

@@ -11,6 +11,8 @@ from .machine import Coordinate, Leg, Machine
 from .self_test import Checks
 from .wording import ACCURACY, Precision, comment, literal, quoted
 
+KINDS = {K.ROD: "PFK_ROD", K.PIVOT: "PFK_PIVOT", K.ARM: "PFK_ARM"}
+FRAMES = {K.FROM_BASE: "PFK_FROM_BASE", K.FROM_PLATFORM: "PFK_FROM_PLATFORM", K.FROM_ITSELF: "PFK_FROM_ITSELF"}
 CARRIERS = {K.CRANK: "PFK_CRANK", K.CARRIAGE: "PFK_CARRIAGE", K.SHARED: "PFK_SHARED"}
 ENDINGS = {K.WELD: "PFK_WELD", K.HINGE: "PFK_HINGE", K.CROSS: "PFK_CROSS", K.TRIPLE: "PFK_TRIPLE", K.BALL: "PFK_BALL"}
 FAR = 1e30
@@ -21,15 +23,19 @@ def features(machine: Machine, parts: Sequence[str]) -> set[str]:
     """What of the routines a machine and the parts that are asked for have a use for."""
     records = [leg.record for leg in machine.legs]
     found = {part.upper() for part in parts}
-    completes = "ik" in parts and machine.unset > 0
-    asked = {
+    completes = "ik" in parts and (machine.unset > 0 or machine.leads_arms)
+    asked: dict[str, object] = {
+        "ARMS": machine.n_arms > 0,
+        "LED": machine.leads_arms,
+        "YAW": completes and machine.rotations == 1,
         "TURNS": "ik" in parts and any(each.may_turn for each in machine.driven),
         "PIVOTS": any(record["kind"] == K.PIVOT for record in records),
         "CONES": "limits" in parts and len(machine.cones) > 0,
         "TWISTS": any(record["twists"] for record in records),
         "COMPLETES": completes,
-        "MOVES": completes or "fk" in parts,
-        "RESTS": "limits" in parts or ("ik" in parts and not completes),
+        "LEADS": completes or machine.leads_arms,
+        "MOVES": completes or machine.leads_arms or "fk" in parts,
+        "RESTS": "limits" in parts or (machine.n_arms and "fk" in parts) or ("ik" in parts and not completes),
         "SOLVES": machine.equations > 0 or "fk" in parts,
     }
     return found | {name for name, is_asked in asked.items() if is_asked}
@@ -68,7 +74,7 @@ def checks_h(checks: Checks, exact: float) -> str:
 def _numbers(machine: Machine, precision: Precision, parts: Sequence[str]) -> Iterator[str]:
     accuracy, turning = ACCURACY[precision], not machine.mechanism.end_effector_is_joint
     forward = "fk" in parts
-    unknowns = (6 if turning else 3) if forward else machine.unset
+    unknowns = machine.n_arms + ((6 if turning else 3) if forward else machine.unset)
     yield "/* Lengths are in the unit of the machine; L is the radius of the smallest sphere around its joints. */"
     yield f"#define PFK_SIZE {literal(machine.mechanism.characteristic_length)}"
     yield f"#define PFK_KEPT {literal(accuracy.kept)}         /* a limit is kept to this [L or rad] */"
@@ -77,8 +83,13 @@ def _numbers(machine: Machine, precision: Precision, parts: Sequence[str]) -> It
     yield f"#define PFK_DEAD {literal(accuracy.dead)}         /* square of the sine of an angle from a dead point */"
     yield f"#define PFK_RANK {literal(accuracy.rank)}         /* share of the largest that says nothing any more */"
     yield f"#define PFK_NO_ROTATION {literal(accuracy.rotation)}  /* deviation of a target from a rotation */"
+    farthest = 0.5 if machine.leads_arms else 2.0  # with arms there are more ways to complete a pose
+    yield f"#define PFK_FARTHEST {farthest}        /* what follows goes no farther at once [L or rad] */"
     yield "enum {"
     yield f"    PFK_LEGS = {len(machine.legs)},"
+    yield f"    PFK_FRAMES = {machine.n_frames},"
+    yield f"    PFK_ARMS = {machine.n_arms},"
+    yield f"    PFK_COLUMNS = {6 + machine.n_arms}, /* what equations have derivatives by */"
     yield f"    PFK_RANGES = {len(machine.limited)},"
     yield f"    PFK_CONES = {len(machine.cones)},"
     yield f"    PFK_ROTATIONS = {machine.rotations}, /* of the pose's three that the task sets */"
@@ -87,7 +98,7 @@ def _numbers(machine: Machine, precision: Precision, parts: Sequence[str]) -> It
     yield f"    PFK_ROWS = {machine.equations + machine.drive_equations * forward}, /* and of actuators */"
     yield f"    PFK_UNKNOWNS = {unknowns}"
     yield "};"
-    if "ik" in parts or "fk" in parts:
+    if {"IK", "MOVES"} & features(machine, parts):
         yield f"static const int pfk_axes[3] = {{{', '.join(map(str, machine.axes))}}}; /* 1: the task sets x, y, z */"
     yield f"static const pfk_real pfk_reference[3] = {literal(np.asarray(machine.mechanism.reference_point))};"
     yield ""
@@ -112,17 +123,18 @@ def _words(name: str, words: Sequence[str]) -> Iterator[str]:
 def _leg(leg: Leg) -> str:
     """All that is not zero of a leg."""
     record = leg.record
-    is_pivot = record["kind"] == K.PIVOT
-    told = {
-        "kind": "PFK_PIVOT" if is_pivot else "PFK_ROD",
-        "frame": "PFK_FROM_PLATFORM" if record["reversed"] else "PFK_FROM_BASE",
-        "main": str(leg.main),
-        "carrier": CARRIERS.get(int(record["carrier"]), ""),
-        "foot_end": ENDINGS[int(record["foot"])],
-        "head_end": "" if is_pivot else ENDINGS[int(record["head"])],
-    }
+    told = {"kind": KINDS[int(record["kind"])], "carrier": CARRIERS.get(int(record["carrier"]), "")}
+    told["frame"] = FRAMES.get(int(record["frame"]), str(record["frame"]))
+    if record["kind"] != K.ARM:
+        told["foot_end"] = ENDINGS[int(record["foot"])]
+    if record["kind"] == K.ROD:
+        told["head_end"] = ENDINGS[int(record["head"])]
     whole = {name: record[name] for name in ("slides", "twists", "foot_aimed", "head_aimed", "upright")}
-    whole |= {"pairs": record["axis_rows"]}
+    whole |= {"main": leg.main, "is_back": record["reversed"], "pairs": record["axis_rows"]}
+    whole |= {"on": record["arm"] + 1, "is_inner": record["inner"]}
+    if record["kind"] == K.ARM:
+        whole |= {name: record[name] for name in ("makes", "column", "at_head", "by_plane", "bears")}
+        whole |= {"is_twin": record["twin"] >= 0}
     told |= {name: str(int(value)) for name, value in whole.items() if value}
     told |= {name: literal(value) for name, value in leg.numbers.items() if np.any(value)}
     lines = [f"        .{name} = {value}" for name, value in told.items() if value]

@@ -47,10 +47,16 @@ class Mobility:
 
 @dataclass(frozen=True)
 class Generic:
-    """What holds in general: the counts, and an orthonormal basis (r, k) of all twists that the platform ever has."""
+    """What holds in general: the counts, and an orthonormal basis (r, k) of all twists that the platform ever has.
+
+    Attributes
+    ----------
+    home_is_singular : whether loops are singular at home: they let more move there than in general.
+    """
 
     mobility: Mobility
     directions: Floats
+    home_is_singular: bool
 
 
 @lru_cache(maxsize=64)
@@ -75,7 +81,7 @@ def generic_of(mechanism: Mechanism) -> Generic:
         over_constraints=closure.shape[1] - rank,
     )
     left, sizes, _ = np.linalg.svd(np.hstack(list(twists)))
-    return Generic(counts, left[:, : int(_rank(sizes))])
+    return Generic(counts, left[:, : int(_rank(sizes))], bool(ranks[0] < rank))
 
 
 def _rank(values: NDArray[Any]) -> Any:
