@@ -517,8 +517,9 @@ static pfk_real pfk_place_pivot(const pfk_frame *frame, const pfk_leg *pivot, pf
 
 #endif
 #if ARMS
-/* Brings an arm to where the hinge n at the foot F of the rod after it faces the head H; how sure it is, see pfk_either.
-   With the arm's axis a through o: (Rot n) . (H - o) = n . (F - o), or n . (H - F - q a) = 0; at home n . (H - F) = 0. */
+/* Brings an arm to where the hinge n at the foot F of the rod after it faces the head H; how sure it is, see
+   pfk_either. With the arm's axis a through o: (Rot n) . (H - o) = n . (F - o), or n . (H - F - q a) = 0; at home
+   n . (H - F) = 0. */
 static pfk_real pfk_face(const pfk_frame *frame, const pfk_leg *arm, const pfk_leg *rod, pfk_real *q)
 {
     const pfk_real *n = rod->foot_axes[0], lean = pfk_dot(arm->axis, n);

@@ -62,9 +62,10 @@ class Leg(NamedTuple):
     joints: tuple[str, ...]
 
     @property
-    def has_carrier(self) -> bool:
-        """Whether it is a rod on a carrier of its own."""
-        return bool(self.record["kind"] == K.ROD and self.record["carrier"] in (K.CRANK, K.CARRIAGE))
+    def keeps_its_length(self) -> bool:
+        """Whether it is a rigid rod on a carrier of its own, which has an equation for its length where that is held."""
+        is_carried = self.record["kind"] == K.ROD and self.record["carrier"] in (K.CRANK, K.CARRIAGE)
+        return bool(is_carried and not self.record["slides"])
 
 
 class Machine:
@@ -74,9 +75,10 @@ class Machine:
     ----------
     limited, driven : coordinates with a range, and those of the actuators in their order.
     cones : records, as in `LegTable`.
-    n_arms, leads_arms : how many coordinates arms have; whether some follow from where they were.
     limits : (joint, bound) of every limit: two of each range, then cones.
     axes, rotations, unset : what the task sets, and how many coordinates of a pose it leaves open; see `K.TASK`.
+    n_arms, leads_arms : how many coordinates arms have; whether some follow from where they were.
+    equations : how many the legs have.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -94,13 +96,12 @@ class Machine:
         ordered = table.driven[np.argsort(table.driven["column"])]
         self.limited = [_coordinate(each, mechanism.coordinates[each["column"]].kind) for each in table.limited]
         self.driven = [_coordinate(each, mechanism.drives[each["column"]].kind) for each in ordered]
-        self.equations = sum(row_counts(table.legs)) + sum(leg.has_carrier for leg in self.legs)
+        self.equations = sum(row_counts(table.legs)) + sum(leg.keeps_its_length for leg in self.legs)
 
     @property
     def n_frames(self) -> int:
         """How many frames legs are read in, see `kernels.legs.frames`."""
-        frames = [2, *(int(leg.record["makes"]) + 1 for leg in self.legs)]
-        return max(frames)
+        return max(K.FROM_ITSELF, *(int(leg.record["makes"]) + 1 for leg in self.legs))
 
     @property
     def drive_equations(self) -> int:
