@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
+from .border import REST, Group, groups_of
 from .drawing import SMALL, axes_for
 from .words import in_words
 
@@ -15,12 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .region import Region
-
-COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#f0e442")
-"""Colours that colour-blind people can tell apart, after Okabe and Ito; of the limits that form most of the border."""
-
-REST = "#b0b0b0"
-"""Of all other limits together."""
 
 MOST_FACES = 40_000
 """Faces of a mesh that are drawn one by one; of a finer one, vertices that are near each other are drawn as one."""
@@ -32,9 +27,6 @@ DARKEST = 0.55
 WITHIN = "#eef3f7"
 """What is within reach, in a plane."""
 
-Group: TypeAlias = tuple[str, str, list[int]]
-"""What a colour stands for, the colour, and the limits that have it."""
-
 Strings: TypeAlias = NDArray[np.str_]
 
 
@@ -44,9 +36,9 @@ def plot(found: Region, ax: Axes | None = None) -> Axes:
     axes = axes_for(ax, d)
     from matplotlib.lines import Line2D
 
-    groups = _groups(found)
+    groups = groups_of(found)
     (_draw_solid if d == 3 else _draw_plane)(axes, found, groups)
-    handles = [Line2D([], [], color=colour, linewidth=4, label=label) for label, colour, _ in groups]
+    handles = [Line2D([], [], color=colour, linewidth=4, label=label) for label, colour, *_ in groups]
     if handles:
         anchor = (1.12 if d == 3 else 1.02, 0.5)
         legend = axes.legend(
@@ -62,27 +54,10 @@ def plot(found: Region, ax: Axes | None = None) -> Axes:
     return axes
 
 
-def _groups(found: Region) -> list[Group]:
-    """Limits that share a colour: each its own where there are colours enough; else those of joints that are copies."""
-    shares = {limit: [limit] for limit in found.shares}
-    if len(shares) > len(COLOURS):
-        shares = {}
-        for joint, bound in found.shares:
-            shares.setdefault((joint.rstrip("0123456789"), bound), []).append((joint, bound))
-    groups: list[Group] = []
-    order = sorted(shares.items(), key=lambda item: -sum(found.shares[limit] for limit in item[1]))
-    for colour, ((name, bound), limits) in zip(COLOURS, order, strict=False):
-        copies = sorted(joint[len(name) :] for joint, _ in limits)
-        label = f"{name}{', '.join(copies)} {bound}".strip()
-        groups.append((label, colour, [found.limits.index(limit) for limit in limits]))
-    rest = [found.limits.index(limit) for _, limits in order[len(COLOURS) :] for limit in limits]
-    return [*groups, (f"{len(rest)} other limits", REST, rest)] if rest else groups
-
-
 def _face_colours(found: Region, groups: list[Group]) -> Strings:
     colours = np.full(len(found.limits), REST)
-    for _, colour, limits in groups:
-        colours[limits] = colour
+    for group in groups:
+        colours[group.limits] = group.colour
     return colours
 
 

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...answers.solution import Solution
-from ...arrays import Floats, Ints
+from ...arrays import Floats
 from ...workspace.ask import workspace
-from ..looks import LINE_COLOURS
-
-REST = "#b0b0b0"
-"""The colour of all limits but those that form most of the border."""
+from ...workspace.border import groups_of
+from ...workspace.words import in_words
 
 POSITIONS = ("x", "y", "z")
 
@@ -25,7 +23,7 @@ class Patch:
     Attributes
     ----------
     corners : of its triangles, (k, 3, 3), or both ends of its segments, (k, 2, 3), in the base frame [length].
-    name, share : the limit that forms it, and how much of the border that is.
+    name, share : the limits that form it, and how much of the border that is.
     """
 
     name: str
@@ -40,26 +38,15 @@ def border_of(start: Solution, on_progress: Callable[[int, int], None]) -> tuple
     What the workspace is not looked over is as in that configuration. Where it is one of angles, there are no patches.
     """
     found = workspace(start.mechanism, start=start, on_progress=on_progress)
-    size = f"{found.size:.4g} ± {found.uncertainty:.1g} {found.size_unit}"
+    size = in_words(found)
     if not set(found.names) <= set(POSITIONS):
         return [], f"workspace over {', '.join(found.names)}: {size}; it has no place in the scene"
     corners = _in_space(start.pose[:3, 3], found.names, np.asarray(found.vertices))[found.faces]
-    names = [" ".join(limit) for limit in found.limits]
-    patches = [
-        Patch(names[limit], share, colour, corners[np.asarray(found.face_limit) == limit])
-        for colour, (limit, share) in zip(
-            LINE_COLOURS, ((found.limits.index(limit), share) for limit, share in found.shares.items()), strict=False
-        )
-    ]
-    return [*patches, *_rest(patches, corners, names, found.face_limit)], size
-
-
-def _rest(patches: list[Patch], corners: Floats, names: list[str], face_limit: Ints) -> list[Patch]:
-    """All faces that have no colour of their own, as one patch."""
-    coloured = [names.index(patch.name) for patch in patches]
-    left = ~np.isin(face_limit, coloured)
-    share = 1.0 - sum(patch.share for patch in patches)
-    return [Patch("other limits", share, REST, corners[left])] if left.any() else []
+    limits = np.asarray(found.face_limit)
+    return [
+        Patch(group.label, group.share, group.colour, corners[np.isin(limits, group.limits)])
+        for group in groups_of(found)
+    ], size
 
 
 def _in_space(position: Floats, names: tuple[str, ...], vertices: Floats) -> Floats:
