@@ -63,7 +63,7 @@ class Leg(NamedTuple):
 
     @property
     def keeps_its_length(self) -> bool:
-        """Whether it is a rigid rod on a carrier of its own, which has an equation for its length where that is held."""
+        """Whether it is a rigid rod on a carrier of its own: it has an equation for its length where that is held."""
         is_carried = self.record["kind"] == K.ROD and self.record["carrier"] in (K.CRANK, K.CARRIAGE)
         return bool(is_carried and not self.record["slides"])
 
