@@ -107,6 +107,12 @@ def truth(name: str, count: int) -> Truth:
     return Truth(targets, whole, closes, actuators, slack_of(mechanism, q, home))
 
 
+def limit_units(mechanism: pf.Mechanism) -> np.ndarray:
+    """Of every limit, in the order of the file: L of lengths, 1 of angles."""
+    table = leg_table(mechanism)
+    return np.concatenate([np.repeat(table.limited["unit"], 2), np.ones(len(table.cones))])
+
+
 def slack_of(mechanism: pf.Mechanism, q: np.ndarray, home: np.ndarray) -> np.ndarray:
     """Room left before every limit, in the order of the file, (n, limits) [L or rad]."""
     turning = {joint.name: angles for joint, angles, _ in coned(mechanism, q - home)}
@@ -126,9 +132,8 @@ def slack_of(mechanism: pf.Mechanism, q: np.ndarray, home: np.ndarray) -> np.nda
             own = [each for each in own if each < columns(mechanism)[joint].stop]
             column = own[place]
         lo, hi = np.reshape(described.range, (-1, 2))[column - columns(mechanism)[joint].start]
-        unit = mechanism.characteristic_length if described.type == "prismatic" else 1.0
-        rooms.append((q[:, column] - lo if bound == "min" else hi - q[:, column]) / unit)
-    return np.array(rooms).T.reshape(len(q), -1)
+        rooms.append(q[:, column] - lo if bound == "min" else hi - q[:, column])
+    return np.array(rooms).T.reshape(len(q), -1) / limit_units(mechanism)
 
 
 def sharpness(mechanism: pf.Mechanism, poses: np.ndarray) -> np.ndarray:
@@ -162,11 +167,7 @@ def asked(program: Path, mechanism: pf.Mechanism, known: Truth) -> Answers:
     run = subprocess.run([str(program)], input=given.tobytes(), capture_output=True)
     assert run.returncode == 0, run.stderr.decode()[-2000:]
     told = np.frombuffer(run.stdout).reshape(len(given), -1)
-    n_a, limits = len(mechanism.actuator_names), leg_table(mechanism).limits
-    sizes = [
-        1.0 if bound == "cone" else size
-        for (_, bound), size in zip(limits, units(mechanism, [j for j, _ in limits]), strict=True)
-    ]
+    n_a, sizes = len(mechanism.actuator_names), limit_units(mechanism)
     codes = told[:, :4].astype(int)
     scale = np.repeat([mechanism.characteristic_length, 1.0], [3, 9])
     return Answers(
