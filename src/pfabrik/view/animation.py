@@ -14,11 +14,12 @@ from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
 from ..checks import require_positive
+from ..drawing import SMALL
 from ..errors import MissingLibrary
 from ..extras import require
 from ..telling import OnProgress, telling
 from ..writing import whole_path
-from .canvas import SMALL, canvas_on, new_axes
+from .canvas import canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD
 from .machine import draw_key, draw_machine
 from .plane import plane_of

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..checks import require_method
-from ..errors import InvalidArgument
-from ..extras import require
+from ..drawing import SMALL, is_spatial, new_figure, require_spatial
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,8 +46,6 @@ SPATIAL = (0.0, 0.0, 1.0, 0.9)
 """Where in a figure axes in space are: left, bottom, width, height."""
 
 PANE, GRID = (1.0, 1.0, 1.0, 0.0), "#d9d9d9"
-SMALL = 8.0
-"""Size of letters [points]."""
 
 
 @dataclass(frozen=True)
@@ -185,20 +182,14 @@ def canvas_on(ax: Axes | None, plane: Floats | None) -> Canvas:
     InvalidArgument : two-dimensional axes for a machine in space.
     MissingLibrary : matplotlib is not installed.
     """
-    require("pictures", "matplotlib", "plot")
-    if ax is not None:
-        require_method("ax", ax, "tick_params", "matplotlib axes, or None")
-    else:
-        from matplotlib import pyplot
-
-        figure = pyplot.figure(figsize=(5.0, 4.5), dpi=150, layout=None if plane is None else "constrained")
-        ax = new_axes(figure, plane)
-    if hasattr(ax, "get_zlim"):
+    if ax is None:
+        ax = new_axes(new_figure(5.0, 4.5, layout=None if plane is None else "constrained"), plane)
+    require_method("ax", ax, "tick_params", "matplotlib axes, or None")
+    if plane is None:
+        require_spatial(ax, "a machine that is not planar")
+    if is_spatial(ax):
         plane = None
         _dress(ax)
-    elif plane is None:
-        expected = "three-dimensional ones, as of figure.add_subplot(projection='3d')"
-        raise InvalidArgument("ax", "two-dimensional axes for a machine that is not planar", expected)
     ax.tick_params(labelsize=SMALL)
     for name in "xyz"[: 2 if plane is not None else 3]:
         getattr(ax, f"{name}axis").label.set_size(SMALL + 1.0)

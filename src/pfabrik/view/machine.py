@@ -11,7 +11,8 @@ from ..answers.solution import Solution
 from ..checks import require_names
 from ..description.joint_types import JointType
 from ..description.mechanism import Mechanism
-from .canvas import SMALL, Canvas, canvas_on
+from ..drawing import SMALL
+from .canvas import Canvas, canvas_on
 from .labels import place_names
 from .looks import ACTUATED, EDGE, HELD, LINK, MARKERS, PASSIVE, PLATFORM, of_a_body
 from .plane import plane_of

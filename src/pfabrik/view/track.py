@@ -14,9 +14,9 @@ from ..answers.tracked import Track
 from ..arrays import Floats
 from ..checks import require_method
 from ..description.readouts import Readout, readouts
+from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument
-from ..extras import require
-from .canvas import SMALL, Canvas, canvas_on, new_axes
+from .canvas import Canvas, canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD, LINE_COLOURS, SHADE
 from .machine import draw_machine, key_of
 from .plane import plane_of
@@ -64,13 +64,8 @@ def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
     MissingLibrary : matplotlib is not installed.
     """
     known = checked_track(track)
-    require("pictures", "matplotlib", "plot")
-    if figure is not None:
-        require_method("figure", figure, "subfigures", "a matplotlib figure, or None")
-    else:
-        from matplotlib import pyplot
-
-        figure = pyplot.figure(figsize=(11.5, 6.2), dpi=130, layout="constrained")
+    figure = new_figure(11.5, 6.2, dpi=130) if figure is None else figure
+    require_method("figure", figure, "subfigures", "a matplotlib figure, or None")
     mechanism = track.mechanism
     figure.suptitle(f"{mechanism.name}: {told(track)}", fontsize=SMALL + 4.0)
     left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1, 1.2), squeeze=False))

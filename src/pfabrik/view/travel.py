@@ -10,10 +10,9 @@ import numpy as np
 
 from ..answers.words import short_names
 from ..checks import require_method
+from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument
-from ..extras import require
 from ..travel import Reach, Travel
-from .canvas import SMALL
 from .looks import EDGE, LINK, PLATFORM
 
 if TYPE_CHECKING:
@@ -61,16 +60,11 @@ def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
     if not isinstance(found, Travel) or not len(found):
         what = type(found).__name__ if not isinstance(found, Travel) else "no direction"
         raise InvalidArgument("found", what, "a Travel, as `travel` returns")
-    require("pictures", "matplotlib", "plot")
     kinds = {kind: _rows([each for each in found if each.kind == kind]) for kind in ("along", "about")}
     kinds = {kind: rows for kind, rows in kinds.items() if rows}
-    if figure is not None:
-        require_method("figure", figure, "subplots", "a matplotlib figure, or None")
-    else:
-        from matplotlib import pyplot
-
-        height = 1.6 + HEIGHT * max(map(len, kinds.values()))
-        figure = pyplot.figure(figsize=(4.4 * len(kinds) + 0.4, height), dpi=150, layout="constrained")
+    if figure is None:
+        figure = new_figure(4.4 * len(kinds) + 0.4, 1.6 + HEIGHT * max(map(len, kinds.values())))
+    require_method("figure", figure, "subplots", "a matplotlib figure, or None")
     mechanism = found.origin.mechanism
     place = ", ".join(f"{part:.4g}" for part in found.origin.pose[:3, 3])
     figure.suptitle(f"{mechanism.name} from ({place}) {mechanism.length_unit}", fontsize=SMALL + 2.0)

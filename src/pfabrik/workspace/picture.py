@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
+from ..drawing import SMALL
+from .axes import axes_for
 from .border import REST, Group, groups_of
-from .drawing import SMALL, axes_for
 from .words import in_words
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..drawing import SMALL
 from ..motion.singularities import Singularity
-from .drawing import SMALL, axes_for
+from .axes import axes_for
 from .picture import labels, shown
 from .region import Region
 
