@@ -290,6 +290,32 @@ def test_what_is_held_is_given_up_only_where_no_pose_has_it(name: str, hold: str
         assert nearest(Problem(mechanism, targets[row], hold, answers[row])) is None
 
 
+HOLDING = {"2-PRU/UPR": closure.pru_upr}
+"""Machines whose platforms have fewer places for what is held than they have others."""
+
+
+@pytest.mark.parametrize("count", [2 if INTERPRETED else 150, pytest.param(800, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("hold", ["orientation", "position"])
+@pytest.mark.parametrize("name", HOLDING)
+def test_what_a_known_pose_holds_is_not_given_up_and_no_farther(name: str, hold: str, count: int) -> None:
+    """Poses that answer other targets have the part of these that is to be held, and none of them is nearer."""
+    mechanism, rng = HOLDING[name](), np.random.default_rng(5)
+    length = mechanism.characteristic_length
+    known = pf.solve_ik(mechanism, drawn(mechanism, rng, count, 0.6, 0.7), options=Options(hold=None)).pose
+    targets = known.copy()
+    if hold == "orientation":
+        counting = np.array(task_of(mechanism).axes)
+        targets[:, :3, 3] += rng.uniform(-0.8, 0.8, (count, 3)) * counting * length
+    else:
+        targets[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-0.9, 0.9, (count, 3))).as_matrix() @ targets[:, :3, :3]
+    answers = pf.solve_ik(mechanism, targets, options=Options(hold=hold))
+    away = answers.status == Status.PROJECTED
+    assert all(held == hold for held in np.array(answers.held)[away])
+    position, rotation = task_of(mechanism).errors(known, targets)
+    far = np.hypot(answers.position_error, mechanism.rotation_length * answers.rotation_error)
+    assert (far <= np.hypot(position, mechanism.rotation_length * rotation) + 1e-6 * length).all()
+
+
 # --- what holds answers back -----------------------------------------------------------------------------------------
 
 GIVEN_WAY = 1e-5

@@ -114,7 +114,7 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
     rng = np.random.default_rng(1)
     search, n = new_search(table, table.cones.shape[0]), E.count_unknowns(table)
     objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
-    aim = Aim(objective, np.zeros((0, len(table.driven))))
+    aim = Aim(objective, np.zeros((0, len(table.driven))), 0)
     search.target[:] = somewhere(mechanism, described, rng).pose
     search.gradient.unit[0] = 1.0
     limits, rows = 2 * len(table.limited) + len(table.cones), len(search.look.rows)

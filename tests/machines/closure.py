@@ -164,6 +164,27 @@ def exechon() -> Mechanism:
     return Mechanism("2-UPR/SPR", joints, "platform", (0, 0, 180))
 
 
+def pru_upr() -> Mechanism:
+    """2-PRU/UPR: two rails in a plane and a strut across; it rises and tilts. Half of its constraints are implied."""
+    joints = []
+    for leg, x in ((1, 250.0), (2, -250.0)):
+        b, c = np.array([x, 0.0, 0.0]), np.array([0.32 * x, 0.0, 300.0])
+        joints += chain(
+            leg,
+            ("P*", None, np.sign(x) * np.array(X), {"range": (-120, 120)}),
+            ("R", b, Y, {"range": (-0.9, 0.9)}),
+            ("U", c, (Y, X), {"range": ((-1.0, 1.0), (-0.8, 0.8))}),
+        )
+    a, c = np.array([0.0, -220.0, 0.0]), np.array([0.0, -80.0, 300.0])
+    joints += chain(
+        3,
+        ("U", a, (Y, X), {"range": ((-0.8, 0.8), (-0.8, 0.8))}),
+        ("P*", None, c - a, {"home": 331.0, "range": (230, 420)}),
+        ("R", c, X, {"range": (-1.0, 1.0)}),
+    )
+    return Mechanism("2-PRU/UPR", joints, "platform", (0, 0, 300), task=("z", "tilt"))
+
+
 def cru() -> Mechanism:
     """3-CRU: guides with cylindrical joints, limited in slide and turn, elbows driven."""
     joints = []

@@ -70,7 +70,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
         approach_by_pose,
         (
             0,
-            Aim(_POSE_OBJECTIVE, np.zeros((0, 0))),
+            Aim(_POSE_OBJECTIVE, np.zeros((0, 0)), 0),
             _STARTS,
             _STARTS,
             0,

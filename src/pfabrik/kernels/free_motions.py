@@ -9,10 +9,13 @@ import numpy as np
 from ._jit import allocator, routine
 from .closure.loops import Floats, Ints
 from .qp import QP, factorise, solve_qp
-from .sqp import CLOSING, LIMITS, MOTIONS, RANK, ROWS, Linearisation, new_linearisation
+from .sqp import CLOSING, GAP, LIMITS, MOTIONS, RANK, ROWS, Linearisation, new_linearisation
 
 DEPENDENT = 1e-6
 """What is left of an equation that follows from the others: descriptions are typed with as many digits."""
+
+LOOSE = 4.0
+"""The same where equations are open, at most, in units of the gap."""
 
 SHARED = 0.01
 """By what entries of unknowns that legs have in common count less as pivots: they couple the legs' equations."""
@@ -52,40 +55,30 @@ def new_elimination(n: int, rows: int) -> Elimination:
 
 
 @routine
-def eliminate(rows: int, scratch: Elimination, view: FreeMotions) -> None:
-    """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what meets the equations."""
-    A, taken, filled_at, used = scratch.A, scratch.taken, scratch.filled, scratch.used
+def eliminate(rows: int, scratch: Elimination, view: FreeMotions, first: int, implied: int) -> None:
+    """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what meets the equations.
+
+    An equation f = a f1 + b f2 that follows from others where these are met does so no more where they are open: what
+    is left of its slope then is of the first order in the gap. Such an equation would bar motions that there are.
+
+    Parameters
+    ----------
+    first, implied : so many of the first equations follow from others in general. Of these equations those that seem to
+        follow from the others at this gap wait, and as many as do in general are left out.
+    """
+    A, taken, used = scratch.A, scratch.taken, scratch.used
     basis, shift, pivots = view.basis, view.shift, view.pivots
     n, rank = used.shape[0], 0
-    width = n + 1 + rows
     for j in range(n):
         shift[j] = 0.0
         taken[j] = 0.0 if used[j] > 0 else 1.0
-    for row in range(rows):
-        largest, pivot = 0.0, -1
-        for j in range(n):
-            size = abs(A[row, j])
-            if size > DEPENDENT and taken[j] == 0.0:
-                size *= SHARED if used[j] > 1 else 1.0
-                if size > largest:
-                    largest, pivot = size, j
-        if pivot < 0:  # it follows from those before
-            continue
-        factor, filled = 1.0 / A[row, pivot], 0
-        for j in range(width):
-            A[row, j], A[rank, j] = A[rank, j], factor * A[row, j]
-            if A[rank, j] != 0.0:
-                filled_at[filled] = j
-                filled += 1
-        for i in range(rows):
-            share = A[i, pivot]
-            if i != rank and share != 0.0:
-                for k in range(filled):
-                    A[i, filled_at[k]] -= share * A[rank, filled_at[k]]
-                A[i, pivot] = 0.0
-        taken[pivot] = 1.0
-        pivots[rank] = pivot
-        rank += 1
+    least, again = DEPENDENT, 0
+    if implied > 0:
+        least, again = max(DEPENDENT, LOOSE * view.linear.scalars[GAP]), first
+    for turn in range(rows + again):
+        row = turn if turn < first else turn - first if turn < first + again else turn - again
+        if not first <= turn < first + again or rank <= min(row, first - implied - 1):
+            rank += solve_row(row, rank, rows, least if turn < first else DEPENDENT, scratch, view)
     motions = 0
     for j in range(n):
         if taken[j] == 0.0:
@@ -101,6 +94,36 @@ def eliminate(rows: int, scratch: Elimination, view: FreeMotions) -> None:
             view.transform[r, i] = A[r, n + 1 + i]
     counts = view.linear.counts
     counts[MOTIONS], counts[RANK], counts[ROWS] = motions, rank, rows
+
+
+@routine
+def solve_row(row: int, rank: int, rows: int, least: float, scratch: Elimination, view: FreeMotions) -> int:
+    """Eliminate an unknown by a row, which becomes that of the `rank`; 0 where it follows from those before, else 1."""
+    A, taken, filled_at, used = scratch.A, scratch.taken, scratch.filled, scratch.used
+    n, largest, pivot = used.shape[0], 0.0, -1
+    for j in range(n):
+        size = abs(A[row, j])
+        if size > least and taken[j] == 0.0:
+            size *= SHARED if used[j] > 1 else 1.0
+            if size > largest:
+                largest, pivot = size, j
+    if pivot < 0:
+        return 0
+    factor, filled = 1.0 / A[row, pivot], 0
+    for j in range(n + 1 + rows):
+        A[row, j], A[rank, j] = A[rank, j], factor * A[row, j]
+        if A[rank, j] != 0.0:
+            filled_at[filled] = j
+            filled += 1
+    for i in range(rows):
+        share = A[i, pivot]
+        if i != rank and share != 0.0:
+            for k in range(filled):
+                A[i, filled_at[k]] -= share * A[rank, filled_at[k]]
+            A[i, pivot] = 0.0
+    taken[pivot] = 1.0
+    view.pivots[rank] = pivot
+    return 1
 
 
 @routine

@@ -25,7 +25,7 @@ from ..kernels.rows import HOLD_NOTHING, LIMIT_EXCESS
 from ..kernels.threads import in_blocks
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
-from .rotation import constraints_at, keeps_rotation, without_idle_legs
+from .rotation import constraints_at, implied_rows, keeps_rotation, without_idle_legs
 from .table import OF_AIMS, machine_searched
 
 MOST_STEPS = 200
@@ -108,7 +108,7 @@ def _search(
     mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts, way: Way, corners: bool, stays: bool
 ) -> Found:
     others = corners_of(mechanism) if corners else no_starts(table)
-    return _approach(table, _objective(mechanism, targets, way, MOST_STEPS), own, others, stays=stays)[0]
+    return _approach(mechanism, table, _objective(mechanism, targets, way, MOST_STEPS), own, others, stays=stays)[0]
 
 
 def _objective(mechanism: Mechanism, targets: Floats, way: Way, steps: int) -> PoseObjective:
@@ -122,7 +122,7 @@ def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, prese
     """How hard every limit holds configurations back from targets (n, 4, 4) [length]: multipliers, in the order of
     those that `closure.descend.weighed_limits` gives."""
     objective = _objective(mechanism, targets, way, 0)
-    found = _approach(table, objective, present, no_starts(table))[1]
+    found = _approach(mechanism, table, objective, present, no_starts(table))[1]
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
     coned = [joint.name for joint in mechanism.joints if joint.cone is not None]
     weights = np.zeros((len(targets), 2 * columns + len(coned)))
@@ -141,7 +141,8 @@ def nearest_actuators(mechanism: Mechanism, table: LegTable, values: Floats, own
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:] = LOCKED
     objective = PoseObjective(poses, weights, BASE_AXES, MARGIN, TOLERANCES.active, MOST_STEPS)
-    return _approach(table, objective, own, corners_of(mechanism) if corners else no_starts(table), values)[0]
+    others = corners_of(mechanism) if corners else no_starts(table)
+    return _approach(mechanism, table, objective, own, others, values)[0]
 
 
 def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
@@ -155,7 +156,7 @@ def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: St
     for part, legs in _apart_by_arms(table):
         begin, arms = Starts(own.poses, *(np.ascontiguousarray(array[:, legs]) for array in own[1:])), part.arms
         values = np.ascontiguousarray(arms["sense"] * begin.sides[:, arms["leg"]])
-        found = _approach(part, objective, begin, no_starts(part), values, arms)[0]
+        found = _approach(mechanism, part, objective, begin, no_starts(part), values, arms)[0]
         np.maximum(best.distances, found.distances, out=best.distances)
         best.poses[:], best.sides[:, legs] = found.poses, found.sides
     return best
@@ -186,6 +187,7 @@ def _apart_by_arms(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
 
 
 def _approach(
+    mechanism: Mechanism,
     table: LegTable,
     objective: PoseObjective,
     own: Starts,
@@ -215,11 +217,12 @@ def _approach(
     minded = len(legs.cones) if minds_aims else int((legs.cones["leader"] != OF_AIMS).sum())
     weights = np.zeros((len(objective.targets), limits))
     hits = _hits(table) if values is None else HITS_OF_VALUES
+    implied = implied_rows(mechanism) if not len(table.arms) else 0
     near = np.zeros((0, len(legs.driven))) if values is None else values
 
     def run(block: slice) -> None:
         first = own if len(own.poses) == 1 else own.at(block)
-        aim = Aim(objective._replace(targets=objective.targets[block]), near[block])
+        aim = Aim(objective._replace(targets=objective.targets[block]), near[block], implied)
         into = Found._make(array[block] for array in found)
         approach(asked.address, aim, first, others, hits, int(stays), minded, into, weights[block])
 
@@ -229,7 +232,9 @@ def _approach(
         begin = own if len(own.poses) == 1 else own.at(np.flatnonzero(astray))
         again = objective._replace(targets=objective.targets[astray])
         asked_values = None if values is None else values[astray]
-        pointed = _approach(table, again, begin, others, asked_values, driven, stays=stays, minds_aims=True)[0]
+        pointed = _approach(
+            mechanism, table, again, begin, others, asked_values, driven, stays=stays, minds_aims=True
+        )[0]
         for array, tried in zip(found, pointed, strict=True):
             array[astray] = tried
     return found, weights
@@ -312,7 +317,8 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
         q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, n)
     targets = in_lengths(poses, mechanism.characteristic_length)
     objective = PoseObjective(targets, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
-    found = _approach(table, objective, Starts(poses, q, np.repeat(home.sides, n, axis=0)), no_starts(table))[0]
+    starts = Starts(poses, q, np.repeat(home.sides, n, axis=0))
+    found = _approach(mechanism, table, objective, starts, no_starts(table))[0]
     found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
     return Starts(*found[1:4]).at(np.flatnonzero(np.isfinite(found.distances)))
 

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..closure.close import platform_poses
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
+from ..motion.walks import around_home
 from ..tolerances import TOLERANCES
 from .table import Machine, kernel_table, machine, machine_searched, with_aims
 
@@ -36,6 +38,23 @@ def keeps_rotation(mechanism: Mechanism) -> bool:
         return False
     stays = np.abs(rows).max(initial=0.0) <= TOLERANCES.position
     return bool(stays and (np.linalg.svd(slopes[:, :, 3:])[1][:, -1] > TOLERANCES.nearly_implied).all())
+
+
+@lru_cache(maxsize=64)
+def implied_rows(mechanism: Mechanism) -> int:
+    """How many constraints of legs without arms follow from the others in general, as of planes that are the same.
+
+    None of legs that are at dead points, where these cannot be told.
+    """
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
+    implied: list[int] = []
+    for poses in (mechanism.home_pose[None], platform_poses(mechanism, around_home(mechanism))):
+        sizes = np.linalg.svd(constraints_at(table, poses)[1], compute_uv=False)
+        implied += (table.task["rows"][0] - (sizes > TOLERANCES.alignment).sum(axis=1)).tolist()
+        if 0 in implied:  # at home they may depend on each other though elsewhere they do not
+            break
+    return min(implied, default=0)
 
 
 @lru_cache(maxsize=64)

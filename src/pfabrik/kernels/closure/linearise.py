@@ -98,7 +98,8 @@ def linearise(
     for j in range(n):
         here[j] = 0.0
     add_force(loops, 0, work.gradient.force, work, work.here)
-    eliminate(lay_out(loops, held, work), work.elimination, view)
+    rows = lay_out(loops, held, work)
+    eliminate(rows, work.elimination, view, rows, 0)
     project_gradient(work.here, view)
     linearise_limits(loops, objective.margin, state, work, view)
 

@@ -26,7 +26,7 @@ def linearise(table: Table, row: int, aim: Aim, now: Now, search: Search, view: 
     for k in range(held):
         gap = max(gap, abs(errors[k]))
     scalars[GAP] = gap
-    eliminate(lay_out(held, search), search.elimination, view)
+    eliminate(lay_out(held, search), search.elimination, view, search.look.rows.shape[0], aim.implied)
     project_gradient(search.force, view)
     linearise_limits(table, aim.pose.margin, search, view)
 

@@ -19,6 +19,7 @@ class Aim(NamedTuple):
 
     pose: PoseObjective  # its targets in [length]
     values: Floats  # (n, n_a): deviations from home [L or rad] that `driven` are to have; no rows if that is no aim
+    implied: int  # how many of the legs' equations follow from the others
 
 
 class Starts(NamedTuple):
