@@ -185,6 +185,34 @@ def pru_upr() -> Mechanism:
     return Mechanism("2-PRU/UPR", joints, "platform", (0, 0, 300), task=("z", "tilt"))
 
 
+def rotopod() -> Mechanism:
+    """3-RRS on a circular rail: all motors turn about the platform's own axis."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        b, c = 200 * _out(angle), 80 * _out(angle) + [0, 0, 180]
+        joints += chain(
+            leg,
+            ("R*", (0, 0, 0), Z, {"range": (-0.9, 0.9)}),
+            ("R", b, _tangent(angle), {"range": (-0.9, 0.9)}),
+            ("S", c, None, {"cone": Cone(b - c, 0.8, "platform")}),
+        )
+    return Mechanism("rotopod", joints, "platform", (0, 0, 180), task=("z", "tilt"))
+
+
+def angled_prr() -> Mechanism:
+    """Planar 3-PRR, its rails 27 degrees from square to the radii, with room for its rods to turn over."""
+    joints = []
+    for leg, angle in enumerate(TURNS, 1):
+        out, side = _out(angle), _tangent(angle)
+        joints += chain(
+            leg,
+            ("P*", None, 0.5 * out + side, {"range": (-100, 100)}),
+            ("R", 180 * out + 30 * side, Z, {"range": (-1.2, 1.2)}),
+            ("R", 60 * out, Z),
+        )
+    return Mechanism("angled 3-PRR", joints, "platform", (0, 0, 0), task=("x", "y", "rotation"))
+
+
 def cru() -> Mechanism:
     """3-CRU: guides with cylindrical joints, limited in slide and turn, elbows driven."""
     joints = []

@@ -232,9 +232,9 @@ def _approach(
         begin = own if len(own.poses) == 1 else own.at(np.flatnonzero(astray))
         again = objective._replace(targets=objective.targets[astray])
         asked_values = None if values is None else values[astray]
-        pointed = _approach(
-            mechanism, table, again, begin, others, asked_values, driven, stays=stays, minds_aims=True
-        )[0]
+        pointed = _approach(mechanism, table, again, begin, others, asked_values, driven, stays=stays, minds_aims=True)[
+            0
+        ]
         for array, tried in zip(found, pointed, strict=True):
             array[astray] = tried
     return found, weights

@@ -22,6 +22,7 @@ from ..sqp import (
     NEARLY_CLOSED,
     PROMISE,
     RESTORING,
+    STEPS,
     VALUE,
     begin_descent,
     go_on,
@@ -43,6 +44,9 @@ from .search import Search, copy_now, move
 
 HOPELESS = 20.0
 """A search that is farther than the nearest yet by so many times what its last step promised is given up."""
+
+THERE = 1e-12
+"""Distance at which a search has arrived, and which counts as none [L]."""
 
 OF_CARRIERS = 0.6
 """What the steps of carriers count beside those of the platform: they end where rods have their lengths."""
@@ -117,7 +121,7 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
     """
     view, other, hessian, control = search.first, search.second, search.hessian, search.control
     unit = search.gradient.unit
-    unit[0] = 1.0
+    unit[0], control.counts[STEPS] = 1.0, 0
     linearise(table, row, aim, search.best, search, view)
     if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
         return math.inf
@@ -146,6 +150,8 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
                     view, other = other, view
                     if least < math.inf and is_by(search.best, met):
                         return least
+                    if view.linear.scalars[VALUE] <= 0.5 * unit[0] * THERE * THERE and is_closed(view.linear, CLOSED):
+                        control.counts[DONE] = 1
                     if HOPELESS * control.scalars[PROMISE] < view.linear.scalars[VALUE] - 0.5 * unit[0] * least * least:
                         return math.inf
             if rests_open(view.linear, led_down, aim.pose.max_iterations, control):
@@ -155,4 +161,5 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
                 led_down = True
     if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
         return math.inf
-    return math.sqrt(2.0 * view.linear.scalars[VALUE] / unit[0])
+    distance = math.sqrt(2.0 * view.linear.scalars[VALUE] / unit[0])
+    return distance if distance > THERE else 0.0

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from .._jit import kernel, routine, search
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
-from ..closure.pose_objective import turn_of_tilt
+from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import balance
 from ..legs.answer import deviation, excess_of
 from ..legs.poses import make_exact
@@ -29,8 +30,21 @@ from .starts import begin, load_target, nearest_start, put_held, put_sides
 LARGEST_NUMBER = 1.7976931348623157e308
 """Distances are finite, however far a target is."""
 
+HOLDABLE = 1e-3
+"""How near a search for what is held must come for its end to be tried with it held [L or rad]."""
+
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
+
+
+class Work(NamedTuple):
+    """Scratch memory of the searches for a row."""
+
+    search: Search
+    best: Now
+    met: Floats  # (2,): the least distance met [L], and how often it was
+    away: Floats  # (2,): the same of searches that did not come to what is held
+    lost: Floats  # (1 + starts,): how far the first start, and each other, is from that; infinite where one is not lost
 
 
 @kernel
@@ -141,46 +155,99 @@ def is_other_mode(legs: Records, first: Floats, sides: Floats) -> bool:
 
 
 @routine
+def holds_some(table: Table, aim: Aim, weights: Floats) -> bool:
+    """Whether some of what a target sets is to be held; what is held, alone, as the weights (6,) of an objective."""
+    held, turns = 0, table.task[0]["rotations"] > 0
+    for i in range(6):
+        is_held = aim.pose.platform[i] == LOCKED and (i < 3 or turns)
+        weights[i] = 1.0 if is_held else 0.0
+        held += 1 if is_held else 0
+    return held > 0 and aim.values.shape[0] == 0
+
+
+@routine
+def take_nearer(distance: float, tally: Floats, search: Search, best: Now) -> None:
+    """Take over where a search has ended if it is nearer; the least distance, and how often it was met, are counted."""
+    if distance < (1.0 - SAME) * tally[0]:
+        tally[0], tally[1] = distance, 1.0
+        copy_now(search.best, best)
+    elif distance <= (1.0 + SAME) * tally[0] and tally[0] < math.inf:
+        tally[1] += 1.0
+
+
+@routine
+def search_from(
+    table: Table, row: int, aim: Aim, sides: Floats, stays: int, search: Search, best: Now, met: Floats
+) -> bool:
+    """Search from where `search.best` is, and take it over if it is nearer; whether it is lost.
+
+    Parameters
+    ----------
+    sides : of the working mode that is to be kept, if one is.
+    """
+    distance = descend(table, row, aim, met[0], best, search)
+    is_lost = distance == math.inf and (met[0] == math.inf or search.control.counts[STEPS] == 0)
+    if distance < math.inf:
+        put_sides(table, search.best, search.look)
+        if stays == 0 or not is_other_mode(table.legs, sides, search.best.sides):
+            take_nearer(distance, met, search, best)
+            if met[1] == 1.0 and distance == met[0] and (distance == 0.0 or is_global(table, aim.pose, search)):
+                met[1] = math.inf  # none is nearer
+    return is_lost
+
+
+@routine
 def search_row(
-    table: Table, row: int, aim: Aim, own: Starts, others: Starts, hits: int, stays: int, search: Search, best: Now
+    table: Table, row: int, aim: Aim, toward: Aim, own: Starts, others: Starts, hits: int, stays: int, work: Work
 ) -> float:
-    """The nearest configuration of a row, into `best`, and how far it is [L]; see `approach`.
+    """The nearest configuration of a row, into `work.best`, and how far it is [L]; see `approach`.
 
     What is held is put in its place at once where searches may start anywhere, and no arms would be left behind, or
-    nothing else has a place; and else brought there step by step. The other way too, where that finds nothing.
+    nothing else has a place; and else brought there step by step. The other way too, where that finds nothing. Where
+    too few agree, searches from starts that were lost go for what is held alone, and then on with it held: from a
+    feasible configuration there are more ways to it than the shortest.
     """
-    least, met, target, n = math.inf, 0, search.target, others.poses.shape[0]
+    search, best, met, away, lost = work.search, work.best, work.met, work.away, work.lost
+    target, n = search.target, others.poses.shape[0]
     near = nearest_start(aim.pose, target, others, search.gradient)
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
+    sides = own.sides[first]
     for k in range(kept.shape[0]):
-        kept[k] = own.sides[first, k] if stays == 1 and is_carried(table.legs[k]) else 0.0
+        kept[k] = sides[k] if stays == 1 and is_carried(table.legs[k]) else 0.0
     at_once = holds_all(aim.pose) or (n > 0 and table.task[0]["led"] == 0)
+    met[0], met[1], away[0], away[1] = math.inf, 0.0, math.inf, 0.0
+    for i in range(n + 1):
+        lost[i] = math.inf
     for start in range(n + 2):
-        if start == 0 or start == n + 1:
-            begin(table, own, first, search)
-        else:
-            begin(table, others, near if start == 1 else (start - 2 if start - 2 < near else start - 1), search)
-        if start == n + 1 and least < math.inf:
+        place = -1 if start == 0 or start == n + 1 else near if start == 1 else start - 2 + int(start - 2 >= near)
+        if met[1] >= hits or (start == n + 1 and met[0] < math.inf):
             break
-        if stays == 1 and is_other_mode(table.legs, own.sides[first], search.best.sides):
+        begin(table, own if place < 0 else others, first if place < 0 else place, search)
+        if stays == 1 and is_other_mode(table.legs, sides, search.best.sides):
             continue
         in_place = (start <= n) == at_once
         fix(aim.pose, in_place, search)
         if in_place:
             put_held(table, aim.pose, target, search.look, search.best)
-        distance = descend(table, row, aim, least, best, search)
-        if distance < math.inf:
-            put_sides(table, search.best, search.look)
-            if stays == 1 and is_other_mode(table.legs, own.sides[first], search.best.sides):
-                distance = math.inf
-        if distance < (1.0 - SAME) * least:
-            least, met = distance, 1
-            copy_now(search.best, best)
-        elif distance <= (1.0 + SAME) * least and least < math.inf:
-            met += 1
-        if met >= hits or (met == 1 and distance == least and is_global(table, aim.pose, search)):
+        if search_from(table, row, aim, sides, stays, search, best, met) and toward.pose.max_iterations > 0:
+            search.gradient.unit[0] = 1.0
+            begun = own.poses[first] if place < 0 else others.poses[place]
+            lost[place + 1], _ = pose_gradient(toward.pose, target, begun, search.gradient, True)
+    fix(toward.pose, False, search)
+    while toward.pose.max_iterations > 0 and met[1] < hits and (met[0] < math.inf or away[1] < hits):
+        place = -1
+        for i in range(n):
+            place = i if lost[i + 1] < lost[place + 1] else place
+        if lost[place + 1] == math.inf:
             break
-    return least
+        lost[place + 1] = math.inf
+        begin(table, own if place < 0 else others, first if place < 0 else place, search)
+        distance = descend(table, row, toward, away[0] if met[0] == math.inf else math.inf, best, search)
+        if distance <= HOLDABLE:
+            search_from(table, row, aim, sides, stays, search, best, met)
+        elif met[0] == math.inf and search.control.counts[STEPS] > 1:
+            take_nearer(distance, away, search, best)
+    return met[0]
 
 
 @search
@@ -210,6 +277,10 @@ def approach(
     """
     table = open_table(machine)
     search, best = new_search(table, cones), new_now(table.legs.shape[0])
+    work = Work(search, best, np.zeros(2), np.zeros(2), np.zeros(1 + others.poses.shape[0]))
+    pose, held = aim.pose, np.zeros(6)
+    steps = pose.max_iterations if holds_some(table, aim, held) else 0
+    toward = Aim(PoseObjective(pose.targets, held, pose.frame, pose.margin, pose.near, steps), aim.values, aim.implied)
     k, n = search.first.linear.G.shape
     p, pulls = new_qp(k, k), np.zeros((k, n))
     for row in range(found.distances.shape[0]):
@@ -225,7 +296,7 @@ def approach(
             for c in range(balance(search.first.linear, aim.pose.near, p, pulls)):
                 weights[row, search.first.linear.which[c]] = p.x[c]
             continue
-        least = search_row(table, row, aim, own, others, hits, stays, search, best)
+        least = search_row(table, row, aim, toward, own, others, hits, stays, work)
         found.distances[row] = least
         found.steps[row] = search.control.counts[STEPS]
         if least < math.inf:
