@@ -290,7 +290,7 @@ def test_what_is_held_is_given_up_only_where_no_pose_has_it(name: str, hold: str
         assert nearest(Problem(mechanism, targets[row], hold, answers[row])) is None
 
 
-HOLDING = {"2-PRU/UPR": closure.pru_upr, "rotopod": closure.rotopod}
+HOLDING = {"2-PRU/UPR": closure.pru_upr, "rotopod": closure.rotopod, "angled 3-PRR": closure.angled_prr}
 """Machines whose platforms have fewer places for what is held than they have others."""
 
 

@@ -117,20 +117,41 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
     """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible.
 
     And infinite where what steps promise says that it will not come as near as `least`; where it comes by the
-    configuration that is so near, that is where it ends.
+    configuration that is so near, that is where it ends. Where steps that leave something open are lost, it goes on
+    from the last configuration that was closed, and closes each.
     """
-    view, other, hessian, control = search.first, search.second, search.hessian, search.control
-    unit = search.gradient.unit
-    unit[0], control.counts[STEPS] = 1.0, 0
+    view, unit = search.first, search.gradient.unit
+    unit[0], search.control.counts[STEPS] = 1.0, 0
     linearise(table, row, aim, search.best, search, view)
     if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
         return math.inf
     unit[0] = scale_objective(view.linear)
     for j in range(search.force.shape[0]):
         search.force[j] *= unit[0]
-    begin_descent(view.linear, hessian, control)
     if view.linear.scalars[VALUE] == 0.0:
         return 0.0
+    copy_now(search.best, search.closed)
+    for closing in range(2):
+        if closing == 1:
+            copy_now(search.closed, search.best)
+            linearise(table, row, aim, search.best, search, view)
+        distance = go_down(table, row, aim, least, met, closing, search)
+        if distance >= 0.0:
+            return distance
+    return math.inf
+
+
+@routine
+def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: int, search: Search) -> float:
+    """Steps from `best`, at which `search.first` is, as of `descend`; negative if what they left open does not close.
+
+    Parameters
+    ----------
+    closing : 1 to close each step before it is judged.
+    """
+    view, other, hessian, control = search.first, search.second, search.hessian, search.control
+    unit = search.gradient.unit
+    begin_descent(view.linear, hessian, control)
     while control.counts[DONE] == 0:
         control.scalars[LARGEST] = lagrangian_hessian(table, row, aim, search, view)
         led_down = False
@@ -140,26 +161,30 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
                 share = take(table, view, search.p.x, search.trial, search)
                 linearise(table, row, aim, search.trial, search, other)
                 closes = True
-                if is_to_close(view.linear, other.linear, share, control):
+                if closing == 1:
+                    closes = restore_feasibility(table, row, aim, search.trial, CLOSED, search, other, RESTORING)
+                elif is_to_close(view.linear, other.linear, share, control):
                     tolerance = on_the_way(control, share)
                     closes = restore_feasibility(table, row, aim, search.trial, tolerance, search, other, CORRECTIONS)
-                closes = closes or openness(other.linear) <= openness(view.linear)
+                    closes = closes or openness(other.linear) <= openness(view.linear)
                 led_down = judge_step(view.linear, other.linear, closes, share, control)
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view
                     if least < math.inf and is_by(search.best, met):
                         return least
-                    if view.linear.scalars[VALUE] <= 0.5 * unit[0] * THERE * THERE and is_closed(view.linear, CLOSED):
-                        control.counts[DONE] = 1
                     if HOPELESS * control.scalars[PROMISE] < view.linear.scalars[VALUE] - 0.5 * unit[0] * least * least:
                         return math.inf
+                    if is_closed(view.linear, CLOSED):
+                        copy_now(search.best, search.closed)
+                        if view.linear.scalars[VALUE] <= 0.5 * unit[0] * THERE * THERE:
+                            control.counts[DONE] = 1
             if rests_open(view.linear, led_down, aim.pose.max_iterations, control):
                 if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
-                    return math.inf
+                    return -1.0
                 go_on(control)
                 led_down = True
     if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
-        return math.inf
+        return -1.0
     distance = math.sqrt(2.0 * view.linear.scalars[VALUE] / unit[0])
     return distance if distance > THERE else 0.0

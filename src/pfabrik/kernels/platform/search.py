@@ -42,6 +42,7 @@ class Search(NamedTuple):
     balance: Floats  # (rows,): multipliers of the equations and of what is held
     best: Now
     trial: Now
+    closed: Now  # the last that was closed entirely on the way
     target: Floats  # (4, 4): of the row [L]
     kept: Floats  # (legs,): the sides that carriers are to stay on; 0 for either
     pulled: Ints  # (legs,): 1 for those that the Lagrangian asks for
@@ -73,6 +74,7 @@ def new_search(table: Table, cones: int) -> Search:
         np.zeros(n),
         np.zeros(n),
         np.zeros(rows),
+        new_now(legs),
         new_now(legs),
         new_now(legs),
         np.zeros((4, 4)),
