@@ -22,6 +22,7 @@ from pfabrik.decomposition.leg_table import leg_table
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.platform.solve import LegsEngine
+from pfabrik.rotations import angles_between
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 FEASIBLE = 1e-9
@@ -517,6 +518,7 @@ def test_a_foot_that_is_asked_to_tilt_too_far_tilts_as_far_as_it_can() -> None:
 EVERY = {
     **{name: partial(pf.load, name) for name in pf.catalog()},
     **{f"closure.{name}": make for name, make in (closure.MACHINES | closure.ON_ARMS).items()},
+    "closure.coaxial_rrr": closure.coaxial_rrr,
     **{f"positions.{name}": make for name, make in positions.MACHINES.items()},
 }
 
@@ -546,6 +548,15 @@ def test_a_pose_that_is_answered_is_reached_when_it_is_asked_for(name: str, coun
     off = again.position_error / mechanism.characteristic_length + again.rotation_error
     most = 0.15 if count > 100 else 0.2  # of few rows more by chance
     assert np.mean(off > 1e-6) <= (most if has_arms else 0.0)
+
+
+def test_searches_mind_where_three_hinges_point_the_platform() -> None:
+    """Where two hinges of a leg cannot point the third, no search ends; and both ways to point it are searched."""
+    mechanism, rng = closure.coaxial_rrr(), np.random.default_rng(2)
+    targets = drawn(mechanism, rng, 3 if INTERPRETED else 300, 0.0, 1.0)
+    answers = pf.solve_ik(mechanism, targets)
+    least = angles_between(answers.pose[:, None, :3, :3], targets[None, :, :3, :3]).min(axis=0)
+    assert np.mean(answers.rotation_error > least + 1e-6) <= 0.01
 
 
 @pytest.mark.campaign

@@ -269,6 +269,21 @@ def agile_eye(reference: Sequence[float] = (0, 0, 0)) -> Mechanism:
     return Mechanism("agile eye", joints, "platform", tuple(reference))
 
 
+def coaxial_rrr() -> Mechanism:
+    """Spherical 3-RRR whose motors all turn about the vertical, with links of less than a right angle."""
+    joints, cranks, ends = [], np.radians(60.0), np.radians(65.0)
+    for leg, angle in enumerate(TURNS, 1):
+        b = np.sin(cranks) * _out(angle) - np.cos(cranks) * np.array(Z)
+        c = np.sin(ends) * _out(angle + 57.0) + np.cos(ends) * np.array(Z)
+        joints += chain(
+            leg,
+            ("R*", (0, 0, -100), Z),
+            ("R", 100 * b, b, {"range": (-1.7, 1.7)}),
+            ("R", 100 * c, c, {"range": (-1.5, 1.5)}),
+        )
+    return Mechanism("coaxial spherical 3-RRR", joints, "platform", (0, 0, 0), task=("rotation",))
+
+
 def ankle() -> Mechanism:
     """2-UPS/U: a universal joint straight between base and platform."""
     joints = [joint("U", "ankle", ("base", "platform"), (0, 0, 100), (X, Y), range=((-0.6, 0.7), (-0.5, 0.5)))]

@@ -37,8 +37,8 @@ struts leave the platform all its freedoms, and have no two ways to bend; more w
 platform nearly has in many poses."""
 
 CORNERS_OF_MANY, HITS_OF_MANY = 32, 8
-"""Corners where arms are led, and hits there and where task and legs do not tell all of a pose: there are many more
-configurations."""
+"""Corners where arms are led, or pivots have two solutions; and hits there and where task and legs do not tell all of a
+pose: there are many more configurations."""
 
 BEYOND, BEYOND_OF_MANY = 8, 16
 """How many more start farther away, where rooms beyond the base may be."""
@@ -276,6 +276,11 @@ def _carriers(table: LegTable) -> Records:
     return np.asarray(table.known[on_rods & (table.known["place"] == K.CARRIER)])
 
 
+def _sided_pivots(table: LegTable) -> NDArray[np.intp]:
+    """The legs that are pivots of three hinges, which have two solutions."""
+    return np.flatnonzero((table.legs["kind"] == K.PIVOT) & (table.legs["side"] != 0.0))
+
+
 def home_start(mechanism: Mechanism, table: LegTable) -> Starts:
     """Home, as a start."""
     poses = in_lengths(mechanism.home_pose[None], 1.0 / mechanism.characteristic_length)
@@ -288,7 +293,8 @@ def corners_of(mechanism: Mechanism) -> Starts:
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
     rng = np.random.default_rng(0)
-    near, beyond = (CORNERS_OF_MANY, BEYOND_OF_MANY) if table.leads_arms else (CORNERS, BEYOND)
+    is_many = table.leads_arms or len(_sided_pivots(table)) > 0
+    near, beyond = (CORNERS_OF_MANY, BEYOND_OF_MANY) if is_many else (CORNERS, BEYOND)
     corners = _far_apart(home_start(mechanism, table), _drawn(mechanism, table, rng, DRAWS, FAR), near)
     others = _far_apart(corners, _drawn(mechanism, table, rng, DRAWS, FARTHER), beyond)
     turns = np.concatenate([np.arange(len(corners.poses)), 2.0 * np.arange(len(others.poses)) + 0.5])
@@ -315,9 +321,12 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     for carrier in (*_carriers(table), *table.arms):
         lo, hi = max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi)
         q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, n)
+    sides = np.repeat(home.sides, n, axis=0)
+    pivots = _sided_pivots(table)
+    sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
     targets = in_lengths(poses, mechanism.characteristic_length)
     objective = PoseObjective(targets, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
-    starts = Starts(poses, q, np.repeat(home.sides, n, axis=0))
+    starts = Starts(poses, q, sides)
     found = _approach(mechanism, table, objective, starts, no_starts(table))[0]
     found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
     return Starts(*found[1:4]).at(np.flatnonzero(np.isfinite(found.distances)))

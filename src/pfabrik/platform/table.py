@@ -51,21 +51,24 @@ def machine_searched(table: LegTable) -> Machine:
 
 
 def with_aims(legs: K.Records, cones: K.Records) -> K.Records:
-    """Cones, and after them those that say where two crossed hinges can point their rods.
+    """Cones, and after them those that say where two crossed hinges can point their rods, or the third of a pivot.
 
     Hinges a, b with an angle A between them, and B between b and the rod: its angle from a is from |A - B| to A + B, or
-    to 2 pi - A - B. Hinges square to each other and to their rod point it anywhere.
+    to 2 pi - A - B. Hinges square to each other and to their rod point it anywhere. Those of pivots come first, with a
+    leader, for searches to mind them always: nothing else says that such a leg does not reach.
     """
     aims = []
     for k, leg in enumerate(legs):
         for end, place in (("foot", K.FOOT_LINE), ("head", K.HEAD_LINE)):
-            if leg["kind"] != K.ROD or leg[end] != K.CROSS:
+            is_pivot = leg["kind"] == K.PIVOT and leg[end] == K.TRIPLE
+            if not is_pivot and (leg["kind"] != K.ROD or leg[end] != K.CROSS):
                 continue
-            a, b = leg[f"{end}_axes"][:2]
-            A, B = np.arccos(np.clip([a @ b, b @ leg["line"]], -1.0, 1.0))
+            a, b, c = leg[f"{end}_axes"]
+            A, B = np.arccos(np.clip([a @ b, b @ (c if is_pivot else leg["line"])], -1.0, 1.0))
             for axis, most in ((a, min(A + B, 2.0 * np.pi - A - B)), (-a, np.pi - abs(A - B))):
                 if most < np.pi - TOLERANCES.alignment:
-                    aims.append((k, place, axis, most, np.cos(most), OF_AIMS))
+                    aims.append((k, place, axis, most, np.cos(most), len(cones) if is_pivot else OF_AIMS))
+    aims.sort(key=lambda aim: aim[-1] == OF_AIMS)
     return np.concatenate([cones, np.array(aims, K.CONE)]) if aims else cones
 
 

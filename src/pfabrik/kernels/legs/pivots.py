@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 from .._jit import routine
-from ..vectors import Vec, cross, dot, move, sub, turn, vec
+from ..vectors import Vec, cross, dot, move, put, sub, turn, vec
 from .endings import aim, angle_to, spin_angle, turned
 from .frames import NOWHERE, put_pose_slope
-from .records import CROSS, FOOT, HEAD, HINGE, TRIPLE, Floats, Record
+from .records import CROSS, FOOT, FOOT_LINE, HEAD, HEAD_LINE, HINGE, TRIPLE, Floats, Record
 
 # What is added to conditions that an axis meets also where it is turned over.
 TURNED_OVER = 2.0
@@ -32,7 +32,8 @@ def place_pivot(pivot: Record, frame: Floats, side: float, own: Floats) -> float
         own[FOOT + 1] = last_angle(frame, axes, own[FOOT], 0.0, 1)
     elif pivot["foot"] == TRIPLE:
         last = vec(axes[2])
-        sure = aim(axes, last, turn(frame, last), side, own[FOOT:HEAD])
+        put(own[FOOT_LINE:HEAD_LINE], turn(frame, last))
+        sure = aim(axes, last, vec(own[FOOT_LINE:]), side, own[FOOT:HEAD])
         own[FOOT + 2] = last_angle(frame, axes, own[FOOT], own[FOOT + 1], 2)
         return sure
     return 1.0

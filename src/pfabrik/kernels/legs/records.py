@@ -79,7 +79,8 @@ LEG = np.dtype(
 
 # What is told of a leg at a pose: places in its row of `values`.
 CARRIER, FOOT, SLIDE, HEAD = 0, 1, 4, 5  # three angles at FOOT and at HEAD; the slides of a pivot at HEAD
-FOOT_LINE, HEAD_LINE = 8, 11  # the rod's direction as seen by the body its foot, or its head, is on
+# The rod's direction as seen by the body its foot, or its head, is on; the third hinge of a pivot by that of its foot.
+FOOT_LINE, HEAD_LINE = 8, 11
 COSINE, SINE = 14, 15  # of the crank's angle
 RATE = 1  # of an arm: the velocity and angular velocity of the platform that would change as much in its frame
 N_VALUES = 16

@@ -118,7 +118,7 @@ def put_pivot_slope(pivot: Record, frame: Floats, own: Floats, spot: int, slope:
         third = turn(frame, vec(axes[2]))
         others = cross(second, third) if which == 0 else (cross(third, first) if which == 1 else cross(first, second))
         D = dot(first, cross(second, third))
-        put_pose_slope(pivot, frame, NOWHERE, scale(1.0 / D, others), slope)
+        put_pose_slope(pivot, frame, NOWHERE, scale(1.0 / math.copysign(max(abs(D), ALIGNED), D), others), slope)
         return
     lean = dot(first, second)
     own_axis, other = (first, second) if which == 0 else (second, first)
@@ -128,8 +128,13 @@ def put_pivot_slope(pivot: Record, frame: Floats, own: Floats, spot: int, slope:
 
 @routine
 def cone_slope(table: Table, cone: Record, view: View) -> float:
-    """The angle of a rod's line from the axis of its cone, its derivative into `view.slope`."""
+    """The angle of a rod's line from the axis of its cone, its derivative into `view.slope`.
+
+    Or that of a pivot's third hinge, which goes with the platform, from an axis that does not.
+    """
     slope, k = view.slope, cone["leg"]
+    if table.legs[k]["kind"] == PIVOT:
+        return pivot_cone_slope(table, cone, view)
     end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
     main = main_of(table, k)
     axis, u = seen(table, k, main, end, vec(cone["axis"]), view), direction(view.lines[k])
@@ -139,6 +144,20 @@ def cone_slope(table: Table, cone: Record, view: View) -> float:
     if sine > ALIGNED:
         put_turning(table, k, main, end, scale(-1.0 / sine, axis), view)
     return angle_between(axis, u)
+
+
+@routine
+def pivot_cone_slope(table: Table, cone: Record, view: View) -> float:
+    """`cone_slope` of a pivot."""
+    slope, k = view.slope, cone["leg"]
+    leg, axis, line = table.legs[k], vec(cone["axis"]), vec(view.values[k, FOOT_LINE:])
+    for j in range(slope.shape[0]):
+        slope[j] = 0.0
+    across = cross(axis, line)
+    if norm(across) > ALIGNED:
+        put_pose_slope(leg, view.frames[leg["frame"]], NOWHERE, scale(1.0 / norm(across), across), slope)
+        put_arm_slopes(table, k, view, slope)
+    return angle_between(axis, line)
 
 
 @routine
