@@ -9,7 +9,7 @@ import numpy as np
 from ._jit import allocator, routine
 from .closure.loops import Floats, Ints
 from .qp import QP, factorise, solve_qp
-from .sqp import CLOSING, GAP, LIMITS, MOTIONS, RANK, ROWS, Linearisation, new_linearisation
+from .sqp import Linearisation, new_linearisation
 
 DEPENDENT = 1e-6
 """What is left of an equation that follows from the others: descriptions are typed with as many digits."""
@@ -74,7 +74,7 @@ def eliminate(rows: int, scratch: Elimination, view: FreeMotions, first: int, im
         taken[j] = 0.0 if used[j] > 0 else 1.0
     least, again = DEPENDENT, 0
     if implied > 0:
-        least, again = max(DEPENDENT, LOOSE * view.linear.scalars[GAP]), first
+        least, again = max(DEPENDENT, LOOSE * view.linear.totals[0]["gap"]), first
     for turn in range(rows + again):
         row = turn if turn < first else turn - first if turn < first + again else turn - again
         if not first <= turn < first + again or rank <= min(row, first - implied - 1):
@@ -92,8 +92,8 @@ def eliminate(rows: int, scratch: Elimination, view: FreeMotions, first: int, im
         shift[pivots[r]] = A[r, n]
         for i in range(rows):
             view.transform[r, i] = A[r, n + 1 + i]
-    counts = view.linear.counts
-    counts[MOTIONS], counts[RANK], counts[ROWS] = motions, rank, rows
+    totals = view.linear.totals[0]
+    totals["motions"], totals["rank"], totals["rows"] = motions, rank, rows
 
 
 @routine
@@ -129,13 +129,13 @@ def solve_row(row: int, rank: int, rows: int, least: float, scratch: Elimination
 @routine
 def put_multipliers(gradient: Floats, view: FreeMotions, multipliers: Floats) -> float:
     """Multipliers with which the equations balance a gradient at the pivot unknowns; the sum of their sizes."""
-    counts, pivots, transform, total = view.linear.counts, view.pivots, view.transform, 0.0
+    totals, pivots, transform, total = view.linear.totals[0], view.pivots, view.transform, 0.0
     for i in range(multipliers.shape[0]):
         multipliers[i] = 0.0
-    for r in range(counts[RANK]):
-        for i in range(counts[ROWS]):
+    for r in range(totals["rank"]):
+        for i in range(totals["rows"]):
             multipliers[i] -= gradient[pivots[r]] * transform[r, i]
-    for i in range(counts[ROWS]):
+    for i in range(totals["rows"]):
         total += abs(multipliers[i])
     return total
 
@@ -144,10 +144,10 @@ def put_multipliers(gradient: Floats, view: FreeMotions, multipliers: Floats) ->
 def project_gradient(force: Floats, view: FreeMotions) -> None:
     """The gradient of the objective in the free motions, from that in the unknowns, and the metric."""
     basis, g, metric, n = view.basis, view.linear.g, view.linear.metric, force.shape[0]
-    view.linear.scalars[CLOSING] = 0.0
+    view.linear.totals[0]["closing"] = 0.0
     for j in range(n):
-        view.linear.scalars[CLOSING] += force[j] * view.shift[j]
-    for a in range(view.linear.counts[MOTIONS]):
+        view.linear.totals[0]["closing"] += force[j] * view.shift[j]
+    for a in range(view.linear.totals[0]["motions"]):
         g[a] = 0.0
         for j in range(n):
             g[a] += basis[j, a] * force[j]
@@ -164,7 +164,7 @@ def add_limit(k: int, h: float, number: int, slope: Floats, view: FreeMotions) -
     drift[k] = 0.0
     for j in range(slope.shape[0]):
         drift[k] += slope[j] * shift[j]
-    for a in range(linear.counts[MOTIONS]):
+    for a in range(linear.totals[0]["motions"]):
         G[k, a] = 0.0
         for j in range(slope.shape[0]):
             G[k, a] += slope[j] * basis[j, a]
@@ -180,7 +180,7 @@ def restoring_step(view: FreeMotions, by_all: bool, p: QP) -> bool:
     Shortest by itself; or, if equations are to be met by all unknowns and not by pivots alone, together with `shift`.
     """
     linear, basis, shift = view.linear, view.basis, view.shift
-    motions, k = linear.counts[MOTIONS], linear.counts[LIMITS]
+    motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
     for a in range(motions):
         p.g[a] = 0.0
         for j in range(shift.shape[0] if by_all else 0):

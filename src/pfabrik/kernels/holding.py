@@ -5,7 +5,7 @@ from __future__ import annotations
 from ._jit import routine
 from .closure.loops import Floats
 from .qp import QP, apply_inverse, factorise, solve_qp
-from .sqp import LIMITS, MOTIONS, Linearisation
+from .sqp import Linearisation
 
 SHARING = 1e-10
 """Weight of the sum of their squares against the balance of multipliers: far below what a limit's gradient counts."""
@@ -17,8 +17,8 @@ def balance(linear: Linearisation, near: float, p: QP, pulls: Floats) -> int:
 
     Of all that balance it as well, those whose squares have the least sum: limits that act as one share what they hold.
     """
-    motions, k = linear.counts[MOTIONS], 0
-    for c in range(linear.counts[LIMITS]):
+    motions, k = linear.totals[0]["motions"], 0
+    for c in range(linear.totals[0]["limits"]):
         if linear.h[c] > -near:
             for a in range(motions):
                 linear.G[k, a] = linear.G[c, a]

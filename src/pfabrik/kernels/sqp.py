@@ -22,6 +22,7 @@ import numpy as np
 
 from ._jit import allocator, routine
 from .closure.loops import Floats, Ints
+from .legs.records import Record, Records
 from .qp import QP, factorise, solve_qp
 
 LONGEST_STEP, AT_FIRST = 0.4, 0.1
@@ -67,16 +68,34 @@ WORTH = 0.01
 STEEPEST = 1e8
 """Damping, in units of curvature, that ends a search: no step however short leads down."""
 
-# Scalars of a control: damping, the largest curvature, what the last step promised, and the one before, the sum of the
-# multipliers of the equations, and what the penalty counts the largest gap or excess. Counts: steps taken, and 1 where
-# none is worth taking any more.
-DAMPING, LARGEST, PROMISE, BEFORE, HOLDING, WEIGHT = 0, 1, 2, 3, 4, 5
-STEPS, DONE, REJECTED = 0, 1, 2
+TOTALS = np.dtype(
+    [
+        ("value", "f8"),  # of the objective
+        ("gap", "f8"),  # the largest of a loop, or of what is held
+        ("excess", "f8"),  # the largest over a limit
+        ("closing", "f8"),  # what closing the loops adds to the objective
+        ("motions", "i8"),  # how many are free
+        ("limits", "i8"),  # how many are noted
+        ("rank", "i8"),  # of the equations
+        ("rows", "i8"),  # how many equations
+    ]
+)
+"""A configuration in numbers."""
 
-# Scalars of a linear: the objective, the largest gap of a loop, the largest excess, and what closing the loops adds to
-# the objective. Counts: unknowns, limits, rank, and equations.
-VALUE, GAP, EXCESS, CLOSING = 0, 1, 2, 3
-MOTIONS, LIMITS, RANK, ROWS = 0, 1, 2, 3
+CONTROL = np.dtype(
+    [
+        ("damping", "f8"),
+        ("largest", "f8"),  # curvature
+        ("promise", "f8"),  # what the last step promised
+        ("before", "f8"),  # and the one before
+        ("holding", "f8"),  # sum of the multipliers of the equations
+        ("weight", "f8"),  # what the penalty counts the largest gap or excess
+        ("steps", "i8"),  # taken
+        ("done", "i8"),  # 1 where none is worth taking any more
+        ("rejected", "i8"),  # 1 where the last did not lead down
+    ]
+)
+"""Step control: how long the next step may be, and whether there is one."""
 
 
 class Linearisation(NamedTuple):
@@ -88,15 +107,7 @@ class Linearisation(NamedTuple):
     h: Floats  # (k,): excess over each, negative inside
     drift: Floats  # (k,): what closing the loops adds to it
     which: Ints  # (k,): its number
-    scalars: Floats  # (4,)
-    counts: Ints  # (4,)
-
-
-class StepControl(NamedTuple):
-    """Step control: how long the next step may be, and whether there is one."""
-
-    scalars: Floats  # (6,): see above
-    counts: Ints  # (3,)
+    totals: Records  # (1,): TOTALS
 
 
 class Hessian(NamedTuple):
@@ -116,19 +127,13 @@ def new_linearisation(n: int, k: int) -> Linearisation:
         np.zeros(k),
         np.zeros(k),
         np.zeros(k, np.int64),
-        np.zeros(4),
-        np.zeros(4, np.int64),
+        np.zeros(1, TOTALS),
     )
 
 
 @allocator
 def new_hessian(n: int, k: int) -> Hessian:
     return Hessian(np.zeros((n, n)), np.zeros(k))
-
-
-@allocator
-def new_step_control() -> StepControl:
-    return StepControl(np.zeros(6), np.zeros(3, np.int64))
 
 
 @routine
@@ -150,21 +155,21 @@ def sum_of(multipliers: Floats, k: int) -> float:
 
 
 @routine
-def on_the_way(control: StepControl, share: float) -> float:
+def on_the_way(control: Record, share: float) -> float:
     """How far loops may be open after a share of the step planned."""
-    return max(CLOSED, OPEN * share * control.scalars[PROMISE])
+    return max(CLOSED, OPEN * share * control["promise"])
 
 
 @routine
 def openness(linear: Linearisation) -> float:
     """How far loops are open, or limits exceeded; nothing where that counts as closed."""
-    return 0.0 if is_closed(linear, CLOSED) else max(linear.scalars[GAP], linear.scalars[EXCESS])
+    return 0.0 if is_closed(linear, CLOSED) else max(linear.totals[0]["gap"], linear.totals[0]["excess"])
 
 
 @routine
 def is_closed(linear: Linearisation, tolerance: float) -> bool:
     """Whether loops are closed and limits kept."""
-    return bool(linear.scalars[GAP] <= tolerance and linear.scalars[EXCESS] <= tolerance)
+    return bool(linear.totals[0]["gap"] <= tolerance and linear.totals[0]["excess"] <= tolerance)
 
 
 @routine
@@ -175,7 +180,7 @@ def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: fl
     is not enough, damping grows. A programme without a solution takes what is exceeded as if it were just met; so does
     one where all is closed, for what is open by rounding is nothing to close.
     """
-    motions, k = linear.counts[MOTIONS], linear.counts[LIMITS]
+    motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
     closed = is_closed(linear, CLOSED)
     for c in range(k):
         p.h[c] = min(linear.h[c], 0.0) if closed else linear.h[c] + linear.drift[c]
@@ -203,7 +208,7 @@ def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: fl
             p.h[c] = min(linear.h[c], 0.0)
         if not solve_qp(p, motions, k):
             return -math.inf, damping
-    promise = 0.0 if closed else -linear.scalars[CLOSING]
+    promise = 0.0 if closed else -linear.totals[0]["closing"]
     for a in range(motions):
         promise -= linear.g[a] * p.x[a]
         for b in range(motions):
@@ -214,22 +219,22 @@ def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: fl
 @routine
 def is_last(linear: Linearisation, promise: float, before: float) -> bool:
     """Whether a step promises so little that none is worth taking after it; `before` is what the last one promised."""
-    fine = FINE * linear.scalars[VALUE]
-    return bool(promise <= LAST * linear.scalars[VALUE] or (before <= fine and promise > CONVERGING * before))
+    fine = FINE * linear.totals[0]["value"]
+    return bool(promise <= LAST * linear.totals[0]["value"] or (before <= fine and promise > CONVERGING * before))
 
 
 @routine
 def merit(linear: Linearisation, weight: float) -> float:
     """The objective, and what it would cost to close what is open: an exact penalty, whose weight is more than the sum
     of all multipliers."""
-    return linear.scalars[VALUE] + weight * openness(linear)
+    return linear.totals[0]["value"] + weight * openness(linear)
 
 
 @routine
 def leads_down(linear: Linearisation, gain: float, promise: float, weight: float) -> bool:
     """Whether a step that promised so much gained enough."""
-    if promise <= FINE * linear.scalars[VALUE]:
-        return gain >= -ROUNDING * linear.scalars[VALUE] - weight * CLOSED
+    if promise <= FINE * linear.totals[0]["value"]:
+        return gain >= -ROUNDING * linear.totals[0]["value"] - weight * CLOSED
     return gain > ENOUGH * promise
 
 
@@ -238,91 +243,89 @@ def note_multipliers(linear: Linearisation, p: QP, hessian: Hessian) -> None:
     """Keep the multipliers of a programme by the limits' own numbers."""
     for c in range(len(hessian.multipliers)):
         hessian.multipliers[c] = 0.0
-    for c in range(linear.counts[LIMITS]):
+    for c in range(linear.totals[0]["limits"]):
         hessian.multipliers[linear.which[c]] = p.multipliers[c]
 
 
 @routine
 def scale_objective(linear: Linearisation) -> float:
     """Choose the unit of the objective, 1 until now, so that its gradient is of order one; the unit."""
-    unit = 1.0 / max(math.sqrt(2.0 * linear.scalars[VALUE]), 1e-12)
-    linear.scalars[VALUE] *= unit
-    linear.scalars[CLOSING] *= unit
-    for a in range(linear.counts[MOTIONS]):
+    unit = 1.0 / max(math.sqrt(2.0 * linear.totals[0]["value"]), 1e-12)
+    linear.totals[0]["value"] *= unit
+    linear.totals[0]["closing"] *= unit
+    for a in range(linear.totals[0]["motions"]):
         linear.g[a] *= unit
     return unit
 
 
 @routine
-def begin_descent(linear: Linearisation, hessian: Hessian, control: StepControl) -> None:
+def begin_descent(linear: Linearisation, hessian: Hessian, control: Record) -> None:
     """Start at a feasible configuration."""
     for c in range(len(hessian.multipliers)):
         hessian.multipliers[c] = 0.0
-    control.scalars[DAMPING] = AT_FIRST * longest(linear.g, linear.counts[MOTIONS]) / LONGEST_STEP
-    control.scalars[PROMISE], control.scalars[WEIGHT] = math.inf, 0.0
-    control.counts[STEPS] = control.counts[DONE] = control.counts[REJECTED] = 0
+    control["damping"] = AT_FIRST * longest(linear.g, linear.totals[0]["motions"]) / LONGEST_STEP
+    control["promise"], control["weight"] = math.inf, 0.0
+    control["steps"] = control["done"] = control["rejected"] = 0
 
 
 @routine
-def rests_open(linear: Linearisation, led_down: bool, most_steps: int, control: StepControl) -> bool:
+def rests_open(linear: Linearisation, led_down: bool, most_steps: int, control: Record) -> bool:
     """Whether no step leads down where something is open."""
-    return not led_down and not is_closed(linear, NEARLY_CLOSED) and control.counts[STEPS] <= most_steps
+    return not led_down and not is_closed(linear, NEARLY_CLOSED) and control["steps"] <= most_steps
 
 
 @routine
-def go_on(control: StepControl) -> None:
+def go_on(control: Record) -> None:
     """Ask anew whether a step is worth taking, now that what was open is closed."""
-    control.scalars[PROMISE] = math.inf
-    control.counts[DONE] = 0
+    control["promise"] = math.inf
+    control["done"] = 0
 
 
 @routine
-def plan_step(linear: Linearisation, hessian: Hessian, control: StepControl, most_steps: int, p: QP) -> bool:
+def plan_step(linear: Linearisation, hessian: Hessian, control: Record, most_steps: int, p: QP) -> bool:
     """The next step to try, into `p.x`; False where none is worth trying."""
-    scalars = control.scalars
-    control.counts[STEPS] += 1
-    scalars[BEFORE] = scalars[PROMISE]
-    promise, damping = propose(linear, hessian, scalars[DAMPING], scalars[LARGEST], p)
-    scalars[WEIGHT] = max(LEAST_WEIGHT, 2.0 * (scalars[HOLDING] + sum_of(p.multipliers, linear.counts[LIMITS])))
-    promise += scalars[WEIGHT] * openness(linear)
-    scalars[PROMISE], scalars[DAMPING] = promise, damping
-    if promise <= 0.0 or damping > STEEPEST * scalars[LARGEST] or control.counts[STEPS] > most_steps:
-        control.counts[DONE] = 1
+    control["steps"] += 1
+    control["before"] = control["promise"]
+    promise, damping = propose(linear, hessian, control["damping"], control["largest"], p)
+    multipliers = control["holding"] + sum_of(p.multipliers, linear.totals[0]["limits"])
+    control["weight"] = max(LEAST_WEIGHT, 2.0 * multipliers)
+    promise += control["weight"] * openness(linear)
+    control["promise"], control["damping"] = promise, damping
+    if promise <= 0.0 or damping > STEEPEST * control["largest"] or control["steps"] > most_steps:
+        control["done"] = 1
         return False
     note_multipliers(linear, p, hessian)
     return True
 
 
 @routine
-def gained(linear: Linearisation, other: Linearisation, control: StepControl) -> float:
+def gained(linear: Linearisation, other: Linearisation, control: Record) -> float:
     """By how much the penalty is less at another configuration."""
-    weight = control.scalars[WEIGHT]
+    weight = control["weight"]
     return merit(linear, weight) - merit(other, weight)
 
 
 @routine
-def is_to_close(linear: Linearisation, other: Linearisation, share: float, control: StepControl) -> bool:
+def is_to_close(linear: Linearisation, other: Linearisation, share: float, control: Record) -> bool:
     """Whether a share of the step planned did not lead down, perhaps for what it left open."""
-    promise = share * control.scalars[PROMISE]
+    promise = share * control["promise"]
     gain = gained(linear, other, control)
-    return not leads_down(linear, gain, promise, control.scalars[WEIGHT]) and not is_closed(
-        other, on_the_way(control, share)
-    )
+    return not leads_down(linear, gain, promise, control["weight"]) and not is_closed(other, on_the_way(control, share))
 
 
 @routine
-def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, share: float, control: StepControl) -> bool:
+def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, share: float, control: Record) -> bool:
     """Whether a share of the step planned led from one linear down to another; damping follows how well it did."""
-    promise, gain = share * control.scalars[PROMISE], gained(linear, other, control)
-    led_down = feasible and leads_down(linear, gain, promise, control.scalars[WEIGHT])
-    if is_last(linear, promise, control.scalars[BEFORE]):
-        control.counts[DONE] = 1
-    control.scalars[PROMISE] = promise
-    damping, largest = control.scalars[DAMPING], control.scalars[LARGEST]
+    promise, gain = share * control["promise"], gained(linear, other, control)
+    led_down = feasible and leads_down(linear, gain, promise, control["weight"])
+    if is_last(linear, promise, control["before"]):
+        control["done"] = 1
+    control["promise"] = promise
+    damping, largest = control["damping"], control["largest"]
     if not led_down:
-        control.scalars[DAMPING] = max(4.0 * damping, WORTH * largest)
-    elif gain > GOOD * promise and control.counts[REJECTED] == 0:
+        control["damping"] = max(4.0 * damping, WORTH * largest)
+    elif gain > GOOD * promise and control["rejected"] == 0:
         damping *= 0.01 if share == 1.0 and abs(gain - promise) < EXACT * promise else 0.1
-        control.scalars[DAMPING] = damping if damping > 1e-8 * largest else 0.0
-    control.counts[REJECTED] = 0 if led_down else 1
+        control["damping"] = damping if damping > 1e-8 * largest else 0.0
+    control["rejected"] = 0 if led_down else 1
     return led_down

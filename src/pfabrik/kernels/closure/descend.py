@@ -17,17 +17,10 @@ from ..qp import QP, new_qp
 from ..rotations import turn_ball
 from ..sqp import (
     CLOSED,
-    DONE,
-    EXCESS,
-    GAP,
-    HOLDING,
-    LARGEST,
     LONGEST_STEP,
-    MOTIONS,
     NEARLY_CLOSED,
     PROBE,
     RESTORING,
-    STEPS,
     begin_descent,
     go_on,
     is_closed,
@@ -86,12 +79,12 @@ def lagrangian_hessian(
     By differences of the gradient of the Lagrangian, whose multipliers of the loops balance it at pivot coordinates.
     """
     n, linear, H = len(loops.lo), view.linear, work.hessian.H
-    motions = linear.counts[MOTIONS]
+    motions = linear.totals[0]["motions"]
     basis, here, there, along = view.basis, work.here, work.there, work.row
     for i in range(work.balance.shape[0]):
         work.balance[i] = 0.0
     lagrangian_gradient(loops, row, objective, state, work, work.here)
-    work.control.scalars[HOLDING] = put_multipliers(work.here, view, work.balance)
+    work.control[0]["holding"] = put_multipliers(work.here, view, work.balance)
     lagrangian_gradient(loops, row, objective, state, work, work.here)
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
@@ -131,7 +124,7 @@ def take(loops: Loops, view: FreeMotions, x: Floats, state: State, work: Workspa
     n = len(loops.lo)
     for j in range(n):
         work.row[j] = view.shift[j]
-        for a in range(view.linear.counts[MOTIONS]):
+        for a in range(view.linear.totals[0]["motions"]):
             work.row[j] += view.basis[j, a] * x[a]
     share = LONGEST_STEP / max(longest(work.row, n), LONGEST_STEP)
     move(loops, work.row, share, state)
@@ -176,13 +169,13 @@ def descend(
     p: QP,
 ) -> int:
     """From a feasible configuration, at which `first` is, down to the nearest; how many steps it took."""
-    view, other, hessian, control, most = first, second, work.hessian, work.control, objective.max_iterations
+    view, other, hessian, control, most = first, second, work.hessian, work.control[0], objective.max_iterations
     work.gradient.unit[0] = scale_objective(view.linear)
     begin_descent(view.linear, hessian, control)
-    while control.counts[DONE] == 0:
-        control.scalars[LARGEST] = lagrangian_hessian(loops, row, objective, best, trial, work, view)
+    while control["done"] == 0:
+        control["largest"] = lagrangian_hessian(loops, row, objective, best, trial, work, view)
         led_down = False
-        while not led_down and control.counts[DONE] == 0:
+        while not led_down and control["done"] == 0:
             if plan_step(view.linear, hessian, control, most, p):
                 copy_state(best, trial)
                 share = take(loops, view, p.x, trial, work)
@@ -198,7 +191,7 @@ def descend(
                     go_on(control)
                 led_down = True
     restore_feasibility(loops, row, objective, best, CLOSED, work, view, p)
-    return int(control.counts[STEPS])
+    return int(control["steps"])
 
 
 @search
@@ -233,6 +226,6 @@ def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Clo
         linearise(loops, row, objective, best, work, first)
         store_row(loops, row, best, closed)
         for group in range(closed.gaps.shape[1]):  # the loops are looked at as a whole
-            closed.gaps[row, group] = first.linear.scalars[GAP]
-            closed.excesses[row, group] = max(first.linear.scalars[EXCESS] - objective.margin, 0.0)
+            closed.gaps[row, group] = first.linear.totals[0]["gap"]
+            closed.excesses[row, group] = max(first.linear.totals[0]["excess"] - objective.margin, 0.0)
             closed.misses[row, group] = 0.0

@@ -9,7 +9,8 @@ import numpy as np
 
 from .._jit import allocator, routine
 from ..free_motions import Elimination, FreeMotions, add_limit, eliminate, new_elimination, project_gradient
-from ..sqp import EXCESS, GAP, LIMITS, MOTIONS, REACH, VALUE, Hessian, StepControl, new_hessian, new_step_control
+from ..legs.records import Records
+from ..sqp import CONTROL, REACH, Hessian, new_hessian
 from .loops import BALL, Floats, Layout, Loops, PoseObjective
 from .path_kinematics import Equations, State, compare_end, end_path, new_equations, pose_cone, walk_path
 from .pose_objective import PoseGradient, pose_gradient
@@ -21,7 +22,7 @@ class Workspace(NamedTuple):
     eq: Equations
     gradient: PoseGradient
     hessian: Hessian
-    control: StepControl
+    control: Records  # (1,): CONTROL
     gaps: Floats  # (paths, 6): between the ends of each path and of the first
     elimination: Elimination  # used: by how many paths, the first counted twice: it is in the equations of all
     row: Floats  # (columns,)
@@ -44,7 +45,7 @@ def new_workspace(loops: Loops, layout: Layout, rows: int) -> Workspace:
         new_equations(loops, layout),
         PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
         new_hessian(n, 2 * n + len(loops.cone_angles)),
-        new_step_control(),
+        np.zeros(1, CONTROL),
         np.zeros((paths, 6)),
         elimination,
         np.zeros(n),
@@ -91,10 +92,10 @@ def linearise(
     """Look at a configuration."""
     linear, n, here = view.linear, len(loops.lo), work.here
     gap = walk_all(loops, state, work)
-    linear.scalars[VALUE], held = pose_gradient(objective, objective.targets[row], state.X, work.gradient, True)
+    linear.totals[0]["value"], held = pose_gradient(objective, objective.targets[row], state.X, work.gradient, True)
     for k in range(held):
         gap = max(gap, abs(work.gradient.errors[k]))
-    linear.scalars[GAP] = gap
+    linear.totals[0]["gap"] = gap
     for j in range(n):
         here[j] = 0.0
     add_force(loops, 0, work.gradient.force, work, work.here)
@@ -139,7 +140,7 @@ def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace,
         for side in range(2):
             h = loops.lo[j] + margin - state.q[j] if side == 0 else state.q[j] - loops.hi[j] + margin
             if h > -REACH and work.elimination.used[j] > 0:
-                for a in range(linear.counts[MOTIONS]):
+                for a in range(linear.totals[0]["motions"]):
                     G[k, a] = -basis[j, a] if side == 0 else basis[j, a]
                 linear.drift[k] = -shift[j] if side == 0 else shift[j]
                 linear.h[k], linear.which[k] = h, 2 * j + side
@@ -153,8 +154,8 @@ def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace,
             add_cone(loops, cone, 1.0, work, work.row)
             excess = max(excess, h)
             k = add_limit(k, h, 2 * n + cone, work.row, view)
-    linear.counts[LIMITS] = k
-    linear.scalars[EXCESS] = excess
+    linear.totals[0]["limits"] = k
+    linear.totals[0]["excess"] = excess
 
 
 @routine

@@ -14,16 +14,9 @@ from ..legs.records import Floats, Table
 from ..sqp import (
     CLOSED,
     CORRECTIONS,
-    DONE,
-    GAP,
-    LARGEST,
     LONGEST_STEP,
-    MOTIONS,
     NEARLY_CLOSED,
-    PROMISE,
     RESTORING,
-    STEPS,
-    VALUE,
     begin_descent,
     go_on,
     is_closed,
@@ -65,7 +58,7 @@ def take(table: Table, view: FreeMotions, x: Floats, now: Now, search: Search) -
     n = step.shape[0]
     for j in range(n):
         step[j] = shift[j]
-        for a in range(view.linear.counts[MOTIONS]):
+        for a in range(view.linear.totals[0]["motions"]):
             step[j] += basis[j, a] * x[a]
     most = 0.0
     for j in range(n):
@@ -89,7 +82,7 @@ def restore_feasibility(
     for _step in range(steps):
         if is_closed(view.linear, tolerance):
             return True
-        gap = view.linear.scalars[GAP]
+        gap = view.linear.totals[0]["gap"]
         if not restoring_step(view, table.task[0]["arms"] > 0 or gap > STUCK * before, search.p):
             return False
         before = gap
@@ -121,14 +114,14 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
     from the last configuration that was closed, and closes each.
     """
     view, unit = search.first, search.gradient.unit
-    unit[0], search.control.counts[STEPS] = 1.0, 0
+    unit[0], search.control[0]["steps"] = 1.0, 0
     linearise(table, row, aim, search.best, search, view)
     if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
         return math.inf
     unit[0] = scale_objective(view.linear)
     for j in range(search.force.shape[0]):
         search.force[j] *= unit[0]
-    if view.linear.scalars[VALUE] == 0.0:
+    if view.linear.totals[0]["value"] == 0.0:
         return 0.0
     copy_now(search.best, search.closed)
     for closing in range(2):
@@ -149,13 +142,13 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
     ----------
     closing : 1 to close each step before it is judged.
     """
-    view, other, hessian, control = search.first, search.second, search.hessian, search.control
+    view, other, hessian, control = search.first, search.second, search.hessian, search.control[0]
     unit = search.gradient.unit
     begin_descent(view.linear, hessian, control)
-    while control.counts[DONE] == 0:
-        control.scalars[LARGEST] = lagrangian_hessian(table, row, aim, search, view)
+    while control["done"] == 0:
+        control["largest"] = lagrangian_hessian(table, row, aim, search, view)
         led_down = False
-        while not led_down and control.counts[DONE] == 0:
+        while not led_down and control["done"] == 0:
             if plan_step(view.linear, hessian, control, aim.pose.max_iterations, search.p):
                 copy_now(search.best, search.trial)
                 share = take(table, view, search.p.x, search.trial, search)
@@ -173,12 +166,12 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
                     view, other = other, view
                     if least < math.inf and is_by(search.best, met):
                         return least
-                    if HOPELESS * control.scalars[PROMISE] < view.linear.scalars[VALUE] - 0.5 * unit[0] * least * least:
+                    if HOPELESS * control["promise"] < view.linear.totals[0]["value"] - 0.5 * unit[0] * least * least:
                         return math.inf
                     if is_closed(view.linear, CLOSED):
                         copy_now(search.best, search.closed)
-                        if view.linear.scalars[VALUE] <= 0.5 * unit[0] * THERE * THERE:
-                            control.counts[DONE] = 1
+                        if view.linear.totals[0]["value"] <= 0.5 * unit[0] * THERE * THERE:
+                            control["done"] = 1
             if rests_open(view.linear, led_down, aim.pose.max_iterations, control):
                 if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
                     return -1.0
@@ -186,5 +179,5 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
                 led_down = True
     if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
         return -1.0
-    distance = math.sqrt(2.0 * view.linear.scalars[VALUE] / unit[0])
+    distance = math.sqrt(2.0 * view.linear.totals[0]["value"] / unit[0])
     return distance if distance > THERE else 0.0

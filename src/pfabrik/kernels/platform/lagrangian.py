@@ -9,7 +9,7 @@ from ..free_motions import FreeMotions, put_multipliers
 from ..legs.answer import end_of_rows
 from ..legs.frames import set_frames
 from ..legs.records import SHARED, Floats, Table
-from ..sqp import HOLDING, MOTIONS, PROBE, ROWS
+from ..sqp import PROBE
 from .equations import Now, is_carried, own_row, place_leg, put_leg_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .records import Aim
@@ -112,10 +112,10 @@ def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: F
     from `best`, where `search.look` still is.
     """
     linear, H, basis, step = view.linear, search.hessian.H, view.basis, search.step
-    motions, here, there = linear.counts[MOTIONS], search.here, search.there
+    motions, here, there = linear.totals[0]["motions"], search.here, search.there
     put_force(table, search, search.here)
-    search.control.scalars[HOLDING] = put_multipliers(search.here, view, search.balance)
-    add_balance(linear.counts[ROWS] - search.look.slopes.shape[0], search, search.here)
+    search.control[0]["holding"] = put_multipliers(search.here, view, search.balance)
+    add_balance(linear.totals[0]["rows"] - search.look.slopes.shape[0], search, search.here)
     note_pulled(table, aim, search)
     largest = 0.0
     for a in range(motions):

@@ -8,7 +8,6 @@ from .._jit import routine
 from ..free_motions import FreeMotions, add_limit, eliminate, project_gradient
 from ..legs.answer import deviation
 from ..legs.records import Table
-from ..sqp import EXCESS, GAP, LIMITS, VALUE
 from ..vectors import dot, vec
 from .equations import Now, place, put_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
@@ -19,13 +18,13 @@ from .search import NEAR, Search, put_objective
 @routine
 def linearise(table: Table, row: int, aim: Aim, now: Now, search: Search, view: FreeMotions) -> None:
     """Look at a configuration."""
-    scalars, errors = view.linear.scalars, search.gradient.errors
+    totals, errors = view.linear.totals[0], search.gradient.errors
     gap = place(table, now, search.look)
     put_slopes(table, search.look)
-    scalars[VALUE], held = put_objective(table, row, aim, now, search)
+    totals["value"], held = put_objective(table, row, aim, now, search)
     for k in range(held):
         gap = max(gap, abs(errors[k]))
-    scalars[GAP] = gap
+    totals["gap"] = gap
     eliminate(lay_out(held, search), search.elimination, view, search.look.rows.shape[0], aim.implied)
     project_gradient(search.force, view)
     linearise_limits(table, aim.pose.margin, search, view)
@@ -86,5 +85,5 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
                 for j in range(slope.shape[0]):
                     slope[j] *= kept[leg]
                 k = add_limit(k, over, first + leg, search.look.slope, view)
-    view.linear.counts[LIMITS] = k
-    view.linear.scalars[EXCESS] = excess
+    view.linear.totals[0]["limits"] = k
+    view.linear.totals[0]["excess"] = excess

@@ -18,7 +18,7 @@ from ..legs.table import open_table
 from ..qp import new_qp
 from ..rotations import difference, yaw_difference
 from ..rows import LIMIT_EXCESS, POSITION_ERROR, RESIDUAL, ROTATION_ERROR
-from ..sqp import STEPS, scale_objective
+from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .descend import descend
 from .equations import Now, is_carried, new_now, new_view, place
@@ -186,7 +186,7 @@ def search_from(
     sides : of the working mode that is to be kept, if one is.
     """
     distance = descend(table, row, aim, met[0], best, search)
-    is_lost = distance == math.inf and (met[0] == math.inf or search.control.counts[STEPS] == 0)
+    is_lost = distance == math.inf and (met[0] == math.inf or search.control[0]["steps"] == 0)
     if distance < math.inf:
         put_sides(table, search.best, search.look)
         if stays == 0 or not is_other_mode(table.legs, sides, search.best.sides):
@@ -245,7 +245,7 @@ def search_row(
         distance = descend(table, row, toward, away[0] if met[0] == math.inf else math.inf, best, search)
         if distance <= HOLDABLE:
             search_from(table, row, aim, sides, stays, search, best, met)
-        elif met[0] == math.inf and search.control.counts[STEPS] > 1:
+        elif met[0] == math.inf and search.control[0]["steps"] > 1:
             take_nearer(distance, away, search, best)
     return met[0]
 
@@ -298,6 +298,6 @@ def approach(
             continue
         least = search_row(table, row, aim, toward, own, others, hits, stays, work)
         found.distances[row] = least
-        found.steps[row] = search.control.counts[STEPS]
+        found.steps[row] = search.control[0]["steps"]
         if least < math.inf:
             write(table, row, aim.pose, search, best, found)

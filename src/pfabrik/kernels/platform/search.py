@@ -12,9 +12,9 @@ from ..closure.loops import BASE_AXES, LOCKED, Ints, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
 from ..legs.poses import turn_pose
-from ..legs.records import Floats, Table
+from ..legs.records import Floats, Records, Table
 from ..qp import QP, new_qp
-from ..sqp import Hessian, StepControl, new_hessian, new_step_control
+from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import copy_row, copy_table, wrap
 from .equations import Now, View, count_unknowns, new_now, new_view
 from .limits import coordinate_slope, counts_turns
@@ -30,7 +30,7 @@ class Search(NamedTuple):
     look: View
     gradient: PoseGradient
     hessian: Hessian
-    control: StepControl
+    control: Records  # (1,): CONTROL
     p: QP
     elimination: Elimination
     first: FreeMotions
@@ -64,7 +64,7 @@ def new_search(table: Table, cones: int) -> Search:
         new_view(table),
         PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
         new_hessian(n, limits),
-        new_step_control(),
+        np.zeros(1, CONTROL),
         new_qp(n, limits),
         elimination,
         new_free_motions(n, rows, limits),
