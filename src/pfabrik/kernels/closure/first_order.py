@@ -13,7 +13,7 @@ import numpy as np
 
 from .._jit import kernel, routine
 from ..rotations import turn_ball
-from .loops import BALL, FirstOrder, FirstOrderPlan, Floats, Layout, Loops
+from .loops import BALL, CONSTRAINT, PARALLEL, PASSIVE, SERIAL, FirstOrder, FirstOrderPlan, Floats, Layout, Loops
 from .path_kinematics import Equations, State, end_path, new_equations, new_state, walk_path
 
 SWEEPS = 40
@@ -40,19 +40,19 @@ def first_order(loops: Loops, layout: Layout, plan: FirstOrderPlan, coordinates:
         lay_out_motions(plan, screws, table)
         triangularise(table, m, plan.rank)
         measures = found.measures[row]
-        measures[0] = measures[1] = measures[2] = measures[3] = math.inf
+        measures[SERIAL] = measures[PARALLEL] = measures[CONSTRAINT] = measures[PASSIVE] = math.inf
         for k in range(plan.rank if plan.asks_constraint == 1 else 0):
             for i in range(m):
                 conditions[k, i] = table[i, k] if i >= k else 0.0
         if plan.asks_constraint == 1 and plan.rank > 0:
             rotate_apart(conditions, 0, m, sizes)
-            measures[2] = sizes[plan.rank - 1]
+            measures[CONSTRAINT] = sizes[plan.rank - 1]
         for k in range(n - plan.rank):
             for i in range(width):
                 motions[k, i] = table[m + i, plan.rank + k]
         rotate_apart(motions, 0, width, sizes)
         for k in range(shown):
-            measures[3] = sizes[k]
+            measures[PASSIVE] = sizes[k]
             for i in range(width):
                 pairs[k, i] = motions[k, i] / sizes[k] if sizes[k] > plan.least else 0.0
         rotate_apart(pairs, plan.twists, width, sizes)
@@ -60,13 +60,13 @@ def first_order(loops: Loops, layout: Layout, plan: FirstOrderPlan, coordinates:
         k = least_ratio(pairs, 0, plan.twists, shown, plan.least, sizes)
         for i in range(plan.twists):
             found.gained[row, i] = pairs[k, i] if k >= 0 else math.nan
-        measures[1] = ratio(pairs, k, 0, plan.twists, sizes)
+        measures[PARALLEL] = ratio(pairs, k, 0, plan.twists, sizes)
         rotate_apart(pairs, 0, plan.twists, sizes)
         put_map(pairs, 0, plan.twists, plan.twists, width, plan.freedoms, plan.least, sizes, found.inverse[row])
         k = least_ratio(pairs, plan.twists, width, plan.freedoms, plan.least, sizes)
         for i in range(plan.twists):
             found.lost[row, i] = pairs[k, i] if k >= 0 else math.nan
-        measures[0] = ratio(pairs, k, plan.twists, width, sizes)
+        measures[SERIAL] = ratio(pairs, k, plan.twists, width, sizes)
 
 
 @routine

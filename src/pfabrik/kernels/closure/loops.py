@@ -94,6 +94,10 @@ class Closed(NamedTuple):
     iterations: Ints  # (n,)
 
 
+# Columns of FirstOrder.measures.
+SERIAL, PARALLEL, CONSTRAINT, PASSIVE = 0, 1, 2, 3
+
+
 class FirstOrderPlan(NamedTuple):
     """What is asked of a mechanism, and what holds of it in general."""
 
@@ -114,7 +118,7 @@ class FirstOrder(NamedTuple):
 
     forward: Floats  # (n, twists, n_a)
     inverse: Floats  # (n, n_a, twists)
-    measures: Floats  # (n, 4): serial, parallel, constraint, passive
+    measures: Floats  # (n, 4): see above
     lost: Floats  # (n, twists): not yet unit vectors
     gained: Floats
 

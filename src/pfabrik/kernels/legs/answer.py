@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .._jit import allocator, kernel, routine
 from ..linear import solve_spd
 from ..rotations import yaw_of
+from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..vectors import copy_row, cross, dot, norm, put, scale, vec, wrap_into
 from .endings import SURE
 from .frames import by_arm, coordinate_of, facing, new_frames, place_arm, set_frames
@@ -20,8 +21,6 @@ from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Floats, Record, Records,
 from .rods import place_rod, rod_rows, rod_slopes
 from .table import open_table
 
-# Status of a row; REACHED is the public one's number.
-REACHED, PENDING = 0, 9
 # Largest constraint of a completed pose, and of one that the task sets whole [L or rad]: the promise is 1e-9, and the
 # gap of a loop may be some times the constraint's.
 CLOSED, CLOSE = 1e-13, 1e-10
@@ -297,8 +296,8 @@ def write_answer(table: Table, work: Completion, pose: Floats, actuators: Floats
     for i in range(table.driven.shape[0]):
         driven = table.driven[i]
         actuators[driven["column"]] = driven["home"] + deviation(driven, work.values) * driven["unit"]
-    measures[2] = worst_of(work.rows) * task["length"]
-    measures[3] = max(excess, 0.0)
+    measures[RESIDUAL] = worst_of(work.rows) * task["length"]
+    measures[LIMIT_EXCESS] = max(excess, 0.0)
     return REACHED
 
 

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._jit import inlined, kernel, routine
+from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..vectors import ON_BOUND, Vec, add, along, cross, dot, scale, sub, vec, wrap
-from .answer import CLOSE, CLOSED, KEPT, PENDING, REACHED
+from .answer import CLOSE, CLOSED, KEPT
 from .columns import (
     AX,
     AY,
@@ -326,7 +327,8 @@ def write_status(task: Record, first: int, n: int, S: Floats, status: NDArray[np
         is_open = (S[IS_SURE, i] == 1.0) & (not is_closed) & (task["unset"] > 0)
         status[first + i] = REACHED if is_reached else (OPEN if is_open else PENDING)
         left += 0 if is_reached else 1
-        measures[first + i, 2], measures[first + i, 3] = S[ROW, i] * length, max(S[EXCESS, i], 0.0)
+        measures[first + i, RESIDUAL] = S[ROW, i] * length
+        measures[first + i, LIMIT_EXCESS] = max(S[EXCESS, i], 0.0)
     return left
 
 

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._jit import allocator, kernel, routine
-from ..legs.answer import KEPT, PENDING, REACHED, deviation, excess_of, worst_of
+from ..legs.answer import KEPT, deviation, excess_of, worst_of
 from ..legs.poses import make_exact
 from ..legs.records import CARRIER, PIVOT, Floats, Record, Table
 from ..legs.table import open_table
 from ..linear import solve_spd, solve_square
 from ..references import opener
-from ..rows import LIMIT_EXCESS, RESIDUAL
+from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..vectors import copy_row, copy_table, wrap
 from .equations import Now, View, count_unknowns, new_now, new_view, place, put_slopes
 from .limits import coordinate_slope, counts_turns

@@ -9,8 +9,6 @@ from .._jit import kernel, routine
 from ..closure.loops import Ints
 from ..legs.answer import (
     KEPT,
-    PENDING,
-    REACHED,
     Completion,
     complete,
     cone_cosine,
@@ -27,6 +25,7 @@ from ..legs.frames import set_frames
 from ..legs.poses import load
 from ..legs.records import ARM, Floats, Table
 from ..legs.table import open_table
+from ..rows import PENDING, REACHED
 from ..vectors import copy_row
 from .equations import main_of
 
