@@ -295,9 +295,7 @@ HOLDING = {"2-PRU/UPR": closure.pru_upr, "rotopod": closure.rotopod, "angled 3-P
 """Machines whose platforms have fewer places for what is held than they have others."""
 
 
-@pytest.mark.filterwarnings(
-    "ignore:(divide by zero|invalid value):RuntimeWarning"
-)  # all legs at dead points, by design
+@pytest.mark.filterwarnings("ignore:(divide by zero|invalid value):RuntimeWarning")  # dead points, where interpreted
 @pytest.mark.parametrize("count", [2 if INTERPRETED else 150, pytest.param(800, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("hold", ["orientation", "position"])
 @pytest.mark.parametrize("name", HOLDING)

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .arrays import Floats
+from .arrays import Floats, Mask
 from .errors import InvalidArgument
 from .rotations import UNTURNED, from_quaternion, from_rotvec, from_rpy, nearest_rotations
 from .tolerances import TOLERANCES
@@ -160,7 +160,7 @@ def as_poses(target: Any) -> tuple[Floats, tuple[int, ...]]:
     raise InvalidArgument("target", f"shape {array.shape}", _EXPECTED)
 
 
-def are_poses(targets: Floats) -> NDArray[np.bool_]:
+def are_poses(targets: Floats) -> Mask:
     """Which of (n, 4, 4) arrays are poses, (n,)."""
     finite = np.asarray(np.isfinite(targets).all(axis=(1, 2)))
     R = np.where(finite[:, None, None], targets, np.eye(4))[:, :3, :3]

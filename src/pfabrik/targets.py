@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any, TypeAlias, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .arrays import Floats
+from .arrays import Floats, Ints
 from .description.mechanism import Mechanism, checked_mechanism
 from .description.task import task_of
 from .errors import InvalidArgument
@@ -72,7 +72,7 @@ def _from_joint(mechanism: Mechanism, target: Mapping[str, Any]) -> tuple[Floats
     return poses, values.shape[:-1]
 
 
-def refuse_invalid(targets: Floats, shape: tuple[int, ...], status: NDArray[np.int64], options: Options) -> None:
+def refuse_invalid(targets: Floats, shape: tuple[int, ...], status: Ints, options: Options) -> None:
     """Raise for rows that are no poses, naming the first of a batch, unless they are to be marked."""
     if (len(targets) == 1 and status[0] != INVALID) or options.on_invalid == "mark":
         return

@@ -6,13 +6,14 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .answers.answer import Wanted
 from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track, pace_of
+from .arrays import Floats
 from .checks import require_callable
 from .description.mechanism import Mechanism
 from .engine import inverse_engine_of
@@ -76,7 +77,7 @@ def track(
     return Track(mechanism, found, wanted, partial(_tracked, mechanism, options), pace)
 
 
-def _count_on(mechanism: Mechanism, rows: Rows, begin: NDArray[np.float64]) -> None:
+def _count_on(mechanism: Mechanism, rows: Rows, begin: Floats) -> None:
     """Count the turns of actuators on from those of the start, (n_a,), as far as their ranges go."""
     known = np.flatnonzero(rows.status != Status.INVALID)
     for column, drive in enumerate(mechanism.drives):
@@ -89,5 +90,5 @@ def _count_on(mechanism: Mechanism, rows: Rows, begin: NDArray[np.float64]) -> N
             rows.actuators[known, column] = values
 
 
-def _tracked(mechanism: Mechanism, options: Options, targets: NDArray[np.float64], start: Solution) -> Track:
+def _tracked(mechanism: Mechanism, options: Options, targets: Floats, start: Solution) -> Track:
     return track(mechanism, targets, start=start, options=options)

@@ -14,7 +14,7 @@ from .answers.solution import Solution, checked_solution
 from .answers.status import Status
 from .answers.table import aligned, plain
 from .answers.words import short_names
-from .arrays import Floats
+from .arrays import Floats, Mask
 from .description.mechanism import Mechanism
 from .description.notebook import card
 from .description.task import task_of
@@ -223,7 +223,7 @@ def _directions(name: str, given: ArrayLike) -> Floats:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
 
 
-def _require_task(mechanism: Mechanism, name: str, vectors: Floats, bad: NDArray[np.bool_]) -> None:
+def _require_task(mechanism: Mechanism, name: str, vectors: Floats, bad: Mask) -> None:
     rows = np.flatnonzero(bad)
     if len(rows):
         expected = f"directions within the task, {' '.join(mechanism.task)}: what it leaves out follows by itself"
@@ -281,7 +281,7 @@ class _Search:
             moving = moving[np.isfinite(near[moving]) & (step[moving] > 0.5 * TOLERANCES.position * units[moving])]
         return near
 
-    def _go_on(self, which: NDArray[np.intp], distances: Floats) -> NDArray[np.bool_]:
+    def _go_on(self, which: NDArray[np.intp], distances: Floats) -> Mask:
         """Whether poses so far out in some directions are reached; where they are, the next go on from them."""
         found = self._engine.advance(self._targets(which, distances), self.best.at(which))
         reached = np.asarray(found.rows.status == REACHED)

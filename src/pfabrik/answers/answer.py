@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..closure.configurations import Configurations
 from ..closure.projection import ways_of
 from ..description.mechanism import Mechanism
@@ -30,8 +30,6 @@ from ..kernels.rows import (
 from ..motion.displacements import columns, home_coordinates
 from .limits import ActiveLimit, active_limits, binding_limits, holding_limits
 from .status import Status
-
-Integers = NDArray[np.int64]
 
 Held: TypeAlias = Literal["orientation", "position"] | None
 """What of its target a projected answer has."""
@@ -78,7 +76,7 @@ class Answer:
         return shaped if shaped.ndim else shaped.item()
 
     @property
-    def status(self) -> Status | Integers:
+    def status(self) -> Status | Ints:
         return Status(int(self._rows.status[0])) if self.shape == () else self._rows.status.reshape(self.shape)
 
     @property
@@ -106,12 +104,12 @@ class Answer:
         return cast(float | Floats, self._shaped(self._rows.measures[:, LIMIT_EXCESS]))
 
     @property
-    def iterations(self) -> int | Integers:
-        return cast(int | Integers, self._shaped(self._rows.counters[:, ITERATIONS]))
+    def iterations(self) -> int | Ints:
+        return cast(int | Ints, self._shaped(self._rows.counters[:, ITERATIONS]))
 
     @property
-    def rounds(self) -> int | Integers:
-        return cast(int | Integers, self._shaped(self._rows.counters[:, ROUNDS]))
+    def rounds(self) -> int | Ints:
+        return cast(int | Ints, self._shaped(self._rows.counters[:, ROUNDS]))
 
     @property
     def held(self) -> Held | NDArray[np.object_]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.task import Task
 from ..motion.displacements import actuator_units, end_effector_pose, gaps
 from .solution import Solution, checked_solution
 
 
-def closure_residual(solution: Solution) -> float | NDArray[np.float64]:
+def closure_residual(solution: Solution) -> float | Floats:
     """Largest gap of any loop of an answer, by the closure engine, (...,) [length].
 
     Bodies are posed from `solution.joints` alone, along one tree of joints. Compared are the two bodies of every other

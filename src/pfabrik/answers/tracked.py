@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints, Mask
 from ..checks import put_limits, require_positive
 from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism
@@ -18,7 +18,7 @@ from ..errors import InvalidArgument
 from ..motion.displacements import actuator_units
 from ..poses import as_floats, between
 from ..tolerances import TOLERANCES
-from .answer import Integers, Wanted
+from .answer import Wanted
 from .limits import ActiveLimit
 from .solution import Solution, as_plain
 from .status import Status
@@ -86,7 +86,7 @@ class Track(Solution):
     if TYPE_CHECKING:  # a path is a batch: all of these are arrays
 
         @property
-        def status(self) -> Integers: ...
+        def status(self) -> Ints: ...
         @property
         def position_error(self) -> Floats: ...
         @property
@@ -98,9 +98,9 @@ class Track(Solution):
         @property
         def limit_excess(self) -> Floats: ...
         @property
-        def iterations(self) -> Integers: ...
+        def iterations(self) -> Ints: ...
         @property
-        def rounds(self) -> Integers: ...
+        def rounds(self) -> Ints: ...
         @property
         def held(self) -> NDArray[np.object_]: ...
         @cached_property
@@ -128,7 +128,7 @@ class Track(Solution):
         return None if self._pace is None else self._pace.sample_time
 
     @cached_property
-    def jumps(self) -> NDArray[np.bool_]:
+    def jumps(self) -> Mask:
         found = np.zeros(self.shape, bool)
         moved = np.maximum(_moves(self.mechanism, self.pose), self._actuator_moves().max(axis=1, initial=0.0))
         asked = np.maximum(SUSPICIOUS * _moves(self.mechanism, self.targets), LEAST)

@@ -13,15 +13,13 @@ import click
 import pfabrik as pf
 
 from ..answers.table import aligned
+from ..arrays import Floats
 from ..extras import require
 from ..telling import telling
 from .picture import picture
 from .whole import new_folder, whole_folder
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ..answers.tracked import Track
     from ..reproduce.study import Case
 
@@ -33,7 +31,7 @@ class Run:
     """One mechanism's circle, followed."""
 
     key: str
-    targets: NDArray[np.float64]
+    targets: Floats
     solution: Track
     seconds: float
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints, Mask
 from ..description.mechanism import Mechanism
 from ..kernels.closure import loops as K
 from ..kernels.threads import in_blocks
@@ -49,14 +49,14 @@ class Closure:
     loops: K.Loops
     scale: Floats
     turning: Floats
-    actuated: NDArray[np.int64]
+    actuated: Ints
     driven: frozenset[int]
     last_balls: frozenset[int]
     home: Floats
     whole: bool
 
     @property
-    def idle(self) -> NDArray[np.bool_]:
+    def idle(self) -> Mask:
         """Which coordinates are on no path (a tool's hinge): they rest, and nothing but their limits counts."""
         idle = np.ones(len(self.scale), bool)
         idle[self.loops.row_columns] = False
@@ -133,7 +133,7 @@ class Closing(NamedTuple):
     gaps: Floats
     excesses: Floats
     misses: Floats
-    iterations: NDArray[np.int64]
+    iterations: Ints
 
     @property
     def gap(self) -> Floats:
@@ -146,7 +146,7 @@ class Closing(NamedTuple):
         return np.asarray(self.excesses.max(axis=1, initial=0.0))
 
     @property
-    def feasible(self) -> NDArray[np.bool_]:
+    def feasible(self) -> Mask:
         """Which rows are closed within every limit, (n,)."""
         return np.asarray((self.gap <= CLOSED) & (self.excess <= TOLERANCES.limit))
 

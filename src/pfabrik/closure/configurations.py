@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, PENDING, RESIDUAL, Rows
 from .close import Closing, Closure, closure_of
@@ -87,13 +87,13 @@ class Configurations:
             return Configurations(rows, self.coordinates[places])
         return Configurations(rows, lambda: self.coordinates[places])
 
-    def replace(self, places: NDArray[np.intp], others: Configurations, rows: NDArray[np.bool_]) -> None:
+    def replace(self, places: NDArray[np.intp], others: Configurations, rows: Mask) -> None:
         """Put some rows of other configurations in some places, in place."""
         put_rows(self.rows, places, rows_at(others.rows, rows))
         if self.were_given:
             self.coordinates[places] = others.coordinates[rows]
 
-    def among(self, known: NDArray[np.bool_]) -> Configurations:
+    def among(self, known: Mask) -> Configurations:
         """As many rows as `known` has, with these configurations where it is true, INVALID and NaN elsewhere."""
         if known.all():
             return self

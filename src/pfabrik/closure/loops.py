@@ -7,9 +7,8 @@ from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..description.graph import cone_line, opposite
 from ..description.home_mobility import universal_axes
 from ..description.mechanism import Joint, Mechanism
@@ -202,11 +201,11 @@ def _starts(sizes: Iterable[int]) -> list[int]:
     return list(accumulate(sizes, initial=0))
 
 
-def _ints(values: Iterable[int]) -> NDArray[np.int64]:
+def _ints(values: Iterable[int]) -> Ints:
     return np.fromiter(values, np.int64)
 
 
-def _pairs(values: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
+def _pairs(values: Iterable[tuple[int, int]]) -> Ints:
     return np.array(list(values), np.int64).reshape(-1, 2)
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..motion.mobility import generic_of
@@ -62,7 +61,7 @@ def has_parasitic_motion(mechanism: Mechanism) -> bool:
     return bool((differences(closure_of(mechanism), poses, kept) > TOLERANCES.same_mode).any())
 
 
-def strays(mechanism: Mechanism, poses: Floats) -> NDArray[np.bool_]:
+def strays(mechanism: Mechanism, poses: Floats) -> Mask:
     """Whether poses (n, 4, 4) are those of a platform that has turned over though its legs keep it as it is, (n,)."""
     if not follows_task(mechanism) or has_parasitic_motion(mechanism):
         return np.zeros(len(poses), bool)

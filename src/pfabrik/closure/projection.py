@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
@@ -47,7 +47,7 @@ class Projected(NamedTuple):
 
     closing: Closing
     distances: Floats
-    holds: NDArray[np.int64]
+    holds: Ints
 
 
 @lru_cache(maxsize=256)
@@ -69,7 +69,7 @@ def held_back(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: W
     return weighed_limits(closure, coordinates, targets, platform=way.weights, frame=frame)
 
 
-def kept(mechanism: Mechanism, holds: NDArray[np.int64], position: Floats, rotation: Floats) -> NDArray[np.int64]:
+def kept(mechanism: Mechanism, holds: Ints, position: Floats, rotation: Floats) -> Ints:
     """What poses have of their targets, of what they were to hold, by how far they are: targets out of sight were not
     sought."""
     turned = (holds == HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
@@ -119,8 +119,8 @@ def _take_nearer(
     found: Closing,
     targets: Floats,
     way: Way,
-    hits: NDArray[np.int64],
-) -> NDArray[np.int64]:
+    hits: Ints,
+) -> Ints:
     """Take over the rows that are feasible, and nearer than the best so far; how often each best was found by now."""
     counts = found.feasible & ~strays(closure.mechanism, found.poses)
     distances = np.where(counts, way.distances(closure, found.poses, targets[rows]), np.inf)

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Mask
+from ..arrays import Floats, Ints, Mask
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import BASE_AXES
@@ -157,9 +157,7 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
     return told(closure, found, wanted, holds, options)
 
 
-def told(
-    closure: Closure, found: Closing, wanted: Floats, holds: NDArray[np.int64], options: Options
-) -> Configurations:
+def told(closure: Closure, found: Closing, wanted: Floats, holds: Ints, options: Options) -> Configurations:
     """Configurations found for poses (n, 4, 4), as answers: with what they hold, their errors, and their status."""
     mechanism = closure.mechanism
     within_turns(mechanism, found.coordinates)
@@ -255,7 +253,7 @@ def _search(
             found.improve(rest, tried)
 
 
-def _hits(best: Floats, tried: Floats, hits: NDArray[np.int64]) -> NDArray[np.int64]:
+def _hits(best: Floats, tried: Floats, hits: Ints) -> Ints:
     """How often each leg has ended where it came nearest, (n, groups); 0 for those that reached."""
     with np.errstate(invalid="ignore", over="ignore"):  # what is endlessly far off is neither nearer nor the same
         nearer, again = tried < (1.0 - SAME) * best, np.abs(tried - best) <= SAME * best

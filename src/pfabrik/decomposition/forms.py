@@ -6,10 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
+from ..arrays import Floats
 
-Array: TypeAlias = NDArray[np.float64]
 Interval: TypeAlias = tuple[float, float]
 FREE: Interval = (-math.inf, math.inf)
 
@@ -26,7 +24,7 @@ class NodeForm:
     """
 
     joints: tuple[str, ...]
-    at: Array
+    at: Floats
     shift: float = 0.0
     stroke: Interval = (0.0, 0.0)
     hinge: bool = False
@@ -46,7 +44,7 @@ class ConeForm:
     joint: str
     kind: Literal["carrier", "link", "platform"]
     node: int
-    axis: Array
+    axis: Floats
     half_angle: float
 
 
@@ -54,8 +52,8 @@ class ConeForm:
 class TrunkForm:
     """The joints between the base and the body that carries several branches; `told` are their names."""
 
-    points: tuple[Array, ...]
-    axes: tuple[Array, ...]
+    points: tuple[Floats, ...]
+    axes: tuple[Floats, ...]
     slides: tuple[bool, ...]
     ranges: tuple[Interval, ...]
     told: tuple[str, ...]
@@ -67,11 +65,11 @@ class BranchForm:
 
     nodes: tuple[NodeForm, ...]
     planar: int
-    normal: Array
-    end_normal: Array | None
+    normal: Floats
+    end_normal: Floats | None
     align: bool
     end_turn: Interval
-    rail: Array | None
+    rail: Floats | None
     rail_range: Interval
     cones: tuple[ConeForm, ...]
     told: tuple[str, ...]

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.graph import Step
 from ..description.home_mobility import universal_axes
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 
-Floats = NDArray[np.float64]
 Kind = Literal["R", "P", "S"]
 
 NO_AXIS = np.zeros(3)

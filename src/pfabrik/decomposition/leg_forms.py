@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from ..arrays import Floats
 from ..kernels.legs import records as K
-from .items import Floats, Item
+from .items import Item
 
 EndingKind = Literal["weld", "hinge", "cross", "triple", "ball"]
 

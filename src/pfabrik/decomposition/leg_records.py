@@ -7,15 +7,13 @@ from collections.abc import Sequence
 from itertools import accumulate, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Records
 from ..description.mechanism import Mechanism
 from ..kernels.legs import records as K
 from ..rotations import square_to
-from .items import Floats, Item
+from .items import Item
 from .leg_forms import Arm, KeptAxis, LegForm, Pivot, Rod, keeps_from_spinning
-
-Records = NDArray[np.void]
 
 _ENDINGS = {"weld": K.WELD, "hinge": K.HINGE, "cross": K.CROSS, "triple": K.TRIPLE, "ball": K.BALL}
 _CARRIERS = {"R": K.CRANK, "P": K.CARRIAGE}

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Records
 from ..description.graph import cone_line
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
@@ -21,9 +21,6 @@ from .items import Item, NoLeg
 from .leg_forms import Arm, LegForm, Rod, told_places
 from .leg_records import leg_records, row_counts
 from .stations import legs_of_sub_chain
-
-Floats = NDArray[np.float64]
-Records = NDArray[np.void]
 
 NO_WAY = "does not lead to the end effector"
 """The reason of a sub-chain beside every way to the end effector."""

@@ -23,11 +23,12 @@ from itertools import pairwise, product
 
 import numpy as np
 
+from ..arrays import Floats
 from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .decompose import Part, Split, SubChain
-from .items import HAS_LOOP, NO_AXIS, Floats, Item, NoLeg, are_parallel, area, items_of
+from .items import HAS_LOOP, NO_AXIS, Item, NoLeg, are_parallel, area, items_of
 from .leg_forms import Arm, Ending, EndingKind, KeptAxis, LegForm, Pivot, Rod, keeps_from_spinning, told_places
 
 MOST_HINGES, MOST_ARMS = 3, 3

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..description.joints import Joint
 from ..tolerances import TOLERANCES
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -64,16 +62,16 @@ def parallelogram_of(ways: Sequence[Sequence[Joint]], length: float) -> Parallel
     return Parallelogram(rods, float(np.linalg.norm(rod)), float(np.linalg.norm(side)), pinned)
 
 
-def _off(point: Array, axis: Array) -> Array:
+def _off(point: Floats, axis: Floats) -> Floats:
     """A point without its part along an axis: where on its axis a pin sits does not matter."""
     return np.asarray(point - (point @ axis) * axis)
 
 
-def _area(a: Array, b: Array) -> float:
+def _area(a: Floats, b: Floats) -> float:
     """Area between two vectors; of unit vectors, the sine of the angle between them."""
     return float(np.linalg.norm(np.cross(a, b)))
 
 
-def _spans(rod: Array, side: Array) -> bool:
+def _spans(rod: Floats, side: Floats) -> bool:
     """Whether two sides are not in one line: a flat parallelogram may open into one whose rods cross."""
     return _area(rod, side) > TOLERANCES.alignment * max(float(rod @ rod), float(side @ side))

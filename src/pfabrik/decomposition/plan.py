@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Records
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.reaching import plan as P
@@ -25,7 +25,7 @@ class JointPoint:
     joint: str
     node: int
     shift: float
-    axis: NDArray[np.float64]
+    axis: Floats
     carrier: int  # what the axis turns with: a carrier, or -1 for the platform
 
 
@@ -187,11 +187,11 @@ class _Builder:
         return CompiledPlan(plan, tuple(self.points), tuple(self.trunk_names), tuple(self.trunk_points), home)
 
 
-def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unit(vector: Floats) -> Floats:
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def _records(rows: list[dict[str, Any]], dtype: np.dtype[np.void]) -> P.Records:
+def _records(rows: list[dict[str, Any]], dtype: np.dtype[np.void]) -> Records:
     array = np.zeros(len(rows), dtype)
     for i, row in enumerate(rows):
         for name, value in row.items():

@@ -14,10 +14,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..arrays import Floats
 from ..description.graph import Step
 from ..description.mechanism import Joint, Mechanism
 from ..tolerances import TOLERANCES
-from .forms import FREE, Array, BranchForm, ConeForm, Interval, NodeForm, NotExpressible, TrunkForm
+from .forms import FREE, BranchForm, ConeForm, Interval, NodeForm, NotExpressible, TrunkForm
 from .spots import Spot, spots_along
 
 
@@ -28,7 +29,7 @@ class _Draft:
     spots: list[Spot]
     rail: Step | None = None
     planar: int = 0
-    normal: Array = field(default_factory=lambda: np.zeros(3))
+    normal: Floats = field(default_factory=lambda: np.zeros(3))
     ends_in_plane: bool = False
     align: bool = False
     told: list[str] = field(default_factory=list)
@@ -128,7 +129,7 @@ def _classify(draft: _Draft) -> None:
             )
 
 
-def _is_parallel(axis: Array | None, normal: Array) -> bool:
+def _is_parallel(axis: Floats | None, normal: Floats) -> bool:
     return axis is not None and float(np.linalg.norm(np.cross(axis, normal))) <= TOLERANCES.alignment
 
 
@@ -196,12 +197,12 @@ def _range_hinge(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: 
     return replace(nodes[k], turn=(lo, hi), angle_home=angle_home)
 
 
-def _sense(step: Step, normal: Array) -> float:
+def _sense(step: Step, normal: Floats) -> float:
     """+1 if the joint's coordinate grows when the outward body turns right-handed about `normal`."""
     return math.copysign(1.0, float(np.array(step.joint.axis) @ normal) * step.sign)
 
 
-def _angle_about(normal: Array, a: Array, b: Array) -> float:
+def _angle_about(normal: Floats, a: Floats, b: Floats) -> float:
     return math.atan2(float(normal @ np.cross(a, b)), float(a @ b))
 
 
@@ -221,7 +222,7 @@ def _end_turn(mechanism: Mechanism, draft: _Draft) -> Interval:
     return lo, hi
 
 
-def _rail(mechanism: Mechanism, draft: _Draft) -> tuple[Array | None, Interval]:
+def _rail(mechanism: Mechanism, draft: _Draft) -> tuple[Floats | None, Interval]:
     if draft.rail is None:
         return None, FREE
     joint = draft.rail.joint

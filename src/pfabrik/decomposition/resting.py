@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arrays import Floats, Records
 from ..kernels.legs import records as K
 from ..rotations import from_rotvec
-from .leg_table import Floats, LegTable, Records
+from .leg_table import LegTable
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,12 @@ from typing import Literal
 
 import numpy as np
 
+from ..arrays import Floats
 from ..description.graph import Step
 from ..description.home_mobility import universal_axes
 from ..description.mechanism import Joint, Mechanism
 from ..tolerances import TOLERANCES
-from .forms import Array, NotExpressible
+from .forms import NotExpressible
 
 _KINDS: dict[str, Literal["R", "U", "S"]] = {"revolute": "R", "universal": "U", "spherical": "S"}
 
@@ -25,8 +26,8 @@ class Spot:
 
     kind: Literal["R", "U", "S", "point"]
     steps: list[Step]
-    at: Array
-    axis: Array | None = None
+    at: Floats
+    axis: Floats | None = None
     slider: Step | None = None
 
 
@@ -94,7 +95,7 @@ def _merge(mechanism: Mechanism, spots: list[Spot], near: float) -> list[Spot]:
     return merged
 
 
-def _common_centre(a: Spot, b: Spot, near: float) -> Array | None:
+def _common_centre(a: Spot, b: Spot, near: float) -> Floats | None:
     """Where two neighbouring joints act as one, or None."""
     if "point" in (a.kind, b.kind) or (a.kind == "S" and b.kind == "S"):
         return None
@@ -135,7 +136,7 @@ def _check_pointing(mechanism: Mechanism, spots: Sequence[Spot]) -> None:
             raise NotExpressible(f"joint {name} does not point anywhere: its link is not square to its axis")
 
 
-def _nearest_to(joint: Joint, body: str, axis: Array) -> float:
+def _nearest_to(joint: Joint, body: str, axis: Floats) -> float:
     """How near the cone of a universal joint lets its line come to the axis on a body [rad]; 0 where nothing does."""
     cone = joint.cone
     if cone is None or cone.fixed_to != body:
@@ -143,9 +144,9 @@ def _nearest_to(joint: Joint, body: str, axis: Array) -> float:
     return math.acos(min(abs(float(np.array(cone.axis) @ axis)), 1.0)) - cone.half_angle
 
 
-def _turns(mechanism: Mechanism, steps: Sequence[Step]) -> list[tuple[str, Array]]:
+def _turns(mechanism: Mechanism, steps: Sequence[Step]) -> list[tuple[str, Floats]]:
     """The axes of revolute and universal joints in a row, outward, with the names of their joints."""
-    turns: list[tuple[str, Array]] = []
+    turns: list[tuple[str, Floats]] = []
     for step in steps:
         joint = step.joint
         axes = [np.array(joint.axis)] if joint.type == "revolute" else list(universal_axes(mechanism, joint))
@@ -153,5 +154,5 @@ def _turns(mechanism: Mechanism, steps: Sequence[Step]) -> list[tuple[str, Array
     return turns
 
 
-def _are_square(axis: Array, other: Array) -> bool:
+def _are_square(axis: Floats, other: Floats) -> bool:
     return abs(float(axis @ other)) <= TOLERANCES.alignment

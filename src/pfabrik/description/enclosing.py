@@ -6,7 +6,9 @@ import sys
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
 
 ROUNDING = 64 * sys.float_info.epsilon
 """How far outside a sphere a point may lie and count as on it [radius]: what a handful of operations round off."""
@@ -35,7 +37,7 @@ def enclosing_radius(points: ArrayLike) -> float:
     return size * _radius_at_unit_size(cloud / size) if size > 0.0 else 0.0
 
 
-def _radius_at_unit_size(cloud: NDArray[np.float64]) -> float:
+def _radius_at_unit_size(cloud: Floats) -> float:
     carriers, centre, radius = cloud[:1], cloud[0], 0.0
     while True:
         distances = np.linalg.norm(cloud - centre, axis=1)
@@ -49,8 +51,8 @@ def _radius_at_unit_size(cloud: NDArray[np.float64]) -> float:
 
 
 def _smallest_among_subsets(
-    points: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    points: Floats,
+) -> tuple[Floats, Floats, float]:
     """The carriers, centre and radius of the smallest sphere around at most five points."""
     best = (points, points[0], np.inf)
     for count in range(2, min(len(points), 4) + 1):
@@ -64,10 +66,10 @@ def _smallest_among_subsets(
     return best
 
 
-def _circumcentre(carriers: NDArray[np.float64]) -> NDArray[np.float64]:
+def _circumcentre(carriers: Floats) -> Floats:
     """The point of their affine hull that is equally far from all carriers."""
     edges = carriers[1:] - carriers[0]
     halves = 0.5 * np.einsum("ij,ij->i", edges, edges)
-    offset: NDArray[np.float64] = np.linalg.lstsq(edges, halves, rcond=None)[0]
-    centre: NDArray[np.float64] = carriers[0] + offset
+    offset: Floats = np.linalg.lstsq(edges, halves, rcond=None)[0]
+    centre: Floats = carriers[0] + offset
     return centre

@@ -15,8 +15,8 @@ from heapq import heappop, heappush
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import InvalidArgument
 from .joint_types import KINDS
 from .joints import Joint
@@ -86,8 +86,8 @@ class Tree:
 
     steps: tuple[tuple[int, bool], ...]
     closing: tuple[int, ...]
-    paths: Mapping[str, NDArray[np.float64]]
-    loops: NDArray[np.float64]
+    paths: Mapping[str, Floats]
+    loops: Floats
 
     def way(self, body: str) -> list[tuple[int, bool]]:
         """The steps from the root to a body, in order."""
@@ -113,7 +113,7 @@ def spanning_tree(edges: Sequence[Edge], root: str) -> Tree:
     one = np.eye(len(edges))
     paths = {root: np.zeros(len(edges))}
     steps: list[tuple[int, bool]] = []
-    loops: dict[int, NDArray[np.float64]] = {}
+    loops: dict[int, Floats] = {}
     waiting = list(touching[root])
     taken = set(waiting)
     while waiting:

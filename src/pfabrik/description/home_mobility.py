@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats
 from ..rotations import square_to
 from ..tolerances import TOLERANCES
 from .graph import next_joints, steps_from_base, tree_of
@@ -20,7 +21,7 @@ from .joints import Joint
 from .structure import Structure
 
 
-def body_twist(path: NDArray[np.float64], screws: NDArray[np.float64]) -> NDArray[np.float64]:
+def body_twist(path: Floats, screws: Floats) -> Floats:
     """Twist of a body per rate, shape (..., 6, c).
 
     Parameters
@@ -31,7 +32,7 @@ def body_twist(path: NDArray[np.float64], screws: NDArray[np.float64]) -> NDArra
     return np.swapaxes(screws, -1, -2) * path
 
 
-def loop_conditions(loops: NDArray[np.float64], screws: NDArray[np.float64]) -> NDArray[np.float64]:
+def loop_conditions(loops: Floats, screws: Floats) -> Floats:
     """What the loops ask to vanish, per rate, shape (..., 6 loops, c).
 
     Parameters
@@ -99,10 +100,10 @@ def _backward(way: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
 
 def _bracketed(
     way: list[tuple[int, bool]],
-    screws: NDArray[np.float64],
+    screws: Floats,
     owners: NDArray[np.intp],
-    rates: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    rates: Floats,
+) -> Floats:
     """The sum of [s_i, s_j] u_i u_j over the pairs of a way in their order, (6, k), at rates u (c, k)."""
     twist, total = np.zeros((6, rates.shape[1])), np.zeros((6, rates.shape[1]))
     for index, forward in way:
@@ -131,7 +132,7 @@ def inexactness(mechanism: Structure) -> float:
     return float(unclear.max(initial=0.0))
 
 
-def universal_axes(mechanism: Structure, joint: Joint) -> NDArray[np.float64]:
+def universal_axes(mechanism: Structure, joint: Joint) -> Floats:
     """The two axes of a universal joint at home, shape (2, 3): its own, or the default where none are given.
 
     The default axes are normal to each other and to the line to the only next joint (on the body farther from the
@@ -150,9 +151,7 @@ def universal_axes(mechanism: Structure, joint: Joint) -> NDArray[np.float64]:
     return np.asarray(normals if joint.connects[0] == inward else normals[::-1])
 
 
-def joint_screws(
-    mechanism: Structure, joint: Joint, point: tuple[float, float, float] = (0.0, 0.0, 0.0)
-) -> NDArray[np.float64]:
+def joint_screws(mechanism: Structure, joint: Joint, point: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Floats:
     """Unit screws of a joint's coordinates at home, (freedoms, 6): angular velocity, velocity at a point [L].
 
     The three of a spherical joint are the rotations about x, y and z.
@@ -182,7 +181,7 @@ def column_joints(mechanism: Structure) -> NDArray[np.intp]:
     return np.repeat(np.arange(len(counts)), counts)
 
 
-def orthonormal_rates(mechanism: Structure) -> NDArray[np.float64]:
+def orthonormal_rates(mechanism: Structure) -> Floats:
     """Combinations of coordinates that turn a joint about orthonormal axes, shape (c, c), one a row.
 
     They count what a universal joint can do, however close its axes are; for all other joints they change nothing.
@@ -198,17 +197,17 @@ def orthonormal_rates(mechanism: Structure) -> NDArray[np.float64]:
     return combinations
 
 
-def _rotations(axes: ArrayLike, centre: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotations(axes: ArrayLike, centre: Floats) -> Floats:
     directions = np.asarray(axes, dtype=float)
     return np.hstack([directions, np.cross(centre, directions)])
 
 
-def _screws(mechanism: Structure) -> NDArray[np.float64]:
+def _screws(mechanism: Structure) -> Floats:
     """Unit screws of all coordinates at home, (c, 6), with the velocity at the reference point [L]."""
     return np.vstack([joint_screws(mechanism, joint, mechanism.reference_point) for joint in mechanism.joints])
 
 
-def _home_motion(mechanism: Structure, locked: frozenset[int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _home_motion(mechanism: Structure, locked: frozenset[int]) -> tuple[Floats, Floats]:
     """Twist of the end effector, (6, rates), and loop conditions, (6 loops, rates), per rate of what is not locked.
 
     Velocities are those at the reference point: at an origin far away from the machine its motions would look alike.
@@ -222,7 +221,7 @@ def _home_motion(mechanism: Structure, locked: frozenset[int]) -> tuple[NDArray[
     return body_twist(path[owners], screws), loop_conditions(tree.loops[:, owners], screws)
 
 
-def _null_space(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _null_space(matrix: Floats) -> Floats:
     """Orthonormal basis, one vector per column, of what the rows of the matrix are blind to."""
     if matrix.size == 0:
         return np.eye(matrix.shape[1])
@@ -230,7 +229,7 @@ def _null_space(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(rows[_count(values) :].T)
 
 
-def _rank(matrix: NDArray[np.float64]) -> int:
+def _rank(matrix: Floats) -> int:
     return _count(np.asarray(np.linalg.svd(matrix, compute_uv=False))) if matrix.size else 0
 
 

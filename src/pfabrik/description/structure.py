@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any, Literal, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import UnknownName
 from .coercion import items, numbers, text, texts, unit_vector
 from .enclosing import enclosing_radius
@@ -118,7 +118,7 @@ class Structure:
         return WHOLE_TASK if self._end_effector_joint() is None else WHOLE_TASK[:3]
 
     @cached_property
-    def home_pose(self) -> NDArray[np.float64]:
+    def home_pose(self) -> Floats:
         """Pose of the end effector at home, T_base_platform, shape (4, 4) [length]: the reference point, unrotated."""
         T_base_platform = np.eye(4)
         T_base_platform[:3, 3] = self.reference_point

@@ -6,14 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Record
 from ..decomposition.leg_forms import Arm, Rod
 from ..decomposition.leg_records import row_counts
 from ..decomposition.leg_table import LegTable, table_of_poses
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.legs import records as K
-from ..kernels.legs.records import Record
 from ..motion.mobility import generic_of
 from ..rotations import square_to
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from ..arrays import Record
 from ..kernels.legs import records as K
 from .machine import Coordinate, Leg, Machine
 from .self_test import Checks
@@ -147,6 +148,6 @@ def _coordinate(each: Coordinate) -> str:
     return f"    {{{whole}, {literal(each.sense)}, {lo}, {hi}, {literal(each.home)}}}"
 
 
-def _cone(cone: K.Record) -> str:
+def _cone(cone: Record) -> str:
     is_head = int(cone["place"] == K.HEAD_LINE)
     return f"    {{{int(cone['leg'])}, {is_head}, {literal(cone['axis'])}, {literal(float(cone['half_angle']))}}}"

@@ -1,4 +1,4 @@
-"""Angles between files, which may use degrees, and everything else, which uses radians."""
+"""Units of files: angles, which are radians everywhere else, and lengths, which are what a mechanism's label says."""
 
 from __future__ import annotations
 
@@ -9,6 +9,11 @@ from typing import Any
 from ..description.coercion import numbers, truths
 from ..description.form_faults import is_numbers
 from ..description.joint_types import KINDS, Coordinate, driven_places
+from ..errors import InvalidArgument, near_miss
+
+METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "µm": 1e-6}
+METRES |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
+"""Label of a unit of length -> its length [m]."""
 
 MEASURED = ("home", "range", "max_speed", "max_acceleration")
 """Fields of a joint in the unit of its coordinate (per second, per second squared): their numbers may be angles."""
@@ -81,3 +86,12 @@ def exact_degrees(angle: float) -> float | None:
 
 
 _DIGITS = 17  # enough to write any float exactly
+
+
+def metres_of(length_unit: str) -> float:
+    """Length of a unit [m], where a machine without a size counts in metres; InvalidArgument for an unknown label."""
+    known = METRES | {"unit": 1.0}
+    if not isinstance(length_unit, str) or length_unit not in known:
+        found = f"'{length_unit}'{near_miss(length_unit, known)}"
+        raise InvalidArgument("length_unit", found, f"a unit whose length in metres is known: {', '.join(known)}")
+    return known[length_unit]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Records
 from ..decomposition.decompose import SubChain
 from ..description.graph import Step
 from ..description.mechanism import Mechanism
@@ -24,7 +24,7 @@ from ..kernels._jit import kernel, routine
 from ..tolerances import TOLERANCES
 from .facts import Interval, centre, home_of, range_of, require, tolerances
 from .struts import FOOT_SIZE, measure_strut, read_strut, strut_records, write_status, write_strut
-from .targets import BLOCK, FREE, OVER, Records, Statuses, load_block
+from .targets import BLOCK, FREE, OVER, Statuses, load_block
 
 CANDIDATES_A_SIDE = 16
 """Values of swing and of extension in the grid. Of the catalogue's machine a grid of 16 finds an answer for 99 % of the

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Records
 from ..decomposition.decompose import SubChain
 from ..description.graph import Step
 from ..description.mechanism import Mechanism
@@ -16,7 +16,7 @@ from ..kernels._jit import kernel, routine
 from ..tolerances import TOLERANCES
 from .facts import Interval, centre, home_of, is_parallel, range_of, require, tolerances
 from .struts import write_status
-from .targets import BLOCK, FREE, OVER, Records, Statuses, load_block
+from .targets import BLOCK, FREE, OVER, Statuses, load_block
 
 # Rows of the table: direction of the elbow from the shoulder, and whether this leg exceeds anything (0 if not).
 ELBOW_X, ELBOW_Y, LEG_OVER = FREE, FREE + 1, FREE + 2

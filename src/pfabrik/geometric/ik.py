@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..kernels.threads import in_blocks
@@ -33,7 +32,7 @@ class Geometric:
         not reached.
     """
 
-    reached: bool | NDArray[np.bool_]
+    reached: bool | Mask
     actuators: Floats
 
     def __bool__(self) -> bool:

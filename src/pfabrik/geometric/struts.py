@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Records
 from ..decomposition.decompose import SubChain
 from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..kernels._jit import kernel, routine
 from ..tolerances import TOLERANCES
 from .facts import NO_CONE, centre, home_of, is_parallel, least_cosine, range_of, require, tolerances
-from .targets import BLOCK, FREE, OVER, REACHED, Records, Statuses, load_block
+from .targets import BLOCK, FREE, OVER, REACHED, Statuses, load_block
 
 _vector = ("f8", (3,))
 STRUT = np.dtype(

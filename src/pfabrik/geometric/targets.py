@@ -12,7 +12,6 @@ from ..arrays import Floats
 from ..kernels._jit import inlined, routine
 from ..tolerances import TOLERANCES
 
-Records: TypeAlias = NDArray[np.void]
 Statuses: TypeAlias = NDArray[np.int8]
 
 # What became of a row.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.graph import tree_of
 from ..description.home_mobility import body_twist, column_joints
 from ..description.structure import Structure
@@ -129,7 +128,7 @@ def _turn(loop: Loop, frames: Floats) -> Floats:
     return np.asarray(sines / np.sinc(angle / np.pi))
 
 
-def closed(closer: Closer, free: NDArray[np.bool_], low: Floats, high: Floats) -> Placed:
+def closed(closer: Closer, free: Mask, low: Floats, high: Floats) -> Placed:
     """The coordinates nearest to home, of those found, in which the loops meet; or are least open.
 
     Parameters
@@ -150,7 +149,7 @@ def closed(closer: Closer, free: NDArray[np.bool_], low: Floats, high: Floats) -
     return best
 
 
-def _descended(closer: Closer, q: Floats, free: NDArray[np.bool_], low: Floats, high: Floats) -> Placed:
+def _descended(closer: Closer, q: Floats, free: Mask, low: Floats, high: Floats) -> Placed:
     """Levenberg and Marquardt's method, its steps cut at the bounds."""
     damping = 1e-3
     rows, slopes = closer.linearised(q)

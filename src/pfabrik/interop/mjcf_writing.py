@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
+from ..files.units import metres_of
 from ..poses import as_floats
 from ..writing import whole_path
 from .cuts import CutTree, cut_tree
 from .mjcf_bodies import Names, as_attributes, bodies, names_of, vector
 from .physics import STEP, Physics, physics
-from .units import metres_of
 
 NOTE = "pfabrik."
 """How the names of custom elements begin that hold what MuJoCo has no word for."""

@@ -8,15 +8,15 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..answers.solution import Solution
 from ..answers.status import Status
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.home_mobility import end_effector_freedom
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..extras import require
+from ..files.units import metres_of
 from ..fk import solve_fk
 from ..ik import solve_ik
 from ..motion.displacements import columns
@@ -27,7 +27,6 @@ from ..tolerances import TOLERANCES
 from .cuts import cut_tree
 from .mjcf_bodies import names_of
 from .mjcf_writing import to_mjcf
-from .units import metres_of
 
 NEWTON_STEPS = 30
 """Most steps in which the referee closes loops that were opened by `APART`; five are usual."""
@@ -201,7 +200,7 @@ class Referee:
         lengths[turning] *= self.metres * self.mechanism.characteristic_length
         return float(lengths.max(initial=0.0))
 
-    def close(self, disturbance: NDArray[np.float64] | None = None) -> None:
+    def close(self, disturbance: Floats | None = None) -> None:
         """Newton's method on MuJoCo's rows, with the actuated joints held; from where a disturbance (nv,) leads to."""
         mujoco, model, data = self._mujoco, self.model, self.data
         if disturbance is not None:
@@ -227,7 +226,7 @@ class Referee:
         conditions = self.data.efc_J.reshape(-1, self.model.nv)[: self.data.ne]
         return int(np.linalg.matrix_rank(conditions, SAME_ROW)) if conditions.size else 0
 
-    def _disturbance(self, rng: np.random.Generator) -> NDArray[np.float64]:
+    def _disturbance(self, rng: np.random.Generator) -> Floats:
         """A motion of the passive joints, (nv,) [rad or m]."""
         model = self.model
         slides = model.jnt_type[model.dof_jntid] == self._mujoco.mjtJoint.mjJNT_SLIDE
@@ -236,7 +235,7 @@ class Referee:
         motion[self._held] = 0.0
         return np.asarray(motion)
 
-    def _turning_rows(self) -> NDArray[np.bool_]:
+    def _turning_rows(self) -> Mask:
         """Which rows are angles: the last three of every six, of a weld."""
         count = self.data.ne
         equalities = self.data.efc_id[:count]

@@ -16,12 +16,12 @@ from ..description.joint_types import KINDS, TASK_COORDINATES
 from ..description.joints import Cone, Joint
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
+from ..files.units import metres_of
 from ..motion.mobility import generic_of
 from .assembling import Imported, assemble
 from .cuts import unique
 from .opened import Loop, Note, OpenMechanism
 from .pruning import prune
-from .units import metres_of
 
 
 class Rates(NamedTuple):

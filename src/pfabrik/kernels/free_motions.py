@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays import Floats, Ints
 from ._jit import allocator, routine
-from .closure.loops import Floats, Ints
 from .qp import QP, factorise, solve_qp
 from .sqp import Linearisation, new_linearisation
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..arrays import Floats
 from ._jit import routine
-from .closure.loops import Floats
 from .qp import QP, apply_inverse, factorise, solve_qp
 from .sqp import Linearisation
 

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..arrays import Ints
 from ._jit import kernel, routine
-
-Integers = NDArray[np.int64]
 
 # A code has the places on three axes, or on two, in so many bits each.
 BITS = 20
@@ -31,7 +27,7 @@ def slot_of(code: int) -> int:
 
 
 @kernel
-def number_points(codes: Integers, table: Integers, known: Integers, count: int, adds: bool, numbers: Integers) -> int:
+def number_points(codes: Ints, table: Ints, known: Ints, count: int, adds: bool, numbers: Ints) -> int:
     """Fill the number of each code (n,); how many are known then.
 
     Parameters
@@ -57,7 +53,7 @@ def number_points(codes: Integers, table: Integers, known: Integers, count: int,
 
 
 @kernel
-def join(pairs: Integers, lowest: Integers) -> None:
+def join(pairs: Ints, lowest: Ints) -> None:
     """Note that two points each, (n, 2), hang together: from each, `lowest` leads to the lowest that it does with."""
     for i in range(pairs.shape[0]):
         a, b = root(lowest, pairs[i, 0]), root(lowest, pairs[i, 1])
@@ -65,7 +61,7 @@ def join(pairs: Integers, lowest: Integers) -> None:
 
 
 @routine
-def root(lowest: Integers, i: int) -> int:
+def root(lowest: Ints, i: int) -> int:
     """Where a point leads to in the end; the way there is halved for whoever comes next."""
     for _ in range(lowest.shape[0]):
         if lowest[i] == i:

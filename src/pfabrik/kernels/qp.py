@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays import Floats, Ints
 from ._jit import allocator, routine
-from .closure.loops import Floats, Ints
 
 # A limit violated by no more counts as kept, and one that rounding alone violates by no more ends the search; a
 # gradient that has no more of its square left beside the active ones depends on them.

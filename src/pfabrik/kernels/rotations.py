@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..arrays import Floats
 from ._jit import inlined, routine
-from .closure.loops import Floats
 
 # Below these squares of a half angle [rad] and of its sine, power series replace trigonometry: their first terms left
 # out are below 1e-17, and most steps of a search are as small.

@@ -20,9 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays import Floats, Ints, Record, Records
 from ._jit import allocator, routine
-from .closure.loops import Floats, Ints
-from .legs.records import Record, Records
 from .qp import QP, factorise, solve_qp
 
 LONGEST_STEP, AT_FIRST = 0.4, 0.1
@@ -93,6 +92,7 @@ CONTROL = np.dtype(
         ("steps", "i8"),  # taken
         ("done", "i8"),  # 1 where none is worth taking any more
         ("rejected", "i8"),  # 1 where the last did not lead down
+        ("recovered", "i8"),  # 1 where steps that left something open were lost
     ]
 )
 """Step control: how long the next step may be, and whether there is one."""

@@ -10,11 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ._jit import kernel, routine
-
-Floats = NDArray[np.float64]
 
 
 @kernel

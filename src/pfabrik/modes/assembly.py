@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..closure.close import Closing, Closure, close, closure_of, platform_poses
 from ..closure.starts import random_starts
 from ..description.mechanism import Mechanism
@@ -119,7 +118,7 @@ class _Search:
             if gone_on.any():
                 raise ContinuumOfSolutions(self.closure.mechanism.name, int(gone_on.sum()))
 
-    def _stepped(self, place: int, along: float) -> tuple[Floats, NDArray[np.bool_]]:
+    def _stepped(self, place: int, along: float) -> tuple[Floats, Mask]:
         """Where steps along each free motion of a mode end once they are closed again, and which stay about so far."""
         moved = stepped_freely(self.closure.mechanism, self.found.coordinates[place], along)
         closed = close(self.closure, moved, platform_poses(self.closure.mechanism, moved), locked=self.locked)

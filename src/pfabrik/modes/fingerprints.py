@@ -6,9 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..closure.close import Closing, Closure, close
 from ..description.task import task_of
 from ..motion.displacements import centres, columns
@@ -47,7 +46,7 @@ class Fingerprints:
         self._closure = closure
         locked = closure.driven
 
-        def rests(read: Read) -> NDArray[np.bool_]:
+        def rests(read: Read) -> Mask:
             return np.asarray((shifts(closure, coordinates, pose, read, locked) == 0.0).all(axis=(0, 2)))
 
         groups = np.arange(len(closure.loops.groups) - 1)

@@ -24,7 +24,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.graph import Tree, tree_of
 from ..description.home_mobility import (
     column_joints,
@@ -63,7 +63,7 @@ class _Geometry:
     turns: Floats
     slides: Floats
     screws: Floats
-    spherical: NDArray[np.bool_]
+    spherical: Mask
 
 
 @lru_cache(maxsize=64)

@@ -13,9 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..tolerances import TOLERANCES
@@ -105,7 +104,7 @@ def parallel_signs(mechanism: Mechanism, q: Floats) -> Floats:
     return np.asarray(np.where(invalid, np.nan, signs))
 
 
-def _set_aside(q: Floats) -> tuple[NDArray[np.bool_], Floats]:
+def _set_aside(q: Floats) -> tuple[Mask, Floats]:
     """Which rows are NaN, and q with home in their place."""
     invalid = np.asarray(np.isnan(q).any(axis=1))
     return invalid, np.where(invalid[:, None], 0.0, q)
@@ -179,7 +178,7 @@ def _nearest_gained(motion: _Motion) -> tuple[Floats, Floats]:
     return parallel, np.where(moves[:, None], freed, gained)
 
 
-def _rules(measure: Floats, other: Floats) -> NDArray[np.bool_]:
+def _rules(measure: Floats, other: Floats) -> Mask:
     """Whether the first kind of singularity has been met, and the other is not nearer still."""
     return np.asarray(measure < np.minimum(other, TOLERANCES.singular))
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats
+from ..files.units import METRES
 from .path import WrongPath
 
 WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
@@ -18,8 +19,6 @@ COMMENT = re.compile(r"\([^()]*\)|;.*")
 AXES = "XYZABC"
 OFFSETS = "IJK"
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
-MILLIMETRES = {"m": 1000.0, "dm": 100.0, "cm": 10.0, "mm": 1.0, "um": 1e-3, "µm": 1e-3}
-MILLIMETRES |= {"in": 25.4, "inch": 25.4, "ft": 304.8}
 IGNORED = {4, 40, 49, 54, 61, 64, 80, 94}
 """Codes that change no position here: dwell, no compensation of the tool, the first work offset, feed per minute."""
 
@@ -78,8 +77,9 @@ def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: fl
     tolerance : how far chords may be off their arc [length].
     longest : of a straight part of a move [length].
     """
-    unit = MILLIMETRES.get(length_unit.strip(), 1.0)
-    state = State(np.array(home, dtype=float), 1.0 / unit, units={20: 25.4 / unit, 21: 1.0 / unit})
+    unit = METRES.get(length_unit.strip(), METRES["mm"])
+    inches, millimetres = METRES["in"] / unit, METRES["mm"] / unit
+    state = State(np.array(home, dtype=float), millimetres, units={20: inches, 21: millimetres})
     yield Step(state.place.copy(), math.nan, 0)
     for number, text in enumerate(lines, 1):
         words = _words(text, number)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Mask
 from ..closure.close import HELD, close, closure_of
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
@@ -13,8 +13,6 @@ from ..motion.limits import within_turns
 from ..motion.meeting import meeting_joints, put_meeting_joints
 from ..tolerances import TOLERANCES
 from .table import machine_aimed
-
-Floats = NDArray[np.float64]
 
 RESTARTS = 24
 """Random starts for joints that closed forms do not tell and that do not close from where they began."""
@@ -58,7 +56,7 @@ def settled(
     return found
 
 
-def _put_others(mechanism: Mechanism, table: LegTable, poses: Floats, found: Floats) -> NDArray[np.bool_]:
+def _put_others(mechanism: Mechanism, table: LegTable, poses: Floats, found: Floats) -> Mask:
     """Write what legs do not tell, where it is where bodies meet, into joint coordinates (n, columns); which close."""
     known = frozenset(table.known["column"].tolist()) | closure_of(mechanism, whole=False).driven
     meeting = meeting_joints(mechanism, known)

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints, Records
 from ..closure.close import MARGIN
 from ..closure.projection import Way
-from ..decomposition.leg_table import LegTable, Records, leg_table
+from ..decomposition.leg_table import LegTable, leg_table
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
@@ -68,7 +68,7 @@ class Projected(NamedTuple):
     is none."""
 
     found: Found
-    holds: NDArray[np.int64]
+    holds: Ints
 
 
 def project(

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..closure.close import platform_poses
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
@@ -83,7 +83,7 @@ def without_idle_legs(table: LegTable) -> Machine:
     return Handle(kernel_table(table)._replace(legs=legs, cones=with_aims(legs, cones[_of_their_own(cones)])))
 
 
-def _of_their_own(cones: NDArray[np.void]) -> NDArray[np.bool_]:
+def _of_their_own(cones: NDArray[np.void]) -> Mask:
     """Which cones limit what none before limits as much."""
     own = np.ones(len(cones), dtype=bool)
     for i, cone in enumerate(cones):

@@ -8,6 +8,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..closure.close import Closing
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at
 from ..closure.parasitic import has_other_assemblies
@@ -28,8 +29,6 @@ from .nearest import in_lengths, weighed_limits
 from .one import OneAssembly, OneTarget
 from .table import Machine, machine, machine_nearby, resting_at_home
 from .unreached import Question, answer_unreached
-
-Floats = NDArray[np.float64]
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of a kernel that answers one by one, or in blocks."""

@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from ..arrays import Records
 from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting, at_rest
@@ -50,7 +51,7 @@ def machine_searched(table: LegTable) -> Machine:
     return Handle(kernel_table(table)._replace(cones=with_aims(table.legs, table.cones)))
 
 
-def with_aims(legs: K.Records, cones: K.Records) -> K.Records:
+def with_aims(legs: Records, cones: Records) -> Records:
     """Cones, and after them those that say where two crossed hinges can point their rods, or the third of a pivot.
 
     Hinges a, b with an angle A between them, and B between b and the rod: its angle from a is from |A - B| to A + B, or

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints, Mask
 from ..closure.configurations import put_rows, rows_at
 from ..closure.projection import kept, ways_of
 from ..decomposition.leg_table import LegTable
@@ -107,7 +107,7 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
     return left
 
 
-def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: Rows) -> NDArray[np.bool_]:
+def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: Rows) -> Mask:
     """Answer rows exactly from where their projections ended; which stay as they are."""
     from ..kernels.legs.answer import answer
 
@@ -132,9 +132,7 @@ def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, row
     return np.asarray(left)
 
 
-def _put_projected(
-    question: Question, rest: NDArray[np.intp], found: Found, holds: NDArray[np.int64], rows: Rows
-) -> None:
+def _put_projected(question: Question, rest: NDArray[np.intp], found: Found, holds: Ints, rows: Rows) -> None:
     """Write configurations found for rows `rest`."""
     mechanism, options = question.mechanism, question.options
     position, rotation = found.measures[:, POSITION_ERROR], found.measures[:, ROTATION_ERROR]

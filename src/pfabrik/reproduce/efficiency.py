@@ -8,12 +8,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import geometric
 from ..answers.solution import Solution
 from ..answers.status import Status
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..closure.configurations import new_rows, rows_at
 from ..closure.projection import ways_of
 from ..decomposition.leg_table import LegTable, leg_table
@@ -64,7 +63,7 @@ class Answered:
         return float(np.mean(np.asarray(self.solution.iterations)[self._are_reached]))
 
     @property
-    def _are_reached(self) -> NDArray[np.bool_]:
+    def _are_reached(self) -> Mask:
         return np.asarray(self.solution.status == Status.REACHED)
 
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import geometric
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import short_names
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..ik import solve_ik
 from ..tolerances import TOLERANCES
@@ -49,7 +48,7 @@ class Workspace:
 
     y: Floats
     z: Floats
-    reached: NDArray[np.bool_]
+    reached: Mask
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ class Robustness:
     seconds: Floats
 
     @property
-    def projected(self) -> NDArray[np.bool_]:
+    def projected(self) -> Mask:
         return np.asarray(self.solution.status == Status.PROJECTED)
 
     @property
@@ -124,13 +123,13 @@ def jumps(solution: Track, finer: Track) -> dict[str, dict[str, Jump]]:
     }
 
 
-def _jump(solution: Track, finer: Track, chosen: NDArray[np.bool_], part: str) -> Jump:
+def _jump(solution: Track, finer: Track, chosen: Mask, part: str) -> Jump:
     changes = _changes(solution, chosen, part)
     step = int(changes.argmax()) + 1 if changes.max() > 0.0 else -1
     return Jump(float(changes.max()), step, float(_changes(finer, chosen, part).max()))
 
 
-def _changes(solution: Track, chosen: NDArray[np.bool_], part: str) -> Floats:
+def _changes(solution: Track, chosen: Mask, part: str) -> Floats:
     """Largest change of the chosen actuators into each step but the first; 0 outside the part."""
     off = np.asarray(solution.status) != Status.REACHED
     parts = {"inside": ~off[1:] & ~off[:-1], "outside": off[1:] & off[:-1], "edge": off[1:] != off[:-1]}

@@ -8,9 +8,8 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..description.mechanism import Mechanism
 from ..description.readouts import readouts
 from ..extras import require
@@ -42,14 +41,14 @@ class Timed:
 
     mechanism: Mechanism
     times: Floats
-    steps: NDArray[np.int64]
+    steps: Ints
     poses: Floats
     actuators: Floats
     rates: Floats
     accelerations: Floats
     platform_speeds: Floats
     used: Floats
-    binding: NDArray[np.int64]
+    binding: Ints
     limits: tuple[tuple[str, What], ...]
 
     @property

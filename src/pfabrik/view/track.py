@@ -11,7 +11,7 @@ from ..answers.margins import margins
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..checks import require_method
 from ..description.readouts import Readout, readouts
 from ..drawing import SMALL, new_figure
@@ -150,7 +150,7 @@ def draw_ways(canvas: Canvas, track: Track) -> list[Artist]:
     return lines
 
 
-def next_to(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def next_to(marked: Mask) -> Mask:
     """The first and last step of every run of marked ones, so that lines on both sides of an end meet."""
     padded = np.concatenate([[True], marked, [True]])
     return np.asarray(marked & ~(padded[:-2] & padded[2:]))
@@ -215,7 +215,7 @@ def draw_limits(axes: Axes, group: list[tuple[int, Readout]]) -> None:
         axes.axhline(bound, color="black", linewidth=1, linestyle=LIMIT_DASHES, zorder=1)
 
 
-def shade_steps(axes: Axes, marked: NDArray[np.bool_]) -> None:
+def shade_steps(axes: Axes, marked: Mask) -> None:
     """A grey band behind every run of marked steps."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
     for start, stop in edges.reshape(-1, 2):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats
 from .._jit import inlined, routine, search
 from ..rotations import exponential, turn_about_z, turn_ball, yaw_of
 from .equations import (
@@ -23,7 +24,7 @@ from .equations import (
     pose_frame,
     turn_equations,
 )
-from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Floats, Layout, Loops
+from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Layout, Loops
 from .path_kinematics import Equations, State, copy_state, load_row, new_equations, new_state, store_row
 
 LONGEST_STEP = 0.5

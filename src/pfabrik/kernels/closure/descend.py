@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from ...arrays import Floats
 from .._jit import routine, search
 from ..free_motions import FreeMotions, new_free_motions, put_multipliers, restoring_step
 from ..holding import balance
@@ -40,7 +41,7 @@ from .linearise import (
     new_workspace,
     walk_all,
 )
-from .loops import BALL, Closed, Floats, Layout, Loops, PoseObjective
+from .loops import BALL, Closed, Layout, Loops, PoseObjective
 from .path_kinematics import State, copy_state, load_row, new_state, store_row
 from .pose_objective import pose_gradient
 

@@ -14,9 +14,10 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats, Ints
 from .._jit import inlined, routine
 from ..rotations import UPSIDE_DOWN, difference, exponential, yaw_difference
-from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, TARGET_AXES, ClosureProblem, Floats, Ints, Layout, Loops
+from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, TARGET_AXES, ClosureProblem, Layout, Loops
 from .path_kinematics import Equations, State, compare_end, end_path, pose_cone, walk_path
 
 

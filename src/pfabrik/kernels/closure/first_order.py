@@ -11,9 +11,10 @@ import math
 
 import numpy as np
 
+from ...arrays import Floats
 from .._jit import kernel, routine
 from ..rotations import turn_ball
-from .loops import BALL, CONSTRAINT, PARALLEL, PASSIVE, SERIAL, FirstOrder, FirstOrderPlan, Floats, Layout, Loops
+from .loops import BALL, CONSTRAINT, PARALLEL, PASSIVE, SERIAL, FirstOrder, FirstOrderPlan, Layout, Loops
 from .path_kinematics import Equations, State, end_path, new_equations, new_state, walk_path
 
 SWEEPS = 40

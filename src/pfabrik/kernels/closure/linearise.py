@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...arrays import Floats, Records
 from .._jit import allocator, routine
 from ..free_motions import Elimination, FreeMotions, add_limit, eliminate, new_elimination, project_gradient
-from ..legs.records import Records
 from ..sqp import CONTROL, REACH, Hessian, new_hessian
-from .loops import BALL, Floats, Layout, Loops, PoseObjective
+from .loops import BALL, Layout, Loops, PoseObjective
 from .path_kinematics import Equations, State, compare_end, end_path, new_equations, pose_cone, walk_path
 from .pose_objective import PoseGradient, pose_gradient
 

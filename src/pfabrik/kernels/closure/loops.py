@@ -8,11 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ...arrays import Floats, Ints
 
 # What weights of a rotation are about: the axes of the base; those of the target, of which the first two turn its z
 # axis (the tilt); or axes of which the third is half way between the z axes of base and platform, about which the

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...arrays import Floats
 from .._jit import allocator, inlined, routine
 from ..rotations import difference, logarithm, rotate_by, turn_ball
-from .loops import BALL, SLIDE, Closed, Floats, Layout, Loops
+from .loops import BALL, SLIDE, Closed, Layout, Loops
 
 
 class State(NamedTuple):

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from ...arrays import Floats
 from .._jit import routine
 from ..rotations import UPSIDE_DOWN, difference, yaw_difference
 from ..vectors import Vec, cross, dot, norm, scale
-from .loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, Floats, PoseObjective
+from .loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 
 ALIGNED = 1e-9
 """Sine below which two directions have no axis across them."""

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints, Record, Records
 from .._jit import allocator, kernel, routine
 from ..linear import solve_spd
 from ..rotations import yaw_of
@@ -17,7 +17,7 @@ from .endings import SURE
 from .frames import by_arm, coordinate_of, facing, new_frames, place_arm, set_frames
 from .pivots import any_across, pivot_rows, pivot_slopes, place_pivot
 from .poses import bring_yaw, load, load_pose, turn_pose
-from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Floats, Record, Records, Table
+from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Table
 from .rods import place_rod, rod_rows, rod_slopes
 from .table import open_table
 
@@ -249,7 +249,7 @@ def answer(
     targets: Floats,
     begins: Floats,
     sides: Floats,
-    status: NDArray[np.int64],
+    status: Ints,
     poses: Floats,
     actuators: Floats,
     measures: Floats,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints, Record
 from .._jit import inlined, kernel, routine
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..vectors import ON_BOUND, Vec, add, along, cross, dot, scale, sub, vec, wrap
@@ -45,20 +45,7 @@ from .columns import (
     lay_turned,
 )
 from .endings import SURE
-from .records import (
-    CARRIAGE,
-    CARRIER,
-    CRANK,
-    FOOT,
-    FOOT_LINE,
-    HEAD,
-    HINGE,
-    NO_CARRIER,
-    SHARED,
-    SLIDE,
-    Floats,
-    Record,
-)
+from .records import CARRIAGE, CARRIER, CRANK, FOOT, FOOT_LINE, HEAD, HINGE, NO_CARRIER, SHARED, SLIDE
 from .table import open_table
 
 # Status of a row that is a pose and within reach, but does not close before what its target leaves open is completed.
@@ -273,7 +260,7 @@ def answer_blocks(
     targets: Floats,
     begins: Floats,
     sides: Floats,
-    status: NDArray[np.int64],
+    status: Ints,
     poses: Floats,
     actuators: Floats,
     measures: Floats,
@@ -318,7 +305,7 @@ def lay_sides(sides: Floats, k: int, first: int, n: int, S: Floats) -> None:
 
 
 @routine
-def write_status(task: Record, first: int, n: int, S: Floats, status: NDArray[np.int64], measures: Floats) -> int:
+def write_status(task: Record, first: int, n: int, S: Floats, status: Ints, measures: Floats) -> int:
     """Write which rows are reached, and what is measured of them; how many are not."""
     length, enough, left = task["length"], CLOSED if task["unset"] > 0 else CLOSE, 0
     for i in range(n):

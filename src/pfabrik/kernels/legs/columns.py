@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, cross, dot, scale, sub, vec
 from .poses import NOT_A_ROTATION, ROUNDED, make_exact
-from .records import CRANK, Floats, Record
+from .records import CRANK
 
 # Few enough for the nearest cache, many enough to pay for what is read once a block.
 BLOCK = 64

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats
 from .._jit import routine
 from ..vectors import Vec, along, cross, dot, scale
-from .records import Floats
 
 # Sine of the angle from a dead point, or from aligned hinges, below which a solution is not sure to half its digits.
 SURE = 1e-6

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints, Record, Records
 from .._jit import kernel, routine
 from ..vectors import angle_between, vec
 from .answer import CLOSE, KEPT, complete, deviation, end_of_rows, new_completion, put_rows
 from .poses import lean_to, load, put_pose
-from .records import CARRIAGE, CRANK, ROD, SLIDE, Floats, Record, Records
+from .records import CARRIAGE, CRANK, ROD, SLIDE
 from .table import open_table
 
 PARTS = 4
@@ -51,7 +51,7 @@ def feasibility(
     begins: Floats,
     sides: Floats,
     margins: Floats,
-    bindings: NDArray[np.int64],
+    bindings: Ints,
 ) -> None:
     """Fill the least margin of each target (n, 4, 4) [length], and which limit it is of.
 

@@ -18,22 +18,11 @@ import math
 
 import numpy as np
 
+from ...arrays import Floats, Record, Records
 from .._jit import allocator, routine
 from ..vectors import Vec, add, cross, dot, move, put, scale, sub, turn, vec
 from .endings import either_angle, turned
-from .records import (
-    ARM,
-    CARRIER,
-    CRANK,
-    FIXED,
-    FROM_BASE,
-    FROM_ITSELF,
-    FROM_PLATFORM,
-    RATE,
-    Floats,
-    Record,
-    Records,
-)
+from .records import ARM, CARRIER, CRANK, FIXED, FROM_BASE, FROM_ITSELF, FROM_PLATFORM, RATE
 
 NOWHERE: Vec = (0.0, 0.0, 0.0)
 # Rows of a frame.

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints, Record, Records
 from .._jit import kernel, routine
 from .answer import CLOSE, CLOSED
 from .blocks import lay_cone_axis, lay_deviation, lay_rod, lay_sides
@@ -36,7 +36,7 @@ from .columns import (
 )
 from .feasibility import share_of
 from .poses import load
-from .records import CARRIAGE, CRANK, HINGE, NO_CARRIER, SHARED, SLIDE, Floats, Record, Records
+from .records import CARRIAGE, CRANK, HINGE, NO_CARRIER, SHARED, SLIDE
 from .table import open_table
 
 # Of a row whose margin blocks do not tell: its pose is still to be completed, or a leg has no direction there.
@@ -57,7 +57,7 @@ def lay_rotation(begin: Floats, S: Floats) -> None:
 
 
 @routine
-def lay_grid(begin: Floats, steps: Floats, counts: NDArray[np.int64], first: int, n: int, L: float, S: Floats) -> None:
+def lay_grid(begin: Floats, steps: Floats, counts: Ints, first: int, n: int, L: float, S: Floats) -> None:
     """Positions of a grid's poses from the `first` on, the last line's running fastest; it begins at a pose [L]."""
     along, across = counts[2], counts[1]
     k, j, i = first % along, first // along % across, first // (along * across)
@@ -164,12 +164,12 @@ def margins_in_blocks(
     machine: int,
     targets: Floats,
     steps: Floats,
-    counts: NDArray[np.int64],
+    counts: Ints,
     first: int,
     begins: Floats,
     sides: Floats,
     margins: Floats,
-    bindings: NDArray[np.int64],
+    bindings: Ints,
 ) -> int:
     """Fill what `feasibility.feasibility` does, where all legs are rods that blocks serve; how many are UNKNOWN.
 

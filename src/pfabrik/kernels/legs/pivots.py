@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, cross, dot, move, put, sub, turn, vec
 from .endings import aim, angle_to, spin_angle, turned
 from .frames import NOWHERE, put_pose_slope
-from .records import CROSS, FOOT, FOOT_LINE, HEAD, HEAD_LINE, HINGE, TRIPLE, Floats, Record
+from .records import CROSS, FOOT, FOOT_LINE, HEAD, HEAD_LINE, HINGE, TRIPLE
 
 # What is added to conditions that an axis meets also where it is turned over.
 TURNED_OVER = 2.0

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats, Record
 from .._jit import routine
 from ..rotations import UPSIDE_DOWN, turn_about_z, yaw_of
 from ..vectors import Vec, cross, dot, norm, scale, vec
 from .endings import SURE, turned
-from .records import Floats, Record
 
 # Deviation from an orthonormal matrix up to which a target is a pose, and from which on it is not made one.
 NOT_A_ROTATION, ROUNDED = 1e-6, 1e-14

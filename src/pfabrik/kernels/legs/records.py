@@ -11,14 +11,11 @@ tell: its coordinate is given, or found with what a target leaves open.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats: TypeAlias = NDArray[np.float64]
-Records: TypeAlias = NDArray[np.void]
-Record: TypeAlias = Any  # one of them: its fields are numbers and arrays
+from ...arrays import Ints, Records
 
 # An idle leg has nothing to say of a platform that does not turn.
 ROD, PIVOT, ARM, IDLE = 0, 1, 2, 3
@@ -134,4 +131,4 @@ class Table(NamedTuple):
     driven: Records
     known: Records
     task: Records  # one
-    columns: NDArray[np.int64]  # (legs,): the unknown that a leg's own carrier, or the arm, has; -1 where there is none
+    columns: Ints  # (legs,): the unknown that a leg's own carrier, or the arm, has; -1 where there is none

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec, wrap
 from .endings import aim, angle_to, either_angle, turned, turned_back
@@ -34,8 +35,6 @@ from .records import (
     SHARED,
     SINE,
     SLIDE,
-    Floats,
-    Record,
 )
 
 

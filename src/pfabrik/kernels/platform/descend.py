@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats
 from .._jit import routine
 from ..free_motions import FreeMotions, restoring_step
-from ..legs.records import Floats, Table
+from ..legs.records import Table
 from ..sqp import (
     CLOSED,
     CORRECTIONS,
@@ -114,7 +115,7 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
     from the last configuration that was closed, and closes each.
     """
     view, unit = search.first, search.gradient.unit
-    unit[0], search.control[0]["steps"] = 1.0, 0
+    unit[0], search.control[0]["steps"], search.control[0]["recovered"] = 1.0, 0, 0
     linearise(table, row, aim, search.best, search, view)
     if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
         return math.inf
@@ -125,6 +126,7 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
         return 0.0
     copy_now(search.best, search.closed)
     for closing in range(2):
+        search.control[0]["recovered"] = closing
         if closing == 1:
             copy_now(search.closed, search.best)
             linearise(table, row, aim, search.best, search, view)

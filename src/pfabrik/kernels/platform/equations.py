@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...arrays import Floats, Record
 from .._jit import allocator, routine
 from ..legs.answer import end_of_rows
 from ..legs.endings import turned
@@ -31,8 +32,6 @@ from ..legs.records import (
     SHARED,
     SINE,
     SLIDE,
-    Floats,
-    Record,
     Table,
 )
 from ..legs.rods import (

@@ -11,12 +11,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints, Record
 from .._jit import allocator, kernel, routine
 from ..legs.answer import KEPT, deviation, excess_of, worst_of
 from ..legs.poses import make_exact
-from ..legs.records import CARRIER, PIVOT, Floats, Record, Table
+from ..legs.records import CARRIER, PIVOT, Table
 from ..legs.table import open_table
 from ..linear import solve_spd, solve_square
 from ..references import opener
@@ -53,7 +53,7 @@ class Newton(NamedTuple):
     """Scratch memory of one thread."""
 
     look: View
-    free: NDArray[np.int64]  # (m,): the unknowns that are free
+    free: Ints  # (m,): the unknowns that are free
     equations: Floats  # (e, m + 1): by these, right-hand side last
     normal: Floats  # (m, m + 1): normal equations
     step: Floats  # (n,)
@@ -284,7 +284,7 @@ def assemble(
     turns: bool,
     own: int,
     others: int,
-    status: NDArray[np.int64],
+    status: Ints,
     wanted: Floats,
     poses: Floats,
     q: Floats,

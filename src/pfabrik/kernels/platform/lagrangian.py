@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats
 from .._jit import routine
 from ..free_motions import FreeMotions, put_multipliers
 from ..legs.answer import end_of_rows
 from ..legs.frames import set_frames
-from ..legs.records import SHARED, Floats, Table
+from ..legs.records import SHARED, Table
 from ..sqp import PROBE
 from .equations import Now, is_carried, own_row, place_leg, put_leg_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope

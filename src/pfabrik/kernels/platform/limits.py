@@ -8,24 +8,11 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats, Record
 from .._jit import routine
 from ..legs.answer import deviation
 from ..legs.frames import NOWHERE, put_pose_slope
-from ..legs.records import (
-    CARRIER,
-    CRANK,
-    CROSS,
-    FOOT,
-    FOOT_LINE,
-    HEAD,
-    HINGE,
-    PIVOT,
-    SLIDE,
-    TRIPLE,
-    Floats,
-    Record,
-    Table,
-)
+from ..legs.records import CARRIER, CRANK, CROSS, FOOT, FOOT_LINE, HEAD, HINGE, PIVOT, SLIDE, TRIPLE, Table
 from ..legs.rods import carried, carried_foot, mark
 from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
 from .equations import View, direction, main_of, put_arm_slopes, put_rate

@@ -7,13 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...arrays import Floats, Records
 from .._jit import kernel, routine, search
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import balance
 from ..legs.answer import deviation, excess_of
 from ..legs.poses import make_exact
-from ..legs.records import ARM, PIVOT, SLIDE, Floats, Records, Table
+from ..legs.records import ARM, PIVOT, SLIDE, Table
 from ..legs.table import open_table
 from ..qp import new_qp
 from ..rotations import difference, yaw_difference
@@ -42,7 +43,7 @@ class Work(NamedTuple):
 
     search: Search
     best: Now
-    met: Floats  # (2,): the least distance met [L], and how often it was
+    met: Floats  # (3,): the least distance met [L], how often it was, and 1 where a search was not lost on its way
     away: Floats  # (2,): the same of searches that did not come to what is held
     lost: Floats  # (1 + starts,): how far the first start, and each other, is from that; infinite where one is not lost
 
@@ -191,6 +192,7 @@ def search_from(
         put_sides(table, search.best, search.look)
         if stays == 0 or not is_other_mode(table.legs, sides, search.best.sides):
             take_nearer(distance, met, search, best)
+            met[2] = max(met[2], 1.0 - search.control[0]["recovered"])
             if met[1] == 1.0 and distance == met[0] and (distance == 0.0 or is_global(table, aim.pose, search)):
                 met[1] = math.inf  # none is nearer
     return is_lost
@@ -203,9 +205,9 @@ def search_row(
     """The nearest configuration of a row, into `work.best`, and how far it is [L]; see `approach`.
 
     What is held is put in its place at once where searches may start anywhere, and no arms would be left behind, or
-    nothing else has a place; and else brought there step by step. The other way too, where that finds nothing. Where
-    too few agree, searches from starts that were lost go for what is held alone, and then on with it held: from a
-    feasible configuration there are more ways to it than the shortest.
+    nothing else has a place; and else brought there step by step. The other way too, where that finds nothing, or only
+    after it was lost on the way. Where too few agree, searches from starts that were lost go for what is held alone,
+    and then on with it held: from a feasible configuration there are more ways to it than the shortest.
     """
     search, best, met, away, lost = work.search, work.best, work.met, work.away, work.lost
     target, n = search.target, others.poses.shape[0]
@@ -215,12 +217,12 @@ def search_row(
     for k in range(kept.shape[0]):
         kept[k] = sides[k] if stays == 1 and is_carried(table.legs[k]) else 0.0
     at_once = holds_all(aim.pose) or (n > 0 and table.task[0]["led"] == 0)
-    met[0], met[1], away[0], away[1] = math.inf, 0.0, math.inf, 0.0
+    met[0], met[1], met[2], away[0], away[1] = math.inf, 0.0, 0.0, math.inf, 0.0
     for i in range(n + 1):
         lost[i] = math.inf
     for start in range(n + 2):
         place = -1 if start == 0 or start == n + 1 else near if start == 1 else start - 2 + int(start - 2 >= near)
-        if met[1] >= hits or (start == n + 1 and met[0] < math.inf):
+        if met[1] >= hits or (start == n + 1 and met[2] == 1.0):
             break
         begin(table, own if place < 0 else others, first if place < 0 else place, search)
         if stays == 1 and is_other_mode(table.legs, sides, search.best.sides):
@@ -277,7 +279,7 @@ def approach(
     """
     table = open_table(machine)
     search, best = new_search(table, cones), new_now(table.legs.shape[0])
-    work = Work(search, best, np.zeros(2), np.zeros(2), np.zeros(1 + others.poses.shape[0]))
+    work = Work(search, best, np.zeros(3), np.zeros(2), np.zeros(1 + others.poses.shape[0]))
     pose, held = aim.pose, np.zeros(6)
     steps = pose.max_iterations if holds_some(table, aim, held) else 0
     toward = Aim(PoseObjective(pose.targets, held, pose.frame, pose.margin, pose.near, steps), aim.values, aim.implied)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from .._jit import kernel, routine
-from ..closure.loops import Ints
 from ..legs.answer import (
     KEPT,
     Completion,
@@ -23,7 +22,7 @@ from ..legs.endings import SURE
 from ..legs.feasibility import largest_row
 from ..legs.frames import set_frames
 from ..legs.poses import load
-from ..legs.records import ARM, Floats, Table
+from ..legs.records import ARM, Table
 from ..legs.table import open_table
 from ..rows import PENDING, REACHED
 from ..vectors import copy_row
@@ -86,7 +85,7 @@ def answer_otherwise(
     targets: Floats,
     begins: Floats,
     sides: Floats,
-    status: NDArray[np.int64],
+    status: Ints,
     poses: Floats,
     actuators: Floats,
     measures: Floats,

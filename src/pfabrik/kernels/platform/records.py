@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from ..closure.loops import PoseObjective
-from ..legs.records import Floats
 
 STRETCHED = 1e-4
 """Difference of a carrier's two solutions below which it is at a dead point, and its side is the start's [L or rad]."""
@@ -41,6 +41,6 @@ class Found(NamedTuple):
     poses: Floats  # (n, 4, 4) [length]
     q: Floats  # (n, legs)
     sides: Floats  # (n, legs)
-    steps: NDArray[np.int64]  # (n,)
+    steps: Ints  # (n,)
     actuators: Floats  # (n, n_a)
     measures: Floats  # (n, 5): distances from the target [length, rad], the largest equation [length], limit excess

@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...arrays import Floats, Ints, Records
 from .._jit import allocator, routine
-from ..closure.loops import BASE_AXES, LOCKED, Ints, PoseObjective
+from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
 from ..legs.poses import turn_pose
-from ..legs.records import Floats, Records, Table
+from ..legs.records import Table
 from ..qp import QP, new_qp
 from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import copy_row, copy_table, wrap

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..legs.frames import coordinate_of, facing, place_arm, set_frames
 from ..legs.poses import bring_yaw, column, is_pose, make_exact, turn_pose
-from ..legs.records import ARM, CARRIER, CRANK, Floats, Record, Table
+from ..legs.records import ARM, CARRIER, CRANK, Table
 from ..legs.rods import carry
 from ..rotations import yaw_of
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap

@@ -7,14 +7,11 @@ platform is given relative to the reference point, at home orientation.
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import Floats, Ints
-
-Records: TypeAlias = NDArray[np.void]
+from ...arrays import Floats, Ints, Records
 
 # What the axis of a cone is fixed to: the branch's carrier, the previous link, the platform.
 CARRIER_CONE, LINK_CONE, PLATFORM_CONE = 0, 1, 2

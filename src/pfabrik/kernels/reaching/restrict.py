@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats
+from ...arrays import Floats, Records
 from .._jit import inlined, routine
 from ..vectors import (
     Vec,
@@ -22,7 +22,7 @@ from ..vectors import (
     wrap,
     wrap_into,
 )
-from .plan import CARRIER_CONE, PLATFORM_CONE, Plan, Records
+from .plan import CARRIER_CONE, PLATFORM_CONE, Plan
 
 # Below this a vector has no direction; far under any length of a machine, far over the smallest normal number.
 NO_LENGTH = 1e-150
