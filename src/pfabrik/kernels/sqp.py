@@ -92,6 +92,7 @@ CONTROL = np.dtype(
         ("steps", "i8"),  # taken
         ("done", "i8"),  # 1 where none is worth taking any more
         ("rejected", "i8"),  # 1 where the last did not lead down
+        ("exact", "i8"),  # 1 where it gained what it promised
         ("recovered", "i8"),  # 1 where steps that left something open were lost
     ]
 )
@@ -217,10 +218,16 @@ def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: fl
 
 
 @routine
-def is_last(linear: Linearisation, promise: float, before: float) -> bool:
-    """Whether a step promises so little that none is worth taking after it; `before` is what the last one promised."""
-    fine = FINE * linear.totals[0]["value"]
-    return bool(promise <= LAST * linear.totals[0]["value"] or (before <= fine and promise > CONVERGING * before))
+def is_last(linear: Linearisation, other: Linearisation, promise: float, before: float) -> bool:
+    """Whether a step from one linear to another promised so little that none is worth taking after it.
+
+    Where it left nothing open, the next is taken to promise less by the factor by which this one promised less than the
+    one `before`.
+    """
+    value = linear.totals[0]["value"]
+    if promise <= LAST * value or (before <= FINE * value and promise > CONVERGING * before):
+        return True
+    return before < math.inf and promise * promise <= LAST * value * before and is_closed(other, CLOSED)
 
 
 @routine
@@ -265,7 +272,7 @@ def begin_descent(linear: Linearisation, hessian: Hessian, control: Record) -> N
         hessian.multipliers[c] = 0.0
     control["damping"] = AT_FIRST * longest(linear.g, linear.totals[0]["motions"]) / LONGEST_STEP
     control["promise"], control["weight"] = math.inf, 0.0
-    control["steps"] = control["done"] = control["rejected"] = 0
+    control["steps"] = control["done"] = control["rejected"] = control["exact"] = 0
 
 
 @routine
@@ -318,14 +325,14 @@ def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, shar
     """Whether a share of the step planned led from one linear down to another; damping follows how well it did."""
     promise, gain = share * control["promise"], gained(linear, other, control)
     led_down = feasible and leads_down(linear, gain, promise, control["weight"])
-    if is_last(linear, promise, control["before"]):
+    if is_last(linear, other, promise, control["before"]):
         control["done"] = 1
-    control["promise"] = promise
+    control["promise"], control["exact"] = promise, int(led_down and abs(gain - promise) < EXACT * promise)
     damping, largest = control["damping"], control["largest"]
     if not led_down:
         control["damping"] = max(4.0 * damping, WORTH * largest)
     elif gain > GOOD * promise and control["rejected"] == 0:
-        damping *= 0.01 if share == 1.0 and abs(gain - promise) < EXACT * promise else 0.1
+        damping *= 0.01 if damping < 0.1 * largest and share == 1.0 and control["exact"] == 1 else 0.1
         control["damping"] = damping if damping > 1e-8 * largest else 0.0
     control["rejected"] = 0 if led_down else 1
     return led_down

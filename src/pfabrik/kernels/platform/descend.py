@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats
+from ...arrays import Floats, Record
 from .._jit import routine
 from ..free_motions import FreeMotions, restoring_step
 from ..legs.records import Table
@@ -23,6 +23,7 @@ from ..sqp import (
     is_closed,
     is_to_close,
     judge_step,
+    longest,
     on_the_way,
     openness,
     plan_step,
@@ -34,7 +35,7 @@ from .equations import Now, close_rods
 from .lagrangian import lagrangian_hessian
 from .linearise import linearise
 from .records import Aim
-from .search import Search, copy_now, move
+from .search import NEAR, NEARBY, STEPS_AWAY, Search, copy_now, move
 
 HOPELESS = 20.0
 """A search that is farther than the nearest yet by so many times what its last step promised is given up."""
@@ -47,6 +48,9 @@ OF_CARRIERS = 0.6
 
 STUCK = 0.2
 """Share of a gap that a step which closes it leaves at most: at a double root Newton's method leaves a quarter."""
+
+SHORT = 1e-6
+"""Share of the objective that a step promised after which curvature is not felt for again: it is off by a thousandth."""
 
 BY = 0.03
 """A search that comes so near to the nearest configuration met yet [rad or L] would end there."""
@@ -107,6 +111,23 @@ def is_by(now: Now, met: Now) -> bool:
 
 
 @routine
+def has_same_curvature(view: FreeMotions, before: FreeMotions, control: Record) -> bool:
+    """Whether the last step was so short, and told so well what it would gain, that curvature is what it was before.
+
+    It is told in the same free motions only where equations have the same pivots.
+    """
+    totals, others = view.linear.totals[0], before.linear.totals[0]
+    if control["promise"] > SHORT * totals["value"] or control["exact"] == 0:
+        return False
+    if totals["rank"] != others["rank"]:
+        return False
+    for r in range(totals["rank"]):
+        if view.pivots[r] != before.pivots[r]:
+            return False
+    return True
+
+
+@routine
 def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Search) -> float:
     """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible.
 
@@ -115,6 +136,7 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
     from the last configuration that was closed, and closes each.
     """
     view, unit = search.first, search.gradient.unit
+    search.near[0] = NEAR
     unit[0], search.control[0]["steps"], search.control[0]["recovered"] = 1.0, 0, 0
     linearise(table, row, aim, search.best, search, view)
     if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
@@ -148,12 +170,14 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
     unit = search.gradient.unit
     begin_descent(view.linear, hessian, control)
     while control["done"] == 0:
-        control["largest"] = lagrangian_hessian(table, row, aim, search, view)
+        if not has_same_curvature(view, other, control):
+            control["largest"] = lagrangian_hessian(table, row, aim, search, view)
         led_down = False
         while not led_down and control["done"] == 0:
             if plan_step(view.linear, hessian, control, aim.pose.max_iterations, search.p):
                 copy_now(search.best, search.trial)
                 share = take(table, view, search.p.x, search.trial, search)
+                search.near[0] = min(NEAR, max(NEARBY, STEPS_AWAY * share * longest(search.step, search.step.shape[0])))
                 linearise(table, row, aim, search.trial, search, other)
                 closes = True
                 if closing == 1:
@@ -161,7 +185,7 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
                 elif is_to_close(view.linear, other.linear, share, control):
                     tolerance = on_the_way(control, share)
                     closes = restore_feasibility(table, row, aim, search.trial, tolerance, search, other, CORRECTIONS)
-                    closes = closes or openness(other.linear) <= openness(view.linear)
+                    closes = closes or other.linear.totals[0]["gap"] <= max(CLOSED, openness(view.linear))
                 led_down = judge_step(view.linear, other.linear, closes, share, control)
                 if led_down:
                     copy_now(search.trial, search.best)

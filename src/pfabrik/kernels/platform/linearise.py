@@ -12,7 +12,7 @@ from ..vectors import dot, vec
 from .equations import Now, place, put_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .records import Aim
-from .search import NEAR, Search, put_objective
+from .search import Search, put_objective
 
 
 @routine
@@ -55,24 +55,26 @@ def lay_out(held: int, search: Search) -> int:
 def linearise_limits(table: Table, margin: float, search: Search, view: FreeMotions) -> None:
     """Excess and gradient of every limit within reach, and of dead points that are not to be passed."""
     slope, values, kept, k, excess = search.look.slope, search.look.values, search.kept, 0, -math.inf
+    near, halves = search.near[0], search.half_angles
+    cosine, sine = math.cos(near), math.sin(near)
     for i in range(table.limited.shape[0]):
         limited = table.limited[i]
         value = deviation(limited, values)
         below, above = limited["lo"] + margin - value, value - limited["hi"] + margin
-        if max(below, above) <= -NEAR:
+        if max(below, above) <= -near:
             continue
         excess = max(excess, max(below, above))
         coordinate_slope(table, limited, search.look)
-        if above > -NEAR:
+        if above > -near:
             k = add_limit(k, above, 2 * i + 1, search.look.slope, view)
-        if below > -NEAR:
+        if below > -near:
             for j in range(slope.shape[0]):
                 slope[j] = -slope[j]
             k = add_limit(k, below, 2 * i, search.look.slope, view)
-    for i in range(search.near_cosines.shape[0]):
+    for i in range(halves.shape[0]):
         cone = table.cones[i]
         line = vec(values[cone["leg"], cone["place"] :])
-        if dot(vec(cone["axis"]), line) <= search.near_cosines[i]:
+        if halves[i, 0] <= near or dot(vec(cone["axis"]), line) <= halves[i, 1] * cosine + halves[i, 2] * sine:
             over = cone_slope(table, cone, search.look) - cone["half_angle"] + margin
             excess = max(excess, over)
             k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.look.slope, view)
@@ -80,7 +82,7 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
     for leg in range(kept.shape[0]):
         if kept[leg] != 0.0:
             over = kept[leg] * dead_point_slope(table, leg, search.look)
-            if over > -NEAR:
+            if over > -near:
                 excess = max(excess, over)
                 for j in range(slope.shape[0]):
                     slope[j] *= kept[leg]

@@ -211,7 +211,7 @@ def search_row(
     """
     search, best, met, away, lost = work.search, work.best, work.met, work.away, work.lost
     target, n = search.target, others.poses.shape[0]
-    near = nearest_start(aim.pose, target, others, search.gradient)
+    near = -1
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
     sides = own.sides[first]
     for k in range(kept.shape[0]):
@@ -221,9 +221,10 @@ def search_row(
     for i in range(n + 1):
         lost[i] = math.inf
     for start in range(n + 2):
-        place = -1 if start == 0 or start == n + 1 else near if start == 1 else start - 2 + int(start - 2 >= near)
         if met[1] >= hits or (start == n + 1 and met[2] == 1.0):
             break
+        near = nearest_start(aim.pose, target, others, search.gradient) if start == 1 else near
+        place = -1 if start == 0 or start == n + 1 else near if start == 1 else start - 2 + int(start - 2 >= near)
         begin(table, own if place < 0 else others, first if place < 0 else place, search)
         if stays == 1 and is_other_mode(table.legs, sides, search.best.sides):
             continue

@@ -21,8 +21,9 @@ from .equations import Now, View, count_unknowns, new_now, new_view
 from .limits import coordinate_slope, counts_turns
 from .records import Aim
 
-NEAR = 0.3
-"""Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
+NEAR, NEARBY, STEPS_AWAY = 0.3, 0.02, 3.0
+"""Limits farther away than the first are left out of a programme [rad or L]: no step comes near them. As steps get
+shorter, so are those farther away than so many of them, but for what is within the second."""
 
 
 class Search(NamedTuple):
@@ -47,7 +48,8 @@ class Search(NamedTuple):
     target: Floats  # (4, 4): of the row [L]
     kept: Floats  # (legs,): the sides that carriers are to stay on; 0 for either
     pulled: Ints  # (legs,): 1 for those that the Lagrangian asks for
-    near_cosines: Floats  # (cones,): of angles from their axes at which the cones that are minded are near
+    near: Floats  # (1,): limits farther away are left out
+    half_angles: Floats  # (cones, 3): of the cones that are minded, their cosines and sines
 
 
 @allocator
@@ -58,9 +60,10 @@ def new_search(table: Table, cones: int) -> Search:
     elimination = new_elimination(n, rows)
     for j in range(n):
         elimination.used[j] = 2 if j < 6 else 1
-    near_cosines = np.zeros(cones)
-    for i in range(near_cosines.shape[0]):
-        near_cosines[i] = math.cos(max(table.cones[i]["half_angle"] - NEAR, 0.0))
+    half_angles = np.zeros((cones, 3))
+    for i in range(half_angles.shape[0]):
+        angle = table.cones[i]["half_angle"]
+        half_angles[i, 0], half_angles[i, 1], half_angles[i, 2] = angle, math.cos(angle), math.sin(angle)
     return Search(
         new_view(table),
         PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
@@ -81,7 +84,8 @@ def new_search(table: Table, cones: int) -> Search:
         np.zeros((4, 4)),
         np.zeros(legs),
         np.zeros(legs, np.int64),
-        near_cosines,
+        np.ones(1),
+        half_angles,
     )
 
 
