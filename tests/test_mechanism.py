@@ -124,6 +124,14 @@ class TestDerived:
             with pytest.raises(ValueError, match="read-only"):
                 each.home_pose[0, 0] = 2.0
 
+    def test_two_that_are_equal_are_compared_joint_by_joint_once(self, monkeypatch):
+        machine, again, other = stewart(), stewart(), stewart().without_limits()
+        assert machine == again and machine != other
+        monkeypatch.delattr(Joint, "__eq__")  # joints made one by one now differ
+        assert machine.joints != again.joints
+        assert machine == again and again == machine and {machine: 1}[again] == 1
+        assert machine != other and machine != machine.name
+
     def test_nothing_can_be_assigned(self):
         with pytest.raises(dataclasses.FrozenInstanceError):
             stewart().name = "other"

@@ -21,7 +21,7 @@ from .joints import Joint, Range, Vector, set_fields
 _TEXT_FIELDS = ("name", "end_effector", "base", "length_unit", "angle_unit")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Structure:
     """Joints between named bodies, one body fixed, one body (or joint) to be placed: a mechanism before its checks.
 
@@ -48,12 +48,28 @@ class Structure:
             set_fields(self, task=self.whole_task)
         set_fields(self, task=_in_order(texts(self.task)))
 
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        if not isinstance(other, Structure) or other.__class__ is not self.__class__:
+            return NotImplemented
+        if self._compared is not other._compared:
+            if self._compared != other._compared:
+                return False
+            set_fields(self, _compared=other._compared)  # the next time one look tells: what is derived is kept by it
+        return True
+
     def __hash__(self) -> int:
         return self._hash
 
     @cached_property
+    def _compared(self) -> tuple[Any, ...]:
+        """What is to be the same where two are equal."""
+        return tuple(getattr(self, each.name) for each in dataclasses.fields(self) if each.compare)
+
+    @cached_property
     def _hash(self) -> int:
-        return hash(tuple(getattr(self, each.name) for each in dataclasses.fields(self) if each.compare))
+        return hash(self._compared)
 
     def __getstate__(self) -> dict[str, Any]:
         """The description alone: what is derived is computed again, read-only again."""
