@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidArgument
+from ..kernels.rows import REACHED
 from .answer import Answer
 from .notebook import answer_html
 from .status import Status
@@ -52,7 +53,7 @@ class Solution(Answer):
 
     def __bool__(self) -> bool:
         """Whether the target, or every target of the batch, is REACHED."""
-        return bool((self._rows.status == Status.REACHED).all())
+        return not np.count_nonzero(self._rows.status != REACHED)
 
     def __len__(self) -> int:
         if self.shape == ():
