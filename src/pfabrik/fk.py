@@ -57,7 +57,7 @@ def solve_fk(
     options = checked_options(options)
     values, shape = as_values(mechanism, actuators)
     begin = start_of(mechanism, start, shape)
-    if shape == () and np.abs(values).max(initial=0.0) <= HORIZON:  # one row of numbers, with nothing to set aside
+    if shape == () and np.vdot(values, values) <= HORIZON**2:  # one row of numbers, with nothing to set aside
         return Solution(mechanism, engine_of(mechanism).forward(values, begin, options.actuator_tolerance), shape)
     known = np.asarray(np.isfinite(values).all(axis=1))
     if options.on_invalid == "raise" and not known.all():

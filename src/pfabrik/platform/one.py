@@ -128,7 +128,8 @@ class OneAssembly:
         """The same, at once; whether it does."""
         if self.prepared(rows, ends)():
             return False
-        ends.sides[:, self._arms] = ends.q[:, self._arms]
+        if len(self._arms):
+            ends.sides[:, self._arms] = ends.q[:, self._arms]
         return True
 
 
