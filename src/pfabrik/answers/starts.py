@@ -13,10 +13,10 @@ from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism, checked_mechanism, told_apart
 from ..engine import engine_of
 from ..errors import InvalidArgument
+from ..kernels.rows import FAILED
 from ..motion.displacements import home_coordinates
 from ..poses import as_floats
 from .solution import Solution
-from .status import Status
 
 Start: TypeAlias = Solution | ArrayLike
 """A Solution, or joint coordinates q (..., nq) in the order of `mechanism.coordinate_names` [rad or length]."""
@@ -39,7 +39,7 @@ def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) 
     if start.mechanism != mechanism:
         found = f"an answer of {told_apart(start.mechanism, mechanism)}"
         raise InvalidArgument("start", found, f"one of '{mechanism.name}' itself, or joint coordinates")
-    if (np.asarray(start.status) >= Status.FAILED).any():
+    if (start._rows.status >= FAILED).any():
         raise InvalidArgument("start", "an answer that is FAILED or INVALID", "a feasible configuration")
     _require_shape(start.shape, shape)
     return start._found
