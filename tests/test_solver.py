@@ -15,7 +15,7 @@ import pfabrik as pf
 from pfabrik import Options, Status
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.errors import InvalidArgument
-from pfabrik.platform.table import machine
+from pfabrik.platform.table import machine, machine_nearby
 
 MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]
 
@@ -43,17 +43,20 @@ def test_answers_and_statuses_are_those_of_single_calls(name: str) -> None:
     assert Status.REACHED in seen
 
 
+@pytest.mark.parametrize("started", [False, True])
 @pytest.mark.parametrize("name", MACHINES)
-def test_forward_answers_and_jacobians_are_those_of_single_calls(name: str) -> None:
+def test_forward_answers_and_jacobians_are_those_of_single_calls(name: str, started: bool) -> None:
     mechanism = pf.load(name)
-    solver = pf.Solver(mechanism)
+    start = pf.solve_ik(mechanism, targets(mechanism, 1, 0.03)[0]) if started else None
+    solver = pf.Solver(mechanism, start=start)
     for share in (0.0, 0.02, 5.0):
         values = pf.solve_ik(mechanism, mechanism.home_pose).actuators + share
-        expected = pf.solve_fk(mechanism, values)
+        expected = pf.solve_fk(mechanism, values, start=start)
         assert solver.fk(values) is solver.status is expected.status
         np.testing.assert_array_equal(solver.pose, expected.pose)
         np.testing.assert_array_equal(solver.actuators, expected.actuators)
         np.testing.assert_array_equal(solver.jacobian(), pf.forward_jacobian(expected))
+        assert solver.solution.to_dict() == expected.to_dict()
 
 
 @pytest.mark.parametrize("target", ["position", "list", "transposed", "joint"])
@@ -153,15 +156,18 @@ def test_what_is_no_mechanism_or_no_single_start_is_refused() -> None:
         pf.Solver(mechanism, start=batch)
 
 
-def test_what_kernels_are_given_is_kept_as_long_as_a_solver() -> None:
+@pytest.mark.parametrize("started", [False, True])
+def test_what_kernels_are_given_is_kept_as_long_as_a_solver(started: bool) -> None:
     """Kernels take an address: what it leads to must not go when a cache has forgotten the machine."""
     mechanism = pf.load("stewart")
-    solver, home = pf.Solver(mechanism), mechanism.home_pose
+    home = mechanism.home_pose
+    solver = pf.Solver(mechanism, start=pf.solve_ik(mechanism, home) if started else None)
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    given = weakref.ref(machine(table))
+    taken = machine_nearby if started else machine
+    given = weakref.ref(taken(table))
     solver.ik(home)
-    machine.cache_clear()
+    taken.cache_clear()
     gc.collect()
     assert given() is not None
     assert solver.ik(home) == Status.REACHED and solver.fk(solver.actuators.copy()) == Status.REACHED

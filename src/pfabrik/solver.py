@@ -66,8 +66,8 @@ class Solver:
         if isinstance(self._engine, LegsEngine):
             keep_mode = keeps_mode(self.options, start)
             self._reach = self._engine.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
-            if start is None:
-                self._assemble = self._engine.prepared_forward(self._rows)
+            self._own = self._engine.forward_start(begin)
+            self._assemble = self._engine.prepared_forward(self._own, self._rows)
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))
         self.pose, self.actuators = _read_only(self._rows.poses[0]), _read_only(self._rows.actuators[0])
         self.status = Status.INVALID
@@ -134,7 +134,8 @@ class Solver:
             if self.status is Status.INVALID:
                 raise InvalidArgument("solution", "no answer", "a question before that is not refused")
             if self._was_forward:
-                self._found = solve_fk(self.mechanism, self._rows.actuators[0], options=self.options)
+                asked = self._rows.actuators[0]
+                self._found = solve_fk(self.mechanism, asked, start=self._start, options=self.options)
             else:
                 self._found = solve_ik(self.mechanism, self._target[0], start=self._start, options=self.options)
         return self._found

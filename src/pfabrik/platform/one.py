@@ -14,6 +14,7 @@ from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
+from ..kernels.platform.records import Starts
 from ..kernels.rows import Rows
 from .nearest import home_start, no_starts
 from .table import machine, machine_nearby, machine_searched, resting_at_home
@@ -98,13 +99,12 @@ class Ends(NamedTuple):
 
 
 class OneAssembly:
-    """Forward kinematics of a machine of legs from home, one row after the other, prepared likewise."""
+    """Forward kinematics of a machine of legs, one row after the other, prepared likewise."""
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
-        turns = not mechanism.end_effector_is_joint
-        self._starts = Handle(home_start(mechanism, table)), Handle(no_starts(table))
-        self._asked = turns, *(starts.address for starts in self._starts)
+        self._turns = not mechanism.end_effector_is_joint
+        self.home, self._nowhere = Handle(home_start(mechanism, table)), Handle(no_starts(table))
         self._legs, self._arms = machine_searched(table), table.led_arms["leg"]
 
     @cached_property
@@ -117,16 +117,16 @@ class OneAssembly:
         """Room for where carriers and legs are in the end."""
         return Ends(np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
 
-    def prepared(self, rows: Rows, ends: Ends) -> Callable[[], int]:
-        """A call that assembles what stands in `rows.actuators` from home within all limits, as long as this object is
-        kept; it returns 0 where it does."""
+    def prepared(self, own: Handle[Starts], rows: Rows, ends: Ends) -> Callable[[], int]:
+        """A call that assembles what stands in `rows.actuators` from one start within all limits, as long as the start
+        and this object are kept; it returns 0 where it does."""
+        asked = self._legs.address, rows.actuators, self._turns, own.address, self._nowhere.address
         wanted = np.empty((1, self._n_actuators))
-        into = rows.status, wanted, rows.poses, *ends, rows.measures
-        return partial(self._kernel, self._legs.address, rows.actuators, *self._asked, *into)
+        return partial(self._kernel, *asked, rows.status, wanted, rows.poses, *ends, rows.measures)
 
-    def assemble(self, rows: Rows, ends: Ends) -> bool:
+    def assemble(self, own: Handle[Starts], rows: Rows, ends: Ends) -> bool:
         """The same, at once; whether it does."""
-        if self.prepared(rows, ends)():
+        if self.prepared(own, rows, ends)():
             return False
         if len(self._arms):
             ends.sides[:, self._arms] = ends.q[:, self._arms]

@@ -16,6 +16,7 @@ from ..closure.projection import Way
 from ..closure.solve import ClosureEngine
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
+from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
 from ..kernels.rows import PENDING, REACHED, Rows
 from ..kernels.threads import in_blocks
@@ -25,7 +26,7 @@ from ..poses import are_poses
 from .answers import LegAnswers, begins_of, coordinates_of, sides_at
 from .coordinates import settled
 from .forward import assembled
-from .nearest import in_lengths, weighed_limits
+from .nearest import in_lengths, starts_at, weighed_limits
 from .one import OneAssembly, OneTarget
 from .table import Machine, machine, machine_nearby, resting_at_home
 from .unreached import Question, answer_unreached
@@ -71,7 +72,7 @@ class LegsEngine:
         Projections are the nearest found in the working mode, if that is kept, or `nearby` those next to the start.
         """
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
-        first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        first = self._sides_of(start)
         rows = self._one.new_rows() if is_one else new_rows(self.mechanism, len(targets))
         ends = first.copy() if self._table.leads_arms else first
         if is_one and self._reach_one(targets, start, ends, keep_mode, rows):
@@ -144,8 +145,7 @@ class LegsEngine:
         others = None
         if len(rest):
             others = Configurations(rows_at(rows, rest), np.concatenate([found[i].coordinates for i in rest]))
-        first_sides = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
-        return self._answers(rows, sides, carriers, start, first_sides, rest, others)
+        return self._answers(rows, sides, carriers, start, self._sides_of(start), rest, others)
 
     def _answers(
         self,
@@ -209,11 +209,11 @@ class LegsEngine:
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
-        if start is None and len(values) == 1:
-            found = self._assemble_one(values)
+        first = self._sides_of(start)
+        if len(values) == 1:
+            found = self._assemble_one(values, start, first)
             if found is not None:
                 return found
-        first = self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
         rows, carriers, sides = assembled(self.mechanism, self._table, values, start, first, tolerance)
         rest, others = np.flatnonzero(rows.status == PENDING), None
         if len(rest) == len(values):
@@ -224,18 +224,35 @@ class LegsEngine:
             put_rows(rows, rest, others.rows)
         return self._answers(rows, sides, carriers, start, first, rest, others)
 
-    def prepared_forward(self, rows: Rows) -> Callable[[], int]:
-        """A call that answers `rows.actuators` from home into the rest of one row; it returns 0 where they assemble."""
-        return self._one_forward.prepared(rows, self._one_forward.new_ends())
+    def prepared_forward(self, own: Handle[Starts], rows: Rows) -> Callable[[], int]:
+        """A call that answers `rows.actuators` into the rest of one row, as long as its start is kept; it returns 0
+        where they assemble."""
+        return self._one_forward.prepared(own, rows, self._one_forward.new_ends())
 
-    def _assemble_one(self, values: Floats) -> Configurations | None:
-        """Forward kinematics of one row from home, if it assembles there."""
-        rows, ends = self._one.new_rows(), self._one_forward.new_ends()
+    def forward_start(self, start: Configurations | None) -> Handle[Starts]:
+        """Where one row starts to be assembled."""
+        return self._forward_start(start, self._sides_of(start))
+
+    def _forward_start(self, start: Configurations | None, sides: Floats) -> Handle[Starts]:
+        if start is None:
+            return self._one_forward.home
+        return Handle(starts_at(self.mechanism, self._table, start.rows.poses, sides))
+
+    def _sides_of(self, start: Configurations | None) -> Floats:
+        """Which of its two solutions each leg takes at a start, (n or 1, legs)."""
+        return self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+
+    def _assemble_one(self, values: Floats, start: Configurations | None, first: Floats) -> Configurations | None:
+        """Forward kinematics of one row, if it assembles from where it starts, on sides `first`."""
+        rows, ends, own = self._one.new_rows(), self._one_forward.new_ends(), self._forward_start(start, first)
         rows.actuators[:] = values
-        if not self._one_forward.assemble(rows, ends):
+        if not self._one_forward.assemble(own, rows, ends):
             return None
-        end = rows.poses, rows.actuators, ends.sides, None, ends.q
-        return LegAnswers(rows, partial(settled, self.mechanism, self._table, *end), ends.sides, ends.q)
+        begins = begins_of(self.mechanism, self._table, start, first)
+        told = rows.poses, rows.actuators, ends.sides
+        return LegAnswers(
+            rows, lambda: settled(self.mechanism, self._table, *told, begins(), ends.q), ends.sides, ends.q
+        )
 
     def _reach_one(
         self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows
