@@ -17,13 +17,20 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
 from .nearest import corners_of, home_start, nearest_actuators, no_starts, starts_at
+from .one import Ends
 from .table import machine_searched
 
 ROWS_A_BLOCK = 256
 
 
 def assembled(
-    mechanism: Mechanism, table: LegTable, values: Floats, start: Configurations | None, sides: Floats, tolerance: float
+    mechanism: Mechanism,
+    table: LegTable,
+    values: Floats,
+    start: Configurations | None,
+    sides: Floats,
+    tolerance: float,
+    tried: tuple[Rows, Ends] | None,
 ) -> tuple[Rows, Floats, Floats]:
     """Configurations that have actuated values (n, n_a), within all limits; rows without one are PENDING.
 
@@ -32,17 +39,15 @@ def assembled(
     Parameters
     ----------
     sides : which of its two solutions each leg takes at the start, (n or 1, legs).
+    tried : the arrays of one row that does not assemble from the start.
 
     Returns
     -------
     The rows, the coordinates of the legs' carriers (n, legs) [L or rad], and the sides of the answers (n, legs).
     """
     own = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
-    rows, n = new_rows(mechanism, len(values)), len(values)
-    found = Starts(rows.poses, np.zeros((n, len(table.legs))), np.zeros((n, len(table.legs))))
-    rows.actuators[:], wanted = values, np.zeros_like(values)
-    _assemble(mechanism, table, own, no_starts(table), (rows.actuators, rows.status, wanted, *found, rows.measures))
-    rest = np.flatnonzero(rows.status == PENDING)
+    rows, (wanted, *ends) = tried or _assembled_from(mechanism, table, values, own)
+    found, rest = Starts(rows.poses, *ends), np.flatnonzero(rows.status == PENDING)
     if start is None and len(rest):
         filled = rows.status, wanted, *found, rows.measures
         parts = [array[rest] for array in (rows.actuators, *filled)]
@@ -56,6 +61,16 @@ def assembled(
         rows.status[near[rows.status[near] == PROJECTED]] = REACHED
     found.sides[:, table.led_arms["leg"]] = found.q[:, table.led_arms["leg"]]
     return rows, found.q, found.sides
+
+
+def _assembled_from(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts) -> tuple[Rows, Ends]:
+    """Rows assembled at actuated values (n, n_a) from where each starts, or all of them; PENDING where they are not."""
+    rows, shape = new_rows(mechanism, len(values)), (len(values), len(table.legs))
+    ends = Ends(np.zeros_like(values), np.zeros(shape), np.zeros(shape))
+    rows.actuators[:] = values
+    filled = rows.status, ends.wanted, rows.poses, ends.q, ends.sides, rows.measures
+    _assemble(mechanism, table, own, no_starts(table), (rows.actuators, *filled))
+    return rows, ends
 
 
 def _project(

@@ -92,10 +92,11 @@ class OneTarget:
 
 
 class Ends(NamedTuple):
-    """Where one row's carriers are, and which solutions its legs take, as of `Starts`."""
+    """Where carriers are and which solutions legs take, as of `Starts`, at actuators that are `wanted`."""
 
-    q: Floats  # (1, legs)
-    sides: Floats  # (1, legs)
+    wanted: Floats  # (n, n_a): deviations from home [L or rad]
+    q: Floats  # (n, legs)
+    sides: Floats  # (n, legs)
 
 
 class OneAssembly:
@@ -114,15 +115,14 @@ class OneAssembly:
         return assemble
 
     def new_ends(self) -> Ends:
-        """Room for where carriers and legs are in the end."""
-        return Ends(np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
+        """Room for where carriers and legs of one row are in the end."""
+        return Ends(np.empty((1, self._n_actuators)), np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
 
     def prepared(self, own: Handle[Starts], rows: Rows, ends: Ends) -> Callable[[], int]:
         """A call that assembles what stands in `rows.actuators` from one start within all limits, as long as the start
         and this object are kept; it returns 0 where it does."""
         asked = self._legs.address, rows.actuators, self._turns, own.address, self._nowhere.address
-        wanted = np.empty((1, self._n_actuators))
-        return partial(self._kernel, *asked, rows.status, wanted, rows.poses, *ends, rows.measures)
+        return partial(self._kernel, *asked, rows.status, ends.wanted, rows.poses, ends.q, ends.sides, rows.measures)
 
     def assemble(self, own: Handle[Starts], rows: Rows, ends: Ends) -> bool:
         """The same, at once; whether it does."""

@@ -27,7 +27,7 @@ from .answers import LegAnswers, begins_of, coordinates_of, sides_at
 from .coordinates import settled
 from .forward import assembled
 from .nearest import in_lengths, starts_at, weighed_limits
-from .one import OneAssembly, OneTarget
+from .one import Ends, OneAssembly, OneTarget
 from .table import Machine, machine, machine_nearby, resting_at_home
 from .unreached import Question, answer_unreached
 
@@ -209,12 +209,13 @@ class LegsEngine:
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
-        first = self._sides_of(start)
+        first, tried = self._sides_of(start), None
         if len(values) == 1:
-            found = self._assemble_one(values, start, first)
-            if found is not None:
-                return found
-        rows, carriers, sides = assembled(self.mechanism, self._table, values, start, first, tolerance)
+            rows, ends = tried = self._one.new_rows(), self._one_forward.new_ends()
+            rows.actuators[:] = values
+            if self._one_forward.assemble(self._forward_start(start, first), rows, ends):
+                return self._answer_one(rows, ends, start, first)
+        rows, carriers, sides = assembled(self.mechanism, self._table, values, start, first, tolerance, tried)
         rest, others = np.flatnonzero(rows.status == PENDING), None
         if len(rest) == len(values):
             return self._inner.forward(values, start, tolerance)
@@ -242,17 +243,11 @@ class LegsEngine:
         """Which of its two solutions each leg takes at a start, (n or 1, legs)."""
         return self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
 
-    def _assemble_one(self, values: Floats, start: Configurations | None, first: Floats) -> Configurations | None:
-        """Forward kinematics of one row, if it assembles from where it starts, on sides `first`."""
-        rows, ends, own = self._one.new_rows(), self._one_forward.new_ends(), self._forward_start(start, first)
-        rows.actuators[:] = values
-        if not self._one_forward.assemble(own, rows, ends):
-            return None
+    def _answer_one(self, rows: Rows, ends: Ends, start: Configurations | None, first: Floats) -> LegAnswers:
+        """One row that assembles as an answer, from a start on sides `first`."""
         begins = begins_of(self.mechanism, self._table, start, first)
-        told = rows.poses, rows.actuators, ends.sides
-        return LegAnswers(
-            rows, lambda: settled(self.mechanism, self._table, *told, begins(), ends.q), ends.sides, ends.q
-        )
+        told, q = (rows.poses, rows.actuators, ends.sides), ends.q
+        return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins(), q), ends.sides, q)
 
     def _reach_one(
         self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows
