@@ -100,7 +100,7 @@ def as_floats(name: str, value: Any, expected: str) -> Floats:
         raise InvalidArgument(name, f"{type(value).__name__} of dtype {array.dtype}", expected)
     if array.dtype is DOUBLE and array.flags.carray:
         return array
-    return np.require(array, np.float64, ["C", "W"])  # the one memory layout that kernels are compiled for
+    return np.array(array, np.float64, order="C")  # the one memory layout that kernels are compiled for
 
 
 DOUBLE = np.dtype(np.float64)
@@ -154,8 +154,7 @@ def as_poses(target: Any) -> tuple[Floats, tuple[int, ...]]:
     if array.ndim and array.shape[-1] == 3:
         positions = array.reshape(-1, 3)
         poses = np.zeros((len(positions), 4, 4))
-        poses[:] = np.eye(4)
-        poses[:, :3, 3] = positions
+        poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = UNTURNED, positions, 1.0
         return poses, array.shape[:-1]
     raise InvalidArgument("target", f"shape {array.shape}", _EXPECTED)
 

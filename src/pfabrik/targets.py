@@ -34,7 +34,7 @@ def as_targets(mechanism: Mechanism, target: Target) -> tuple[Floats, tuple[int,
     if isinstance(target, Mapping):
         return _from_joint(mechanism, target)
     poses, shape = as_poses(target)
-    if np.shape(cast(Any, target)) == (*shape, 3) and not any(task_of(mechanism).axes):
+    if not any(task_of(mechanism).axes) and np.shape(cast(Any, target)) == (*shape, 3):
         raise InvalidArgument("target", "positions", f"poses: the task of '{mechanism.name}' has no position")
     return poses, shape
 
