@@ -61,8 +61,9 @@ ENOUGH, GOOD, EXACT = 1e-4, 0.5, 0.1
 """Shares of what a step promised that make it worth keeping, and the model good enough for less damping; and by how
 much it may be off where the model, at the end of a whole step, is good enough for far less."""
 
-WORTH = 0.01
-"""Damping after a step that did not lead down, at least, in units of curvature."""
+WORTH, MUCH = 0.01, 0.1
+"""Damping, in units of curvature: at least, after a step that did not lead down; and more than a good step takes back
+at once."""
 
 STEEPEST = 1e8
 """Damping, in units of curvature, that ends a search: no step however short leads down."""
@@ -332,7 +333,7 @@ def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, shar
     if not led_down:
         control["damping"] = max(4.0 * damping, WORTH * largest)
     elif gain > GOOD * promise and control["rejected"] == 0:
-        damping *= 0.01 if damping < 0.1 * largest and share == 1.0 and control["exact"] == 1 else 0.1
+        damping *= 0.01 if damping < MUCH * largest and share == 1.0 and control["exact"] == 1 else 0.1
         control["damping"] = damping if damping > 1e-8 * largest else 0.0
     control["rejected"] = 0 if led_down else 1
     return led_down

@@ -50,7 +50,8 @@ STUCK = 0.2
 """Share of a gap that a step which closes it leaves at most: at a double root Newton's method leaves a quarter."""
 
 SHORT = 1e-6
-"""Share of the objective that a step promised after which curvature is not felt for again: it is off by a thousandth."""
+"""Share of the objective that a step promised after which curvature is not felt for again: it has changed by about a
+thousandth."""
 
 BY = 0.03
 """A search that comes so near to the nearest configuration met yet [rad or L] would end there."""
@@ -117,9 +118,8 @@ def has_same_curvature(view: FreeMotions, before: FreeMotions, control: Record) 
     It is told in the same free motions only where equations have the same pivots.
     """
     totals, others = view.linear.totals[0], before.linear.totals[0]
-    if control["promise"] > SHORT * totals["value"] or control["exact"] == 0:
-        return False
-    if totals["rank"] != others["rank"]:
+    is_short = control["promise"] <= SHORT * totals["value"]
+    if not is_short or control["exact"] == 0 or totals["rank"] != others["rank"]:
         return False
     for r in range(totals["rank"]):
         if view.pivots[r] != before.pivots[r]:

@@ -84,7 +84,7 @@ def new_search(table: Table, cones: int) -> Search:
         np.zeros((4, 4)),
         np.zeros(legs),
         np.zeros(legs, np.int64),
-        np.ones(1),
+        np.full(1, NEAR),
         half_angles,
     )
 
