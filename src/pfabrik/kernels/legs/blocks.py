@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Floats, Ints, Record
 from .._jit import inlined, kernel, routine
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
-from ..vectors import ON_BOUND, Vec, add, along, cross, dot, scale, sub, vec, wrap
+from ..vectors import ON_BOUND, Vec, add, along, copy_row, cross, dot, scale, sub, vec, wrap
 from .answer import CLOSE, CLOSED, KEPT
 from .columns import (
     AX,
@@ -25,6 +25,7 @@ from .columns import (
     IS_SURE,
     LENGTH,
     MORE,
+    OFF,
     PX,
     ROW,
     SIDE,
@@ -32,19 +33,20 @@ from .columns import (
     VALUE,
     VALUES,
     XX,
-    YY,
-    ZZ,
     X,
     Y,
     Z,
     arctangent,
-    lay_along,
+    lay_along_carried,
+    lay_along_turned,
     lay_carried,
+    lay_inverse,
     lay_moved,
     lay_out,
     lay_turned,
 )
 from .endings import SURE
+from .poses import ROUNDED
 from .records import CARRIAGE, CARRIER, CRANK, FOOT, FOOT_LINE, HEAD, HINGE, NO_CARRIER, SHARED, SLIDE
 from .table import open_table
 
@@ -138,8 +140,7 @@ def leave_slide(axis: Vec, n: int, S: Floats) -> None:
 def lay_length(length: float, n: int, S: Floats) -> None:
     for i in range(n):
         present = math.sqrt(S[X, i] * S[X, i] + S[Y, i] * S[Y, i] + S[Z, i] * S[Z, i])
-        S[LENGTH, i], S[INVERSE, i] = present, 1.0 / present
-        S[VALUES + SLIDE, i] = present - length
+        S[LENGTH, i], S[VALUES + SLIDE, i] = present, present - length
 
 
 @routine
@@ -147,37 +148,32 @@ def lay_hinges(rod: Record, carrier: Record, n: int, S: Floats) -> None:
     """Constraints and angles of single hinges at the ends of a rod, and that they do not twist."""
     foot, head, home = vec(rod["foot_axes"][0]), vec(rod["head_axes"][0]), vec(rod["line"])
     if rod["foot"] == HINGE:
-        lay_carried(foot, carrier, n, S)
-        lay_along(VALUE, n, S)
+        lay_along_carried(foot, carrier, VALUE, n, S)
         note_row(VALUE, n, S)
-        if rod["twists"] == 1:
-            for i in range(n):
-                S[BX, i], S[BY, i], S[BZ, i] = S[AX, i], S[AY, i], S[AZ, i]
     if rod["head"] == HINGE:
-        lay_turned(head, n, S)
-        lay_along(VALUE, n, S)
+        lay_along_turned(head, VALUE, n, S)
         note_row(VALUE, n, S)
     if rod["twists"] == 1:
+        lay_carried(foot, carrier, n, S)
+        lay_turned(head, n, S)
+        lay_inverse(n, S)
         lay_twist(rod["twist"], n, S)
         note_row(VALUE, n, S)
     if rod["foot_aimed"] == 1:
-        lay_carried(cross(foot, home), carrier, n, S)
-        lay_along(VALUE, n, S)
-        lay_carried(along(home, -dot(foot, home), foot), carrier, n, S)
+        lay_along_carried(cross(foot, home), carrier, AY, n, S)
+        lay_along_carried(along(home, -dot(foot, home), foot), carrier, AX, n, S)
         lay_angle(VALUES + FOOT, n, S)
     if rod["head_aimed"] == 1:
-        lay_turned(cross(head, home), n, S)
-        lay_along(VALUE, n, S)
-        lay_turned(along(home, -dot(head, home), head), n, S)
+        lay_along_turned(cross(head, home), AY, n, S)
+        lay_along_turned(along(home, -dot(head, home), head), AX, n, S)
         lay_angle(VALUES + HEAD, n, S)
 
 
 @routine
 def lay_angle(to: int, n: int, S: Floats) -> None:
-    """An angle whose sine goes as VALUE, and its cosine as the line along AX, AY, AZ."""
+    """An angle whose cosine goes as AX, and its sine as AY."""
     for i in range(n):
-        cosine = S[AX, i] * S[X, i] + S[AY, i] * S[Y, i] + S[AZ, i] * S[Z, i]
-        S[to, i] = arctangent(S[VALUE, i], cosine)
+        S[to, i] = arctangent(S[AY, i], S[AX, i])
 
 
 @routine
@@ -203,18 +199,15 @@ def note_row(column: int, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_deviation(coordinate: Record, to: int, n: int, S: Floats) -> None:
-    """Fill a column with a coordinate's deviation from home; see `answer.deviation`."""
-    sense, place = coordinate["sense"], VALUES + coordinate["place"]
-    more, below, above = 0.0, -math.inf, math.inf
-    if coordinate["turns"] == 1:
-        lo, hi = coordinate["lo"], coordinate["hi"]
-        middle = 0.5 * (lo + hi)
-        below, above = lo - ON_BOUND, hi + ON_BOUND
-        if hi - lo <= TURN:
-            more, below, above = middle - wrap(middle, 0.0), middle - 0.5 * TURN, middle + 0.5 * TURN
-    for i in range(n):
-        S[to, i] = turned_into(sense * S[place, i] + more, below, above)
+def turns_of(coordinate: Record) -> Vec:
+    """What is added to a coordinate, and the bounds that it is counted into then; see `answer.deviation`."""
+    if coordinate["turns"] == 0:
+        return 0.0, -math.inf, math.inf
+    lo, hi = coordinate["lo"], coordinate["hi"]
+    if hi - lo > TURN:
+        return 0.0, lo - ON_BOUND, hi + ON_BOUND
+    middle = 0.5 * (lo + hi)
+    return middle - wrap(middle, 0.0), middle - 0.5 * TURN, middle + 0.5 * TURN
 
 
 @inlined
@@ -226,32 +219,35 @@ def turned_into(angle: float, below: float, above: float) -> float:
 @routine
 def note_range(coordinate: Record, n: int, S: Floats) -> None:
     """The excess of a coordinate over its range."""
-    lo, hi = coordinate["lo"], coordinate["hi"]
-    lay_deviation(coordinate, VALUE, n, S)
+    lo, hi, sense, place = coordinate["lo"], coordinate["hi"], coordinate["sense"], VALUES + coordinate["place"]
+    more, least, most = turns_of(coordinate)
     for i in range(n):
-        below, above = lo - S[VALUE, i], S[VALUE, i] - hi
+        value = turned_into(sense * S[place, i] + more, least, most)
+        below, above = lo - value, value - hi
         excess = below if below > above else above
         excess = excess if excess < math.inf else math.inf
         S[EXCESS, i] = excess if excess > S[EXCESS, i] else S[EXCESS, i]
 
 
 @routine
-def lay_cone_axis(cone: Record, carrier: Record, n: int, S: Floats) -> None:
+def lay_along_cone(cone: Record, carrier: Record, n: int, S: Floats) -> None:
+    """Fill VALUE with the share of the rod's line along the axis of a cone."""
     if cone["place"] == FOOT_LINE:
-        lay_carried(vec(cone["axis"]), carrier, n, S)
+        lay_along_carried(vec(cone["axis"]), carrier, VALUE, n, S)
     else:
-        lay_turned(vec(cone["axis"]), n, S)
+        lay_along_turned(vec(cone["axis"]), VALUE, n, S)
 
 
 @routine
 def note_cone(cone: Record, carrier: Record, n: int, S: Floats) -> None:
     """The excess of a rod over a cone at one of its ends: only that it is more than is kept."""
     least = cone["least_cosine"]
-    lay_cone_axis(cone, carrier, n, S)
+    lay_along_cone(cone, carrier, n, S)
     for i in range(n):
-        cosine = (S[AX, i] * S[X, i] + S[AY, i] * S[Y, i] + S[AZ, i] * S[Z, i]) * S[INVERSE, i]
-        excess = -math.inf if cosine >= least else 2.0 * KEPT
-        S[EXCESS, i] = excess if excess > S[EXCESS, i] else S[EXCESS, i]
+        length, before = S[LENGTH, i], S[EXCESS, i]
+        is_kept = (S[VALUE, i] >= least * length) & (length > 0.0)
+        excess = -math.inf if is_kept else 2.0 * KEPT
+        S[EXCESS, i] = excess if excess > before else before
 
 
 @kernel
@@ -271,7 +267,8 @@ def answer_blocks(
     """
     table = open_table(machine)
     legs, limited, cones, driven, task = table.legs, table.limited, table.cones, table.driven, table.task
-    S, pose, left = np.empty((MORE + driven.shape[0], BLOCK)), np.zeros((4, 4)), 0
+    S, pose, left = np.empty((MORE, BLOCK)), np.zeros((4, 4)), 0
+    copy_row(targets.reshape(-1), poses.reshape(-1))  # at once: that also fetches targets faster than reading blocks
     for first in range(0, targets.shape[0], BLOCK):
         n = min(BLOCK, targets.shape[0] - first)
         lay_out(targets, begins, task[0], first, n, pose, S)
@@ -289,12 +286,10 @@ def answer_blocks(
                 note_cone(cones[b], legs[main], n, S)
                 b += 1
             while c < driven.shape[0] and driven[c]["leg"] == k:
-                lay_deviation(driven[c], MORE + c, n, S)
+                write_actuator(driven[c], first, n, S, actuators)
                 c += 1
         left += write_status(task[0], first, n, S, status, measures)
-        write_poses(targets, task[0], first, n, S, poses)
-        for c in range(driven.shape[0]):
-            write_actuator(driven[c], MORE + c, first, n, S, actuators)
+        write_poses(task[0], first, n, S, poses)
     return left
 
 
@@ -308,38 +303,38 @@ def lay_sides(sides: Floats, k: int, first: int, n: int, S: Floats) -> None:
 def write_status(task: Record, first: int, n: int, S: Floats, status: Ints, measures: Floats) -> int:
     """Write which rows are reached, and what is measured of them; how many are not."""
     length, enough, left = task["length"], CLOSED if task["unset"] > 0 else CLOSE, 0
+    status, measures = status[first : first + n], measures[first : first + n]
     for i in range(n):
         is_closed = S[ROW, i] <= enough
         is_reached = (S[IS_SURE, i] == 1.0) & is_closed & (S[EXCESS, i] <= KEPT)
         is_open = (S[IS_SURE, i] == 1.0) & (not is_closed) & (task["unset"] > 0)
-        status[first + i] = REACHED if is_reached else (OPEN if is_open else PENDING)
+        status[i] = REACHED if is_reached else (OPEN if is_open else PENDING)
         left += 0 if is_reached else 1
-        measures[first + i, RESIDUAL] = S[ROW, i] * length
-        measures[first + i, LIMIT_EXCESS] = max(S[EXCESS, i], 0.0)
+        measures[i, RESIDUAL] = S[ROW, i] * length
+        measures[i, LIMIT_EXCESS] = max(S[EXCESS, i], 0.0)
     return left
 
 
 @routine
-def write_poses(targets: Floats, task: Record, first: int, n: int, S: Floats, poses: Floats) -> None:
-    """Write poses: what targets set as they have it, unless it had to be made orthonormal."""
-    length, is_set = task["length"], task["rotations"] == 3
+def write_poses(task: Record, first: int, n: int, S: Floats, poses: Floats) -> None:
+    """Write what targets do not set of poses, and rotations that had to be made orthonormal."""
+    length, is_set, own = task["length"], task["rotations"] == 3, poses[first : first + n]
     for i in range(n):
-        target, pose = targets[first + i], poses[first + i]
-        for j in range(4):
-            for k in range(4):
-                pose[j, k] = target[j, k]
-        if not is_set or S[XX, i] != target[0, 0] or S[YY, i] != target[1, 1] or S[ZZ, i] != target[2, 2]:
+        if not is_set or S[OFF, i] > ROUNDED:
             for j in range(9):
-                pose[j // 3, j % 3] = S[XX + j, i]
+                own[i, j // 3, j % 3] = S[XX + j, i]
     for j in range(3):
         if task["axes"][j] == 0:
             for i in range(n):
-                poses[first + i, j, 3] = S[PX + j, i] * length
+                own[i, j, 3] = S[PX + j, i] * length
 
 
 @routine
-def write_actuator(driven: Record, column: int, first: int, n: int, S: Floats, actuators: Floats) -> None:
-    """Write the values of an actuator, of which the column has the deviations from home."""
-    to, home, unit = driven["column"], driven["home"], driven["unit"]
+def write_actuator(driven: Record, first: int, n: int, S: Floats, actuators: Floats) -> None:
+    """Write the values of an actuator."""
+    home, unit, sense, place = driven["home"], driven["unit"], driven["sense"], VALUES + driven["place"]
+    (more, least, most), own = turns_of(driven), actuators[first : first + n, driven["column"]]
     for i in range(n):
-        actuators[first + i, to] = home + S[column, i] * unit
+        S[VALUE, i] = home + turned_into(sense * S[place, i] + more, least, most) * unit
+    for i in range(n):
+        own[i] = S[VALUE, i]

@@ -13,15 +13,15 @@ from .records import CRANK
 # Few enough for the nearest cache, many enough to pay for what is read once a block.
 BLOCK = 64
 
-# Rows of the table: rotation and position of the platform [L]; whether the row is a pose and all solutions are sure,
-# its largest constraint, its largest excess; sides that rods take.
+# Rows of the table: rotation and position of the platform [L]; how far the rotation was from orthonormal, whether the
+# row is a pose and all solutions are sure, its largest constraint, its largest excess; sides that rods take.
 XX, XY, XZ, YX, YY, YZ, ZX, ZY, ZZ, PX, PY, PZ = range(12)
-IS_SURE, ROW, EXCESS, SIDE = range(12, 16)
+OFF, IS_SURE, ROW, EXCESS, SIDE = range(12, 17)
 # Of one rod: from foot to head, its length and the inverse of that, the carrier's angle, two directions, a number.
-X, Y, Z, LENGTH, INVERSE, COS, SIN = range(16, 23)
-AX, AY, AZ, BX, BY, BZ, VALUE = range(23, 30)
+X, Y, Z, LENGTH, INVERSE, COS, SIN = range(17, 24)
+AX, AY, AZ, BX, BY, BZ, VALUE = range(24, 31)
 # Then its values in the places that `records` gives them, as far as HEAD; then as many more as the caller needs.
-VALUES, MORE = 30, 36
+VALUES, MORE = 31, 37
 
 # Coefficients of atan t = t (1 + z P(z)), z = t^2, for |t| <= tan(pi / 8): Chebyshev's, off by 6e-18 at most.
 ATAN = (
@@ -66,18 +66,18 @@ def lay_out(targets: Floats, begins: Floats, task: Record, first: int, n: int, p
 
     `pose` is room for one.
     """
-    shrink = 1.0 / task["length"]
+    shrink, own = 1.0 / task["length"], targets[first : first + n]
     for i in range(n):
-        target = targets[first + i]
+        target = own[i]
         S[XX, i], S[XY, i], S[XZ, i] = target[0, 0], target[0, 1], target[0, 2]
         S[YX, i], S[YY, i], S[YZ, i] = target[1, 0], target[1, 1], target[1, 2]
         S[ZX, i], S[ZY, i], S[ZZ, i] = target[2, 0], target[2, 1], target[2, 2]
         S[PX, i], S[PY, i], S[PZ, i] = shrink * target[0, 3], shrink * target[1, 3], shrink * target[2, 3]
-        S[VALUE, i] = abs(target[3, 0]) + abs(target[3, 1]) + abs(target[3, 2]) + abs(target[3, 3] - 1.0)
+        S[OFF, i] = abs(target[3, 0]) + abs(target[3, 1]) + abs(target[3, 2]) + abs(target[3, 3] - 1.0)
     check_poses(n, S)
     if task["rotations"] == 3:
         for i in range(n):
-            if S[VALUE, i] > ROUNDED and S[IS_SURE, i] == 1.0:
+            if S[OFF, i] > ROUNDED and S[IS_SURE, i] == 1.0:
                 straighten(i, pose, S)
     else:
         for i in range(n):
@@ -92,7 +92,7 @@ def lay_out(targets: Floats, begins: Floats, task: Record, first: int, n: int, p
 
 @routine
 def check_poses(n: int, S: Floats) -> None:
-    """Start IS_SURE with whether a column is a pose, and put into VALUE how far its rotation is from orthonormal."""
+    """Start IS_SURE with whether a column is a pose, whose last row is off by OFF; then that is for the rotation."""
     for i in range(n):
         xx, xy, xz = S[XX, i], S[XY, i], S[XZ, i]
         yx, yy, yz = S[YX, i], S[YY, i], S[YZ, i]
@@ -102,9 +102,9 @@ def check_poses(n: int, S: Floats) -> None:
         off += abs(xy * xz + yy * yz + zy * zz) + abs(xz * xx + yz * yx + zz * zx)
         volume = xx * (yy * zz - yz * zy) - xy * (yx * zz - yz * zx) + xz * (yx * zy - yy * zx)
         farthest = abs(S[PX, i]) + abs(S[PY, i]) + abs(S[PZ, i])
-        is_pose = (off + S[VALUE, i] <= NOT_A_ROTATION) & (volume > 0.0) & (farthest < math.inf)
+        is_pose = (off + S[OFF, i] <= NOT_A_ROTATION) & (volume > 0.0) & (farthest < math.inf)
         S[IS_SURE, i], S[ROW, i], S[EXCESS, i] = (1.0 if is_pose else 0.0), 0.0, -math.inf
-        S[VALUE, i] = off
+        S[OFF, i] = off
 
 
 @routine
@@ -127,6 +127,13 @@ def lay_moved(point: Vec, origin: Vec, n: int, S: Floats) -> None:
 
 
 @routine
+def lay_inverse(n: int, S: Floats) -> None:
+    """Fill INVERSE with that of the rod's length."""
+    for i in range(n):
+        S[INVERSE, i] = 1.0 / S[LENGTH, i]
+
+
+@routine
 def lay_turned(direction: Vec, n: int, S: Floats) -> None:
     """Fill AX, AY, AZ with a direction of the platform."""
     for i in range(n):
@@ -136,24 +143,48 @@ def lay_turned(direction: Vec, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_carried(direction: Vec, carrier: Record, n: int, S: Floats) -> None:
-    """Fill AX, AY, AZ with a direction of the body that the foot is on."""
-    if carrier["carrier"] != CRANK:
-        for i in range(n):
-            S[AX, i], S[AY, i], S[AZ, i] = direction[0], direction[1], direction[2]
-        return
-    axis = vec(carrier["carrier_axis"])
-    rest = scale(dot(axis, direction), axis)
-    plain, across = sub(direction, rest), cross(axis, direction)
+def lay_along_turned(direction: Vec, to: int, n: int, S: Floats) -> None:
+    """Fill a column with the share of the rod's line along a direction of the platform."""
     for i in range(n):
-        cosine, sine = S[COS, i], S[SIN, i]
-        S[AX, i] = rest[0] + cosine * plain[0] + sine * across[0]
-        S[AY, i] = rest[1] + cosine * plain[1] + sine * across[1]
-        S[AZ, i] = rest[2] + cosine * plain[2] + sine * across[2]
+        x = S[XX, i] * direction[0] + S[XY, i] * direction[1] + S[XZ, i] * direction[2]
+        y = S[YX, i] * direction[0] + S[YY, i] * direction[1] + S[YZ, i] * direction[2]
+        z = S[ZX, i] * direction[0] + S[ZY, i] * direction[1] + S[ZZ, i] * direction[2]
+        S[to, i] = x * S[X, i] + y * S[Y, i] + z * S[Z, i]
 
 
 @routine
-def lay_along(to: int, n: int, S: Floats) -> None:
-    """Fill a column with the share of the rod's line along the direction in AX, AY, AZ."""
+def lay_carried(direction: Vec, carrier: Record, n: int, S: Floats) -> None:
+    """Fill BX, BY, BZ with a direction of the body that the foot is on."""
+    if carrier["carrier"] != CRANK:
+        for i in range(n):
+            S[BX, i], S[BY, i], S[BZ, i] = direction[0], direction[1], direction[2]
+        return
+    rest, plain, across = split(direction, vec(carrier["carrier_axis"]))
     for i in range(n):
-        S[to, i] = S[AX, i] * S[X, i] + S[AY, i] * S[Y, i] + S[AZ, i] * S[Z, i]
+        cosine, sine = S[COS, i], S[SIN, i]
+        S[BX, i] = rest[0] + cosine * plain[0] + sine * across[0]
+        S[BY, i] = rest[1] + cosine * plain[1] + sine * across[1]
+        S[BZ, i] = rest[2] + cosine * plain[2] + sine * across[2]
+
+
+@routine
+def lay_along_carried(direction: Vec, carrier: Record, to: int, n: int, S: Floats) -> None:
+    """Fill a column with the share of the rod's line along a direction of the body that the foot is on."""
+    if carrier["carrier"] != CRANK:
+        for i in range(n):
+            S[to, i] = direction[0] * S[X, i] + direction[1] * S[Y, i] + direction[2] * S[Z, i]
+        return
+    rest, plain, across = split(direction, vec(carrier["carrier_axis"]))
+    for i in range(n):
+        cosine, sine = S[COS, i], S[SIN, i]
+        x = rest[0] + cosine * plain[0] + sine * across[0]
+        y = rest[1] + cosine * plain[1] + sine * across[1]
+        z = rest[2] + cosine * plain[2] + sine * across[2]
+        S[to, i] = x * S[X, i] + y * S[Y, i] + z * S[Z, i]
+
+
+@routine
+def split(direction: Vec, axis: Vec) -> tuple[Vec, Vec, Vec]:
+    """What of a direction an axis keeps that it turns about, what it turns, and that a quarter turn on."""
+    rest = scale(dot(axis, direction), axis)
+    return rest, sub(direction, rest), cross(axis, direction)

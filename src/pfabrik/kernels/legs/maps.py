@@ -12,11 +12,8 @@ import numpy as np
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import kernel, routine
 from .answer import CLOSE, CLOSED
-from .blocks import lay_cone_axis, lay_deviation, lay_rod, lay_sides
+from .blocks import lay_along_cone, lay_rod, lay_sides, turned_into, turns_of
 from .columns import (
-    AX,
-    AY,
-    AZ,
     BLOCK,
     EXCESS,
     INVERSE,
@@ -28,10 +25,8 @@ from .columns import (
     VALUE,
     VALUES,
     XX,
-    X,
-    Y,
-    Z,
     arctangent,
+    lay_inverse,
     lay_out,
 )
 from .feasibility import share_of
@@ -98,9 +93,11 @@ def note_bounds(coordinate: Record, limit: int, n: int, S: Floats) -> None:
     """The shares of both bounds of a range, of which the first is called `limit`."""
     lo, hi = coordinate["lo"], coordinate["hi"]
     room = 0.5 * (hi - lo)
-    lay_deviation(coordinate, VALUE, n, S)
+    sense, place = coordinate["sense"], VALUES + coordinate["place"]
+    more, least, most = turns_of(coordinate)
     for i in range(n):
-        below, above, before, binding = S[VALUE, i] - lo, hi - S[VALUE, i], S[LEAST, i], S[BINDING, i]
+        value = turned_into(sense * S[place, i] + more, least, most)
+        below, above, before, binding = value - lo, hi - value, S[LEAST, i], S[BINDING, i]
         nearer = float(limit + 1) if above < below else float(limit)
         share = share_of(above if above < below else below, room)
         S[BINDING, i] = nearer if share < before else binding
@@ -110,11 +107,11 @@ def note_bounds(coordinate: Record, limit: int, n: int, S: Floats) -> None:
 @routine
 def note_cosine(cone: Record, carrier: Record, limit: int, n: int, S: Floats) -> None:
     """The cosine of a rod's angle to the axis of a cone, if it is the least of those with the same half angle."""
-    lay_cone_axis(cone, carrier, n, S)
+    lay_along_cone(cone, carrier, n, S)
     least = CONES + 2 * cone["leader"]
     for i in range(n):
         before, whose = S[least, i], S[least + 1, i]
-        cosine = (S[AX, i] * S[X, i] + S[AY, i] * S[Y, i] + S[AZ, i] * S[Z, i]) * S[INVERSE, i]
+        cosine = S[VALUE, i] * S[INVERSE, i]
         S[least + 1, i] = float(limit) if cosine < before else whose
         S[least, i] = cosine if cosine < before else before
 
@@ -207,6 +204,8 @@ def margins_in_blocks(
             while a < limited.shape[0] and limited[a]["leg"] == k:
                 note_bounds(limited[a], 2 * a, n, S)
                 a += 1
+            if c < cones.shape[0] and cones[c]["leg"] == k:
+                lay_inverse(n, S)
             while c < cones.shape[0] and cones[c]["leg"] == k:
                 note_cosine(cones[c], legs[main], 2 * limited.shape[0] + c, n, S)
                 c += 1
