@@ -237,9 +237,26 @@ def apart(one: Floats, other: Floats) -> float:
 
 
 @routine
-def assemble_row(table: Table, values: Floats, own: Starts, row: int, others: Starts, work: Newton) -> bool:
+def put_deviations(table: Table, values: Floats, wanted: Floats) -> None:
+    """Fill the deviations from home [L or rad] that actuators have at given values (n_a,) [length or rad].
+
+    Those of angles without bounds within a turn, and no farther off than anything is looked for.
+    """
+    for i in range(table.driven.shape[0]):
+        driven = table.driven[i]
+        off = (values[driven["column"]] - driven["home"]) / driven["unit"]
+        if driven["turns"] == 1 and driven["hi"] - driven["lo"] == math.inf:
+            off -= 2.0 * math.pi * math.floor(off / (2.0 * math.pi))
+        wanted[driven["column"]] = min(max(off, -SIGHT), SIGHT)
+
+
+@routine
+def assemble_row(
+    table: Table, given: Floats, own: Starts, row: int, others: Starts, wanted: Floats, work: Newton
+) -> bool:
     """Assemble one row, into `work.now`, within all limits, and read the legs there; see `assemble`."""
-    first = row if own.poses.shape[0] > 1 else 0
+    first, values = row if own.poses.shape[0] > 1 else 0, wanted[row]
+    put_deviations(table, given[row], values)
     for attempt in range(2):
         load_start(table, own, first, work)
         copy_row(values, work.values)
@@ -264,17 +281,17 @@ def assemble_row(table: Table, values: Floats, own: Starts, row: int, others: St
 
 
 @routine
-def put_deviations(table: Table, values: Floats, wanted: Floats) -> None:
-    """Fill the deviations from home [L or rad] that actuators have at given values (n_a,) [length or rad].
-
-    Those of angles without bounds within a turn, and no farther off than anything is looked for.
-    """
-    for i in range(table.driven.shape[0]):
-        driven = table.driven[i]
-        off = (values[driven["column"]] - driven["home"]) / driven["unit"]
-        if driven["turns"] == 1 and driven["hi"] - driven["lo"] == math.inf:
-            off -= 2.0 * math.pi * math.floor(off / (2.0 * math.pi))
-        wanted[driven["column"]] = min(max(off, -SIGHT), SIGHT)
+def write_assembled(table: Table, row: int, work: Newton, ends: Starts, measures: Floats) -> None:
+    """Write a configuration that is assembled, its pose in [length], and what is measured of it."""
+    length, pose = table.task[0]["length"], ends.poses[row]
+    make_exact(work.now.pose)
+    measures[row, RESIDUAL] = worst_of(work.look.rows) * length
+    measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, work.look.values), 0.0)
+    copy_table(work.now.pose, pose)
+    for i in range(3):
+        pose[i, 3] *= length
+    copy_row(work.now.q, ends.q[row])
+    copy_row(work.now.sides, ends.sides[row])
 
 
 @kernel
@@ -311,19 +328,11 @@ def assemble(
     How many are PENDING.
     """
     table, first, rest, left = open_table(machine), open_starts(own), open_starts(others), 0
-    work, length = new_newton(table, turns), table.task[0]["length"]
+    work = new_newton(table, turns)
     for row in range(values.shape[0]):
         status[row] = PENDING
-        put_deviations(table, values[row], wanted[row])
-        if assemble_row(table, wanted[row], first, row, rest, work):
+        if assemble_row(table, values, first, row, rest, wanted, work):
             status[row] = REACHED
-            make_exact(work.now.pose)
-            measures[row, RESIDUAL] = worst_of(work.look.rows) * length
-            measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, work.look.values), 0.0)
-            copy_table(work.now.pose, poses[row])
-            for i in range(3):
-                poses[row, i, 3] *= length
-            copy_row(work.now.q, q[row])
-            copy_row(work.now.sides, sides[row])
+            write_assembled(table, row, work, Starts(poses, q, sides), measures)
         left += status[row]
     return left // PENDING
