@@ -108,12 +108,10 @@ def put_drivers(table: Table, work: Newton) -> None:
 
 
 @routine
-def put_equation(e: int, residual: float, slope: Floats, work: Newton) -> None:
+def put_slope(e: int, slope: Floats, work: Newton) -> None:
     free, own = work.free, work.equations[e]
-    m = free.shape[0]
-    for a in range(m):
+    for a in range(free.shape[0]):
         own[a] = slope[free[a]]
-    own[m] = -residual
 
 
 @routine
@@ -124,28 +122,33 @@ def off_by(driven: Record, value: float, work: Newton) -> float:
 
 
 @routine
-def largest_residual(table: Table, work: Newton) -> float:
-    """Read the legs at the present configuration; the largest residual."""
-    worst = place(table, work.now, work.look)
+def put_residuals(table: Table, work: Newton) -> float:
+    """Read the legs at the present configuration, and fill the right-hand sides; the largest residual."""
+    worst, rows, equations = place(table, work.now, work.look), work.look.rows, work.equations
+    m, e = work.free.shape[0], rows.shape[0]
+    for r in range(e):
+        equations[r, m] = -rows[r]
     for i in range(table.driven.shape[0]):
         if not drives_carrier(table, i):
             driven = table.driven[i]
-            worst = max(worst, abs(off_by(driven, deviation(driven, work.look.values), work)))
+            off = off_by(driven, deviation(driven, work.look.values), work)
+            worst, equations[e, m] = max(worst, abs(off)), -off
+            e += 1
     return worst
 
 
 @routine
 def put_equations(table: Table, work: Newton) -> None:
-    """Fill the equations where the legs have been read."""
-    rows, slopes, look = work.look.rows, work.look.slopes, work.look
+    """Fill the left-hand sides where the legs have been read."""
+    slopes, look = work.look.slopes, work.look
     put_slopes(table, look)
-    e = rows.shape[0]
+    e = slopes.shape[0]
     for r in range(e):
-        put_equation(r, rows[r], slopes[r], work)
+        put_slope(r, slopes[r], work)
     for i in range(table.driven.shape[0]):
         if not drives_carrier(table, i):
-            driven = table.driven[i]
-            put_equation(e, off_by(driven, coordinate_slope(table, driven, look), work), look.slope, work)
+            coordinate_slope(table, table.driven[i], look)
+            put_slope(e, look.slope, work)
             e += 1
 
 
@@ -172,11 +175,12 @@ def newton(table: Table, steps: int, work: Newton) -> float:
     free, normal, step = work.free, work.normal, work.step
     m, before = free.shape[0], math.inf
     put_drivers(table, work)
-    for _ in range(steps):
-        worst = largest_residual(table, work)
+    for taken in range(steps):
+        worst = put_residuals(table, work)
         if not worst < math.inf or worst <= ASSEMBLED or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * before):
             return worst
-        put_equations(table, work)
+        if taken == 0 or not worst * worst <= ASSEMBLED * before:  # else the same slopes, once more, leave less
+            put_equations(table, work)
         if not solve(work):
             return math.inf
         before, most = worst, 0.0
@@ -184,7 +188,7 @@ def newton(table: Table, steps: int, work: Newton) -> float:
             step[free[a]] = normal[a, m]
             most = max(most, abs(normal[a, m]))
         move(table, step, min(1.0, FAR_STEP / max(most, FAR_STEP)), work.now)
-    return largest_residual(table, work)
+    return put_residuals(table, work)
 
 
 @routine
