@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import checks
 import oracles
 import pfabrik as pf
-from machines import MACHINES, published
+from machines import MACHINES, closure, published
 from machines.published import PUBLISHED
 from oracles import assembly
 from pfabrik import Status
@@ -369,6 +370,25 @@ def test_a_seed_keeps_its_assembly_mode() -> None:
         expected = [published.planar_pose(each, home) for each in geometry.solutions(np.add(case["p"], 0.01))]
         nearest = min(expected, key=lambda pose: np.abs(pose - mode.pose).max())
         np.testing.assert_allclose(answer.pose, nearest, rtol=0, atol=1e-8)
+
+
+def assembled_anywhere(mechanism: pf.Mechanism, n: int) -> tuple[pf.Solution, np.ndarray]:
+    """Configurations in whatever working modes random actuator values have; and a turn for each angle among these."""
+    turns = np.array([2.0 * np.pi * (drive.kind == "angle") for drive in mechanism.drives])
+    span = np.where(turns > 0.0, 1.5, 0.5 * mechanism.characteristic_length)
+    values = home_values(mechanism) + np.random.default_rng(0).uniform(-span, span, (n, len(span)))
+    found = pf.solve_fk(mechanism, values)
+    return found[np.asarray(found.status) == Status.REACHED], turns
+
+
+@pytest.mark.parametrize("make", [lambda: pf.load("five_bar"), lambda: pf.load("delta"), closure.scara])
+def test_an_assembled_configuration_is_in_the_working_mode_that_its_actuators_tell(make: Any) -> None:
+    """Values may take an elbow past its dead point; who starts there stays there."""
+    mechanism = make().without_limits()
+    found, turns = assembled_anywhere(mechanism, 6 if INTERPRETED else 40)
+    answer = pf.solve_ik(mechanism, found.pose, start=found)
+    away = np.abs(answer.actuators - found.actuators)
+    assert bool(answer) and np.minimum(away, np.abs(turns - away)).max() <= 1e-6
 
 
 # --- values that cannot be -------------------------------------------------------------------------------------------

@@ -59,7 +59,6 @@ def assembled(
         _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
         near = rest[rows.measures[rest, ACTUATOR_ERROR] <= tolerance]
         rows.status[near[rows.status[near] == PROJECTED]] = REACHED
-    found.sides[:, table.led_arms["leg"]] = found.q[:, table.led_arms["leg"]]
     return rows, found.q, found.sides
 
 

@@ -106,7 +106,7 @@ class OneAssembly:
         self._n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
         self._turns = not mechanism.end_effector_is_joint
         self.home, self._nowhere = Handle(home_start(mechanism, table)), Handle(no_starts(table))
-        self._legs, self._arms = machine_searched(table), table.led_arms["leg"]
+        self._legs = machine_searched(table)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -126,11 +126,7 @@ class OneAssembly:
 
     def assemble(self, own: Handle[Starts], rows: Rows, ends: Ends) -> bool:
         """The same, at once; whether it does."""
-        if self.prepared(own, rows, ends)():
-            return False
-        if len(self._arms):
-            ends.sides[:, self._arms] = ends.q[:, self._arms]
-        return True
+        return self.prepared(own, rows, ends)() == 0
 
 
 def _filled(rows: Rows) -> tuple[NDArray[Any], ...]:

@@ -26,7 +26,7 @@ from .equations import Now, View, count_unknowns, new_now, new_view, place, put_
 from .limits import coordinate_slope, counts_turns
 from .records import Starts
 from .search import copy_now, move
-from .starts import put_carriers
+from .starts import put_carriers, put_sides
 
 ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
 """Largest equation of an assembled configuration, and of one that no step makes more so [L or rad]: more actuators than
@@ -294,6 +294,7 @@ def write_assembled(table: Table, row: int, work: Newton, ends: Starts, measures
     copy_table(work.now.pose, pose)
     for i in range(3):
         pose[i, 3] *= length
+    put_sides(table, work.now, work.look)
     copy_row(work.now.q, ends.q[row])
     copy_row(work.now.sides, ends.sides[row])
 
