@@ -391,6 +391,17 @@ def test_an_assembled_configuration_is_in_the_working_mode_that_its_actuators_te
     assert bool(answer) and np.minimum(away, np.abs(turns - away)).max() <= 1e-6
 
 
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.parametrize("make", [closure.h4, closure.par4])
+def test_a_joint_vector_is_in_the_working_mode_that_its_joints_tell(make: Any) -> None:
+    """That of a leg on an arm is told with the arm where it is."""
+    mechanism = make().without_limits()
+    found, turns = assembled_anywhere(mechanism, 4 if INTERPRETED else 40)
+    answer = pf.solve_ik(mechanism, found.pose, start=found.q)
+    away = np.abs(answer.actuators - found.actuators)
+    assert bool(answer) and np.minimum(away, np.abs(turns - away)).max() <= 1e-6
+
+
 # --- values that cannot be -------------------------------------------------------------------------------------------
 
 

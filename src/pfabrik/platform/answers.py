@@ -72,13 +72,16 @@ def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Fl
     else:
         present = start.coordinates
     turning = closure.turning[own] > 0.0
-    off = []
-    for factor in (1.0, -1.0):
-        found = np.zeros_like(present)
-        read_into(table, start.rows.poses, factor * sides, found)
-        away = found[:, own] - present[:, own]
-        off.append(np.abs(np.where(turning, np.remainder(away + np.pi, 2.0 * np.pi) - np.pi, away)))
-    sides[:, choosing] *= np.where(off[0] <= off[1], 1.0, -1.0)
+    on_arms = table.legs["kind"][choosing] != K.ARM
+    for some in (~on_arms, on_arms):  # where arms are decides where the legs on them are
+        off = []
+        for factor in (1.0, -1.0):
+            tried, found = sides.copy(), np.zeros_like(present)
+            tried[:, choosing[some]] *= factor
+            read_into(table, start.rows.poses, tried, found)
+            away = found[:, own] - present[:, own]
+            off.append(np.abs(np.where(turning, np.remainder(away + np.pi, 2.0 * np.pi) - np.pi, away))[:, some])
+        sides[:, choosing[some]] *= np.where(off[0] <= off[1], 1.0, -1.0)
     return sides
 
 
