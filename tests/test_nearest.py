@@ -21,6 +21,7 @@ from pfabrik.closure.solve import ClosureEngine
 from pfabrik.decomposition.leg_table import leg_table
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
+from pfabrik.platform import rotation
 from pfabrik.platform.solve import LegsEngine
 from pfabrik.rotations import angles_between
 
@@ -577,3 +578,9 @@ def test_hardly_any_answer_to_another_target_is_nearer(name: str) -> None:
         position, rotation = task_of(mechanism).errors(others, np.repeat(target[None], len(others), axis=0))
         beaten += np.hypot(position, turning * rotation).min() < own - 1e-6 * length
     assert beaten <= most * few
+
+
+def test_where_no_constraint_follows_from_others_at_home_no_walk_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Walks take a second or more of a machine with many legs, before its first projection."""
+    monkeypatch.setattr(rotation, "around_home", None)
+    assert rotation.implied_rows.__wrapped__(pf.load("stewart")) == 0

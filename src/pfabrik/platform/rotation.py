@@ -48,13 +48,17 @@ def implied_rows(mechanism: Mechanism) -> int:
     """
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    implied: list[int] = []
-    for poses in (mechanism.home_pose[None], platform_poses(mechanism, around_home(mechanism))):
-        sizes = np.linalg.svd(constraints_at(table, poses)[1], compute_uv=False)
-        implied += (table.task["rows"][0] - (sizes > TOLERANCES.alignment).sum(axis=1)).tolist()
-        if 0 in implied:  # at home they may depend on each other though elsewhere they do not
-            break
-    return min(implied, default=0)
+    at_home = _implied_at(table, mechanism.home_pose[None])
+    if 0 in at_home:  # where walks about home, which take long, would tell nothing else
+        return 0
+    return min(at_home + _implied_at(table, platform_poses(mechanism, around_home(mechanism))), default=0)
+
+
+def _implied_at(table: LegTable, poses: Floats) -> list[int]:
+    """The same of each of some poses (n, 4, 4) [length] that no dead point is at."""
+    sizes = np.linalg.svd(constraints_at(table, poses)[1], compute_uv=False)
+    implied: list[int] = (table.task["rows"][0] - (sizes > TOLERANCES.alignment).sum(axis=1)).tolist()
+    return implied
 
 
 @lru_cache(maxsize=64)
