@@ -153,6 +153,16 @@ def test_a_home_at_dead_points_is_one_to_search_from() -> None:
     assert_as_on_joint_coordinates(mechanism, wanted, answers, at_most=2e-5)
 
 
+def test_a_carrier_that_its_rod_does_not_place_alone_has_no_dead_point() -> None:
+    """Rods of a 4-RRUR face their heads and do not spin: passing over the carrier leads to no other working mode."""
+    mechanism = closure.rrur()
+    found = pf.solve_fk(mechanism, np.random.default_rng(0).uniform(-1.0, 1.2, (40, 4)))
+    poses = found.pose[np.asarray(found.status) == pf.Status.REACHED]
+    assert len(poses) > 10 and pf.solve_ik(mechanism, poses)
+    (along,) = pf.travel(pf.solve_ik(mechanism, mechanism.home_pose), along=(1, 0, 0))
+    assert along.stopped_by and along.distance > 25.0
+
+
 def test_maps_know_arms_that_follow() -> None:
     mechanism = machine("H4")
     wanted = targets(mechanism, 200, 0.4, 0.8, (0, 0, 1))

@@ -621,6 +621,25 @@ def par4() -> Mechanism:
     return Mechanism("Par4", joints, "bar1", (-60, 0, -800), task=("x", "y", "z", "yaw"))
 
 
+def rrur() -> Mechanism:
+    """4-RRUR: upright elbows below a platform that shifts and yaws, its hinges held level."""
+    joints = []
+    for leg, (angle, turned) in enumerate(((20, 15), (110, -30), (200, 15), (290, -30)), 1):
+        sense = np.sign(turned)
+        shoulder, wrist = 150 * _out(angle), 90 * _out(angle + 10 * sense)
+        across = _out(angle) + 0.8 * sense * _tangent(angle)
+        elbow, head = shoulder + 60 * across / np.linalg.norm(across), 40 * _out(angle + turned) + [0, 0, 60]
+        level = np.cross(Z, head - wrist)
+        joints += chain(
+            leg,
+            ("R*", shoulder, Z, {"range": (-1.0, 1.3)}),
+            ("R", elbow, Z),
+            ("U", wrist, (Z, level), {"range": ((-1.5, 1.2), (-0.8, 0.6))}),
+            ("R", head, level),
+        )
+    return Mechanism("4-RRUR", joints, "platform", (0, 0, 60), task=("x", "y", "z"))
+
+
 def hybrid() -> Mechanism:
     """A turntable below, three sliding legs with hinges at their feet in between, and a wrist of two hinges above."""
     joints = [joint("R*", "turntable", ("base", "table"), (0, 0, -40), Z, range=(-1.0, 1.0))]

@@ -213,10 +213,15 @@ def _facing(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegF
 
 
 def _led(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm, ...]:
-    """A rod that asks something of the arm that it is on: not to spin, or to face the other end."""
+    """A rod that asks something of the arm that it is on: not to spin, or to face the other end.
+
+    One that asks for both tells by that where its carrier is, too; beyond the dead point of the carrier is no other
+    working mode then, and it is an arm rather.
+    """
     rod = _rod_on(items[1:], n_carriers, is_reversed)
     hinges = [end for end in (rod.foot_ending, rod.head_ending) if end.kind == "hinge"]
-    if items[0].kind == "S" or not (hinges or keeps_from_spinning(rod)):
+    asks = len(hinges) + keeps_from_spinning(rod)
+    if items[0].kind == "S" or asks == 0 or (n_carriers == 1 and asks > 1):
         raise NoLeg("several joints carry its rod")
     under = Arm(items[0], is_reversed)
     return under, *put_on(under, [rod])
