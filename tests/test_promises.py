@@ -206,6 +206,26 @@ def test_more_freedom_leads_no_farther_from_the_target() -> None:
     assert (answer.position_error <= nearest + 1e-6 * machine.characteristic_length).all()
 
 
+def test_a_position_that_another_way_of_assembly_has_is_reached() -> None:
+    """A tool on a forearm of a 5-bar: where it points is left open, and has two solutions at each elbow."""
+    machine = Mechanism(
+        "5-bar with a tool",
+        [
+            Joint("A1", "revolute", ("base", "a1"), at=(-40, 0, 0), axis=Z, actuated=True),
+            Joint("B1", "revolute", ("a1", "tool"), at=(-80, 90, 0), axis=Z, range=(-1.8, 2.0)),
+            Joint("A2", "revolute", ("base", "a2"), at=(55, -10, 0), axis=Z, actuated=True, range=(-1.4, 1.1)),
+            Joint("B2", "revolute", ("a2", "c2"), at=(95, 70, 0), axis=Z, range=(-1.8, 0.7)),
+            Joint("C", "revolute", ("tool", "c2"), at=(10, 180, 0), axis=Z),
+        ],
+        "tool",
+        (35, 215, 10),
+        task=("x", "y"),
+    )
+    rng = np.random.default_rng(0)
+    found = pf.solve_fk(machine, rng.uniform((-np.pi, -1.4), (np.pi, 1.1), (600, 2)))
+    assert pf.solve_ik(machine, found.pose[found.status == Status.REACHED])
+
+
 def test_answers_survive_pickling_and_copying_after_they_were_read() -> None:
     answer = pf.solve_ik(pf.load("stewart"), [[0, 0, 200], [0, 0, 900]])
     points, limits = dict(answer.points), answer.active_limits

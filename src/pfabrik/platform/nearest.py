@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Records
 from ..closure.close import MARGIN
+from ..closure.configurations import new_rows
 from ..closure.projection import Way
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.home_mobility import column_joints
@@ -21,12 +22,12 @@ from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Aim, Found, Starts
-from ..kernels.rows import HOLD_NOTHING, LIMIT_EXCESS
+from ..kernels.rows import HOLD_NOTHING, LIMIT_EXCESS, REACHED
 from ..kernels.threads import in_blocks
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 from .rotation import constraints_at, implied_rows, keeps_rotation, without_idle_legs
-from .table import OF_AIMS, machine_searched
+from .table import OF_AIMS, machine, machine_searched
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
@@ -300,6 +301,30 @@ def corners_of(mechanism: Mechanism) -> Starts:
     turns = np.concatenate([np.arange(len(corners.poses)), 2.0 * np.arange(len(others.poses)) + 0.5])
     in_turn = np.argsort(turns)
     return Starts(*(np.concatenate(both)[in_turn] for both in zip(corners, others, strict=True)))
+
+
+@lru_cache(maxsize=64)
+def assembled_otherwise(mechanism: Mechanism) -> Starts:
+    """The corners whose poses are others where what the task leaves out of them, and arms, are completed from home."""
+    from ..kernels.legs.answer import answer
+
+    table, corners = leg_table(mechanism), corners_of(mechanism)
+    assert isinstance(table, LegTable)
+    poses, length = in_lengths(corners.poses, mechanism.characteristic_length), mechanism.characteristic_length
+    rows, sides, arms = new_rows(mechanism, len(poses)), corners.sides.copy(), table.led_arms["leg"]
+    sides[:, arms] = table.home_sides[:, arms]
+    answer(
+        machine(table).address,
+        poses,
+        mechanism.home_pose[None].copy(),
+        sides,
+        rows.status,
+        rows.poses,
+        rows.actuators,
+        rows.measures,
+    )
+    off = np.abs(in_lengths(rows.poses, 1.0 / length) - corners.poses).max(axis=(1, 2))
+    return corners.at(np.flatnonzero((rows.status != REACHED) | (off > TOLERANCES.same_mode)))
 
 
 def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: int, far: float) -> Starts:

@@ -17,8 +17,8 @@ from ..kernels.rows import HOLD, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED,
 from ..kernels.threads import in_blocks
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .nearest import project, starts_at
-from .table import machine, machine_nearby
+from .nearest import assembled_otherwise, in_lengths, project, starts_at
+from .table import Machine, machine, machine_nearby
 
 ROWS_A_BLOCK = 64
 
@@ -56,6 +56,8 @@ def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, 
     carriers = np.full(sides.shape, np.nan)
     if not keep_mode and table.home_sides.any():
         rest = _reach_otherwise(question, rest, sides, rows)
+    if not keep_mode and len(rest) and table.task[0]["unset"] + table.task[0]["led"] > 0:
+        rest = _reach_from_corners(question, rest, sides, rows)
     if not len(rest):
         return carriers
     places = rest[:1] if len(begins) == 1 else rest
@@ -107,28 +109,41 @@ def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, 
     return left
 
 
+def _reach_from_corners(question: Question, rest: NDArray[np.intp], sides: Floats, rows: Rows) -> NDArray[np.intp]:
+    """Answer rows in other ways of assembly, completed from corners, the nearest first; which are left."""
+    length = question.mechanism.characteristic_length
+    corners, targets = assembled_otherwise(question.mechanism), in_lengths(question.targets[rest], 1.0 / length)
+    poses = in_lengths(corners.poses, length)
+    away = np.square((corners.poses[:, None] - targets)[:, :, :3]).sum(axis=(2, 3))
+    for places in np.argsort(away, axis=0):
+        waiting = np.flatnonzero(rows.status[rest] != REACHED)
+        if not len(waiting):
+            break
+        begins, ends = poses[places[waiting]], corners.sides[places[waiting]]
+        _complete(question, machine(question.table), rest[waiting], begins, ends, sides, rows)
+    left: NDArray[np.intp] = rest[rows.status[rest] != REACHED]
+    return left
+
+
 def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: Rows) -> Mask:
     """Answer rows exactly from where their projections ended; which stay as they are."""
+    asked = (machine_nearby if question.nearby else machine)(question.table)
+    return _complete(question, asked, again, rows.poses[again], sides[again], sides, rows)
+
+
+def _complete(
+    question: Question, asked: Machine, some: NDArray[np.intp], begins: Floats, ends: Floats, sides: Floats, rows: Rows
+) -> Mask:
+    """Answer some rows from as many poses (m, 4, 4) [length], on sides (m, legs); which stay as they are."""
     from ..kernels.legs.answer import answer
 
-    table, own = question.table, rows_at(rows, again)
-    legs = machine_nearby(table) if question.nearby else machine(table)
-    begins, ends = own.poses.copy(), sides[again]
-    answer(
-        legs.address,
-        question.targets[again],
-        begins,
-        ends,
-        own.status,
-        own.poses,
-        own.actuators,
-        own.measures,
-    )
+    own = rows_at(rows, some)
+    answer(asked.address, question.targets[some], begins, ends, own.status, own.poses, own.actuators, own.measures)
     own.measures[:, [POSITION_ERROR, ROTATION_ERROR]] = 0.0
     left = own.status != REACHED
     if not left.all():
-        put_rows(rows, again[~left], rows_at(own, ~left))
-        sides[again[~left]] = ends[~left]
+        put_rows(rows, some[~left], rows_at(own, ~left))
+        sides[some[~left]] = ends[~left]
     return np.asarray(left)
 
 
