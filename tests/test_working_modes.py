@@ -549,3 +549,9 @@ def test_counts_that_are_none_are_refused(wrong: object) -> None:
             pf.working_modes(machine, (0, 0, 180), **{name: wrong})
     with pytest.raises(InvalidArgument, match="most_starts: found"):
         pf.assembly_modes(machine, (0, 0), most_starts=wrong)
+
+
+def test_a_platform_that_is_upside_down_is_at_no_yaw() -> None:
+    """Loops of a 4-RUU close there too, badly, and its yaw is that of rounding: it took a hundred modes for one."""
+    modes = pf.working_modes(closure.ruu(), closure.ruu().home_pose, most_starts=64 if INTERPRETED else 1024)
+    assert len(modes) and all(mode.pose[2, 2] > 0.0 for mode in modes)

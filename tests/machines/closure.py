@@ -621,6 +621,24 @@ def par4() -> Mechanism:
     return Mechanism("Par4", joints, "bar1", (-60, 0, -800), task=("x", "y", "z", "yaw"))
 
 
+def ruu() -> Mechanism:
+    """4-RUU: upright cranks, and rods whose cardan joints let the platform shift and yaw."""
+    joints = []
+    for leg, angle in enumerate((20, 100, 200, 290), 1):
+        sense = 1 if leg % 2 else -1
+        across = _out(angle) + 0.8 * sense * _tangent(angle)
+        foot, head = 150 * _out(angle), 40 * _out(angle + 15 * sense) + [0, 0, 130]
+        elbow = foot + (60 + 5 * leg) * across / np.linalg.norm(across)
+        level = np.cross(Z, head - elbow)
+        joints += chain(
+            leg,
+            ("R*", foot, Z, {"range": (-1.0, 1.3)}),
+            ("U", elbow, (Z, level), {"range": ((-1.5, 1.2), (-0.5, 0.6))}),
+            ("U", head, (level, Z)),
+        )
+    return Mechanism("4-RUU", joints, "platform", (0, 0, 130), task=("x", "y", "z", "yaw"))
+
+
 def rrur() -> Mechanism:
     """4-RRUR: upright elbows below a platform that shifts and yaws, its hinges held level."""
     joints = []

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Mask
 from ..closure.close import HELD, MARGIN, Closing, Closure, close, platform_poses
 from ..closure.starts import random_starts
+from ..description.joint_types import TASK_TURNS
 from ..description.task import task_of
 from ..errors import ContinuumOfWorkingModes
 from ..motion.displacements import columns
@@ -82,6 +83,8 @@ class BranchSearch:
         wanted = self.task.completed(np.repeat(self.target[None], n, axis=0), begin)
         found = close_on_target(self.closure, coordinates, wanted, max_iterations=STEPS)
         closed = (found.gaps <= TOLERANCES.position) & ~_inside_out(self.closure, found.coordinates)
+        if self.task.rotations == TASK_TURNS["yaw"]:
+            closed &= ~_upside_down(found.poses)[:, None]
         if not self.task.is_whole_pose:
             closed &= closed.all(axis=1, keepdims=True)
         self._complete(found.coordinates, closed)
@@ -252,6 +255,11 @@ def _inside_out(closure: Closure, coordinates: Floats) -> Mask:
             length = coordinates[:, column] + np.ravel(closure.mechanism.home_coordinate(joint.name))
             found[:, closure.loops.group_of[column]] |= length < 0.0
     return found
+
+
+def _upside_down(poses: Floats) -> Mask:
+    """Which poses (n, 4, 4) have no yaw: loops that close badly there are on no target, whatever their yaw comes to."""
+    return (poses[:, 2, 2] < 0.0) & (np.hypot(poses[:, 0, 2], poses[:, 1, 2]) <= TOLERANCES.same_mode)
 
 
 def _least_sums(terms: list[Floats], most: int) -> tuple[Floats, Ints]:
