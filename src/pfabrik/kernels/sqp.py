@@ -43,9 +43,9 @@ FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
 it did not lead up by more than the second, or than it costs to close what counts as closed: it is known no better."""
 
-LAST, CONVERGING = 1e-18, 1e-2
-"""Share of the objective that the last step promises: its length is a billionth of the distance. And, of a fine step,
-share of what the one before promised: if it is more, what moves is rounding."""
+LAST, NEXT, CONVERGING = 1e-18, 1e-22, 1e-2
+"""Share of the objective that the last step promises: its length is a billionth of the distance. That a step after it
+would promise. And, of a fine step, share of what the one before promised: if it is more, what moves is rounding."""
 
 PROBE = 1e-6
 """How far curvature is felt for along each motion [rad or L]."""
@@ -228,7 +228,7 @@ def is_last(linear: Linearisation, other: Linearisation, promise: float, before:
     value = linear.totals[0]["value"]
     if promise <= LAST * value or (before <= FINE * value and promise > CONVERGING * before):
         return True
-    return before < math.inf and promise * promise <= LAST * value * before and is_closed(other, CLOSED)
+    return before < math.inf and promise * promise <= NEXT * value * before and is_closed(other, CLOSED)
 
 
 @routine

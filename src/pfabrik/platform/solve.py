@@ -361,10 +361,13 @@ class LegsEngine:
     def _count_turns(self, begin: Floats, rows: Rows) -> None:
         """Count the angles of actuators that may turn more than once from those of a start (n or 1, n_a)."""
         for driven in self._turning:
-            values = rows.actuators[:, driven["column"]]  # a view
-            nearest = values - 2.0 * np.pi * np.round((values - begin[:, driven["column"]]) / (2.0 * np.pi))
+            told = rows.status != PENDING
+            values, before = rows.actuators[told, driven["column"]], begin[:, driven["column"]]
+            before = before if len(begin) == 1 else before[told]
+            nearest = values - 2.0 * np.pi * np.round((values - before) / (2.0 * np.pi))
             inside = (nearest >= driven["home"] + driven["lo"]) & (nearest <= driven["home"] + driven["hi"])
-            values[:] = np.where(inside, nearest, values)
+            rows.actuators[told, driven["column"]] = np.where(inside, nearest, values)
+
 
 
 def _part(array: Floats, block: slice) -> Floats:
