@@ -37,7 +37,7 @@ from .linearise import linearise
 from .records import Aim
 from .search import NEAR, NEARBY, STEPS_AWAY, Search, copy_now, move
 
-HOPELESS = 20.0
+HOPELESS = 8.0
 """A search that is farther than the nearest yet by so many times what its last step promised is given up."""
 
 THERE = 1e-12
