@@ -15,6 +15,7 @@ import pfabrik as pf
 from machines import closure, published
 from pfabrik.decomposition.leg_table import leg_table
 from pfabrik.description.joint_types import KINDS
+from pfabrik.description.task import task_of
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 from pfabrik.export.export_c import c_source
 from pfabrik.export.self_test import targets_around_home
@@ -268,6 +269,25 @@ def test_numbers_too_small_for_single_precision_are_no_warning(compiler: str, tm
 @needs_compiler
 def test_arms_that_follow_in_more_than_one_way_do_so_in_home_s(tmp_path: Path) -> None:
     program = compiled(tmp_path, c_source(machine(AMBIGUOUS)), COMPILERS[0], driver=None)
+    assert subprocess.run([str(program)], capture_output=True, text=True).stdout == "50 poses, 0 wrong\n"
+
+
+@needs_compiler
+@pytest.mark.parametrize("made", [closure.five_bar_with_tool])
+def test_the_file_reaches_what_is_feasible_where_more_than_one_pose_closes(made: Any, tmp_path: Path) -> None:
+    mechanism, random = made(), np.random.default_rng(0)
+    near = np.array([1.2 if drive.kind == "angle" else 30.0 for drive in mechanism.drives])
+    values = [drive.home for drive in mechanism.drives] + near * random.uniform(-1.0, 1.0, (500, len(near)))
+    targets = pf.solve_fk(mechanism, values).pose
+    feasible = np.asarray(pf.feasibility(mechanism, targets).margin) > 1e-9
+    assert feasible.mean() > 0.3
+    text, unknown = c_source(mechanism), np.zeros(0)
+    program = compiled(tmp_path, text, COMPILERS[0])
+    told = asked(program, mechanism, Truth(targets, targets, unknown, unknown, unknown))
+    assert not told.ik[feasible].any()
+    off = told.poses[:, :3] - targets[:, :3, 3] / mechanism.characteristic_length
+    assert np.abs(off[feasible] * task_of(mechanism).axes).max() < 1e-12
+    program = compiled(tmp_path, text, COMPILERS[0], driver=None)
     assert subprocess.run([str(program)], capture_output=True, text=True).stdout == "50 poses, 0 wrong\n"
 
 

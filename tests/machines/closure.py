@@ -325,6 +325,18 @@ def ranged_stewart() -> Mechanism:
     return Mechanism("ranged 6-UPS", joints, "platform", (0, 0, 180))
 
 
+def five_bar_with_tool() -> Mechanism:
+    """The tool is on one of the two upper bars, beyond the hinge between them: the bar turns where it goes."""
+    joints = [
+        joint("R*", "A1", ("base", "a1"), (-40, 0, 0), Z),
+        joint("R", "B1", ("a1", "c1"), (-80, 90, 0), Z, range=(-1.8, 2.0)),
+        joint("R*", "A2", ("base", "a2"), (55, -10, 0), Z, range=(-1.4, 1.1)),
+        joint("R", "B2", ("a2", "c2"), (95, 70, 0), Z, range=(-1.8, 0.7)),
+        joint("R", "P", ("c1", "c2"), (10, 180, 0), Z),
+    ]
+    return Mechanism("5-bar with a tool", joints, "c1", (35, 215, 10), task=("x", "y"))
+
+
 def five_bar_with_limited_tip() -> Mechanism:
     joints = [
         joint("R*", "A1", ("base", "a1"), (-50, 0, 0), Z),

@@ -59,6 +59,7 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 
 #define PFK_TURN 6.283185307179586
 #define PFK_LONGEST_STEP 0.5 /* [L or rad] */
+#define PFK_FAR 1e30
 #define PFK_MODE_APART 1e-3  /* nearer to each other actuators of two working modes meet [L or rad] */
 enum {
     PFK_IK_STEPS = 20,
@@ -1112,11 +1113,11 @@ static int pfk_arm_motions(const pfk_state *state, int count, pfk_real motion[PF
 
 #endif
 
-/* Moves what is open until all legs close, in no more than `most` steps, by Newton's method: 0, or the number of a leg
-   that does not. All of the pose is open where actuators are given. Where it is strict all legs must reach at every
-   step. */
-static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most, int strict, pfk_state *state,
-                      int *steps)
+/* Moves what is open until all legs close, in no more than `most` steps that together go no farther than `farthest`, by
+   Newton's method: 0, or the number of a leg that does not. All of the pose is open where actuators are given. Where it
+   is strict all legs must reach at every step. */
+static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most, pfk_real farthest, int strict,
+                      pfk_state *state, int *steps)
 {
     const int rows = given ? PFK_ROWS : PFK_OWN_ROWS;
     const pfk_pose start = *pose;
@@ -1134,7 +1135,7 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
         open = pfk_equations(state, given, 1, row, &worst);
         if (worst <= PFK_CLOSED || (*steps && worst <= PFK_CLOSE && worst > 0.25 * last))
             return missing;
-        if (*steps == most || (!given && gone > PFK_FARTHEST))
+        if (*steps == most || gone > farthest)
             return open;
         last = worst;
         count = pfk_motions(pose, moves, motion);
@@ -1270,6 +1271,45 @@ const char *pfk_what(int code)
     return "no code of this file";
 }
 
+#if LIMITS
+#if CONES
+/* Angle between two directions. */
+static pfk_real pfk_angle_between(const pfk_real a[3], const pfk_real b[3])
+{
+    pfk_real across[3];
+    pfk_cross(a, b, across);
+    return atan2(pfk_norm(across), pfk_dot(a, b));
+}
+
+#endif
+/* Fills the room that is left before every limit; 0, or the number of the one that is exceeded most. */
+static int pfk_slacks(const pfk_state *state, pfk_real slack[])
+{
+    pfk_real value, unit, worst = PFK_KEPT;
+    int i, exceeded = 0;
+    for (i = 0; i < PFK_RANGES; ++i) {
+        value = pfk_deviation(&pfk_limited[i], state);
+        slack[2 * i] = value - pfk_limited[i].lo;
+        slack[2 * i + 1] = pfk_limited[i].hi - value;
+    }
+#if CONES
+    for (i = 0; i < PFK_CONES; ++i) {
+        const pfk_placed *leg = &state->leg[pfk_cones[i].leg];
+        const pfk_real *line = pfk_cones[i].is_head ? leg->head_line : leg->foot_line;
+        slack[2 * PFK_RANGES + i] = pfk_cones[i].half_angle - pfk_angle_between(pfk_cones[i].axis, line);
+    }
+#endif
+    for (i = 0; i < PFK_LIMITS; ++i) {
+        unit = i < 2 * PFK_RANGES && pfk_limited[i / 2].is_length ? PFK_SIZE : 1.0;
+        if (!(-slack[i] / unit <= worst)) {
+            worst = -slack[i] / unit;
+            exceeded = i + 1;
+        }
+    }
+    return exceeded;
+}
+
+#endif
 #if LEADS
 /* Turns a pose a share of the way to another. */
 static void pfk_turn_toward(pfk_pose *pose, const pfk_pose *target, pfk_real share)
@@ -1312,7 +1352,7 @@ static int pfk_lean_toward(pfk_pose *pose, const pfk_pose *target, pfk_real shar
 
 /* Leads what a task sets of a pose, or all of it where arms alone follow, to a target in so many parts, each completed
    from the one before: 0, PFK_NO_POSE, or the number of a leg that does not reach or close. */
-static int pfk_lead(const pfk_pose *target, int moves, int parts, pfk_pose *own, pfk_state *state)
+static int pfk_lead(const pfk_pose *target, int moves, int parts, pfk_real farthest, pfk_pose *own, pfk_state *state)
 {
     const int is_whole = moves == PFK_ARMS_ALONE;
     int i, left, steps, code = 0;
@@ -1335,9 +1375,39 @@ static int pfk_lead(const pfk_pose *target, int moves, int parts, pfk_pose *own,
         else
             pfk_bring_yaw(own, pfk_yaw(own) + share * pfk_wrap(pfk_yaw(target) - pfk_yaw(own), 0.0));
 #endif
-        code = pfk_settle(own, 0, moves, PFK_IK_STEPS, parts == 1, state, &steps);
+        code = pfk_settle(own, 0, moves, PFK_IK_STEPS, farthest, parts == 1, state, &steps);
     }
     return code;
+}
+
+/* The same, in one of the ways that there are: from a start at once, from there in parts, and from home in parts, where
+   it is known where arms are; then, where arms are led, so that what follows goes farther. */
+static int pfk_go(const pfk_pose *target, const pfk_pose *start, int moves, int way, pfk_pose *own, pfk_state *state)
+{
+    *own = *start;
+    if (way % 3 == 2)
+        pfk_home(own);
+    return pfk_lead(target, moves, way % 3 ? PFK_PARTS : 1, way < 3 ? PFK_NEAR : PFK_FARTHEST, own, state);
+}
+
+/* Takes the first way that ends within all limits, else the first that ends where all legs close: 0, or what the first
+   of all says. More than one pose may close: beyond a limit need not mean that there is none within. */
+static int pfk_reach(const pfk_pose *target, const pfk_pose *start, int moves, pfk_pose *own, pfk_state *state)
+{
+    int way, closing = -1;
+    for (way = 0; way < PFK_WAYS; ++way) {
+        if (pfk_go(target, start, moves, way, own, state))
+            continue;
+#if LIMITS
+        pfk_real slack[PFK_LIMITS + 1];
+        if (pfk_slacks(state, slack)) {
+            closing = closing < 0 ? way : closing;
+            continue;
+        }
+#endif
+        return 0;
+    }
+    return pfk_go(target, start, moves, closing < 0 ? 0 : closing, own, state);
 }
 
 #endif
@@ -1347,12 +1417,8 @@ static int pfk_rest(const pfk_pose *pose, pfk_state *state)
 {
     int code;
 #if LED
-    pfk_pose own = *pose;
-    code = pfk_lead(pose, PFK_ARMS_ALONE, 1, &own, state);
-    if (code) {
-        pfk_home(&own);
-        code = pfk_lead(pose, PFK_ARMS_ALONE, PFK_PARTS, &own, state);
-    }
+    pfk_pose own;
+    code = pfk_reach(pose, pose, PFK_ARMS_ALONE, &own, state);
 #else
 #if ARMS
     pfk_start(state);
@@ -1372,43 +1438,6 @@ static int pfk_rest(const pfk_pose *pose, pfk_state *state)
 
 #endif
 #if LIMITS
-#if CONES
-/* Angle between two directions. */
-static pfk_real pfk_angle_between(const pfk_real a[3], const pfk_real b[3])
-{
-    pfk_real across[3];
-    pfk_cross(a, b, across);
-    return atan2(pfk_norm(across), pfk_dot(a, b));
-}
-
-#endif
-/* Fills the room that is left before every limit; 0, or the number of the one that is exceeded most. */
-static int pfk_slacks(const pfk_state *state, pfk_real slack[])
-{
-    pfk_real value, unit, worst = PFK_KEPT;
-    int i, exceeded = 0;
-    for (i = 0; i < PFK_RANGES; ++i) {
-        value = pfk_deviation(&pfk_limited[i], state);
-        slack[2 * i] = value - pfk_limited[i].lo;
-        slack[2 * i + 1] = pfk_limited[i].hi - value;
-    }
-#if CONES
-    for (i = 0; i < PFK_CONES; ++i) {
-        const pfk_placed *leg = &state->leg[pfk_cones[i].leg];
-        const pfk_real *line = pfk_cones[i].is_head ? leg->head_line : leg->foot_line;
-        slack[2 * PFK_RANGES + i] = pfk_cones[i].half_angle - pfk_angle_between(pfk_cones[i].axis, line);
-    }
-#endif
-    for (i = 0; i < PFK_LIMITS; ++i) {
-        unit = i < 2 * PFK_RANGES && pfk_limited[i / 2].is_length ? PFK_SIZE : 1.0;
-        if (!(-slack[i] / unit <= worst)) {
-            worst = -slack[i] / unit;
-            exceeded = i + 1;
-        }
-    }
-    return exceeded;
-}
-
 int pfk_limits(const pfk_pose *pose, pfk_real slack[])
 {
     pfk_state state;
@@ -1436,6 +1465,9 @@ int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUAT
 {
     pfk_state state;
     pfk_pose own, wanted = *target;
+#if COMPLETES
+    pfk_pose begin;
+#endif
     int i, code;
     pfk_home(&own);
     for (i = 0; i < 3; ++i)
@@ -1445,19 +1477,10 @@ int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUAT
     if (pfk_make_exact(&wanted))
         return PFK_NO_POSE;
 #if COMPLETES
-    own = *pose;
-    if (pfk_make_exact(&own))
+    begin = *pose;
+    if (pfk_make_exact(&begin))
         return PFK_NO_POSE;
-    code = pfk_lead(&wanted, PFK_WHAT_IS_LEFT, 1, &own, &state);
-    if (code > 0) { /* there may be a way in small steps */
-#if ARMS
-        pfk_home(&own); /* where it is known where arms are */
-#else
-        own = *pose;
-        pfk_make_exact(&own);
-#endif
-        code = pfk_lead(&wanted, PFK_WHAT_IS_LEFT, PFK_PARTS, &own, &state);
-    }
+    code = pfk_reach(&wanted, &begin, PFK_WHAT_IS_LEFT, &own, &state);
     if (code < 0)
         return code;
 #else
@@ -1512,7 +1535,7 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
 #if ARMS
     pfk_rest(&own, &state); /* arms begin where the pose has them */
 #endif
-    code = pfk_settle(&own, given, PFK_ALL, PFK_FK_STEPS, 0, &state, &count);
+    code = pfk_settle(&own, given, PFK_ALL, PFK_FK_STEPS, PFK_FAR, 0, &state, &count);
     if (steps)
         *steps = count;
     if (code)
@@ -1520,7 +1543,7 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
     pfk_make_exact(&own);
     *pose = own;
 #if LED
-    code = pfk_settle(&own, 0, PFK_ARMS_ALONE, PFK_IK_STEPS, 0, &state, &i);
+    code = pfk_settle(&own, 0, PFK_ARMS_ALONE, PFK_IK_STEPS, PFK_NEAR, 0, &state, &i);
 #else
     code = pfk_place(&own, 0, &state);
 #endif

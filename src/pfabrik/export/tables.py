@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from ..arrays import Record
+from ..decomposition.leg_table import COMPLETED_WITHIN
 from ..kernels.legs import records as K
 from .machine import Coordinate, Leg, Machine
 from .self_test import Checks
@@ -84,8 +85,9 @@ def _numbers(machine: Machine, precision: Precision, parts: Sequence[str]) -> It
     yield f"#define PFK_DEAD {literal(accuracy.dead)}         /* square of the sine of an angle from a dead point */"
     yield f"#define PFK_RANK {literal(accuracy.rank)}         /* share of the largest that says nothing any more */"
     yield f"#define PFK_NO_ROTATION {literal(accuracy.rotation)}  /* deviation of a target from a rotation */"
-    farthest = 0.5 if machine.leads_arms else 2.0  # with arms there are more ways to complete a pose
-    yield f"#define PFK_FARTHEST {farthest}        /* what follows goes no farther at once [L or rad] */"
+    near = 0.5 if machine.leads_arms else COMPLETED_WITHIN  # with arms there are more poses that close
+    yield f"#define PFK_NEAR {near}            /* what follows goes no farther at once [L or rad] */"
+    yield f"#define PFK_FARTHEST {COMPLETED_WITHIN}        /* nor than this where nothing nearer closes */"
     yield "enum {"
     yield f"    PFK_LEGS = {len(machine.legs)},"
     yield f"    PFK_FRAMES = {machine.n_frames},"
@@ -94,6 +96,7 @@ def _numbers(machine: Machine, precision: Precision, parts: Sequence[str]) -> It
     yield f"    PFK_RANGES = {len(machine.limited)},"
     yield f"    PFK_CONES = {len(machine.cones)},"
     yield f"    PFK_ROTATIONS = {machine.rotations}, /* of the pose's three that the task sets */"
+    yield f"    PFK_WAYS = {6 if machine.leads_arms else 3}, /* in which a target is led to */"
     yield f"    PFK_TURNING = {int(turning)}, /* 0: the end effector is a point */"
     yield f"    PFK_OWN_ROWS = {machine.equations}, /* equations of the legs */"
     yield f"    PFK_ROWS = {machine.equations + machine.drive_equations * forward}, /* and of actuators */"
