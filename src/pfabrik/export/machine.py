@@ -98,6 +98,11 @@ class Machine:
         self.equations = sum(row_counts(table.legs)) + sum(leg.keeps_its_length for leg in self.legs)
 
     @property
+    def completes(self) -> bool:
+        """Whether more follows from a target than the coordinates of its legs."""
+        return self.unset > 0 or self.leads_arms
+
+    @property
     def n_frames(self) -> int:
         """How many frames legs are read in, see `kernels.legs.frames`."""
         return max(K.FROM_ITSELF, *(int(leg.record["makes"]) + 1 for leg in self.legs))
@@ -111,6 +116,13 @@ class Machine:
     def uncontrolled(self) -> int:
         """Freedoms of the end effector that its actuators leave."""
         return generic_of(self.mechanism).mobility.uncontrolled
+
+    def apart(self, actuators: Floats, others: Floats) -> Floats:
+        """How far actuators are at most from others (n, n_a) each, but for whole turns, (n,) [L or rad]."""
+        off, size = actuators - others, self.mechanism.characteristic_length
+        turned = np.remainder(off + np.pi, 2.0 * np.pi) - np.pi
+        off = np.where([each.is_length for each in self.driven], off / size, turned)
+        return np.asarray(np.abs(off).max(axis=1))
 
 
 def _coordinate(record: Record, kind: str) -> Coordinate:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..answers.solution import Solution
 from ..arrays import Floats, Mask
 from ..configuration import configuration
 from ..description.mechanism import Mechanism
@@ -14,6 +15,7 @@ from ..ik import solve_ik
 from ..motion.mobility import generic_of
 from ..options import Options
 from ..poses import pose
+from .machine import Machine
 from .wording import Precision
 
 POSES = 50
@@ -21,6 +23,7 @@ FARTHEST = (0.3, 0.5)
 """How far the poses are from home [L, rad] at most."""
 
 TRIED = 400
+KEEP = Options(working_mode="keep")
 EXACT: dict[Precision, float] = {"double": 1e-10, "float": 1e-4}
 """To what share of L, or to how many rad, actuators must agree: what rounding may leave near a dead point."""
 
@@ -36,20 +39,42 @@ class Checks(NamedTuple):
     kept: Mask
 
 
-def checks_of(mechanism: Mechanism, limits: bool) -> Checks:
-    """Poses around home that the mechanism reaches in home's working mode, some beyond its limits."""
+def checks_of(machine: Machine, limits: bool) -> Checks:
+    """Poses around home that a mechanism reaches in home's working mode, some beyond its limits.
+
+    Within limits are those alone that the file reaches for sure: `feasibility` tells that they are.
+    """
+    mechanism = machine.mechanism
     targets = targets_around_home(mechanism, TRIED, np.random.default_rng(0))
     targets[0] = mechanism.home_pose
     free = mechanism.without_limits()
     targets = targets[~(np.asarray(feasibility(free, targets).margin) < 0.0)]
-    found = solve_ik(free, targets, options=Options(working_mode="keep"))
-    reached = np.flatnonzero(found.status == 0)
-    least = least_margins(mechanism, found.q[reached])
-    sure = np.abs(least) > SURE
-    kept, beyond = reached[sure & (least > 0.0)], reached[sure & (least < 0.0)] if limits else reached[:0]
+    found = solve_ik(free, targets, options=KEEP)
+    least = least_margins(mechanism, found.q)
+    if machine.completes:
+        told = np.asarray(feasibility(mechanism, targets).margin)
+        least[((least > 0.0) & (told < 0.0)) | ~_are_all_answers(machine, targets, found, least > 0.0)] = 0.0
+    reached, sure = found.status == 0, np.abs(least) > SURE
+    kept = np.flatnonzero(reached & sure & (least > 0.0))
+    beyond = np.flatnonzero(reached & sure & (least < 0.0)) if limits else kept[:0]
     n_beyond = min(len(beyond), max(POSES // 5, POSES - len(kept)))
     chosen = np.concatenate([kept[: POSES - n_beyond], beyond[:n_beyond]])
     return Checks(targets[chosen], found.actuators[chosen], np.isin(chosen, kept))
+
+
+def _are_all_answers(machine: Machine, targets: Floats, found: Solution, kept: Mask) -> Mask:
+    """Whether no other answer to targets (n,) is within limits than those found: from home, and where arms follow from
+    where they were, from the answers kept where each actuator is least, and where it is most."""
+    starts: list[Floats | None] = [None]
+    if machine.leads_arms and kept.any():
+        ends = found.actuators[kept]
+        some = np.flatnonzero(kept)[np.unique([ends.argmin(axis=0), ends.argmax(axis=0)])]
+        starts += list(found.q[some])
+    same = np.ones(len(targets), dtype=bool)
+    for start in starts:
+        other = solve_ik(machine.mechanism, targets, start=start, options=KEEP)
+        same &= (other.status != 0) | (machine.apart(other.actuators, found.actuators) <= EXACT["double"])
+    return same
 
 
 def targets_around_home(mechanism: Mechanism, count: int, random: np.random.Generator) -> Floats:

@@ -20,7 +20,7 @@ def source(machine: Machine, name: str, precision: Precision, parts: Sequence[st
     """The text of the file."""
     included = {"machine.h": machine_h(machine, parts), "tables.h": tables_h(machine, precision, parts)}
     if "ik" in parts:
-        included["checks.h"] = checks_h(checks_of(machine.mechanism, "limits" in parts), EXACT[precision])
+        included["checks.h"] = checks_h(checks_of(machine, "limits" in parts), EXACT[precision])
     routines = resources.files(__package__).joinpath("kinematics.c").read_text(encoding="utf-8")
     text = _kept(routines[routines.index("#ifndef") :], features(machine, parts))
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)

@@ -25,7 +25,7 @@ def features(machine: Machine, parts: Sequence[str]) -> set[str]:
     """What of the routines a machine and the parts that are asked for have a use for."""
     records = [leg.record for leg in machine.legs]
     found = {part.upper() for part in parts}
-    completes = "ik" in parts and (machine.unset > 0 or machine.leads_arms)
+    completes = "ik" in parts and machine.completes
     asked: dict[str, object] = {
         "ARMS": machine.n_arms > 0,
         "LED": machine.leads_arms,
