@@ -693,6 +693,24 @@ def hybrid() -> Mechanism:
     return Mechanism("R + 3-RPS + RR", joints, "tool", (0, 0, 260))
 
 
+def stretched_wrist() -> Mechanism:
+    """Three sliding legs with hinges at their feet, and on their plate a wrist of two hinges: the first is in line with
+    the tool at home, where both of its ways to point the tool meet."""
+    joints = []
+    for leg, angle in enumerate((0, 125, 240), 1):
+        foot, head = 100 * _out(angle), 55 * _out(angle) + [0, 0, 160]
+        joints += chain(
+            leg,
+            ("R", foot, _tangent(angle), {"range": (-0.5, 0.6)}),
+            ("P*", None, head - foot, {"home": float(np.linalg.norm(head - foot)), "range": (130, 210)}),
+            ("S", head, None, {"cone": Cone(foot - head, 0.7, "plate")}),
+            end="plate",
+        )
+    wrist = ("R*", (0, 0, 190), Z, {"range": (-2.5, 2.9)}), ("R*", (0, 0, 220), X, {"range": (-0.3, 1.9)})
+    joints += chain("w", *wrist, start="plate", end="tool")
+    return Mechanism("3-RPS + RR", joints, "tool", (0, 0, 270), task=("x", "y", "z", "tilt"))
+
+
 def picker() -> Mechanism:
     """A delta whose tool a shaft turns: from a motor on the base, through cardan joints and a slide between them."""
     joints = []

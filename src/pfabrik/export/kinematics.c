@@ -1015,37 +1015,43 @@ static void pfk_bring_yaw(pfk_pose *pose, pfk_real yaw)
 
 #endif
 /* Solves m x = right by least squares, with reflections: `m` holds the right side in its last column and is used up.
-   0 where it tells x; 1 where it does not, or is not of numbers. */
+   Unknowns that it does not tell stay 0; 1 where there are such. */
 static int pfk_least_squares(pfk_real m[PFK_ROWS][PFK_UNKNOWNS + 1], int rows, int unknowns, pfk_real x[PFK_UNKNOWNS])
 {
     pfk_real size, part, share, largest = 0.0;
-    int i, j, k;
+    int row[PFK_UNKNOWNS] = {0}, i, j, k, told = 0;
     for (k = 0; k < unknowns; ++k) {
         size = 0.0;
-        for (i = k; i < rows; ++i)
+        for (i = told; i < rows; ++i)
             size += m[i][k] * m[i][k];
-        size = m[k][k] > 0.0 ? -sqrt(size) : sqrt(size);
-        largest = fabs(size) > largest ? fabs(size) : largest;
-        if (!(fabs(size) > PFK_RANK * largest))
-            return 1;
-        part = size * (size - m[k][k]);
-        m[k][k] -= size;
+        size = sqrt(size);
+        largest = size > largest ? size : largest;
+        row[k] = -1;
+        if (!(size > PFK_RANK * largest))
+            continue;
+        row[k] = told;
+        size = m[told][k] > 0.0 ? -size : size;
+        part = size * (size - m[told][k]);
+        m[told][k] -= size;
         for (j = k + 1; j <= unknowns; ++j) {
             share = 0.0;
-            for (i = k; i < rows; ++i)
+            for (i = told; i < rows; ++i)
                 share += m[i][k] * m[i][j];
-            for (i = k; i < rows; ++i)
+            for (i = told; i < rows; ++i)
                 m[i][j] -= share / part * m[i][k];
         }
-        m[k][k] = size;
+        m[told++][k] = size;
     }
     for (k = unknowns - 1; k >= 0; --k) {
-        x[k] = m[k][unknowns];
+        x[k] = 0.0;
+        if (row[k] < 0)
+            continue;
+        x[k] = m[row[k]][unknowns];
         for (j = k + 1; j < unknowns; ++j)
-            x[k] -= m[k][j] * x[j];
-        x[k] /= m[k][k];
+            x[k] -= m[row[k]][j] * x[j];
+        x[k] /= m[row[k]][k];
     }
-    return 0;
+    return told < unknowns;
 }
 
 /* Gives a pose the opposite of the turn that it has made since the start. */
@@ -1151,8 +1157,8 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
             }
             system[i][count] = -row[i].off;
         }
-        if (pfk_least_squares(system, rows, count, x))
-            return open;
+        if (pfk_least_squares(system, rows, count, x) && moves != PFK_WHAT_IS_LEFT)
+            return open; /* what a task leaves open may stay where it is */
         for (k = 0; k < PFK_COLUMNS; ++k) {
             twist[k] = 0.0;
             for (j = 0; j < count; ++j)
