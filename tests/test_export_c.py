@@ -292,6 +292,13 @@ def test_the_file_reaches_what_is_feasible_where_more_than_one_pose_closes(made:
 
 
 @needs_compiler
+def test_a_file_checks_itself_with_poses_that_have_one_answer_alone(tmp_path: Path) -> None:
+    text = c_source(closure.stretched_wrist(tool=(0, 10, 270)))
+    program = compiled(tmp_path, text, COMPILERS[0], driver=None)
+    assert subprocess.run([str(program)], capture_output=True, text=True).stdout == "50 poses, 0 wrong\n"
+
+
+@needs_compiler
 def test_a_self_test_fails_where_the_machine_is_another(tmp_path: Path) -> None:
     text = c_source(machine("stewart"))
     place = text.index(".foot = {") + len(".foot = {")

@@ -693,7 +693,7 @@ def hybrid() -> Mechanism:
     return Mechanism("R + 3-RPS + RR", joints, "tool", (0, 0, 260))
 
 
-def stretched_wrist() -> Mechanism:
+def stretched_wrist(tool: tuple[float, float, float] = (0, 0, 270)) -> Mechanism:
     """Three sliding legs with hinges at their feet, and on their plate a wrist of two hinges: the first is in line with
     the tool at home, where both of its ways to point the tool meet."""
     joints = []
@@ -708,7 +708,7 @@ def stretched_wrist() -> Mechanism:
         )
     wrist = ("R*", (0, 0, 190), Z, {"range": (-2.5, 2.9)}), ("R*", (0, 0, 220), X, {"range": (-0.3, 1.9)})
     joints += chain("w", *wrist, start="plate", end="tool")
-    return Mechanism("3-RPS + RR", joints, "tool", (0, 0, 270), task=("x", "y", "z", "tilt"))
+    return Mechanism("3-RPS + RR", joints, "tool", tool, task=("x", "y", "z", "tilt"))
 
 
 def picker() -> Mechanism:
