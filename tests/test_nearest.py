@@ -496,6 +496,17 @@ def test_a_working_mode_with_a_small_room_of_its_own_is_searched() -> None:
     assert (answers.position_error < 0.35 * mechanism.characteristic_length).all()
 
 
+def test_a_search_that_passes_by_the_nearest_yet_goes_on_to_one_nearer() -> None:
+    """Two of a hexaglide's poses are nearest to a target among those about them, and the way to one leads by the
+    other."""
+    mechanism = pf.load("hexaglide")
+    target = np.eye(4)
+    target[:3, :3] = Rotation.from_rotvec([-0.362, -0.415, -0.202]).as_matrix()
+    target[:3, 3] = [-5.8, -19.9, 231.3]
+    answer = pf.solve_ik(mechanism, target, options=Options(hold=None))
+    assert np.hypot(answer.position_error, mechanism.rotation_length * answer.rotation_error) < 31.92
+
+
 def test_a_foot_that_is_asked_to_tilt_too_far_tilts_as_far_as_it_can() -> None:
     """An ankle's motors pass their dead points on the way: no search may be lost there. Of all tilts, every third of a
     degree, that the foot can have, none is nearer."""

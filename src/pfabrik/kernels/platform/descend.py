@@ -53,7 +53,7 @@ SHORT = 1e-6
 """Share of the objective that a step promised after which curvature is not felt for again: it has changed by about a
 thousandth."""
 
-BY = 0.03
+BY = 0.01
 """A search that comes so near to the nearest configuration met yet [rad or L] would end there."""
 
 
