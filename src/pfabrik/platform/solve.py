@@ -369,7 +369,6 @@ class LegsEngine:
             rows.actuators[told, driven["column"]] = np.where(inside, nearest, values)
 
 
-
 def _part(array: Floats, block: slice) -> Floats:
     """One for all rows, or those of a block; writable, as kernels are compiled for."""
     own = array if len(array) == 1 else array[block]

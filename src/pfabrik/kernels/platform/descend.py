@@ -16,6 +16,7 @@ from ..sqp import (
     CLOSED,
     CORRECTIONS,
     LONGEST_STEP,
+    MUCH,
     NEARLY_CLOSED,
     RESTORING,
     begin_descent,
@@ -38,7 +39,8 @@ from .records import Aim
 from .search import NEAR, NEARBY, STEPS_AWAY, Search, copy_now, move
 
 HOPELESS = 8.0
-"""A search that is farther than the nearest yet by so many times what its last step promised is given up."""
+"""A search that is farther than the nearest yet by so many times what its last step promised is given up, unless the
+step was short for damping."""
 
 THERE = 1e-12
 """Distance at which a search has arrived, and which counts as none [L]."""
@@ -128,6 +130,14 @@ def has_same_curvature(view: FreeMotions, before: FreeMotions, control: Record) 
 
 
 @routine
+def is_hopeless(behind: float, share: float, control: Record) -> bool:
+    """Whether a search that is so far behind the nearest yet, in the objective, will not come as near; `share` of the
+    last step was taken."""
+    is_damped = control["damping"] > MUCH * control["largest"]
+    return bool(not is_damped and HOPELESS * control["promise"] < share * behind)
+
+
+@routine
 def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Search) -> float:
     """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible.
 
@@ -192,7 +202,8 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
                     view, other = other, view
                     if least < math.inf and is_by(search.best, met):
                         return least
-                    if HOPELESS * control["promise"] < view.linear.totals[0]["value"] - 0.5 * unit[0] * least * least:
+                    behind = view.linear.totals[0]["value"] - 0.5 * unit[0] * least * least
+                    if is_hopeless(behind, share, control):
                         return math.inf
                     if is_closed(view.linear, CLOSED):
                         copy_now(search.best, search.closed)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Records
+from ...arrays import Floats, Record, Records
 from .._jit import kernel, routine, search
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
@@ -37,14 +37,24 @@ HOLDABLE = 1e-3
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
 
+TALLY = np.dtype(
+    [
+        ("least", "f8"),  # distance met [L]
+        ("hits", "f8"),  # how often it was; infinite where none is nearer
+        ("others", "f8"),  # how often a search ended farther away
+        ("sure", "i8"),  # 1 where a search was not lost on its way
+    ]
+)
+"""Where searches for a row have ended."""
+
 
 class Work(NamedTuple):
     """Scratch memory of the searches for a row."""
 
     search: Search
     best: Now
-    met: Floats  # (3,): the least distance met [L], how often it was, and 1 where a search was not lost on its way
-    away: Floats  # (2,): the same of searches that did not come to what is held
+    met: Records  # (1,): TALLY
+    away: Records  # (1,): TALLY of searches that did not come to what is held
     lost: Floats  # (1 + starts,): how far the first start, and each other, is from that; infinite where one is not lost
 
 
@@ -167,18 +177,34 @@ def holds_some(table: Table, aim: Aim, weights: Floats) -> bool:
 
 
 @routine
-def take_nearer(distance: float, tally: Floats, search: Search, best: Now) -> None:
-    """Take over where a search has ended if it is nearer; the least distance, and how often it was met, are counted."""
-    if distance < (1.0 - SAME) * tally[0]:
-        tally[0], tally[1] = distance, 1.0
+def clear(tally: Record) -> None:
+    """Begin a tally."""
+    tally["least"], tally["hits"], tally["others"], tally["sure"] = math.inf, 0.0, 0.0, 0
+
+
+@routine
+def take_nearer(distance: float, tally: Record, search: Search, best: Now) -> None:
+    """Take over where a search has ended if it is nearer, and count it."""
+    least = tally["least"]
+    if distance < (1.0 - SAME) * least:
+        tally["others"] += tally["hits"]
+        tally["least"], tally["hits"] = distance, 1.0
         copy_now(search.best, best)
-    elif distance <= (1.0 + SAME) * tally[0] and tally[0] < math.inf:
-        tally[1] += 1.0
+    elif distance <= (1.0 + SAME) * least and least < math.inf:
+        tally["hits"] += 1.0
+    else:
+        tally["others"] += 1.0
+
+
+@routine
+def is_enough(tally: Record, hits: int) -> bool:
+    """Whether searches agree often enough: as often as asked for, and once more for each that ended elsewhere."""
+    return bool(tally["hits"] >= hits + tally["others"])
 
 
 @routine
 def search_from(
-    table: Table, row: int, aim: Aim, sides: Floats, stays: int, search: Search, best: Now, met: Floats
+    table: Table, row: int, aim: Aim, sides: Floats, stays: int, search: Search, best: Now, met: Record
 ) -> bool:
     """Search from where `search.best` is, and take it over if it is nearer; whether it is lost.
 
@@ -186,15 +212,19 @@ def search_from(
     ----------
     sides : of the working mode that is to be kept, if one is.
     """
-    distance = descend(table, row, aim, met[0], best, search)
-    is_lost = distance == math.inf and (met[0] == math.inf or search.control[0]["steps"] == 0)
+    distance = descend(table, row, aim, met["least"], best, search)
+    is_lost = distance == math.inf and (met["least"] == math.inf or search.control[0]["steps"] == 0)
     if distance < math.inf:
         put_sides(table, search.best, search.look)
         if stays == 0 or not is_other_mode(table.legs, sides, search.best.sides):
             take_nearer(distance, met, search, best)
-            met[2] = max(met[2], 1.0 - search.control[0]["recovered"])
-            if met[1] == 1.0 and distance == met[0] and (distance == 0.0 or is_global(table, aim.pose, search)):
-                met[1] = math.inf  # none is nearer
+            met["sure"] = max(met["sure"], 1 - search.control[0]["recovered"])
+            if (
+                met["hits"] == 1.0
+                and distance == met["least"]
+                and (distance == 0.0 or is_global(table, aim.pose, search))
+            ):
+                met["hits"] = math.inf
     return is_lost
 
 
@@ -209,7 +239,7 @@ def search_row(
     after it was lost on the way. Where too few agree, searches from starts that were lost go for what is held alone,
     and then on with it held: from a feasible configuration there are more ways to it than the shortest.
     """
-    search, best, met, away, lost = work.search, work.best, work.met, work.away, work.lost
+    search, best, met, away, lost = work.search, work.best, work.met[0], work.away[0], work.lost
     target, n = search.target, others.poses.shape[0]
     near = -1
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
@@ -217,11 +247,12 @@ def search_row(
     for k in range(kept.shape[0]):
         kept[k] = sides[k] if stays == 1 and is_carried(table.legs[k]) else 0.0
     at_once = holds_all(aim.pose) or (n > 0 and table.task[0]["led"] == 0)
-    met[0], met[1], met[2], away[0], away[1] = math.inf, 0.0, 0.0, math.inf, 0.0
+    clear(met)
+    clear(away)
     for i in range(n + 1):
         lost[i] = math.inf
     for start in range(n + 2):
-        if met[1] >= hits or (start == n + 1 and met[2] == 1.0):
+        if is_enough(met, hits) or (start == n + 1 and met["sure"] == 1):
             break
         near = nearest_start(aim.pose, target, others, search.gradient) if start == 1 else near
         place = -1 if start == 0 or start == n + 1 else near if start == 1 else start - 2 + int(start - 2 >= near)
@@ -237,7 +268,11 @@ def search_row(
             begun = own.poses[first] if place < 0 else others.poses[place]
             lost[place + 1], _ = pose_gradient(toward.pose, target, begun, search.gradient, True)
     fix(toward.pose, False, search)
-    while toward.pose.max_iterations > 0 and met[1] < hits and (met[0] < math.inf or away[1] < hits):
+    while (
+        toward.pose.max_iterations > 0
+        and not is_enough(met, hits)
+        and (met["least"] < math.inf or not is_enough(away, hits))
+    ):
         place = -1
         for i in range(n):
             place = i if lost[i + 1] < lost[place + 1] else place
@@ -245,12 +280,13 @@ def search_row(
             break
         lost[place + 1] = math.inf
         begin(table, own if place < 0 else others, first if place < 0 else place, search)
-        distance = descend(table, row, toward, away[0] if met[0] == math.inf else math.inf, best, search)
+        distance = descend(table, row, toward, away["least"] if met["least"] == math.inf else math.inf, best, search)
         if distance <= HOLDABLE:
             search_from(table, row, aim, sides, stays, search, best, met)
-        elif met[0] == math.inf and search.control[0]["steps"] > 1:
+        elif met["least"] == math.inf and search.control[0]["steps"] > 1:
             take_nearer(distance, away, search, best)
-    return met[0]
+    least: float = met["least"]
+    return least
 
 
 @search
@@ -280,7 +316,7 @@ def approach(
     """
     table = open_table(machine)
     search, best = new_search(table, cones), new_now(table.legs.shape[0])
-    work = Work(search, best, np.zeros(3), np.zeros(2), np.zeros(1 + others.poses.shape[0]))
+    work = Work(search, best, np.zeros(1, TALLY), np.zeros(1, TALLY), np.zeros(1 + others.poses.shape[0]))
     pose, held = aim.pose, np.zeros(6)
     steps = pose.max_iterations if holds_some(table, aim, held) else 0
     toward = Aim(PoseObjective(pose.targets, held, pose.frame, pose.margin, pose.near, steps), aim.values, aim.implied)
