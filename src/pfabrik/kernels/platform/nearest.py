@@ -310,7 +310,7 @@ def approach(
     ----------
     machine : see `open_table`.
     own : the first start of each row, or one for all.
-    others : starts that follow, for any row, until the nearest configuration has been met often enough, see `is_enough`.
+    others : starts that follow, for any row, until the nearest configuration has been met often enough: `is_enough`.
     stays : 1 for configurations in the working mode of a row's first start alone.
     cones : how many of the cones searches mind, the first ones; excesses over all of them are told.
     """
