@@ -32,9 +32,10 @@ from .table import OF_AIMS, machine, machine_searched
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
-CORNERS, HITS, HITS_OF_VALUES = 16, 3, 8
+CORNERS, HITS, HITS_OF_STRUTS, HITS_OF_VALUES = 16, 4, 3, 8
 """How many configurations searches start from at most, and how many of them must end at the nearest one, and one more
-for each that ends elsewhere: more where actuators have values, which a platform nearly has in many poses."""
+for each that ends elsewhere: fewer where struts leave the platform all its freedoms, and have no two ways to bend; more
+where actuators have values, which a platform nearly has in many poses."""
 
 CORNERS_OF_MANY, HITS_OF_MANY = 32, 8
 """Corners where arms are led, or pivots have two solutions; and hits there and where task and legs do not tell all of a
@@ -245,7 +246,7 @@ def _hits(table: LegTable) -> int:
     task = table.task[0]
     if table.leads_arms or task["unset"] + task["arms"] > task["rows"]:
         return HITS_OF_MANY
-    return HITS
+    return HITS if table.task[0]["rows"] > 0 or len(_carriers(table)) else HITS_OF_STRUTS
 
 
 def _new_found(n: int, table: LegTable) -> Found:
