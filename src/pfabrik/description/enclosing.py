@@ -50,9 +50,7 @@ def _radius_at_unit_size(cloud: Floats) -> float:
         carriers, centre, radius = grown
 
 
-def _smallest_among_subsets(
-    points: Floats,
-) -> tuple[Floats, Floats, float]:
+def _smallest_among_subsets(points: Floats) -> tuple[Floats, Floats, float]:
     """The carriers, centre and radius of the smallest sphere around at most five points."""
     best = (points, points[0], np.inf)
     for count in range(2, min(len(points), 4) + 1):
