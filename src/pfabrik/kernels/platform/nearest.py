@@ -14,13 +14,14 @@ from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import balance
 from ..legs.answer import deviation, excess_of
 from ..legs.poses import make_exact
-from ..legs.records import ARM, PIVOT, SLIDE, Table
+from ..legs.records import ARM, Table
 from ..legs.table import open_table
 from ..qp import new_qp
 from ..rotations import difference, yaw_difference
 from ..rows import LIMIT_EXCESS, POSITION_ERROR, RESIDUAL, ROTATION_ERROR
 from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
+from .certificate import is_global
 from .descend import descend
 from .equations import Now, is_carried, new_now, new_view, place
 from .linearise import linearise
@@ -115,39 +116,6 @@ def turned_by(rotations: int, pose: Floats, search: Search) -> float:
 
 
 @routine
-def is_global(table: Table, aim: PoseObjective, search: Search) -> bool:
-    """Whether no feasible configuration is nearer than where a descent has ended.
-
-    So if the Lagrangian of what holds it there is convex: with the orientation held and all legs struts, the bounds of
-    a strut s = |o| are (s^2 - hi^2) / 2 hi and (lo^2 - s^2) / 2 lo, with the gradients of s - hi and lo - s; a cone of
-    at most a right angle is convex; and the distance outweighs the least lengths if the sum of their multipliers, each
-    over its length, is below 1.
-    """
-    if (
-        aim.frame != BASE_AXES
-        or aim.platform[3] != LOCKED
-        or search.force.shape[0] > 6
-        or search.look.rows.shape[0] > 0
-    ):
-        return False
-    for i in range(3):
-        if aim.platform[i] != 1.0:
-            return False
-    multipliers, pull, ranges = search.hessian.multipliers, 0.0, table.limited.shape[0]
-    for i in range(ranges):
-        limited = table.limited[i]
-        leg = table.legs[limited["leg"]]
-        if leg["kind"] != PIVOT and limited["place"] == SLIDE:
-            pull += multipliers[2 * i] / (leg["length"] + limited["lo"])
-        elif multipliers[2 * i] + multipliers[2 * i + 1] > 0.0:
-            return False
-    for i in range(table.cones.shape[0]):
-        if multipliers[2 * ranges + i] > 0.0 and table.cones[i]["half_angle"] > 0.5 * math.pi:
-            return False
-    return bool(pull < search.gradient.unit[0])
-
-
-@routine
 def holds_all(aim: PoseObjective) -> bool:
     """Whether the whole pose is held."""
     free = 0
@@ -222,7 +190,7 @@ def search_from(
             if (
                 met["hits"] == 1.0
                 and distance == met["least"]
-                and (distance == 0.0 or is_global(table, aim.pose, search))
+                and (distance == 0.0 or is_global(table, row, aim, search))
             ):
                 met["hits"] = math.inf
     return is_lost

@@ -1,0 +1,182 @@
+"""Whether no feasible configuration is nearer than where a search has ended, of platforms that do not turn.
+
+A rod from a foot E, which a carrier may move, to a head y keeps to |y - E| = l (or a bound l of its length); with
+multipliers that balance the distance at the place x where a search has ended, and T the target,
+
+    |y - T|^2 / 2  >=  |y - T|^2 / 2 + sum_k m_k (l_k^2 - |y - E_k|^2) / 2 + sum_k b_k . (y - E_k)  +  const
+
+holds for every feasible y: the terms are zero, or not positive, there. Here b has the conditions that are linear in
+y - E: cones, c . (y - E) >= l cos(half angle), and hinges across. All of it is convex in y where M = sum_k m_k < 1
+(rods under tension have m < 0), and then least, for feet that have moved by d_k, at
+
+    |x - T|^2 / 2 + sum_k ((m_k l_k u_k - b_k) . d_k - m_k |d_k|^2 / 2) - |sum_k m_k d_k|^2 / (2 (1 - M)),
+
+the last term at least - (sum_k |m_k|) sum_k |m_k| |d_k|^2 / (2 (1 - M)): a sum over carriers, each a function of its
+own coordinate q, A (cos q - 1) + B sin q of a crank and a parabola of a carriage, whose least value within the limits
+of q is known. No configuration is nearer where these least values are zero: of any working mode.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .._jit import routine
+from ..closure.loops import BASE_AXES
+from ..free_motions import put_multipliers
+from ..legs.answer import deviation
+from ..legs.frames import NOWHERE
+from ..legs.records import CARRIAGE, CARRIER, CRANK, FOOT_LINE, FROM_BASE, HINGE, ROD, SHARED, SLIDE, Table
+from ..legs.rods import carried_foot
+from ..vectors import Vec, add, along, cross, dot, flatten, norm, scale, sub, vec
+from .equations import direction, is_carried, own_row
+from .lagrangian import put_force
+from .limits import AT_FOOT, AT_HEAD, cone_slope, seen
+from .linearise import linearise
+from .records import Aim
+from .search import Search
+
+NEARER = 1e-7
+"""Share of the square of the distance by which something might be nearer that does not count."""
+
+BALANCED = 1e-7
+"""Share of the distance that multipliers may leave unbalanced, and of what limits and rods say, along directions that
+a crank does not turn."""
+
+
+@routine
+def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
+    """Whether nothing feasible is nearer than `search.best`, as far as can be told; `search.look` is there then."""
+    pose, used, view = aim.pose, search.elimination.used, search.first
+    if pose.frame != BASE_AXES or aim.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
+        return False
+    for i in range(3):
+        if pose.platform[i] != 1.0:
+            return False
+    linearise(table, row, aim, search.best, search, view)
+    put_force(table, search, search.here)
+    put_multipliers(search.here, view, search.balance)
+    unit, away, pushing, moving, main = search.gradient.unit[0], vec(search.force), 0.0, 0.0, 0
+    total, turned = away, NOWHERE
+    for k in range(table.legs.shape[0]):
+        if table.legs[k]["carrier"] != SHARED:
+            moving, turned, main = moving + norm(turned), NOWHERE, k
+        m, b, e = hold_of(table, k, main, search)
+        total = add(along(total, -m, vec(search.look.lines[k])), b)
+        turned = add(turned, velocity(table, k, main, m, e, search))
+        pushing += m
+    moving += norm(turned)
+    square = dot(away, away)
+    if norm(total) > BALANCED * math.sqrt(square) or pushing >= unit:
+        return False
+    least, k = 0.0, 0
+    while k < table.legs.shape[0]:
+        main, A, B, turned = k, 0.0, 0.0, NOWHERE
+        while k < table.legs.shape[0] and (k == main or table.legs[k]["carrier"] == SHARED):
+            m, b, e = hold_of(table, k, main, search)
+            line = vec(search.look.lines[k])
+            spoke, tangent, axis = arm_of(table, k, main, search)
+            v = sub(scale(m, line), b)
+            A += dot(v, spoke) + m * dot(tangent, tangent) - dot(line, flatten(e, axis)) - 2.0 * dot(e, spoke)
+            B += dot(v, tangent) - dot(line, cross(axis, e))
+            turned = add(turned, velocity(table, k, main, m, e, search))
+            k += 1
+        if A != 0.0 or B != 0.0:
+            least += least_of(table, main, A + moving * norm(turned) / (unit - pushing), B, search)
+    return bool(least >= -NEARER * square / unit)
+
+
+@routine
+def hold_of(table: Table, k: int, main: int, search: Search) -> tuple[float, Vec, Vec]:
+    """How much a rod pushes, m, what else holds it, b, and what of - b turns with its crank, e; times the unit of the
+    objective."""
+    leg, lead, look, multipliers = table.legs[k], table.legs[main], search.look, search.hessian.multipliers
+    if leg["kind"] != ROD or leg["frame"] != FROM_BASE:
+        return 0.0, NOWHERE, NOWHERE
+    length, ranges, row, pull = norm(vec(look.lines[k])), table.limited.shape[0], leg["first_row"], 0.0
+    at_foot, at_head = NOWHERE, NOWHERE
+    if is_carried(leg):
+        pull = search.balance[own_row(table, k)]
+    elif leg["slides"] == 0:
+        pull = search.balance[row]
+        row += 1
+    if leg["foot"] == HINGE:
+        at_foot = scale(search.balance[row], seen(table, k, main, AT_FOOT, vec(leg["foot_axes"][0]), look))
+        row += 1
+    if leg["head"] == HINGE:
+        at_head = scale(search.balance[row], seen(table, k, main, AT_HEAD, vec(leg["head_axes"][0]), look))
+    for i in range(ranges):
+        limited = table.limited[i]
+        if limited["leg"] == k and limited["place"] == SLIDE:
+            now = deviation(limited, look.values)
+            if limited["hi"] - now < BALANCED:
+                pull += limited["sense"] * multipliers[2 * i + 1]
+            if now - limited["lo"] < BALANCED:
+                pull -= limited["sense"] * multipliers[2 * i]
+    for i in range(table.cones.shape[0]):
+        cone, push = table.cones[i], multipliers[2 * ranges + i]
+        if cone["leg"] != k or push == 0.0 or cone_slope(table, cone, look) < cone["half_angle"] - BALANCED:
+            continue
+        cosine, sine = math.cos(cone["half_angle"]), math.sin(cone["half_angle"])
+        push /= length * max(sine, BALANCED)
+        if leg["slides"] == 0:
+            pull += push * cosine
+        elif cosine >= 0.0:
+            at_head = along(at_head, push * cosine, direction(look.lines[k]))
+        if cone["place"] == FOOT_LINE:
+            at_foot = along(at_foot, -push, seen(table, k, main, AT_FOOT, vec(cone["axis"]), look))
+        else:
+            at_head = along(at_head, -push, seen(table, k, main, AT_HEAD, vec(cone["axis"]), look))
+    return -pull / length, add(at_foot, at_head), scale(-1.0 if lead["carrier"] == CRANK else 0.0, at_foot)
+
+
+@routine
+def arm_of(table: Table, k: int, main: int, search: Search) -> tuple[Vec, Vec, Vec]:
+    """The foot of a rod as seen from the axis of its crank, its velocity by the carrier's coordinate, and that axis;
+    of a carriage, the velocity alone."""
+    lead, foot = table.legs[main], carried_foot(table.legs[k], table.legs[main], search.look.values[main])
+    axis = vec(lead["carrier_axis"])
+    if lead["carrier"] == CRANK:
+        arm = flatten(sub(foot, vec(lead["carrier_point"])), axis)
+        return arm, cross(axis, arm), axis
+    return NOWHERE, axis if lead["carrier"] == CARRIAGE else NOWHERE, NOWHERE
+
+
+@routine
+def velocity(table: Table, k: int, main: int, m: float, e: Vec, search: Search) -> Vec:
+    """m d' - e', the rate at which a carrier moves what pushes."""
+    _, tangent, axis = arm_of(table, k, main, search)
+    return along(scale(m, tangent), -1.0, cross(axis, e))
+
+
+@routine
+def least_of(table: Table, k: int, A: float, B: float, search: Search) -> float:
+    """The least within the limits of a carrier, not more than the nothing that it is where the carrier is.
+
+    Of a crank A (cos q - 1) + B sin q, of a carriage B q - A q^2 / 2.
+    """
+    lo, hi = room(table, k, search)
+    if table.legs[k]["carrier"] == CARRIAGE:
+        if A < 0.0 and lo < B / A < hi:
+            return 0.5 * B * B / A
+        if lo == -math.inf or hi == math.inf:
+            return -math.inf
+        return min(0.0, B * lo - 0.5 * A * lo * lo, B * hi - 0.5 * A * hi * hi)
+    lowest = math.atan2(-B, -A)
+    if lowest + 2.0 * math.pi * math.ceil((lo - lowest) / (2.0 * math.pi)) < hi:
+        return -A - math.hypot(A, B)
+    return min(0.0, A * (math.cos(lo) - 1.0) + B * math.sin(lo), A * (math.cos(hi) - 1.0) + B * math.sin(hi))
+
+
+@routine
+def room(table: Table, k: int, search: Search) -> tuple[float, float]:
+    """How far a carrier may go on from where it is."""
+    is_crank = table.legs[k]["carrier"] == CRANK
+    least, most = (-math.pi, math.pi) if is_crank else (-math.inf, math.inf)
+    for i in range(table.limited.shape[0]):
+        limited = table.limited[i]
+        if limited["leg"] == k and limited["place"] == CARRIER:
+            now = deviation(limited, search.look.values)
+            lo, hi = limited["lo"] - now, limited["hi"] - now
+            if not is_crank or hi - lo < 2.0 * math.pi:
+                least, most = (lo, hi) if limited["sense"] > 0.0 else (-hi, -lo)
+    return min(least, 0.0), max(most, 0.0)
