@@ -29,6 +29,7 @@ class FreeMotions(NamedTuple):
     shift: Floats  # (unknowns,): what would meet the equations
     transform: Floats  # (rows, rows): how pivot rows are made of the equations
     pivots: Ints  # (rows,): column of each
+    free: Ints  # (unknowns,): the column that is a free motion's own, which no other moves
 
 
 class Elimination(NamedTuple):
@@ -44,7 +45,8 @@ class Elimination(NamedTuple):
 def new_free_motions(n: int, rows: int, limits: int) -> FreeMotions:
     """Memory for what is known of one configuration."""
     linear = new_linearisation(n, limits)
-    return FreeMotions(linear, np.zeros((n, n)), np.zeros(n), np.zeros((rows, rows)), np.zeros(rows, np.int64))
+    columns, own = np.zeros(rows, np.int64), np.zeros(n, np.int64)
+    return FreeMotions(linear, np.zeros((n, n)), np.zeros(n), np.zeros((rows, rows)), columns, own)
 
 
 @allocator
@@ -85,6 +87,7 @@ def eliminate(rows: int, scratch: Elimination, view: FreeMotions, first: int, im
             for i in range(n):
                 basis[i, motions] = 0.0
             basis[j, motions] = 1.0
+            view.free[motions] = j
             for r in range(rank):
                 basis[pivots[r], motions] = -A[r, j]
             motions += 1
@@ -141,33 +144,64 @@ def put_multipliers(gradient: Floats, view: FreeMotions, multipliers: Floats) ->
 
 
 @routine
+def project(gradient: Floats, view: FreeMotions, out: Floats) -> None:
+    """A gradient in the free motions, (motions,), from that in the unknowns."""
+    basis, pivots, free, totals = view.basis, view.pivots, view.free, view.linear.totals[0]
+    motions = totals["motions"]
+    for a in range(motions):
+        out[a] = gradient[free[a]]
+    for r in range(totals["rank"]):
+        p = pivots[r]
+        if gradient[p] != 0.0:
+            for a in range(motions):
+                out[a] += gradient[p] * basis[p, a]
+
+
+@routine
 def project_gradient(force: Floats, view: FreeMotions) -> None:
     """The gradient of the objective in the free motions, from that in the unknowns, and the metric."""
-    basis, g, metric, n = view.basis, view.linear.g, view.linear.metric, force.shape[0]
-    view.linear.totals[0]["closing"] = 0.0
-    for j in range(n):
-        view.linear.totals[0]["closing"] += force[j] * view.shift[j]
-    for a in range(view.linear.totals[0]["motions"]):
-        g[a] = 0.0
-        for j in range(n):
-            g[a] += basis[j, a] * force[j]
+    basis, metric, pivots, totals = view.basis, view.linear.metric, view.pivots, view.linear.totals[0]
+    totals["closing"] = along_shift(force, view)
+    project(force, view, view.linear.g)
+    for a in range(totals["motions"]):
         for b in range(a + 1):
-            metric[a, b] = 0.0
-            for j in range(n):
-                metric[a, b] += basis[j, a] * basis[j, b]
+            metric[a, b] = 1.0 if a == b else 0.0
+        for r in range(totals["rank"]):
+            share = basis[pivots[r], a]
+            for b in range(a + 1):
+                metric[a, b] += share * basis[pivots[r], b]
+
+
+@routine
+def along_shift(gradient: Floats, view: FreeMotions) -> float:
+    """What meeting the equations does to something with a gradient in the unknowns."""
+    total = 0.0
+    for r in range(view.linear.totals[0]["rank"]):
+        total += gradient[view.pivots[r]] * view.shift[view.pivots[r]]
+    return total
+
+
+@routine
+def put_step(x: Floats, view: FreeMotions, step: Floats) -> None:
+    """A step of the unknowns, from one of the free motions, and with it one that meets the equations."""
+    basis, pivots, free, totals = view.basis, view.pivots, view.free, view.linear.totals[0]
+    for j in range(step.shape[0]):
+        step[j] = 0.0
+    for a in range(totals["motions"]):
+        step[free[a]] = x[a]
+    for r in range(totals["rank"]):
+        p = pivots[r]
+        step[p] = view.shift[p]
+        for a in range(totals["motions"]):
+            step[p] += basis[p, a] * x[a]
 
 
 @routine
 def add_limit(k: int, h: float, number: int, slope: Floats, view: FreeMotions) -> int:
     """Note a limit by its excess, its number and its derivative by the unknowns; how many are noted then."""
-    linear, basis, shift, G, drift = view.linear, view.basis, view.shift, view.linear.G, view.linear.drift
-    drift[k] = 0.0
-    for j in range(slope.shape[0]):
-        drift[k] += slope[j] * shift[j]
-    for a in range(linear.totals[0]["motions"]):
-        G[k, a] = 0.0
-        for j in range(slope.shape[0]):
-            G[k, a] += slope[j] * basis[j, a]
+    linear = view.linear
+    linear.drift[k] = along_shift(slope, view)
+    project(slope, view, linear.G[k])
     linear.h[k], linear.which[k] = h, number
     return k + 1
 
@@ -179,12 +213,12 @@ def restoring_step(view: FreeMotions, by_all: bool, p: QP) -> bool:
 
     Shortest by itself; or, if equations are to be met by all unknowns and not by pivots alone, together with `shift`.
     """
-    linear, basis, shift = view.linear, view.basis, view.shift
+    linear = view.linear
     motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
     for a in range(motions):
         p.g[a] = 0.0
-        for j in range(shift.shape[0] if by_all else 0):
-            p.g[a] += shift[j] * basis[j, a]
+    if by_all:
+        project(view.shift, view, p.g)
     for c in range(k):
         p.h[c] = linear.h[c] + linear.drift[c]
         for a in range(motions):

@@ -148,6 +148,17 @@ def longest(step: Floats, n: int) -> float:
 
 
 @routine
+def symmetrise(H: Floats, n: int) -> float:
+    """Take the mean of a matrix and its transpose; the largest on its diagonal."""
+    largest = 0.0
+    for a in range(n):
+        largest = max(largest, abs(H[a, a]))
+        for b in range(a):
+            H[a, b] = H[b, a] = 0.5 * (H[a, b] + H[b, a])
+    return largest
+
+
+@routine
 def sum_of(multipliers: Floats, k: int) -> float:
     """The sum of the first k."""
     total = 0.0

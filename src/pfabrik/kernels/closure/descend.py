@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays import Floats
 from .._jit import routine, search
-from ..free_motions import FreeMotions, new_free_motions, put_multipliers, restoring_step
+from ..free_motions import FreeMotions, new_free_motions, project, put_multipliers, put_step, restoring_step
 from ..holding import balance
 from ..qp import QP, new_qp
 from ..rotations import turn_ball
@@ -31,6 +31,7 @@ from ..sqp import (
     plan_step,
     rests_open,
     scale_objective,
+    symmetrise,
 )
 from .linearise import (
     Workspace,
@@ -96,16 +97,8 @@ def lagrangian_hessian(
         lagrangian_gradient(loops, row, objective, trial, work, work.there)
         for j in range(n):
             there[j] = (there[j] - here[j]) / probe
-        for b in range(motions):
-            H[b, a] = 0.0
-            for j in range(n):
-                H[b, a] += basis[j, b] * there[j]
-    largest = 0.0
-    for a in range(motions):
-        largest = max(largest, abs(H[a, a]))
-        for b in range(a):
-            H[a, b] = H[b, a] = 0.5 * (H[a, b] + H[b, a])
-    return largest
+        project(there, view, H[a])
+    return symmetrise(H, motions)
 
 
 @routine
@@ -122,12 +115,8 @@ def move(loops: Loops, step: Floats, share: float, state: State) -> None:
 @routine
 def take(loops: Loops, view: FreeMotions, x: Floats, state: State, work: Workspace) -> float:
     """Take a step of the free motions, and with it one that closes the loops; the share of it that is not too long."""
-    n = len(loops.lo)
-    for j in range(n):
-        work.row[j] = view.shift[j]
-        for a in range(view.linear.totals[0]["motions"]):
-            work.row[j] += view.basis[j, a] * x[a]
-    share = LONGEST_STEP / max(longest(work.row, n), LONGEST_STEP)
+    put_step(x, view, work.row)
+    share = LONGEST_STEP / max(longest(work.row, len(loops.lo)), LONGEST_STEP)
     move(loops, work.row, share, state)
     return share
 

@@ -10,7 +10,7 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
-from ..free_motions import FreeMotions, restoring_step
+from ..free_motions import FreeMotions, put_step, restoring_step
 from ..legs.records import Table
 from ..sqp import (
     CLOSED,
@@ -62,12 +62,9 @@ BY = 0.01
 @routine
 def take(table: Table, view: FreeMotions, x: Floats, now: Now, search: Search) -> float:
     """Take a step of the free motions, and with it one that meets the equations; the share of it not too long."""
-    basis, shift, step = view.basis, view.shift, search.step
+    step = search.step
     n = step.shape[0]
-    for j in range(n):
-        step[j] = shift[j]
-        for a in range(view.linear.totals[0]["motions"]):
-            step[j] += basis[j, a] * x[a]
+    put_step(x, view, search.step)
     most = 0.0
     for j in range(n):
         most = max(most, abs(step[j]) * (1.0 if j < 6 else OF_CARRIERS))

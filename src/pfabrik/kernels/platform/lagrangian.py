@@ -6,11 +6,11 @@ import math
 
 from ...arrays import Floats
 from .._jit import routine
-from ..free_motions import FreeMotions, put_multipliers
+from ..free_motions import FreeMotions, project, put_multipliers
 from ..legs.answer import end_of_rows
 from ..legs.frames import set_frames
 from ..legs.records import SHARED, Table
-from ..sqp import PROBE
+from ..sqp import PROBE, symmetrise
 from .equations import Now, is_carried, own_row, place_leg, put_leg_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .records import Aim
@@ -118,7 +118,6 @@ def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: F
     search.control[0]["holding"] = put_multipliers(search.here, view, search.balance)
     add_balance(linear.totals[0]["rows"] - search.look.slopes.shape[0], search, search.here)
     note_pulled(table, aim, search)
-    largest = 0.0
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
         for j in range(step.shape[0]):
@@ -128,12 +127,5 @@ def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: F
         lagrangian_gradient(table, row, aim, search.trial, search, search.there)
         for j in range(step.shape[0]):
             there[j] = (there[j] - here[j]) / probe
-        for b in range(motions):
-            H[b, a] = 0.0
-            for j in range(step.shape[0]):
-                H[b, a] += basis[j, b] * there[j]
-    for a in range(motions):
-        largest = max(largest, abs(H[a, a]))
-        for b in range(a):
-            H[a, b] = H[b, a] = 0.5 * (H[a, b] + H[b, a])
-    return largest
+        project(there, view, H[a])
+    return symmetrise(H, motions)
