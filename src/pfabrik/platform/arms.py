@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from .nearest import nearest_arms, starts_at
+from .approach import starts_at
+from .nearest import nearest_arms
 
 
 def move_arms(

@@ -16,7 +16,9 @@ from ..kernels.handle import Handle
 from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
-from .nearest import corners_of, home_start, nearest_actuators, no_starts, starts_at
+from .approach import home_start, no_starts, starts_at
+from .corners import corners_of
+from .nearest import nearest_actuators
 from .one import Ends
 from .table import machine_searched
 

@@ -16,7 +16,7 @@ from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
 from ..kernels.rows import Rows
-from .nearest import home_start, no_starts
+from .approach import home_start, no_starts
 from .table import machine, machine_nearby, machine_searched, resting_at_home
 
 

@@ -24,9 +24,10 @@ from ..motion.displacements import centres_at
 from ..options import Options
 from ..poses import are_poses
 from .answers import LegAnswers, begins_of, coordinates_of, sides_at
+from .approach import in_lengths, starts_at
 from .coordinates import settled
 from .forward import assembled
-from .nearest import in_lengths, starts_at, weighed_limits
+from .nearest import weighed_limits
 from .one import Ends, OneAssembly, OneTarget
 from .table import Machine, machine, machine_nearby, resting_at_home
 from .unreached import Question, answer_unreached

@@ -17,7 +17,9 @@ from ..kernels.rows import HOLD, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED,
 from ..kernels.threads import in_blocks
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .nearest import assembled_otherwise, in_lengths, project, starts_at
+from .approach import in_lengths, starts_at
+from .corners import assembled_otherwise
+from .nearest import project
 from .table import Machine, machine, machine_nearby
 
 ROWS_A_BLOCK = 64

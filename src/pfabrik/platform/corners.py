@@ -1,0 +1,143 @@
+"""Corners: feasible configurations far apart, which searches start from beside their own start."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..closure.close import MARGIN
+from ..closure.configurations import new_rows
+from ..decomposition.leg_table import LegTable, leg_table
+from ..description.mechanism import Mechanism
+from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
+from ..kernels.legs import records as K
+from ..kernels.platform.records import Starts
+from ..kernels.rows import REACHED
+from ..rotations import from_rotvec
+from ..tolerances import TOLERANCES
+from .approach import approached, carriers_of, home_start, in_lengths, no_starts
+from .rotation import constraints_at, keeps_rotation
+from .table import machine
+
+CORNERS, CORNERS_OF_MANY = 16, 32
+"""How many configurations searches start from at most, and how many where arms are led, or pivots have two solutions:
+there are many more configurations."""
+
+BEYOND, BEYOND_OF_MANY = 8, 16
+"""How many more start farther away, where rooms beyond the base may be."""
+
+DRAWS, DRAWN_STEPS = 240, 30
+"""How many random poses either are chosen from, and the steps that bring each to a feasible one."""
+
+FAR, FARTHER, TURNED = 1.0, 2.5, 1.5
+"""How far from home they are, and the other ones [L]: the mirror image of a room is twice as far away as the base. And
+how far they are turned [rad]."""
+
+TURNING = 0.2
+"""What the square of a rotation counts beside that of a distance where corners are to be far apart [L^2]."""
+
+OTHER_SIDE = 0.02
+"""The same for the square of the sine of half the angle by which carriers differ."""
+
+OF_A_MODE, SELDOM = 4, 0.2
+"""How many corners of one working mode are enough, and by how much more those of a mode that has fewer count as apart
+[L^2]: a mode may have a room of its own, small as it is."""
+
+
+@lru_cache(maxsize=64)
+def corners_of(mechanism: Mechanism) -> Starts:
+    """Feasible configurations far from home and from each other; every third may be in a room beyond the base."""
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
+    rng = np.random.default_rng(0)
+    is_many = table.leads_arms or len(_sided_pivots(table)) > 0
+    near, beyond = (CORNERS_OF_MANY, BEYOND_OF_MANY) if is_many else (CORNERS, BEYOND)
+    corners = _far_apart(home_start(mechanism, table), _drawn(mechanism, table, rng, DRAWS, FAR), near)
+    others = _far_apart(corners, _drawn(mechanism, table, rng, DRAWS, FARTHER), beyond)
+    turns = np.concatenate([np.arange(len(corners.poses)), 2.0 * np.arange(len(others.poses)) + 0.5])
+    in_turn = np.argsort(turns)
+    return Starts(*(np.concatenate(both)[in_turn] for both in zip(corners, others, strict=True)))
+
+
+@lru_cache(maxsize=64)
+def assembled_otherwise(mechanism: Mechanism) -> Starts:
+    """The corners whose poses are others where what the task leaves out of them, and arms, are completed from home."""
+    from ..kernels.legs.answer import answer
+
+    table, corners = leg_table(mechanism), corners_of(mechanism)
+    assert isinstance(table, LegTable)
+    poses, length = in_lengths(corners.poses, mechanism.characteristic_length), mechanism.characteristic_length
+    rows, sides, arms = new_rows(mechanism, len(poses)), corners.sides.copy(), table.led_arms["leg"]
+    sides[:, arms] = table.home_sides[:, arms]
+    answer(
+        machine(table).address,
+        poses,
+        mechanism.home_pose[None].copy(),
+        sides,
+        rows.status,
+        rows.poses,
+        rows.actuators,
+        rows.measures,
+    )
+    off = np.abs(in_lengths(rows.poses, 1.0 / length) - corners.poses).max(axis=(1, 2))
+    return corners.at(np.flatnonzero((rows.status != REACHED) | (off > TOLERANCES.same_mode)))
+
+
+def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: int, far: float) -> Starts:
+    """Feasible configurations, the nearest to n random poses up to so far from home [L]."""
+    home = home_start(mechanism, table)
+    poses = np.repeat(home.poses, n, axis=0)
+    twists = rng.uniform(-1.0, 1.0, (n, 6)) * np.repeat([far, TURNED], 3)
+    for slopes in constraints_at(table, mechanism.home_pose[None])[1]:
+        _, sizes, directions = np.linalg.svd(slopes)
+        bound = directions[: (sizes > TOLERANCES.alignment).sum()]
+        twists -= twists @ bound.T @ bound  # what the legs do not allow at home they hardly do elsewhere
+    poses[:, :3, 3] += twists[:, :3]
+    weights = np.array([1.0, 1.0, 1.0, TURNING, TURNING, TURNING])
+    if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
+        weights[3:] = LOCKED
+    else:
+        poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
+    q = np.zeros((n, len(table.legs)))
+    for carrier in (*carriers_of(table), *table.arms):
+        lo, hi = max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi)
+        q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, n)
+    sides = np.repeat(home.sides, n, axis=0)
+    pivots = _sided_pivots(table)
+    sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
+    targets = in_lengths(poses, mechanism.characteristic_length)
+    objective = PoseObjective(targets, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
+    starts = Starts(poses, q, sides)
+    found = approached(mechanism, table, objective, starts, no_starts(table))[0]
+    found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
+    return Starts(*found[1:4]).at(np.flatnonzero(np.isfinite(found.distances)))
+
+
+def _far_apart(first: Starts, drawn: Starts, most: int) -> Starts:
+    """Configurations drawn that are far from the first and from each other, chosen one by one."""
+    every = Starts(*(np.concatenate(both) for both in zip(first, drawn, strict=True)))
+    modes = np.unique(np.sign(every.sides), axis=0, return_inverse=True)[1].ravel()
+    chosen: list[int] = []
+    away = np.full(len(every.poses), np.inf)
+    for k in range(len(first.poses)):
+        away = np.minimum(away, _apart(every, k))
+    while len(chosen) < min(most, len(drawn.poses)):
+        rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < OF_A_MODE
+        chosen.append(int(np.where(rare & (away > 0.0), away + SELDOM, away).argmax()))
+        away = np.minimum(away, _apart(every, chosen[-1]))
+    return Starts._make(array[chosen] for array in every)
+
+
+def _apart(starts: Starts, which: int) -> Floats:
+    """How far starts are from one of them, (s,): squares of distances [L]."""
+    squares = (starts.poses - starts.poses[which])[:, :3] ** 2 * (TURNING, TURNING, TURNING, 1.0)
+    bends = np.sin(0.5 * (starts.q - starts.q[which])) ** 2
+    return np.asarray(squares.sum(axis=(1, 2)) + OTHER_SIDE * bends.sum(axis=1))
+
+
+def _sided_pivots(table: LegTable) -> NDArray[np.intp]:
+    """The legs that are pivots of three hinges, which have two solutions."""
+    return np.flatnonzero((table.legs["kind"] == K.PIVOT) & (table.legs["side"] != 0.0))
