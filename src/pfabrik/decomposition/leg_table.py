@@ -82,6 +82,21 @@ class LegTable:
         return len(self.arms) > 0 and not self.task["arms"][0]
 
     @cached_property
+    def has_sides(self) -> bool:
+        """Whether some legs have two solutions."""
+        return bool(self.home_sides.any())
+
+    @cached_property
+    def is_partial(self) -> bool:
+        """Whether the task leaves some of the pose open."""
+        return bool(self.task["unset"][0] > 0)
+
+    @cached_property
+    def is_completed(self) -> bool:
+        """Whether some of the pose, or of the arms, follows from where it was."""
+        return self.is_partial or self.leads_arms
+
+    @cached_property
     def leads_arms(self) -> bool:
         """Whether some arms follow from where they were."""
         return bool(self.task["led"][0])

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from ..arrays import Floats, Records
+from ..closure.close import MARGIN
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import LOCKED, PoseObjective
@@ -29,59 +31,103 @@ HITS_OF_MANY = 8
 
 ROWS_A_BLOCK = 16
 
+_NO_WEIGHTS = np.zeros((0, 0))
 
-def approached(
-    mechanism: Mechanism,
-    table: LegTable,
-    objective: PoseObjective,
-    own: Starts,
-    others: Starts,
-    values: Floats | None = None,
-    driven: Records | None = None,
-    *,
-    stays: bool = False,
-    minds_aims: bool = False,
-) -> tuple[Found, Floats]:
-    """The kernel over all rows, on all cores: what was found, or what holds them where they start.
+
+class Approach:
+    """Searches of a machine for what is nearest in one way, prepared: what is left to do for a row is little.
 
     Parameters
     ----------
-    values : what coordinates, those of actuators if no others are `driven`, are to be near to; see `Aim`.
+    weights, frame : what counts, as of `PoseObjective`.
+    steps : of each search at most; 0 to weigh limits alone.
+    others : starts that follow each row's own.
+    driven : the coordinates that are to be near to values; None where only poses count.
+    stays : in the working mode of each row's own start.
     minds_aims : keep on the way, too, to where crossed hinges can point their rods. Rows that end where they cannot are
         searched for again like this: a way that is barred ends earlier.
     """
-    from ..kernels.platform.nearest import approach
 
-    at_home = table.task[0]["rotations"] == 0 and objective.platform[3] == LOCKED and objective.max_iterations > 0
-    asked = without_idle_legs(table) if at_home and not len(table.arms) else machine_searched(table)
-    asked = asked if driven is None else Handle(asked.record._replace(driven=driven))
-    found, legs = new_found(len(objective.targets), table), asked.record
-    limits = 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)
-    minds_aims = minds_aims or objective.max_iterations == 0
-    minded = len(legs.cones) if minds_aims else int((legs.cones["leader"] != OF_AIMS).sum())
-    weights = np.zeros((len(objective.targets), limits))
-    hits = _hits(table) if values is None else HITS_OF_VALUES
-    implied = implied_rows(mechanism) if not len(table.arms) else 0
-    near = np.zeros((0, len(legs.driven))) if values is None else values
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        table: LegTable,
+        weights: Floats,
+        frame: int,
+        steps: int,
+        others: Starts,
+        *,
+        driven: Records | None = None,
+        stays: bool = False,
+        minds_aims: bool = False,
+    ) -> None:
+        self._table = table
+        at_home = table.task[0]["rotations"] == 0 and weights[3] == LOCKED and steps > 0
+        legs = without_idle_legs(table) if at_home and not len(table.arms) else machine_searched(table)
+        self._legs = legs if driven is None else Handle(legs.record._replace(driven=driven))
+        self._settings, self._others = (weights, frame, MARGIN, TOLERANCES.active, steps), others
+        self._hits = _hits(table) if driven is None else HITS_OF_VALUES
+        self._stays, self._implied = int(stays), 0 if len(table.arms) else implied_rows(mechanism)
+        cones, minds_aims = self._legs.record.cones, minds_aims or steps == 0
+        self._minded = len(cones) if minds_aims else int((cones["leader"] != OF_AIMS).sum())
+        self._no_values = np.zeros((0, len(self._legs.record.driven)))
+        self._minding: Approach | None = None
+        if self._minded < len(cones):
+            told = mechanism, table, weights, frame, steps, others
+            self._minding = Approach(*told, driven=driven, stays=stays, minds_aims=True)
 
-    def run(block: slice) -> None:
-        first = own if len(own.poses) == 1 else own.at(block)
-        aim = Aim(objective._replace(targets=objective.targets[block]), near[block], implied)
-        into = Found._make(array[block] for array in found)
-        approach(asked.address, aim, first, others, hits, int(stays), minded, into, weights[block])
+    @cached_property
+    def _kernel(self) -> Callable[..., None]:
+        from ..kernels.platform.nearest import approach
 
-    in_blocks(run, len(found.distances), ROWS_A_BLOCK)
-    astray = found.measures[:, LIMIT_EXCESS] > TOLERANCES.limit
-    if minded < len(legs.cones) and astray.any():
-        begin = own if len(own.poses) == 1 else own.at(np.flatnonzero(astray))
-        again = objective._replace(targets=objective.targets[astray])
-        asked_values = None if values is None else values[astray]
-        pointed = approached(
-            mechanism, table, again, begin, others, asked_values, driven, stays=stays, minds_aims=True
-        )[0]
-        for array, tried in zip(found, pointed, strict=True):
-            array[astray] = tried
-    return found, weights
+        return approach
+
+    def find(self, targets: Floats, own: Starts, values: Floats | None = None) -> Found:
+        """Where searches for targets (n, 4, 4) [length] end; see `fill`."""
+        found = new_found(len(targets), self._table)
+        self.fill(targets, own, found, values)
+        return found
+
+    def fill(self, targets: Floats, own: Starts, found: Found, values: Floats | None = None) -> None:
+        """Search for targets (n, 4, 4) [length], on all cores; what is told of rows without an answer is left alone.
+
+        Parameters
+        ----------
+        own : the first start of each row, or one for all.
+        values : what driven coordinates are to be near to, (n, driven) [L or rad].
+        """
+        self._run(targets, own, found, self._no_values if values is None else values, _NO_WEIGHTS)
+        if self._minding is None:
+            return
+        astray = (found.measures[:, LIMIT_EXCESS] > TOLERANCES.limit) & (found.distances < np.inf)
+        if np.count_nonzero(astray):
+            begin, near = own.of(astray), None if values is None else values[astray]
+            pointed = self._minding.find(targets[astray], begin, near)
+            for array, tried in zip(found, pointed, strict=True):
+                array[astray] = tried
+
+    def weigh(self, targets: Floats, present: Starts) -> Floats:
+        """How hard every limit, and then every leg, holds configurations back from targets (n, 4, 4) [length], where
+        these approaches have no steps to take: see the kernel."""
+        legs = self._legs.record
+        weights = np.zeros((len(targets), 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)))
+        self._run(targets, present, new_found(len(targets), self._table), self._no_values, weights)
+        return weights
+
+    def _run(self, targets: Floats, own: Starts, found: Found, values: Floats, weights: Floats) -> None:
+        def run(block: slice) -> None:
+            near = values[block] if len(values) else values
+            into = Found._make(array[block] for array in found)
+            self._run_block(targets[block], own.of(block), into, near, weights[block])
+
+        if len(targets) > ROWS_A_BLOCK:
+            in_blocks(run, len(targets), ROWS_A_BLOCK)
+        else:
+            self._run_block(targets, own, found, values, weights)
+
+    def _run_block(self, targets: Floats, own: Starts, found: Found, values: Floats, weights: Floats) -> None:
+        aim = Aim(PoseObjective(targets, *self._settings), values, self._implied)
+        self._kernel(self._legs.address, aim, own, self._others, self._hits, self._stays, self._minded, found, weights)
 
 
 @lru_cache(maxsize=64)

@@ -8,17 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.close import MARGIN
 from ..closure.configurations import new_rows
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
-from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
+from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Starts
 from ..kernels.rows import REACHED
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
-from .approach import approached, carriers_of, home_start, in_lengths, no_starts
+from .approach import Approach, carriers_of, home_start, in_lengths, no_starts
 from .rotation import constraints_at, keeps_rotation
 from .table import machine
 
@@ -109,9 +108,8 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     pivots = _sided_pivots(table)
     sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
     targets = in_lengths(poses, mechanism.characteristic_length)
-    objective = PoseObjective(targets, weights, BASE_AXES, MARGIN, TOLERANCES.active, DRAWN_STEPS)
-    starts = Starts(poses, q, sides)
-    found = approached(mechanism, table, objective, starts, no_starts(table))[0]
+    approach = Approach(mechanism, table, weights, BASE_AXES, DRAWN_STEPS, no_starts(table))
+    found = approach.find(targets, Starts(poses, q, sides))
     found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
     return Starts(*found[1:4]).at(np.flatnonzero(np.isfinite(found.distances)))
 

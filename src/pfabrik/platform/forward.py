@@ -86,8 +86,8 @@ def _project(
     anywhere: bool,
 ) -> None:
     """Answer rows by feasible configurations with actuators as near to their values as searches bring them."""
-    first = own if len(own.poses) == 1 else own.at(places)
-    ended = nearest_actuators(mechanism, table, values[places], first, corners=anywhere)
+    first = own.of(places)
+    ended = nearest_actuators(mechanism, values[places], first, corners=anywhere)
     near = np.flatnonzero(np.isfinite(ended.distances))
     ended, places = Found._make(array[near] for array in ended), places[near]
     asked, actuators, measures = rows.actuators[places], ended.actuators, ended.measures
@@ -116,7 +116,7 @@ def _assemble(
     legs, turns, elsewhere = machine_searched(table), not mechanism.end_effector_is_joint, Handle(others)
 
     def run(block: slice) -> None:
-        first, (values, *filled) = Handle(own if len(own.poses) == 1 else own.at(block)), (a[block] for a in arrays)
+        first, (values, *filled) = Handle(own.of(block)), (a[block] for a in arrays)
         assemble(legs.address, values, turns, first.address, elsewhere.address, *filled)
 
     in_blocks(run, len(arrays[0]), ROWS_A_BLOCK)

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..closure.close import MARGIN
-from ..closure.projection import Way
-from ..decomposition.leg_table import LegTable
+from ..arrays import Floats, Ints, Records
+from ..closure.projection import Way, ways_of
+from ..decomposition.leg_table import LegTable, leg_table
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..kernels.closure.loops import BASE_AXES, LOCKED, PoseObjective
+from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import HOLD_NOTHING
-from ..tolerances import TOLERANCES
-from .approach import approached, in_lengths, new_found, no_starts
+from ..options import Options
+from .approach import Approach, in_lengths, new_found, no_starts
 from .corners import corners_of
 from .rotation import keeps_rotation
 
@@ -29,66 +26,69 @@ MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
 
-class Projected(NamedTuple):
-    """The nearest feasible configurations found, and what each holds of its target; distances are infinite where there
-    is none."""
-
-    found: Found
-    holds: Ints
-
-
 def project(
-    mechanism: Mechanism,
-    table: LegTable,
-    targets: Floats,
-    own: Starts,
-    ways: Sequence[Way],
-    *,
-    corners: bool,
-    stays: bool,
-) -> Projected:
-    """The nearest feasible configurations that searches from several starts find.
+    mechanism: Mechanism, options: Options, targets: Floats, own: Starts, found: Found, *, corners: bool, stays: bool
+) -> Ints:
+    """Fill the nearest feasible configurations that searches from several starts find.
 
     Parameters
     ----------
+    options : what counts and what is held: of the ways to project, the first that has an answer.
     targets : (n, 4, 4) [length].
     own : the first start of each row, or one for all; poses [L].
-    ways : what counts and what is held, tried in turn until one has an answer.
+    found : distances are infinite where there is none.
     corners : start from elsewhere too. Without, a search stays about where it starts.
     stays : in the working mode of the first start; through a dead point lies another.
+
+    Returns
+    -------
+    What each holds of its target, (n,).
     """
-    first, *others = ways
-    best = Projected(_search(mechanism, table, targets, own, first, corners, stays), np.full(len(targets), first.hold))
-    for way in others:
-        rows = np.flatnonzero(np.isinf(best.found.distances))
-        if len(rows):
-            start = own if len(own.poses) == 1 else own.at(rows)
-            found = _search(mechanism, table, targets[rows], start, way, corners, stays)
-            for array, tried in zip(best.found, found, strict=True):
-                array[rows] = tried
-            best.holds[rows] = way.hold
-    return best
+    (hold, first), *others = _ways(mechanism, options.hold, options.rotation_length, corners, stays)
+    first.fill(targets, own, found)
+    holds = np.full(len(targets), hold)
+    for hold, way in others:
+        lost = found.distances == np.inf
+        if not np.count_nonzero(lost):
+            break
+        for array, tried in zip(found, way.find(targets[lost], own.of(lost)), strict=True):
+            array[lost] = tried
+        holds[lost] = hold
+    return holds
 
 
-def _search(
-    mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts, way: Way, corners: bool, stays: bool
-) -> Found:
+@lru_cache(maxsize=256)
+def _ways(
+    mechanism: Mechanism, hold: str | None, rotation_length: float | None, corners: bool, stays: bool
+) -> tuple[tuple[int, Approach], ...]:
+    """The ways to project, and what each holds, in the order in which they are tried."""
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
     others = corners_of(mechanism) if corners else no_starts(table)
-    return approached(mechanism, table, _objective(mechanism, targets, way, MOST_STEPS), own, others, stays=stays)[0]
+    ways = ways_of(mechanism, hold, rotation_length)
+    return tuple((way.hold, _approach(mechanism, table, way, MOST_STEPS, others, stays=stays)) for way in ways)
 
 
-def _objective(mechanism: Mechanism, targets: Floats, way: Way, steps: int) -> PoseObjective:
+def _approach(
+    mechanism: Mechanism,
+    table: LegTable,
+    way: Way,
+    steps: int,
+    others: Starts,
+    driven: Records | None = None,
+    *,
+    stays: bool = False,
+) -> Approach:
     weights, frame = np.array(way.weights, dtype=float), task_of(mechanism).frame
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:], frame = LOCKED, BASE_AXES
-    return PoseObjective(targets, weights, frame, MARGIN, TOLERANCES.active, steps)
+    return Approach(mechanism, table, weights, frame, steps, others, driven=driven, stays=stays)
 
 
 def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: Way) -> Floats:
     """How hard every limit holds configurations back from targets (n, 4, 4) [length]: multipliers, in the order of
     those that `closure.descend.weighed_limits` gives."""
-    objective = _objective(mechanism, targets, way, 0)
-    found = approached(mechanism, table, objective, present, no_starts(table))[1]
+    found = _approach(mechanism, table, way, 0, no_starts(table)).weigh(targets, present)
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
     coned = [joint.name for joint in mechanism.joints if joint.cone is not None]
     weights = np.zeros((len(targets), 2 * columns + len(coned)))
@@ -99,16 +99,23 @@ def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, prese
     return weights
 
 
-def nearest_actuators(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts, *, corners: bool) -> Found:
+def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, corners: bool) -> Found:
     """Feasible configurations whose actuators are nearest to values (n, n_a), deviations from home [L or rad]."""
     poses = in_lengths(own.poses, mechanism.characteristic_length)
     poses = poses if len(poses) == len(values) else np.repeat(poses, len(values), axis=0)
+    return _toward_values(mechanism, corners).find(poses, own, values)
+
+
+@lru_cache(maxsize=64)
+def _toward_values(mechanism: Mechanism, corners: bool) -> Approach:
+    """Searches for actuators that have values; the pose does not count."""
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
     weights = np.zeros(6)
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:] = LOCKED
-    objective = PoseObjective(poses, weights, BASE_AXES, MARGIN, TOLERANCES.active, MOST_STEPS)
     others = corners_of(mechanism) if corners else no_starts(table)
-    return approached(mechanism, table, objective, own, others, values)[0]
+    return Approach(mechanism, table, weights, BASE_AXES, MOST_STEPS, others, driven=table.driven)
 
 
 def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
@@ -116,19 +123,27 @@ def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: St
 
     Searches start there alone: what they miss, projections from elsewhere find.
     """
-    way, n = Way(task_of(mechanism).weights(LOCKED, LOCKED), HOLD_NOTHING), len(targets)
-    objective, best = _objective(mechanism, targets, way, MOST_STEPS), new_found(n, table)
+    best = new_found(len(targets), table)
     best.distances[:], best.sides[:] = 0.0, own.sides
-    for part, legs in _apart_by_arms(table):
-        begin, arms = Starts(own.poses, *(np.ascontiguousarray(array[:, legs]) for array in own[1:])), part.arms
+    for arms, legs, approach in _toward_arms(mechanism, table):
+        begin = Starts(own.poses, *(np.ascontiguousarray(array[:, legs]) for array in own[1:]))
         values = np.ascontiguousarray(arms["sense"] * begin.sides[:, arms["leg"]])
-        found = approached(mechanism, part, objective, begin, no_starts(part), values, arms)[0]
+        found = approach.find(targets, begin, values)
         np.maximum(best.distances, found.distances, out=best.distances)
         best.poses[:], best.sides[:, legs] = found.poses, found.sides
     return best
 
 
 @lru_cache(maxsize=64)
+def _toward_arms(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, slice, Approach], ...]:
+    """Searches for each set of arms at poses that are held: the arms, and which legs these are."""
+    way = Way(task_of(mechanism).weights(LOCKED, LOCKED), HOLD_NOTHING)
+    return tuple(
+        (part.arms, legs, _approach(mechanism, part, way, MOST_STEPS, no_starts(part), part.arms))
+        for part, legs in _apart_by_arms(table)
+    )
+
+
 def _apart_by_arms(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
     """Tables of the legs on each set of arms, and which legs these are: they have nothing to do with each other where
     the pose is given; else all in one."""

@@ -30,7 +30,7 @@ from .forward import assembled
 from .nearest import weighed_limits
 from .one import Ends, OneAssembly, OneTarget
 from .table import Machine, machine, machine_nearby, resting_at_home
-from .unreached import Question, answer_unreached
+from .unreached import Question, Unreached, answer_unreached
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of a kernel that answers one by one, or in blocks."""
@@ -81,15 +81,17 @@ class LegsEngine:
             told = rows.poses, rows.actuators, ends
             return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins()), ends)
         left, sides = self._reach(targets, start, first, keep_mode, rows, tried=is_one)
-        carriers, others, rest = None, None, np.flatnonzero(rows.status != REACHED)
+        carriers, others = None, None
         if left and self._searches:
-            sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
+            sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
+            carriers = np.full(sides.shape, np.nan)
             poses = self._one.home if start is None else start.rows.poses
-            question = Question(self.mechanism, self._table, targets, poses, options, keep_mode, nearby)
-            carriers = answer_unreached(question, rest, sides, rows)
-            rest = np.flatnonzero(rows.status == PENDING)
+            question = Question(self.mechanism, self._table, options, keep_mode, nearby)
+            unreached = Unreached(targets, poses, sides, carriers, rows)
+            unreached.answer(rows.status != REACHED, partial(answer_unreached, question))
             if start is not None:
                 self._count_turns(start.rows.actuators, rows)
+        rest = (rows.status == PENDING if carriers is not None else rows.status != REACHED).nonzero()[0]
         if len(rest) == len(targets):
             return self._inner.answer(targets, start, options, keep_mode=keep_mode)
         if len(rest):

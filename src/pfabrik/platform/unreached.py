@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints, Mask
+from ..arrays import Floats, Mask
 from ..closure.configurations import put_rows, rows_at
-from ..closure.projection import kept, ways_of
+from ..closure.projection import kept
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..kernels.platform.records import Found
+from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import HOLD, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options
@@ -29,132 +31,147 @@ NEARLY = 1e-4
 
 
 class Question(NamedTuple):
-    """What is asked: targets (n, 4, 4) [length], to be reached from poses (n or 1, 4, 4).
+    """What is asked of all targets.
 
     With `keep_mode` in the working mode of the start; `nearby`, as along a path, about the start alone.
     """
 
     mechanism: Mechanism
     table: LegTable
-    targets: Floats
-    begins: Floats
     options: Options
     keep_mode: bool
     nearby: bool
 
 
-def answer_unreached(question: Question, rest: NDArray[np.intp], sides: Floats, rows: Rows) -> Floats:
-    """Answer the rows `rest` in other working modes, or by the nearest feasible poses; some may stay PENDING.
+class Unreached(NamedTuple):
+    """Targets that are not reached, and what is told of them."""
 
-    Parameters
-    ----------
-    sides : which of its two solutions each leg starts on, (n, legs); those of the answers are written into it.
+    targets: Floats  # (n, 4, 4) [length]
+    begins: Floats  # (n or 1, 4, 4) [length]: poses that they are to be reached from
+    sides: Floats  # (n, legs): which of its two solutions each leg starts on; of an answer, which it takes
+    carriers: Floats  # (n, legs) [L or rad]: of an answer, where closed forms tell them less exactly; else NaN
+    rows: Rows
 
-    Returns
-    -------
-    Coordinates of the legs' carriers (n, legs) [L or rad] where closed forms tell them less exactly; else NaN.
-    """
-    mechanism, table, targets, begins, options, keep_mode, _ = question
-    carriers = np.full(sides.shape, np.nan)
-    if not keep_mode and table.home_sides.any():
-        rest = _reach_otherwise(question, rest, sides, rows)
-    if not keep_mode and len(rest) and table.task[0]["unset"] + table.task[0]["led"] > 0:
-        rest = _reach_from_corners(question, rest, sides, rows)
-    if not len(rest):
-        return carriers
-    places = rest[:1] if len(begins) == 1 else rest
-    own = starts_at(mechanism, table, begins[places % len(begins)], sides[places])
-    ways = ways_of(mechanism, options.hold, options.rotation_length)
-    found, holds = project(mechanism, table, targets[rest], own, ways, corners=not question.nearby, stays=keep_mode)
-    placed = np.isfinite(found.distances)
-    if not placed.all():
-        found, rest, holds = Found._make(array[placed] for array in found), rest[placed], holds[placed]
-    sides[rest], carriers[rest] = found.sides, found.q
-    _put_projected(question, rest, found, holds, rows)
-    is_near = found.distances <= NEARLY
-    again = np.flatnonzero(is_near | (table.task[0]["unset"] > 0))
-    if len(again):
-        left = _reach_again(question, rest[again], sides, rows)
-        carriers[rest[again[~left]]] = np.nan
-        lost = rest[again[left & is_near[again]]]
-        rows.status[lost], carriers[lost] = PENDING, np.nan
-    return carriers
+    def at(self, places: Mask | NDArray[np.intp]) -> Unreached:
+        """Those at some places, copied."""
+        begins = self.begins if len(self.begins) == 1 else self.begins[places]
+        arrays = self.targets[places], begins, self.sides[places], self.carriers[places]
+        return Unreached(*arrays, rows_at(self.rows, places))
+
+    def put(self, places: Mask | NDArray[np.intp], others: Unreached) -> None:
+        """Write what is told of others at some places."""
+        self.sides[places], self.carriers[places] = others.sides, others.carriers
+        put_rows(self.rows, places, others.rows)
+
+    def answer(self, which: Mask, answer: Callable[[Unreached], None]) -> None:
+        """Have some of them answered; where that is all, without a copy."""
+        n = np.count_nonzero(which)
+        if n == len(which):
+            answer(self)
+        elif n:
+            others = self.at(which)
+            answer(others)
+            self.put(which, others)
 
 
-def _reach_otherwise(question: Question, rest: NDArray[np.intp], sides: Floats, rows: Rows) -> NDArray[np.intp]:
+def answer_unreached(question: Question, some: Unreached) -> None:
+    """Answer targets in other working modes, or by the nearest feasible poses; some may stay PENDING."""
+    table = question.table
+    if question.keep_mode or not table.has_sides:
+        _answer_completed(question, some)
+    else:
+        some.answer(_reach_otherwise(table, some), partial(_answer_completed, question))
+
+
+def _answer_completed(question: Question, some: Unreached) -> None:
+    """Answer targets in other ways of assembly, where poses are completed, or by the nearest feasible poses."""
+    if question.keep_mode or not question.table.is_completed:
+        _project(question, some)
+        return
+    corners = assembled_otherwise(question.mechanism)
+    if len(corners.poses):
+        some.answer(_reach_from(corners, question, some), partial(_project, question))
+    else:
+        _project(question, some)
+
+
+def _reach_otherwise(table: LegTable, some: Unreached) -> Mask:
     """Answer rows in other working modes; which are left, but for those that wait for another engine: closed forms tell
     too little of a leg at a dead point."""
     from ..kernels.platform.otherwise import UNSURE, answer_otherwise
 
-    begins, own, tried = question.begins, rows_at(rows, rest), sides[rest]
-    first = begins if len(begins) == 1 else begins[rest]
-    legs, targets = machine(question.table), question.targets[rest]
+    targets, begins, sides, _, rows = some
+    legs, tried, status = machine(table), sides.copy(), np.empty_like(rows.status)
 
     def run(block: slice) -> int:
         return answer_otherwise(
             legs.address,
             targets[block],
-            first if len(first) == 1 else first[block],
+            begins if len(begins) == 1 else begins[block],
             tried[block],
-            own.status[block],
-            own.poses[block],
-            own.actuators[block],
-            own.measures[block],
+            status[block],
+            rows.poses[block],
+            rows.actuators[block],
+            rows.measures[block],
         )
 
-    in_blocks(run, len(rest), ROWS_A_BLOCK)
-    reached = own.status == REACHED
-    if reached.any():
-        put_rows(rows, rest[reached], rows_at(own, reached))
-        sides[rest[reached]] = tried[reached]
-    left: NDArray[np.intp] = rest[~reached & (own.status != UNSURE)]
-    return left
+    if sum(in_blocks(run, len(targets), ROWS_A_BLOCK)) < len(targets):
+        reached = status == REACHED
+        rows.status[reached], sides[reached] = REACHED, tried[reached]
+    return np.asarray((status != REACHED) & (status != UNSURE))
 
 
-def _reach_from_corners(question: Question, rest: NDArray[np.intp], sides: Floats, rows: Rows) -> NDArray[np.intp]:
+def _reach_from(corners: Starts, question: Question, some: Unreached) -> Mask:
     """Answer rows in other ways of assembly, completed from corners, the nearest first; which are left."""
-    length = question.mechanism.characteristic_length
-    corners, targets = assembled_otherwise(question.mechanism), in_lengths(question.targets[rest], 1.0 / length)
-    poses = in_lengths(corners.poses, length)
+    length, left = question.mechanism.characteristic_length, np.ones(len(some.targets), bool)
+    targets, poses = in_lengths(some.targets, 1.0 / length), in_lengths(corners.poses, length)
     away = np.square((corners.poses[:, None] - targets)[:, :, :3]).sum(axis=(2, 3))
-    for places in np.argsort(away, axis=0):
-        waiting = np.flatnonzero(rows.status[rest] != REACHED)
-        if not len(waiting):
-            break
-        begins, ends = poses[places[waiting]], corners.sides[places[waiting]]
-        _complete(question, machine(question.table), rest[waiting], begins, ends, sides, rows)
-    left: NDArray[np.intp] = rest[rows.status[rest] != REACHED]
+    for nearest in np.argsort(away, axis=0):
+        places = nearest[left]
+        some.answer(left, partial(_complete, machine(question.table), poses[places], corners.sides[places]))
+        left &= some.rows.status != REACHED
     return left
 
 
-def _reach_again(question: Question, again: NDArray[np.intp], sides: Floats, rows: Rows) -> Mask:
-    """Answer rows exactly from where their projections ended; which stay as they are."""
-    asked = (machine_nearby if question.nearby else machine)(question.table)
-    return _complete(question, asked, again, rows.poses[again], sides[again], sides, rows)
+def _project(question: Question, some: Unreached) -> None:
+    """Answer rows by the nearest feasible poses, and exactly from there where these are as good as reached, or the task
+    leaves some of the pose open."""
+    mechanism, table, options, keep_mode, nearby = question
+    targets, begins, sides, carriers, rows = some
+    n, own = len(targets), starts_at(mechanism, table, begins, sides[: len(begins)])
+    told = rows.poses, np.empty_like(carriers), np.empty_like(sides), np.empty(n, np.int64), rows.actuators
+    found = Found(np.empty(n), *told, rows.measures)
+    holds = project(mechanism, options, targets, own, found, corners=not nearby, stays=keep_mode)
+    placed = found.distances < np.inf
+    n_placed = np.count_nonzero(placed)
+    if not n_placed:
+        return
+    at = slice(None) if n_placed == n else placed
+    position, rotation = rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR]
+    is_there = position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)
+    is_there &= rotation <= options.rotation_tolerance
+    sides[at], carriers[at] = found.sides[at], found.q[at]
+    rows.status[at] = np.where(is_there, REACHED, PROJECTED)[at]
+    rows.counters[at, ITERATIONS] = found.steps[at]
+    rows.counters[at, HOLD] = kept(mechanism, holds, position, rotation)[at]
+    is_near = found.distances <= NEARLY
+    rows.status[is_near], carriers[is_near] = PENDING, np.nan
+    asked = (machine_nearby if nearby else machine)(table)
+    some.answer(placed if table.is_partial else is_near, partial(_reach_again, asked))
 
 
-def _complete(
-    question: Question, asked: Machine, some: NDArray[np.intp], begins: Floats, ends: Floats, sides: Floats, rows: Rows
-) -> Mask:
-    """Answer some rows from as many poses (m, 4, 4) [length], on sides (m, legs); which stay as they are."""
+def _reach_again(asked: Machine, some: Unreached) -> None:
+    """Answer rows exactly from where their projections ended; others stay as they are."""
+    _complete(asked, some.rows.poses.copy(), some.sides.copy(), some)
+
+
+def _complete(asked: Machine, begins: Floats, ends: Floats, some: Unreached) -> None:
+    """Answer rows from as many poses (n, 4, 4) [length], on sides (n, legs); others stay as they are."""
     from ..kernels.legs.answer import answer
 
-    own = rows_at(rows, some)
-    answer(asked.address, question.targets[some], begins, ends, own.status, own.poses, own.actuators, own.measures)
-    own.measures[:, [POSITION_ERROR, ROTATION_ERROR]] = 0.0
-    left = own.status != REACHED
-    if not left.all():
-        put_rows(rows, some[~left], rows_at(own, ~left))
-        sides[some[~left]] = ends[~left]
-    return np.asarray(left)
-
-
-def _put_projected(question: Question, rest: NDArray[np.intp], found: Found, holds: Ints, rows: Rows) -> None:
-    """Write configurations found for rows `rest`."""
-    mechanism, options = question.mechanism, question.options
-    position, rotation = found.measures[:, POSITION_ERROR], found.measures[:, ROTATION_ERROR]
-    is_near = position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)
-    rows.status[rest] = np.where(is_near & (rotation <= options.rotation_tolerance), REACHED, PROJECTED)
-    rows.poses[rest], rows.actuators[rest], rows.measures[rest] = found.poses, found.actuators, found.measures
-    rows.counters[rest, ITERATIONS] = found.steps
-    rows.counters[rest, HOLD] = kept(mechanism, holds, position, rotation)
+    targets, _, sides, carriers, rows = some
+    status = np.empty_like(rows.status)
+    if answer(asked.address, targets, begins, ends, status, rows.poses, rows.actuators, rows.measures) < len(targets):
+        reached = status == REACHED
+        rows.status[reached], sides[reached], carriers[reached] = REACHED, ends[reached], np.nan
+        rows.measures[reached, POSITION_ERROR] = rows.measures[reached, ROTATION_ERROR] = 0.0

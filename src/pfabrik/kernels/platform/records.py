@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, Mask
 from ..closure.loops import PoseObjective
 
 STRETCHED = 1e-4
@@ -29,9 +29,13 @@ class Starts(NamedTuple):
     q: Floats  # (s, legs); no rows where they are what poses and sides tell
     sides: Floats  # (s, legs)
 
-    def at(self, places: NDArray[np.intp] | slice) -> Starts:
+    def at(self, places: NDArray[np.intp] | Mask | slice) -> Starts:
         """Those at some places."""
         return Starts(self.poses[places], self.q[places] if len(self.q) else self.q, self.sides[places])
+
+    def of(self, rows: NDArray[np.intp] | Mask | slice) -> Starts:
+        """Those of some rows, if there is one for each; else the one for all."""
+        return self if len(self.poses) == 1 else self.at(rows)
 
 
 class Found(NamedTuple):
