@@ -23,7 +23,6 @@ from .platform.forward import assemble
 from .platform.nearest import approach as approach_by_pose
 from .platform.nearest import read_configurations
 from .platform.otherwise import answer_otherwise
-from .platform.records import Aim, Found, Starts
 from .reaching import plan as P
 from .reaching.solve import solve_by_passes
 from .timing import fastest, second_derivatives
@@ -52,7 +51,6 @@ _PASSES = (
     P.Reached(*_values("f3 f3 f2 f1 i1 i1")),
 )
 
-_STARTS = Starts(*_values("f3 f2 f2"))
 _POSE_OBJECTIVE = PoseObjective(*_values("f3 f1 i f f i"))
 _ANSWERS = tuple(_values("i f3 f3 f2 i1 f3 f2 f2"))
 
@@ -66,20 +64,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (first_order, (_LOOPS, _LAYOUT, FirstOrderPlan(*_values("f2 f1 f2 i1 i i i i f i")), _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
     (answer_otherwise, _ANSWERS),
-    (
-        approach_by_pose,
-        (
-            0,
-            Aim(_POSE_OBJECTIVE, np.zeros((0, 0)), 0),
-            _STARTS,
-            _STARTS,
-            0,
-            0,
-            0,
-            Found(*_values("f1 f3 f2 f2 i1 f2 f2")),
-            _F2,
-        ),
-    ),
+    (approach_by_pose, tuple(_values("i i f3 f2 f3 f2 f2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (read_configurations, tuple(_values("i f3 f2 f2 f2"))),
     (assemble, (0, np.zeros((0, 0)), True, *_values("i i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i f3 f2 i1 i f3 f2 f1 i1"))),

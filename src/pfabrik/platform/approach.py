@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -11,11 +11,11 @@ from ..arrays import Floats, Records
 from ..closure.close import MARGIN
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..kernels.closure.loops import LOCKED, PoseObjective
+from ..kernels.closure.loops import LOCKED
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
-from ..kernels.platform.records import Aim, Found, Starts
-from ..kernels.rows import LIMIT_EXCESS
+from ..kernels.platform.records import SETTINGS, Found, Plan, Starts
+from ..kernels.rows import LIMIT_EXCESS, PENDING
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .rotation import implied_rows, without_idle_legs
@@ -39,11 +39,10 @@ class Approach:
 
     Parameters
     ----------
-    weights, frame : what counts, as of `PoseObjective`.
-    steps : of each search at most; 0 to weigh limits alone.
+    weights : what counts of the pose, (6,), as of `PoseObjective`.
+    settings : of `SETTINGS`, by name, those that do not follow from the machine.
     others : starts that follow each row's own.
     driven : the coordinates that are to be near to values; None where only poses count.
-    stays : in the working mode of each row's own start.
     minds_aims : keep on the way, too, to where crossed hinges can point their rods. Rows that end where they cannot are
         searched for again like this: a way that is barred ends earlier.
     """
@@ -53,31 +52,32 @@ class Approach:
         mechanism: Mechanism,
         table: LegTable,
         weights: Floats,
-        frame: int,
-        steps: int,
+        settings: Mapping[str, float],
         others: Starts,
-        *,
         driven: Records | None = None,
-        stays: bool = False,
+        *,
         minds_aims: bool = False,
     ) -> None:
-        self._table = table
-        at_home = table.task[0]["rotations"] == 0 and weights[3] == LOCKED and steps > 0
+        self._table, searches = table, settings["steps"] > 0
+        at_home = table.task[0]["rotations"] == 0 and weights[3] == LOCKED and searches
         legs = without_idle_legs(table) if at_home and not len(table.arms) else machine_searched(table)
         self._legs = legs if driven is None else Handle(legs.record._replace(driven=driven))
-        self._settings, self._others = (weights, frame, MARGIN, TOLERANCES.active, steps), others
-        self._hits = _hits(table) if driven is None else HITS_OF_VALUES
-        self._stays, self._implied = int(stays), 0 if len(table.arms) else implied_rows(mechanism)
-        cones, minds_aims = self._legs.record.cones, minds_aims or steps == 0
-        self._minded = len(cones) if minds_aims else int((cones["leader"] != OF_AIMS).sum())
+        cones = self._legs.record.cones
+        minded = len(cones) if minds_aims or not searches else int((cones["leader"] != OF_AIMS).sum())
+        own = np.zeros(1, SETTINGS)
+        own["margin"], own["near"], own["cones"] = MARGIN, TOLERANCES.active, minded
+        own["implied"] = 0 if len(table.arms) else implied_rows(mechanism)
+        own["hits"] = _hits(table) if driven is None else HITS_OF_VALUES
+        for name, value in settings.items():
+            own[name] = value
+        self._plan = Handle(Plan(weights, own, *others))
         self._no_values = np.zeros((0, len(self._legs.record.driven)))
         self._minding: Approach | None = None
-        if self._minded < len(cones):
-            told = mechanism, table, weights, frame, steps, others
-            self._minding = Approach(*told, driven=driven, stays=stays, minds_aims=True)
+        if minded < len(cones):
+            self._minding = Approach(mechanism, table, weights, settings, others, driven, minds_aims=True)
 
     @cached_property
-    def _kernel(self) -> Callable[..., None]:
+    def _kernel(self) -> Callable[..., int]:
         from ..kernels.platform.nearest import approach
 
         return approach
@@ -88,23 +88,23 @@ class Approach:
         self.fill(targets, own, found, values)
         return found
 
-    def fill(self, targets: Floats, own: Starts, found: Found, values: Floats | None = None) -> None:
-        """Search for targets (n, 4, 4) [length], on all cores; what is told of rows without an answer is left alone.
+    def fill(self, targets: Floats, own: Starts, found: Found, values: Floats | None = None) -> int:
+        """Search for targets (n, 4, 4) [length], on all cores; how many rows have no answer.
 
         Parameters
         ----------
         own : the first start of each row, or one for all.
         values : what driven coordinates are to be near to, (n, driven) [L or rad].
         """
-        self._run(targets, own, found, self._no_values if values is None else values, _NO_WEIGHTS)
-        if self._minding is None:
-            return
-        astray = (found.measures[:, LIMIT_EXCESS] > TOLERANCES.limit) & (found.distances < np.inf)
-        if np.count_nonzero(astray):
-            begin, near = own.of(astray), None if values is None else values[astray]
-            pointed = self._minding.find(targets[astray], begin, near)
-            for array, tried in zip(found, pointed, strict=True):
-                array[astray] = tried
+        left = self._run(targets, own, found, self._no_values if values is None else values, _NO_WEIGHTS)
+        if self._minding is not None:
+            astray = (found.measures[:, LIMIT_EXCESS] > TOLERANCES.limit) & (found.distances < np.inf)
+            if np.count_nonzero(astray):
+                found.status[astray] = PENDING
+                near, some = None if values is None else values[astray], found.at(astray)
+                left += self._minding.fill(targets[astray], own.of(astray), some, near)
+                found.put(astray, some)
+        return left
 
     def weigh(self, targets: Floats, present: Starts) -> Floats:
         """How hard every limit, and then every leg, holds configurations back from targets (n, 4, 4) [length], where
@@ -114,20 +114,16 @@ class Approach:
         self._run(targets, present, new_found(len(targets), self._table), self._no_values, weights)
         return weights
 
-    def _run(self, targets: Floats, own: Starts, found: Found, values: Floats, weights: Floats) -> None:
-        def run(block: slice) -> None:
+    def _run(self, targets: Floats, own: Starts, found: Found, values: Floats, weights: Floats) -> int:
+        asked = self._legs.address, self._plan.address
+        if len(targets) <= ROWS_A_BLOCK:
+            return self._kernel(*asked, targets, values, *own, *found, weights)
+
+        def run(block: slice) -> int:
             near = values[block] if len(values) else values
-            into = Found._make(array[block] for array in found)
-            self._run_block(targets[block], own.of(block), into, near, weights[block])
+            return self._kernel(*asked, targets[block], near, *own.of(block), *found.at(block), weights[block])
 
-        if len(targets) > ROWS_A_BLOCK:
-            in_blocks(run, len(targets), ROWS_A_BLOCK)
-        else:
-            self._run_block(targets, own, found, values, weights)
-
-    def _run_block(self, targets: Floats, own: Starts, found: Found, values: Floats, weights: Floats) -> None:
-        aim = Aim(PoseObjective(targets, *self._settings), values, self._implied)
-        self._kernel(self._legs.address, aim, own, self._others, self._hits, self._stays, self._minded, found, weights)
+        return sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
 
 
 @lru_cache(maxsize=64)
@@ -151,9 +147,10 @@ def new_found(n: int, table: LegTable) -> Found:
         np.zeros((n, 4, 4)),
         np.zeros((n, legs)),
         np.zeros((n, legs)),
-        np.zeros(n, np.int64),
+        np.zeros((n, 3), np.int64),
         np.zeros((n, actuators)),
         np.zeros((n, 5)),
+        np.full(n, PENDING),
     )
 
 

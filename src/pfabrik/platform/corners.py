@@ -108,7 +108,8 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     pivots = _sided_pivots(table)
     sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
     targets = in_lengths(poses, mechanism.characteristic_length)
-    approach = Approach(mechanism, table, weights, BASE_AXES, DRAWN_STEPS, no_starts(table))
+    settings = {"frame": BASE_AXES, "steps": DRAWN_STEPS}
+    approach = Approach(mechanism, table, weights, settings, no_starts(table))
     found = approach.find(targets, Starts(poses, q, sides))
     found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
     return Starts(*found[1:4]).at(np.flatnonzero(np.isfinite(found.distances)))

@@ -13,7 +13,7 @@ from ..closure.configurations import Configurations, new_rows
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
-from ..kernels.platform.records import Found, Starts
+from ..kernels.platform.records import Starts
 from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
 from .approach import home_start, no_starts, starts_at
@@ -89,7 +89,7 @@ def _project(
     first = own.of(places)
     ended = nearest_actuators(mechanism, values[places], first, corners=anywhere)
     near = np.flatnonzero(np.isfinite(ended.distances))
-    ended, places = Found._make(array[near] for array in ended), places[near]
+    ended, places = ended.at(near), places[near]
     asked, actuators, measures = rows.actuators[places], ended.actuators, ended.measures
     measures[:, [POSITION_ERROR, ROTATION_ERROR]] = 0.0
     for driven in table.driven:
@@ -103,7 +103,7 @@ def _project(
         measures[:, ACTUATOR_ERROR] = np.maximum(measures[:, ACTUATOR_ERROR], off)
     rows.actuators[places], rows.measures[places] = actuators, measures
     rows.status[places] = PROJECTED
-    rows.counters[places, ITERATIONS] = ended.steps
+    rows.counters[places, ITERATIONS] = ended.counters[:, ITERATIONS]
     rows.poses[places], found.q[places], found.sides[places] = ended.poses, ended.q, ended.sides
 
 

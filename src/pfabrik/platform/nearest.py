@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from ..arrays import Floats, Ints, Records
+from ..arrays import Floats, Records
 from ..closure.projection import Way, ways_of
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.home_mobility import column_joints
@@ -16,8 +17,9 @@ from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Found, Starts
-from ..kernels.rows import HOLD_NOTHING
+from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..options import Options
+from ..tolerances import TOLERANCES
 from .approach import Approach, in_lengths, new_found, no_starts
 from .corners import corners_of
 from .rotation import keeps_rotation
@@ -28,7 +30,7 @@ MOST_STEPS = 200
 
 def project(
     mechanism: Mechanism, options: Options, targets: Floats, own: Starts, found: Found, *, corners: bool, stays: bool
-) -> Ints:
+) -> int:
     """Fill the nearest feasible configurations that searches from several starts find.
 
     Parameters
@@ -42,53 +44,66 @@ def project(
 
     Returns
     -------
-    What each holds of its target, (n,).
+    How many rows have none.
     """
-    (hold, first), *others = _ways(mechanism, options.hold, options.rotation_length, corners, stays)
-    first.fill(targets, own, found)
-    holds = np.full(len(targets), hold)
-    for hold, way in others:
-        lost = found.distances == np.inf
-        if not np.count_nonzero(lost):
+    tolerances = options.tolerance, options.rotation_tolerance
+    first, *others = _ways(mechanism, options.hold, options.rotation_length, *tolerances, corners, stays)
+    left = first.fill(targets, own, found)
+    for way in others:
+        if not left:
             break
-        for array, tried in zip(found, way.find(targets[lost], own.of(lost)), strict=True):
-            array[lost] = tried
-        holds[lost] = hold
-    return holds
+        lost = found.distances == np.inf
+        some = found.at(lost)
+        left = way.fill(targets[lost], own.of(lost), some)
+        found.put(lost, some)
+    return left
 
 
 @lru_cache(maxsize=256)
 def _ways(
-    mechanism: Mechanism, hold: str | None, rotation_length: float | None, corners: bool, stays: bool
-) -> tuple[tuple[int, Approach], ...]:
-    """The ways to project, and what each holds, in the order in which they are tried."""
-    table = leg_table(mechanism)
+    mechanism: Mechanism,
+    hold: str | None,
+    rotation_length: float | None,
+    tolerance: float | None,
+    rotation_tolerance: float,
+    corners: bool,
+    stays: bool,
+) -> tuple[Approach, ...]:
+    """The ways to project, in the order in which they are tried."""
+    table, length = leg_table(mechanism), mechanism.characteristic_length
     assert isinstance(table, LegTable)
     others = corners_of(mechanism) if corners else no_starts(table)
-    ways = ways_of(mechanism, hold, rotation_length)
-    return tuple((way.hold, _approach(mechanism, table, way, MOST_STEPS, others, stays=stays)) for way in ways)
+    settings = {"steps": MOST_STEPS, "stays": int(stays), "rotation": rotation_tolerance}
+    settings["position"] = tolerance or TOLERANCES.position * length
+    ways = []
+    for way in ways_of(mechanism, hold, rotation_length):
+        held = {
+            "hold": way.hold,
+            "held_position": TOLERANCES.held * length if way.hold == HOLD_POSITION else np.inf,
+            "held_rotation": TOLERANCES.held if way.hold == HOLD_ORIENTATION else np.inf,
+        }
+        ways.append(_approach(mechanism, table, way, settings | held, others))
+    return tuple(ways)
 
 
 def _approach(
     mechanism: Mechanism,
     table: LegTable,
     way: Way,
-    steps: int,
+    settings: Mapping[str, float],
     others: Starts,
     driven: Records | None = None,
-    *,
-    stays: bool = False,
 ) -> Approach:
     weights, frame = np.array(way.weights, dtype=float), task_of(mechanism).frame
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:], frame = LOCKED, BASE_AXES
-    return Approach(mechanism, table, weights, frame, steps, others, driven=driven, stays=stays)
+    return Approach(mechanism, table, weights, {"frame": frame, **settings}, others, driven)
 
 
 def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: Way) -> Floats:
     """How hard every limit holds configurations back from targets (n, 4, 4) [length]: multipliers, in the order of
     those that `closure.descend.weighed_limits` gives."""
-    found = _approach(mechanism, table, way, 0, no_starts(table)).weigh(targets, present)
+    found = _approach(mechanism, table, way, {"steps": 0}, no_starts(table)).weigh(targets, present)
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
     coned = [joint.name for joint in mechanism.joints if joint.cone is not None]
     weights = np.zeros((len(targets), 2 * columns + len(coned)))
@@ -115,7 +130,8 @@ def _toward_values(mechanism: Mechanism, corners: bool) -> Approach:
     if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
         weights[3:] = LOCKED
     others = corners_of(mechanism) if corners else no_starts(table)
-    return Approach(mechanism, table, weights, BASE_AXES, MOST_STEPS, others, driven=table.driven)
+    settings = {"frame": BASE_AXES, "steps": MOST_STEPS}
+    return Approach(mechanism, table, weights, settings, others, table.driven)
 
 
 def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
@@ -139,7 +155,7 @@ def _toward_arms(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, 
     """Searches for each set of arms at poses that are held: the arms, and which legs these are."""
     way = Way(task_of(mechanism).weights(LOCKED, LOCKED), HOLD_NOTHING)
     return tuple(
-        (part.arms, legs, _approach(mechanism, part, way, MOST_STEPS, no_starts(part), part.arms))
+        (part.arms, legs, _approach(mechanism, part, way, {"steps": MOST_STEPS}, no_starts(part), part.arms))
         for part, legs in _apart_by_arms(table)
     )
 

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
 from ..closure.configurations import put_rows, rows_at
-from ..closure.projection import kept
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Found, Starts
-from ..kernels.rows import HOLD, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
+from ..kernels.rows import PENDING, POSITION_ERROR, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options
-from ..tolerances import TOLERANCES
 from .approach import in_lengths, starts_at
 from .corners import assembled_otherwise
 from .nearest import project
@@ -139,25 +137,18 @@ def _project(question: Question, some: Unreached) -> None:
     mechanism, table, options, keep_mode, nearby = question
     targets, begins, sides, carriers, rows = some
     n, own = len(targets), starts_at(mechanism, table, begins, sides[: len(begins)])
-    told = rows.poses, np.empty_like(carriers), np.empty_like(sides), np.empty(n, np.int64), rows.actuators
-    found = Found(np.empty(n), *told, rows.measures)
-    holds = project(mechanism, options, targets, own, found, corners=not nearby, stays=keep_mode)
-    placed = found.distances < np.inf
-    n_placed = np.count_nonzero(placed)
-    if not n_placed:
+    ends = rows.poses, np.empty_like(carriers), np.empty_like(sides)
+    found = Found(np.empty(n), *ends, rows.counters, rows.actuators, rows.measures, rows.status)
+    left = project(mechanism, options, targets, own, found, corners=not nearby, stays=keep_mode)
+    if left == n:
         return
-    at = slice(None) if n_placed == n else placed
-    position, rotation = rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR]
-    is_there = position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)
-    is_there &= rotation <= options.rotation_tolerance
-    sides[at], carriers[at] = found.sides[at], found.q[at]
-    rows.status[at] = np.where(is_there, REACHED, PROJECTED)[at]
-    rows.counters[at, ITERATIONS] = found.steps[at]
-    rows.counters[at, HOLD] = kept(mechanism, holds, position, rotation)[at]
+    placed = slice(None) if left == 0 else found.distances < np.inf
+    sides[placed], carriers[placed] = found.sides[placed], found.q[placed]
     is_near = found.distances <= NEARLY
-    rows.status[is_near], carriers[is_near] = PENDING, np.nan
+    if np.count_nonzero(is_near):
+        rows.status[is_near], carriers[is_near] = PENDING, np.nan
     asked = (machine_nearby if nearby else machine)(table)
-    some.answer(placed if table.is_partial else is_near, partial(_reach_again, asked))
+    some.answer(found.distances < np.inf if table.is_partial else is_near, partial(_reach_again, asked))
 
 
 def _reach_again(asked: Machine, some: Unreached) -> None:

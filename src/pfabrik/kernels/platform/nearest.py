@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Record, Records
+from ...arrays import Floats, Ints, Record, Records
 from .._jit import kernel, routine, search
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
@@ -17,15 +17,26 @@ from ..legs.poses import make_exact
 from ..legs.records import ARM, Table
 from ..legs.table import open_table
 from ..qp import new_qp
+from ..references import opener
 from ..rotations import difference, yaw_difference
-from ..rows import LIMIT_EXCESS, POSITION_ERROR, RESIDUAL, ROTATION_ERROR
+from ..rows import (
+    HOLD,
+    HOLD_NOTHING,
+    ITERATIONS,
+    LIMIT_EXCESS,
+    POSITION_ERROR,
+    PROJECTED,
+    REACHED,
+    RESIDUAL,
+    ROTATION_ERROR,
+)
 from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global
 from .descend import descend
 from .equations import Now, is_carried, new_now, new_view, place
 from .linearise import linearise
-from .records import Aim, Found, Starts
+from .records import SETTINGS, Aim, Found, Plan, Starts
 from .search import Search, copy_now, fix, new_search
 from .starts import begin, load_target, nearest_start, put_held, put_sides
 
@@ -47,6 +58,10 @@ TALLY = np.dtype(
     ]
 )
 """Where searches for a row have ended."""
+
+
+open_plan = opener(Plan(np.zeros(0), np.zeros(0, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0))))
+"""What `approach` is asked, of which it is given the address of a `Handle`."""
 
 
 class Work(NamedTuple):
@@ -257,18 +272,36 @@ def search_row(
     return least
 
 
+@routine
+def judge(own: Record, row: int, found: Found) -> None:
+    """Tell whether what counts is REACHED, and what of the target an answer has of what it was to hold, by how far it
+    is: targets out of sight were not sought."""
+    position, rotation = found.measures[row, POSITION_ERROR], found.measures[row, ROTATION_ERROR]
+    is_there = position <= own["position"] and rotation <= own["rotation"]
+    is_held = position <= own["held_position"] and rotation <= own["held_rotation"]
+    found.status[row] = REACHED if is_there else PROJECTED
+    found.counters[row, HOLD] = own["hold"] if is_held else HOLD_NOTHING
+
+
 @search
 def approach(
     machine: int,
-    aim: Aim,
-    own: Starts,
-    others: Starts,
-    hits: int,
-    stays: int,
-    cones: int,
-    found: Found,
+    plan: int,
+    targets: Floats,
+    values: Floats,
+    begins: Floats,
+    q: Floats,
+    sides: Floats,
+    distances: Floats,
+    ends: Floats,
+    ends_q: Floats,
+    ends_sides: Floats,
+    counters: Ints,
+    actuators: Floats,
+    measures: Floats,
+    status: Ints,
     weights: Floats,
-) -> None:
+) -> int:
     """Fill the nearest feasible configuration of every row.
 
     With no steps to take, fill `weights` instead, (n, 2 ranges + cones + legs): how hard every limit holds each row
@@ -277,34 +310,52 @@ def approach(
     Parameters
     ----------
     machine : see `open_table`.
-    own : the first start of each row, or one for all.
-    others : starts that follow, for any row, until the nearest configuration has been met often enough: `is_enough`.
-    stays : 1 for configurations in the working mode of a row's first start alone.
-    cones : how many of the cones searches mind, the first ones; excesses over all of them are told.
+    plan : the address of a `Plan`.
+    targets, values : see `Aim`.
+    begins, q, sides : the first start of each row, or one for all, as of `Starts`; the others follow until the nearest
+        configuration has been met often enough: `is_enough`.
+    distances, ends, ends_q, ends_sides, counters, actuators, measures, status : `Found`.
+
+    Returns
+    -------
+    How many rows have no answer.
     """
-    table = open_table(machine)
-    search, best = new_search(table, cones), new_now(table.legs.shape[0])
+    table, asked = open_table(machine), open_plan(plan)
+    setting, own, left = asked.settings[0], Starts(begins, q, sides), 0
+    others, found = (
+        Starts(asked.poses, asked.q, asked.sides),
+        Found(distances, ends, ends_q, ends_sides, counters, actuators, measures, status),
+    )
+    search, best = new_search(table, setting["cones"]), new_now(table.legs.shape[0])
     work = Work(search, best, np.zeros(1, TALLY), np.zeros(1, TALLY), np.zeros(1 + others.poses.shape[0]))
-    pose, held = aim.pose, np.zeros(6)
-    steps = pose.max_iterations if holds_some(table, aim, held) else 0
-    toward = Aim(PoseObjective(pose.targets, held, pose.frame, pose.margin, pose.near, steps), aim.values, aim.implied)
+    frame, margin, near, weighs = setting["frame"], setting["margin"], setting["near"], setting["steps"] == 0
+    pose, held = PoseObjective(targets, asked.weights, frame, margin, near, setting["steps"]), np.zeros(6)
+    aim = Aim(pose, values, setting["implied"])
+    steps = setting["steps"] if holds_some(table, aim, held) else 0
+    toward = Aim(PoseObjective(targets, held, frame, margin, near, steps), values, setting["implied"])
     k, n = search.first.linear.G.shape
+    k = k if weighs else 0
     p, pulls = new_qp(k, k), np.zeros((k, n))
-    for row in range(found.distances.shape[0]):
-        found.distances[row] = math.inf
-        if not load_target(table, aim.pose, row, search):
+    for row in range(distances.shape[0]):
+        distances[row] = math.inf
+        if not load_target(table, pose, row, search):
+            left += 1
             continue
-        if aim.pose.max_iterations == 0:
+        if weighs:
             begin(table, own, row, search)
-            fix(aim.pose, True, search)
+            fix(pose, True, search)
             search.gradient.unit[0] = 1.0
             linearise(table, row, aim, search.best, search, search.first)
             scale_objective(search.first.linear)
-            for c in range(balance(search.first.linear, aim.pose.near, p, pulls)):
+            for c in range(balance(search.first.linear, near, p, pulls)):
                 weights[row, search.first.linear.which[c]] = p.x[c]
             continue
-        least = search_row(table, row, aim, toward, own, others, hits, stays, work)
-        found.distances[row] = least
-        found.steps[row] = search.control[0]["steps"]
+        least = search_row(table, row, aim, toward, own, others, setting["hits"], setting["stays"], work)
+        distances[row] = least
         if least < math.inf:
-            write(table, row, aim.pose, search, best, found)
+            counters[row, ITERATIONS] = search.control[0]["steps"]
+            write(table, row, pose, search, best, found)
+            judge(setting, row, found)
+        else:
+            left += 1
+    return left

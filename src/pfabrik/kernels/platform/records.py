@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Ints, Mask
+from ...arrays import Floats, Ints, Mask, Records
 from ..closure.loops import PoseObjective
 
 STRETCHED = 1e-4
@@ -38,13 +38,52 @@ class Starts(NamedTuple):
         return self if len(self.poses) == 1 else self.at(rows)
 
 
+SETTINGS = np.dtype(
+    [
+        ("frame", "i8"),  # as of `PoseObjective`
+        ("margin", "f8"),
+        ("near", "f8"),
+        ("steps", "i8"),  # of a search at most; 0 to weigh limits alone
+        ("implied", "i8"),  # as of `Aim`
+        ("hits", "i8"),  # how often the nearest configuration is to be met: see `is_enough`
+        ("stays", "i8"),  # 1 for configurations in the working mode of a row's first start alone
+        ("cones", "i8"),  # how many of the cones searches mind, the first ones; excesses over all of them are told
+        ("position", "f8"),  # what is REACHED [length]
+        ("rotation", "f8"),  # likewise [rad]
+        ("hold", "i8"),  # what of the target is held
+        ("held_position", "f8"),  # how far off it has it all the same [length]
+        ("held_rotation", "f8"),  # likewise [rad]
+    ]
+)
+
+
+class Plan(NamedTuple):
+    """What searches are to bring near, and how, whatever the rows."""
+
+    weights: Floats  # (6,): of the pose, as of `PoseObjective`
+    settings: Records  # (1,): SETTINGS
+    poses: Floats  # starts that follow a row's own, for any row, as of `Starts`
+    q: Floats
+    sides: Floats
+
+
 class Found(NamedTuple):
-    """Where the searches of each row ended."""
+    """Where the searches of each row ended; of rows without an answer, distances alone are told."""
 
     distances: Floats  # (n,) [L]; infinite where nothing feasible was found, and where the target is no pose
     poses: Floats  # (n, 4, 4) [length]
     q: Floats  # (n, legs)
     sides: Floats  # (n, legs)
-    steps: Ints  # (n,)
+    counters: Ints  # (n, 3): steps and what is held, as of `Rows`
     actuators: Floats  # (n, n_a)
     measures: Floats  # (n, 5): distances from the target [length, rad], the largest equation [length], limit excess
+    status: Ints  # (n,): REACHED or PROJECTED
+
+    def at(self, places: NDArray[np.intp] | Mask | slice) -> Found:
+        """Those of some rows."""
+        return Found._make(array[places] for array in self)
+
+    def put(self, places: Mask, others: Found) -> None:
+        """Write others at some places."""
+        for array, own in zip(self, others, strict=True):
+            array[places] = own
