@@ -8,6 +8,9 @@ from ..arrays import Floats, Ints
 
 # Status of a row; the same numbers as the public Status.
 REACHED, PROJECTED, EXCEEDED, FAILED, INVALID, PENDING = 0, 1, 2, 3, 4, 9
+# Of rows on their way: within reach, but legs close only once what the target leaves open is completed, if they do; and
+# reached by some leg at a dead point, as far as can be told.
+OPEN, UNSURE = 8, 10
 # What a projection holds.
 HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION = 0, 1, 2
 # Columns of Rows.counters, and of Rows.measures.

@@ -171,6 +171,12 @@ def home_start(mechanism: Mechanism, table: LegTable) -> Starts:
 
 def in_lengths(poses: Floats, scale: float) -> Floats:
     """Poses with their positions scaled, copied."""
-    scaled = np.array(poses)
-    scaled[:, :3, 3] *= scale
-    return scaled
+    return np.asarray(poses * _scaling(scale))
+
+
+@lru_cache(maxsize=64)
+def _scaling(scale: float) -> Floats:
+    """What the numbers of a pose are multiplied with."""
+    factors = np.ones((4, 4))
+    factors[:3, 3] = scale
+    return factors

@@ -52,6 +52,9 @@ def project(
     for way in others:
         if not left:
             break
+        if left == len(targets):
+            left = way.fill(targets, own, found)
+            continue
         lost = found.distances == np.inf
         some = found.at(lost)
         left = way.fill(targets[lost], own.of(lost), some)

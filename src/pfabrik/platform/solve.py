@@ -18,7 +18,7 @@ from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
-from ..kernels.rows import PENDING, REACHED, Rows
+from ..kernels.rows import OPEN, PENDING, REACHED, Rows
 from ..kernels.threads import in_blocks
 from ..motion.displacements import centres_at
 from ..options import Options
@@ -84,7 +84,8 @@ class LegsEngine:
         carriers, others = None, None
         if left and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
-            carriers = np.full(sides.shape, np.nan)
+            carriers = np.empty_like(sides)
+            carriers[:] = np.nan
             poses = self._one.home if start is None else start.rows.poses
             question = Question(self.mechanism, self._table, options, keep_mode, nearby)
             unreached = Unreached(targets, poses, sides, carriers, rows)
@@ -350,9 +351,7 @@ class LegsEngine:
 
     def _complete(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
         """Answer the rows that blocks left OPEN, whose poses are to be completed; how many of them are reached."""
-        from ..kernels.legs.blocks import OPEN
-
-        some = np.flatnonzero(rows.status == OPEN)
+        some = (rows.status == OPEN).nonzero()[0]
         if not len(some):
             return 0
         own = rows_at(rows, some)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -72,6 +72,20 @@ class Unreached(NamedTuple):
             self.put(which, others)
 
 
+@cache
+def _answer() -> Callable[..., int]:
+    from ..kernels.legs.answer import answer
+
+    return answer
+
+
+@cache
+def _answer_otherwise() -> Callable[..., int]:
+    from ..kernels.platform.otherwise import answer_otherwise
+
+    return answer_otherwise
+
+
 def answer_unreached(question: Question, some: Unreached) -> None:
     """Answer targets in other working modes, or by the nearest feasible poses; some may stay PENDING."""
     table = question.table
@@ -96,27 +110,22 @@ def _answer_completed(question: Question, some: Unreached) -> None:
 def _reach_otherwise(table: LegTable, some: Unreached) -> Mask:
     """Answer rows in other working modes; which are left, but for those that wait for another engine: closed forms tell
     too little of a leg at a dead point."""
-    from ..kernels.platform.otherwise import UNSURE, answer_otherwise
-
     targets, begins, sides, _, rows = some
-    legs, tried, status = machine(table), sides.copy(), np.empty_like(rows.status)
+    legs, tried, status = machine(table).address, sides.copy(), np.empty_like(rows.status)
+    told, answer = (tried, status, rows.poses, rows.actuators, rows.measures), _answer_otherwise()
 
     def run(block: slice) -> int:
-        return answer_otherwise(
-            legs.address,
-            targets[block],
-            begins if len(begins) == 1 else begins[block],
-            tried[block],
-            status[block],
-            rows.poses[block],
-            rows.actuators[block],
-            rows.measures[block],
-        )
+        begin = begins if len(begins) == 1 else begins[block]
+        return answer(legs, targets[block], begin, *(array[block] for array in told))
 
-    if sum(in_blocks(run, len(targets), ROWS_A_BLOCK)) < len(targets):
+    if len(targets) <= ROWS_A_BLOCK:
+        left = answer(legs, targets, begins, *told)
+    else:
+        left = sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
+    if left < len(targets):
         reached = status == REACHED
         rows.status[reached], sides[reached] = REACHED, tried[reached]
-    return np.asarray((status != REACHED) & (status != UNSURE))
+    return np.asarray(status == PENDING)
 
 
 def _reach_from(corners: Starts, question: Question, some: Unreached) -> Mask:
@@ -158,11 +167,10 @@ def _reach_again(asked: Machine, some: Unreached) -> None:
 
 def _complete(asked: Machine, begins: Floats, ends: Floats, some: Unreached) -> None:
     """Answer rows from as many poses (n, 4, 4) [length], on sides (n, legs); others stay as they are."""
-    from ..kernels.legs.answer import answer
-
     targets, _, sides, carriers, rows = some
     status = np.empty_like(rows.status)
-    if answer(asked.address, targets, begins, ends, status, rows.poses, rows.actuators, rows.measures) < len(targets):
+    told = status, rows.poses, rows.actuators, rows.measures
+    if _answer()(asked.address, targets, begins, ends, *told) < len(targets):
         reached = status == REACHED
         rows.status[reached], sides[reached], carriers[reached] = REACHED, ends[reached], np.nan
         rows.measures[reached, POSITION_ERROR] = rows.measures[reached, ROTATION_ERROR] = 0.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record
 from .._jit import inlined, kernel, routine
-from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
+from ..rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL
 from ..vectors import ON_BOUND, Vec, add, along, copy_row, cross, dot, scale, sub, vec, wrap
 from .answer import CLOSE, CLOSED, KEPT
 from .columns import (
@@ -50,8 +50,6 @@ from .poses import ROUNDED
 from .records import CARRIAGE, CARRIER, CRANK, FOOT, FOOT_LINE, HEAD, HINGE, NO_CARRIER, SHARED, SLIDE
 from .table import open_table
 
-# Status of a row that is a pose and within reach, but does not close before what its target leaves open is completed.
-OPEN = 8
 TURN = 2.0 * math.pi
 
 

@@ -24,13 +24,12 @@ from ..legs.frames import set_frames
 from ..legs.poses import load
 from ..legs.records import ARM, Table
 from ..legs.table import open_table
-from ..rows import PENDING, REACHED
+from ..rows import PENDING, REACHED, UNSURE
 from ..vectors import copy_row
 from .equations import main_of
 
-UNSURE, NEARLY = 10, 1e-6
-"""Status of a row that some leg at a dead point reaches; and by how much legs may be off there, where closed forms tell
-half their digits [rad or L]."""
+NEARLY = 1e-6
+"""By how much legs at dead points may be off, where closed forms tell half their digits [rad or L]."""
 
 MOST_CHOICES = 8
 """Legs with two solutions beyond which not every combination of them is tried, where a pose is completed by all."""
