@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
-from ..closure.configurations import put_rows, rows_at
+from ..closure.configurations import new_rows, put_rows, rows_at
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Found, Starts
@@ -50,8 +50,8 @@ class Unreached(NamedTuple):
     carriers: Floats  # (n, legs) [L or rad]: of an answer, where closed forms tell them less exactly; else NaN
     rows: Rows
 
-    def at(self, places: Mask | NDArray[np.intp]) -> Unreached:
-        """Those at some places, copied."""
+    def at(self, places: Mask | NDArray[np.intp] | slice) -> Unreached:
+        """Those at some places, copied but for those of a slice."""
         begins = self.begins if len(self.begins) == 1 else self.begins[places]
         arrays = self.targets[places], begins, self.sides[places], self.carriers[places]
         return Unreached(*arrays, rows_at(self.rows, places))
@@ -111,15 +111,15 @@ def _reach_otherwise(table: LegTable, some: Unreached) -> Mask:
     """Answer rows in other working modes; which are left, but for those that wait for another engine: closed forms tell
     too little of a leg at a dead point."""
     targets, begins, sides, _, rows = some
-    legs, tried, status = machine(table).address, sides.copy(), np.empty_like(rows.status)
+    legs, tried, status = machine(table), sides.copy(), np.empty_like(rows.status)
     told, answer = (tried, status, rows.poses, rows.actuators, rows.measures), _answer_otherwise()
 
     def run(block: slice) -> int:
         begin = begins if len(begins) == 1 else begins[block]
-        return answer(legs, targets[block], begin, *(array[block] for array in told))
+        return answer(legs.address, targets[block], begin, *(array[block] for array in told))
 
     if len(targets) <= ROWS_A_BLOCK:
-        left = answer(legs, targets, begins, *told)
+        left = answer(legs.address, targets, begins, *told)
     else:
         left = sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
     if left < len(targets):
@@ -129,15 +129,27 @@ def _reach_otherwise(table: LegTable, some: Unreached) -> Mask:
 
 
 def _reach_from(corners: Starts, question: Question, some: Unreached) -> Mask:
-    """Answer rows in other ways of assembly, completed from corners, the nearest first; which are left."""
-    length, left = question.mechanism.characteristic_length, np.ones(len(some.targets), bool)
-    targets, poses = in_lengths(some.targets, 1.0 / length), in_lengths(corners.poses, length)
-    away = np.square((corners.poses[:, None] - targets)[:, :, :3]).sum(axis=(2, 3))
-    for nearest in np.argsort(away, axis=0):
-        places = nearest[left]
-        some.answer(left, partial(_complete, machine(question.table), poses[places], corners.sides[places]))
-        left &= some.rows.status != REACHED
-    return left
+    """Answer rows in other ways of assembly, completed from the nearest corner that leads to one; which are left."""
+    length, legs, k = question.mechanism.characteristic_length, machine(question.table), len(corners.poses)
+    poses = in_lengths(corners.poses, length)
+
+    def reach(block: slice) -> Mask:
+        own = some.at(block)
+        n = len(own.targets)
+        begins, ends = np.tile(poses, (n, 1, 1)), np.tile(corners.sides, (n, 1))
+        targets, rows = np.repeat(own.targets, k, axis=0), new_rows(question.mechanism, n * k)
+        every = Unreached(targets, begins, ends, np.empty_like(ends), rows)
+        _complete(legs, begins, ends, every)
+        reached = (rows.status == REACHED).reshape(n, k)
+        found = reached.any(axis=1)
+        if np.count_nonzero(found):
+            wanted = in_lengths(own.targets, 1.0 / length)[:, None]
+            away = np.square((corners.poses - wanted)[:, :, :3]).sum(axis=(2, 3))
+            nearest = np.where(reached, away, np.inf).argmin(axis=1)
+            own.put(found, every.at((np.arange(0, n * k, k) + nearest)[found]))
+        return np.asarray(~found)
+
+    return np.concatenate(in_blocks(reach, len(some.targets), ROWS_A_BLOCK))
 
 
 def _project(question: Question, some: Unreached) -> None:
