@@ -39,7 +39,7 @@ def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) 
     if start.mechanism != mechanism:
         found = f"an answer of {told_apart(start.mechanism, mechanism)}"
         raise InvalidArgument("start", found, f"one of '{mechanism.name}' itself, or joint coordinates")
-    if (start._rows.status >= FAILED).any():
+    if np.count_nonzero(start._rows.status >= FAILED):
         raise InvalidArgument("start", "an answer that is FAILED or INVALID", "a feasible configuration")
     _require_shape(start.shape, shape)
     return start._found
