@@ -136,7 +136,7 @@ def _reach_from(corners: Starts, question: Question, some: Unreached) -> Mask:
     def reach(block: slice) -> Mask:
         own = some.at(block)
         n = len(own.targets)
-        begins, ends = np.tile(poses, (n, 1, 1)), np.tile(corners.sides, (n, 1))
+        begins, ends = np.concatenate([poses] * n), np.concatenate([corners.sides] * n)
         targets, rows = np.repeat(own.targets, k, axis=0), new_rows(question.mechanism, n * k)
         every = Unreached(targets, begins, ends, np.empty_like(ends), rows)
         _complete(legs, begins, ends, every)
