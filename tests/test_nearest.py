@@ -214,6 +214,26 @@ def test_special_targets_have_feasible_answers(name: str, hold: str | None) -> N
     check_feasible(mechanism, targets, pf.solve_ik(mechanism, targets, options=Options(hold=hold)))
 
 
+@pytest.mark.parametrize("count", [4 if INTERPRETED else 60, pytest.param(2000, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize(
+    "name",
+    ["five_bar", "delta", "linear_delta", "orthoglide", "psu", "stewart", "ucu", "servo_hexapod", "hexaglide"],
+)
+def test_nothing_is_reached_that_is_nearer_than_what_is_certified(name: str, count: int) -> None:
+    mechanism, targets, answers = projections(name, "orientation", count)
+    kept = np.flatnonzero(answers.certified)
+    assert len(kept) >= 0.4 * len(targets) or INTERPRETED
+    rng, away = np.random.default_rng(1), np.asarray(answers.position_error)[kept]
+    nearer = np.repeat(answers.pose[kept][:, None], 40, axis=1)
+    shifts = rng.normal(size=nearer.shape[:2] + (3,)) * (name != "five_bar", True, True)
+    shifts *= (away[:, None] * 10.0 ** rng.uniform(-4.0, 0.3, nearer.shape[:2]) / np.linalg.norm(shifts, axis=2))[
+        ..., None
+    ]
+    nearer[..., :3, 3] += shifts
+    inside = np.linalg.norm(nearer[..., :3, 3] - targets[kept, None, :3, 3], axis=2) < (1.0 - SAME) * away[:, None]
+    assert inside.any() and not np.any(pf.solve_ik(mechanism, nearer[inside]).status == Status.REACHED)
+
+
 @pytest.mark.parametrize(("name", "hold"), [("five_bar", None), ("stewart", "orientation"), ("stewart", None)])
 def test_hardly_any_feasible_pose_is_nearer_to_a_special_target(name: str, hold: str | None) -> None:
     """Far away a share of the distance says little: answers are as far out as the machine goes."""

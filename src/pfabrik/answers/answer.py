@@ -17,6 +17,7 @@ from ..engine import engine_of
 from ..frozen import FrozenMapping
 from ..kernels.rows import (
     ACTUATOR_ERROR,
+    CERTIFIED,
     HOLD,
     HOLD_NOTHING,
     ITERATIONS,
@@ -116,6 +117,12 @@ class Answer:
         names = np.array([None, "orientation", "position"], dtype=object)
         held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, HOLD], HOLD_NOTHING)]
         return held[0] if self.shape == () else held.reshape(self.shape)
+
+    @property
+    def certified(self) -> bool | NDArray[np.bool_]:
+        status = self._rows.status
+        is_nearest = (status == Status.PROJECTED) & (self._rows.counters[:, CERTIFIED] == 1)
+        return cast("bool | NDArray[np.bool_]", self._shaped((status == Status.REACHED) | is_nearest))
 
     @property
     def actuator_error(self) -> float | Floats:

@@ -45,6 +45,9 @@ class Solution(Answer):
     limit_excess : largest excess over any limit, (...,); lengths relative to L, angles in rad; 0 if all are kept.
     held : what of the target a projected answer has all the same: "orientation", "position", or None; for a batch an
         array of them, (...,). It is what `Options.hold` asked for, or None where no feasible pose has that.
+    certified : whether it is certain that no feasible pose of the same orientation is nearer, in any working mode,
+        (...,): it is of REACHED answers, and of most projected ones where the platform does not turn, or its
+        orientation is held, and legs are struts, or rods on cranks and carriages. False where searches alone say so.
     iterations, rounds : passes over the chains, and revisions of the target, (...,).
     active_limits : limits that hold a projected answer back, the hardest first, or that another one exceeds; for a
         batch, one tuple a row, in row order. A projected answer may lie on other limits too; were one of those a little
@@ -89,6 +92,7 @@ class Solution(Answer):
         plain: dict[str, Any] = {"status": _plain_status(self.status)}
         plain |= {name: as_plain(getattr(self, name)) for name in names}
         plain["held"] = as_plain(self.held)
+        plain["certified"] = as_plain(self.certified)
         plain["joints"] = {name: as_plain(value) for name, value in self.joints.items()}
         plain["points"] = {name: as_plain(point) for name, point in self.points.items()}
         listed = [[vars(limit) for limit in row] for row in self._limits]

@@ -14,7 +14,7 @@ OPEN, UNSURE = 8, 10
 # What a projection holds.
 HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION = 0, 1, 2
 # Columns of Rows.counters, and of Rows.measures.
-ITERATIONS, ROUNDS, HOLD = 0, 1, 2
+ITERATIONS, ROUNDS, HOLD, CERTIFIED, N_COUNTERS = 0, 1, 2, 3, 4
 POSITION_ERROR, ROTATION_ERROR, RESIDUAL, LIMIT_EXCESS, ACTUATOR_ERROR = 0, 1, 2, 3, 4
 
 
@@ -22,7 +22,7 @@ class Rows(NamedTuple):
     """The answers of a batch."""
 
     status: Ints  # (n,)
-    counters: Ints  # (n, 3): iterations, rounds, what a projection held (HOLD_...)
+    counters: Ints  # (n, N_COUNTERS): iterations, rounds, what is held (HOLD_...), 1 where none is nearer for certain
     poses: Floats  # (n, 4, 4)
     actuators: Floats  # (n, n_actuators)
     measures: Floats  # (n, 5): position error, rotation error, residual, limit excess, actuator error

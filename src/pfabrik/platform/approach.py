@@ -15,7 +15,7 @@ from ..kernels.closure.loops import LOCKED
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..kernels.platform.records import SETTINGS, Found, Plan, Starts
-from ..kernels.rows import LIMIT_EXCESS, PENDING
+from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .rotation import implied_rows, without_idle_legs
@@ -147,7 +147,7 @@ def new_found(n: int, table: LegTable) -> Found:
         np.zeros((n, 4, 4)),
         np.zeros((n, legs)),
         np.zeros((n, legs)),
-        np.zeros((n, 3), np.int64),
+        np.zeros((n, N_COUNTERS), np.int64),
         np.zeros((n, actuators)),
         np.zeros((n, 5)),
         np.full(n, PENDING),

@@ -15,7 +15,7 @@ from ..decomposition.resting import Resting
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
-from ..kernels.rows import Rows
+from ..kernels.rows import N_COUNTERS, Rows
 from .approach import home_start, no_starts
 from .table import machine, machine_nearby, machine_searched, resting_at_home
 
@@ -52,7 +52,7 @@ class OneTarget:
         """Room for one answer."""
         return Rows(
             np.empty(1, np.int64),
-            np.zeros((1, 3), np.int64),
+            np.zeros((1, N_COUNTERS), np.int64),
             np.empty((1, 4, 4)),
             np.empty((1, self._n_actuators)),
             np.zeros((1, 5)),

@@ -20,6 +20,7 @@ from ..qp import new_qp
 from ..references import opener
 from ..rotations import difference, yaw_difference
 from ..rows import (
+    CERTIFIED,
     HOLD,
     HOLD_NOTHING,
     ITERATIONS,
@@ -354,6 +355,7 @@ def approach(
         distances[row] = least
         if least < math.inf:
             counters[row, ITERATIONS] = search.control[0]["steps"]
+            counters[row, CERTIFIED] = int(work.met[0]["hits"] == math.inf)
             write(table, row, pose, search, best, found)
             judge(setting, row, found)
         else:
