@@ -169,3 +169,13 @@ def test_maps_know_arms_that_follow() -> None:
     margin = pf.feasibility(mechanism, wanted).margin
     reached = np.asarray(pf.solve_ik(mechanism, wanted[margin > 0.0]).status) == pf.Status.REACHED
     assert reached.all() and 20 < len(reached) < 200
+
+
+def test_maps_lead_arms_that_turn_far_near_home() -> None:
+    """The tool stands beside the first of two axes, in line with it: to lean, this one turns by up to half a turn."""
+    mechanism = closure.stretched_wrist(tool=(0, 10, 270))
+    wanted = targets(mechanism, 100, 0.1, 0.3, (1, 1, 0))
+    reached = np.asarray(pf.solve_ik(mechanism, wanted, options=Options(working_mode="keep")).status) == 0
+    feasible = np.asarray(pf.feasibility(mechanism, wanted).margin) > 0.0
+    assert 20 < reached.sum() < 100 and not (feasible & ~reached).any()
+    assert (feasible & reached).sum() > 0.97 * reached.sum()

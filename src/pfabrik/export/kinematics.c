@@ -63,7 +63,7 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #define PFK_MODE_APART 1e-3  /* nearer to each other actuators of two working modes meet [L or rad] */
 enum {
     PFK_IK_STEPS = 20,
-    PFK_PARTS = 8, /* of the way to a target that is not completed at once */
+    PFK_PARTS = 16, /* of the way to a target that is not completed at once */
     PFK_FK_STEPS = 40
 };
 

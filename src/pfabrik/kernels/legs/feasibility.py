@@ -8,14 +8,15 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import kernel, routine
-from ..vectors import angle_between, vec
+from ..vectors import angle_between, copy_row, vec
 from .answer import CLOSE, KEPT, complete, deviation, end_of_rows, new_completion, put_rows
 from .poses import lean_to, load, put_pose
 from .records import CARRIAGE, CRANK, ROD, SLIDE
 from .table import open_table
 
-PARTS = 4
-"""Parts of the way from the start in which a pose is completed where, all at once, it does not close within limits."""
+PARTS, PARTS_OF_ARMS = 4, 16
+"""Parts of the way from the start in which a pose is completed where, all at once, it does not close within limits; and
+where arms follow, which near where they are singular turn far at once, if neither did."""
 
 
 @routine
@@ -61,23 +62,30 @@ def feasibility(
     table = open_table(machine)
     work, legs, task, limited, cones = new_completion(table), table.legs, table.task, table.limited, table.cones
     before, toward, n_legs = np.zeros((4, 4)), np.zeros((4, 4)), legs.shape[0]
+    own = np.zeros(n_legs)
     n_limits = 2 * limited.shape[0] + cones.shape[0]
     for row in range(targets.shape[0]):
         margins[row], bindings[row] = math.nan, -1
-        for parts in (1, PARTS):
+        for parts in (1, PARTS, PARTS_OF_ARMS):
             if parts > 1 and (task[0]["unset"] == 0 or not margins[row] < 0.0):
                 break
+            if parts > PARTS and task[0]["led"] == 0:
+                break
             aim(begins[0], begins[0], 1.0, task[0], before)
+            copy_row(sides[0], own)
             is_pose, closed = True, True
             for part in range(1, parts + 1):
                 aim(targets[row], begins[0], part / parts, task[0], toward)
                 is_pose = load(toward, before, task[0], work.pose)
-                closed = is_pose and complete(table, sides[0], work)
+                closed = is_pose and complete(table, own, work)
                 if not closed:
                     break
                 put_pose(work.pose, task[0]["length"], before)
-            if not is_pose or (parts > 1 and not closed):
+                copy_row(work.sides, own)
+            if not is_pose:
                 break
+            if parts > 1 and not closed:
+                continue
             least, binding = least_margin(limited, cones, work.values)
             if not closed:
                 put_rows(legs, work.frames, work.values, work.lines, work.rows)
