@@ -258,6 +258,17 @@ def test_what_feasibility_says_is_what_is_reached_however_far_from_home(name: st
     assert 0 < reached.sum() < len(reached)
 
 
+def test_feasibility_turns_what_a_leg_does_not_reach_as_it_stands_at_home() -> None:
+    """The bar that carries the tool turns with where it is: held as at home, its hinge is soon too far away."""
+    mechanism = closure.five_bar_with_tool()
+    x, y = np.meshgrid(np.linspace(-150.0, 150.0, 21), np.linspace(-50.0, 260.0, 21))
+    targets = pf.pose(np.stack([x, y, np.full_like(x, 10.0)], axis=-1))
+    reached = np.asarray(pf.solve_ik(mechanism, targets, options=Options(working_mode="keep")).status) == 0
+    feasible = np.asarray(pf.feasibility(mechanism, targets).margin) >= 0.0
+    assert 100 < reached.sum() < 250 and not (feasible & ~reached).any()
+    assert feasible.sum() > 0.95 * reached.sum()
+
+
 @pytest.mark.parametrize("name", ["stewart", "delta", "orthoglide"])
 def test_feasibility_on_a_grid_is_that_of_its_targets(name: str) -> None:
     mechanism = machine(name)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .answers.starts import Start, start_of
 from .arrays import Floats, Ints
+from .closure.parasitic import has_parasitic_motion
 from .decomposition.leg_forms import LegForm, Rod
 from .decomposition.leg_table import LegTable, table_of_poses
 from .description.mechanism import Mechanism, checked_mechanism
@@ -92,6 +93,7 @@ class _Asked:
         if not isinstance(table, LegTable):
             raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"])
         self._table, self._machine = table, machine(table)
+        self._follows = int(table.task["unset"][0] > 0 and has_parasitic_motion(mechanism))
         self._begin, self._sides = mechanism.home_pose[None].copy(), table.home_sides
         if start is not None:
             found = start_of(mechanism, start, ())
@@ -132,9 +134,17 @@ class _Asked:
 
         def run(block: slice) -> int:
             targets = poses if len(counts) else poses[block]
-            told = margin[block], binding[block]
             return margins_in_blocks(
-                self._machine.address, targets, steps, counts, block.start, self._begin, self._sides, *told
+                self._machine.address,
+                targets,
+                steps,
+                counts,
+                block.start,
+                self._begin,
+                self._sides,
+                self._follows,
+                margin[block],
+                binding[block],
             )
 
         return margin, binding, sum(in_blocks(run, n, ROWS_A_RUN))

@@ -165,6 +165,7 @@ def margins_in_blocks(
     first: int,
     begins: Floats,
     sides: Floats,
+    follows: int,
     margins: Floats,
     bindings: Ints,
 ) -> int:
@@ -177,6 +178,8 @@ def margins_in_blocks(
     steps, counts : of a grid, (3, 3) [length] and (3,): from a pose to the next along each of three lines, and how many
         there are on each; the last line's run fastest. No counts, (0,), for `targets` themselves.
     first : which of the grid's poses is the first to be told of.
+    follows : whether what the task leaves open changes with what it sets. Then a leg that does not reach a pose as it
+        is may reach it completed; else it does not, and blocks tell by how much.
     """
     table = open_table(machine)
     legs, limited, cones, task = table.legs, table.limited, table.cones, table.task
@@ -216,7 +219,7 @@ def margins_in_blocks(
         for i in range(n):
             margins[start + i], bindings[start + i] = S[LEAST, i], int(S[BINDING, i])
             is_pose = S[IS_POSE, i] == 1.0
-            is_open = task[0]["unset"] > 0 and S[IS_SURE, i] == 1.0 and S[LARGEST, i] > enough
+            is_open = follows == 1 if S[IS_SURE, i] == 0.0 else task[0]["unset"] > 0 and S[LARGEST, i] > enough
             if not is_pose:
                 margins[start + i], bindings[start + i] = math.nan, -1
             elif is_open or S[IS_KNOWN, i] == 0.0:
