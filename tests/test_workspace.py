@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 import pfabrik as pf
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument, PfabrikError
+from pfabrik.workspace.border import groups_of
 
 Array = NDArray[np.float64]
 
@@ -145,6 +146,17 @@ def test_vertices_are_on_the_limits_they_name(name: str) -> None:
     assert np.mean(named[told.binding] == named[found.vertex_limit]) > 0.98
     assert {found.limits[limit] for limit in found.face_limit.tolist()} == set(found.shares)
     assert sum(found.shares.values()) == pytest.approx(1.0)
+
+
+def test_shares_of_a_joint_with_two_ranges_are_those_of_both() -> None:
+    found = pf.workspace(pf.load("ankle_ups"), resolution=0.05)
+    assert sum(found.shares.values()) == pytest.approx(1.0)
+    assert {place for group in groups_of(found) for place in group.limits} >= set(found.face_limit.tolist())
+    own = np.array([limit == ("pivot", "min") for limit in found.limits])
+    assert own.sum() == 2
+    lengths = np.linalg.norm(np.diff(found.vertices[found.faces], axis=1)[:, 0], axis=1)
+    expected = lengths[own[found.face_limit]].sum() / lengths.sum()
+    assert found.shares["pivot", "min"] == pytest.approx(expected)
 
 
 def test_an_orthoglide_without_limits_fills_three_cylinders() -> None:

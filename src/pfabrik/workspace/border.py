@@ -47,4 +47,4 @@ def groups_of(found: Region) -> list[Group]:
 
 def _group(found: Region, label: str, colour: str, limits: list[tuple[str, str]]) -> Group:
     share = sum(found.shares[limit] for limit in limits)
-    return Group(label, colour, [found.limits.index(limit) for limit in limits], share)
+    return Group(label, colour, [place for place, limit in enumerate(found.limits) if limit in limits], share)

@@ -103,11 +103,15 @@ class Region:
 
     @cached_property
     def shares(self) -> dict[tuple[str, str], float]:
-        """(joint, bound) -> share of the border that this limit forms, the greatest first."""
-        sizes = self._mesh.face_sizes
-        total = np.bincount(self.face_limit, sizes, minlength=len(self.limits))
-        order = [index for index in np.argsort(-total, kind="stable").tolist() if total[index] > 0.0]
-        return {self.limits[index]: float(total[index] / sizes.sum()) for index in order}
+        """(joint, bound) -> share of the border that this limit forms, the greatest first.
+
+        Both ranges of a joint that has two count together, as in `margins`, and all legs on one carrier.
+        """
+        sizes, total = self._mesh.face_sizes, dict.fromkeys(self.limits, 0.0)
+        for limit, size in zip(self.face_limit.tolist(), sizes.tolist(), strict=True):
+            total[self.limits[limit]] += size
+        order = sorted((limit for limit, size in total.items() if size > 0.0), key=lambda limit: -total[limit])
+        return {limit: float(total[limit] / sizes.sum()) for limit in order}
 
     def contains(self, points: ArrayLike) -> bool | Mask:
         """Whether points (..., d) are within reach [length or rad]: asked anew, not read off the mesh; bools (...).
