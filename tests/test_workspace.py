@@ -8,14 +8,17 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from machines import closure
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument, PfabrikError
 from pfabrik.workspace.border import groups_of
@@ -146,6 +149,16 @@ def test_vertices_are_on_the_limits_they_name(name: str) -> None:
     assert np.mean(named[told.binding] == named[found.vertex_limit]) > 0.98
     assert {found.limits[limit] for limit in found.face_limit.tolist()} == set(found.shares)
     assert sum(found.shares.values()) == pytest.approx(1.0)
+
+
+def test_what_has_no_size_is_told_before_it_is_measured() -> None:
+    upright, turn = closure.five_bar_with_tool(), Rotation.from_rotvec([0.4, 0.3, 0.0])
+    joints = [replace(joint, at=turn.apply(joint.at), axis=turn.apply(joint.axis)) for joint in upright.joints]
+    leaning = pf.Mechanism("leaning", joints, "c1", turn.apply(upright.reference_point), task=("x", "y", "z"))
+    with pytest.raises(InvalidArgument, match="x, y, z change in 2 directions"):
+        pf.workspace(leaning)
+    with pytest.raises(InvalidArgument, match="at most 2 coordinates"):
+        pf.workspace(pf.load("ankle_ups"), over=("tilt_x", "tilt_y", "yaw"))
 
 
 def test_shares_of_a_joint_with_two_ranges_are_those_of_both() -> None:

@@ -125,6 +125,9 @@ def space_of(
             f"two or three coordinates to look over, of those that move: {', '.join(free_coordinates(mechanism))}"
         )
         raise InvalidArgument("over", ", ".join(names) or "no coordinate", expected)
+    if len(names) > (most := generic_of(mechanism).mobility.platform):
+        expected = f"at most {most} coordinates: the end effector has no more freedoms, and more have no size"
+        raise InvalidArgument("over", ", ".join(names), expected)
     _require_task(mechanism, "over", names)
     _require_task(mechanism, "fixed", [name for name in fixed if name not in names])
     return Space(mechanism, names, np.array([held[name] for name in names]), held, rotation)
@@ -134,14 +137,15 @@ def free_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
     """Coordinates of the task that the end effector can change."""
     task, directions = task_of(mechanism), generic_of(mechanism).directions
     moves = np.linalg.norm(directions, axis=1) > TOLERANCES.alignment
-    rank = int((np.linalg.svd(directions[:3], compute_uv=False) > TOLERANCES.alignment).sum())
-    if rank < moves[:3].sum() and rank == directions.shape[1]:
+    places = [name for name, counts, free in zip(POSITIONS, task.axes, moves, strict=False) if counts and free]
+    rows = [POSITIONS.index(name) for name in places]
+    rank = int((np.linalg.svd(directions[rows], compute_uv=False) > TOLERANCES.alignment).sum())
+    if rank < len(places):
         raise InvalidArgument(
             "mechanism",
-            f"an end effector that moves in {rank} of the directions x, y, z, none of them along an axis of the base",
+            f"an end effector of which {', '.join(places)} change in {rank} directions, across the axes of the base",
             "a base frame turned so that it moves along its axes",
         )
-    places = [name for name, counts, free in zip(POSITIONS, task.axes, moves, strict=False) if counts and free]
     turned = moves[3:] if len(moves) > 3 else np.zeros(3, bool)
     counts = {3: (True, True, True), 2: (True, True, False), 1: (False, False, True), 0: (False,) * 3}[task.rotations]
     return (*places, *(name for name, each, free in zip(TURNS, counts, turned, strict=True) if each and free))
