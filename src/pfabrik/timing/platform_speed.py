@@ -64,13 +64,13 @@ def platform_speed(
     inverse, forward = inverse_jacobian(solution), forward_jacobian(solution)
     sizes = np.repeat([mechanism.characteristic_length, 1.0], 3)[: inverse.shape[1]]
     twists = _twists(solution)[:, : len(sizes)]
-    kept = (twists * sizes) @ (forward / sizes[:, None])
+    kept = twists @ (forward / sizes[:, None])
     following = np.linalg.pinv(kept, rcond=TOLERANCES.alignment)
     found = []
     for twist in twists:
         rates = inverse @ twist
         if not _is_made(twist, forward @ rates, sizes):
-            wanted = twists @ (sizes * twist)
+            wanted = twists @ (twist / sizes)
             rates = following @ wanted
             if not _is_made(wanted, kept @ rates, np.ones(len(wanted))):
                 rates = np.full(len(limits), np.nan)
