@@ -333,3 +333,14 @@ def test_a_rod_that_goes_faster_and_faster_stops_nothing_before_it_is_square_to_
     knee = np.hypot(50, 75) - 10  # how high B is with the second rod square to its rail
     lift = np.arcsin(knee / np.hypot(120, 65)) - np.arctan2(65, 120)
     assert end.distance == pytest.approx(220 * np.sin(lift) + 120 * np.cos(lift) - 120, abs=1e-6)
+
+
+def test_a_limit_just_before_links_are_stretched_out_is_named() -> None:
+    """There a hinge turns a thousand times as fast as the end effector goes."""
+    free = pf.load("five_bar").without_limits()
+    (stretched,) = pf.travel(home_of(free), along=Z)
+    assert stretched.end is not None and not stretched.stopped_by
+    assert abs(float(stretched.end.joints["p2"])) < 1e-4
+    (reach,) = pf.travel(home_of(free.with_limits(p2=(-2.0, -2e-4))), along=Z)
+    assert [(limit.joint, limit.bound) for limit in reach.stopped_by] == [("p2", "max")]
+    assert reach.distance < stretched.distance

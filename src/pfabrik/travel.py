@@ -32,6 +32,10 @@ NEARBY, LONGEST, HORIZON = 4.0, 64.0, 1e3
 """How far looks along a line are so short, beyond which each goes twice as far as the one before; how far one goes at
 most, as an engine that takes limited steps can follow; and beyond which none goes [L]."""
 
+SHORTEST = 1e-12
+"""How short a step is not halved again [L or rad]: so near to where a limit stops it, a joint is on that limit even if
+it turns a hundred thousand times as fast as the end effector goes. Beyond, its links are as good as stretched out."""
+
 FULL_TURN = 2.0 * np.pi
 """How far is looked about an axis [rad]: after a full turn the poses repeat."""
 
@@ -136,7 +140,7 @@ def travel(
     """How far the end effector can go from a configuration, in its working mode, until a limit or a link stops it.
 
     Directions are looked along in steps of L/32 or 1/32 rad, each from the configuration before it; steps that are not
-    reached are halved, down to the tolerance of a pose. All are followed at once.
+    reached are halved, far below the tolerance of a pose. All are followed at once.
 
     Parameters
     ----------
@@ -259,7 +263,7 @@ class _Search:
     def run(self) -> Floats:
         """How far each goes, (n,) [length or rad].
 
-        Steps that are not reached are halved, until they are as short as the tolerance; two in a row that are reached
+        Steps that are not reached are halved, until they are the shortest; two in a row that are reached
         after all, for they begin nearer, are doubled again.
         """
         units = np.where(self._turns, 1.0, self._length)
@@ -278,7 +282,7 @@ class _Search:
             step[steady] = np.minimum(2.0 * step[steady], longest[steady])
             streak[steady] = 0
             near[near > farthest] = np.inf
-            moving = moving[np.isfinite(near[moving]) & (step[moving] > 0.5 * TOLERANCES.position * units[moving])]
+            moving = moving[np.isfinite(near[moving]) & (step[moving] > SHORTEST * units[moving])]
         return near
 
     def _go_on(self, which: NDArray[np.intp], distances: Floats) -> Mask:
