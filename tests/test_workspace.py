@@ -157,6 +157,8 @@ def test_what_has_no_size_is_told_before_it_is_measured() -> None:
     leaning = pf.Mechanism("leaning", joints, "c1", turn.apply(upright.reference_point), task=("x", "y", "z"))
     with pytest.raises(InvalidArgument, match="x, y, z change in 2 directions"):
         pf.workspace(leaning)
+    with pytest.raises(InvalidArgument, match="whose task has a tilt"):
+        pf.workspace(closure.ruu(), tilt=0.1)
     with pytest.raises(InvalidArgument, match="at most 2 coordinates"):
         pf.workspace(pf.load("ankle_ups"), over=("tilt_x", "tilt_y", "yaw"))
 

@@ -124,13 +124,14 @@ def _turns(space: Space, tilt: float | None) -> Floats:
         return np.eye(3)[None]
     if isinstance(tilt, bool) or not isinstance(tilt, int | float | np.number) or not 0.0 <= tilt <= math.pi:
         raise InvalidArgument("tilt", repr(tilt), "an angle from 0 to pi [rad]")
-    _require_turning(space, "tilt")
+    _require_turning(space, "tilt", "tilt")
     return tilts_up_to(float(tilt))
 
 
-def _require_turning(space: Space, argument: str) -> None:
-    if any(space.is_angle) or not task_of(space.mechanism).rotations:
-        expected = "None: it is for positions, of a machine whose task has a rotation"
+def _require_turning(space: Space, argument: str, kind: Literal["rotation", "tilt"] = "rotation") -> None:
+    rotations = task_of(space.mechanism).rotations
+    if any(space.is_angle) or rotations == 0 or (kind == "tilt" and rotations == 1):
+        expected = f"None: it is for positions, of a machine whose task has a {kind}"
         raise InvalidArgument(argument, f"a value, for a workspace over {', '.join(space.names)}", expected)
 
 
