@@ -98,3 +98,19 @@ def test_what_is_no_workspace_of_the_machine_is_refused(free_five_bar: pf.Worksp
         pf.singularity_map(pf.load("stewart"), free_five_bar)
     with pytest.raises(InvalidArgument, match="resolution"):
         pf.singularity_map(free_five_bar.mechanism, free_five_bar, resolution=-1.0)
+
+
+def test_the_locus_of_a_pointing_machine_is_where_its_axis_is_let_go_of() -> None:
+    """However far it leans: the tilt that a task sets is about the platform's axes, not the base's."""
+    axes = [(1, 0.1, 0), (0.2, 1, 0.3), (0, 0.2, 1), (-0.9, 0.3, 0.6), (-0.3, -1, 0.1)]
+    links = [("base", "l1"), ("l1", "l2"), ("l2", "l3"), ("l3", "l4"), ("base", "l4")]
+    joints = [
+        pf.Joint(name, "revolute", link, at=(0, 0, 0), axis=axis, actuated=name in "AE")
+        for name, link, axis in zip("ABCDE", links, axes, strict=True)
+    ]
+    machine = pf.Mechanism("spherical 5R", joints, "l2", (0, 20, 100), task=("tilt",))
+    ends = {"tilt_x": (-1.2, 1.2), "tilt_y": (-1.2, 1.2)}
+    found = pf.singularity_map(machine, pf.workspace(machine, within=ends, resolution=0.06), resolution=0.1)
+    at = pf.solve_ik(machine, found.workspace.poses(found.locus_vertices), options=pf.Options(working_mode="keep"))
+    assert len(found.locus_vertices) > 5
+    assert np.median(pf.singularity(at).parallel) < 0.01 and np.max(pf.singularity(at).parallel) < 0.1

@@ -18,6 +18,7 @@ from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..tolerances import TOLERANCES
+from .displacements import displacements
 from .first_order import actuated_columns, first_order, right_singular
 from .mobility import Generic, generic_of
 
@@ -92,16 +93,24 @@ def parallel_signs(mechanism: Mechanism, q: Floats) -> Floats:
     """
     invalid, q = _set_aside(q)
     generic, freedoms = generic_of(mechanism), generic_of(mechanism).mobility.platform
-    axes, turns = task_of(mechanism).axes, task_of(mechanism).rotations
-    directions = generic.directions
-    if directions.shape[1] != freedoms:
-        turned = {0: (), 1: (5,), 2: (3, 4), 3: (3, 4, 5)}[turns]
-        directions = np.eye(6)[:, [*np.flatnonzero(axes).tolist(), *turned]]
-    if not len(mechanism.actuator_names) == directions.shape[1] == freedoms:
+    directions = generic.directions if generic.directions.shape[1] == freedoms else _of_task(mechanism, q)
+    if not len(mechanism.actuator_names) == directions.shape[-1] == freedoms:
         return np.full(len(q), np.nan)
     motion = _motion(mechanism, q)
-    signs = np.sign(np.linalg.det(motion.actuators)) * np.sign(np.linalg.det(directions.T @ motion.twists))
+    shown = np.swapaxes(directions, -1, -2) @ motion.twists
+    signs = np.sign(np.linalg.det(motion.actuators)) * np.sign(np.linalg.det(shown))
     return np.asarray(np.where(invalid, np.nan, signs))
+
+
+def _of_task(mechanism: Mechanism, q: Floats) -> Floats:
+    """The twists that a task sets at coordinates q (n, c), (n, 6, k): of a tilt, about the platform's x and y axes."""
+    task = task_of(mechanism)
+    every = np.repeat(np.eye(6)[None], len(q), axis=0)
+    if task.rotations == 2:
+        moved = displacements(mechanism, q)[mechanism.end_effector_body]
+        every[:, 3:, 3:] = (moved @ mechanism.home_pose)[:, :3, :3]
+    turned = {0: (), 1: (5,), 2: (3, 4), 3: (3, 4, 5)}[task.rotations]
+    return every[:, :, [*np.flatnonzero(task.axes).tolist(), *turned]]
 
 
 def _set_aside(q: Floats) -> tuple[Mask, Floats]:
