@@ -448,6 +448,13 @@ def test_limits_that_hold_alike_are_named_as_the_description_lists_them(away: fl
     assert all(limit.bound == "max" for limit in limits)
 
 
+@pytest.mark.parametrize("away", [1e160, 1e300])
+def test_however_far_a_target_is_no_square_of_it_overflows(away: float) -> None:
+    answer = pf.solve_ik(closure.five_bar_with_tool(), (away, 0, 10))
+    assert answer.status is pf.Status.PROJECTED
+    assert answer.position_error == pytest.approx(away)
+
+
 def test_a_limit_says_which_coordinate_of_a_joint_it_is() -> None:
     pivot = {"type": "universal", "connects": ("base", "table"), "at": (0, 0, 10), "axes": ((1, 0, 0), (0, 1, 0))}
     post = Joint("pivot", **pivot, range=((-0.5, 0.5), (-0.5, 0.5)))

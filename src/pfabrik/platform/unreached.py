@@ -144,7 +144,8 @@ def _reach_from(corners: Starts, question: Question, some: Unreached) -> Mask:
         found = reached.any(axis=1)
         if np.count_nonzero(found):
             wanted = in_lengths(own.targets, 1.0 / length)[:, None]
-            away = np.square((corners.poses - wanted)[:, :, :3]).sum(axis=(2, 3))
+            scale = np.abs(wanted).max(axis=(1, 2, 3), initial=1.0)  # squares of what is farther may be infinite
+            away = np.square((corners.poses - wanted)[:, :, :3] / scale[:, None, None, None]).sum(axis=(2, 3))
             nearest = np.where(reached, away, np.inf).argmin(axis=1)
             own.put(found, every.at((np.arange(0, n * k, k) + nearest)[found]))
         return np.asarray(~found)
