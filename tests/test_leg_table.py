@@ -266,7 +266,7 @@ def test_feasibility_turns_what_a_leg_does_not_reach_as_it_stands_at_home() -> N
     reached = np.asarray(pf.solve_ik(mechanism, targets, options=Options(working_mode="keep")).status) == 0
     feasible = np.asarray(pf.feasibility(mechanism, targets).margin) >= 0.0
     assert 100 < reached.sum() < 250 and not (feasible & ~reached).any()
-    assert feasible.sum() > 0.95 * reached.sum()
+    assert feasible.sum() > 0.98 * reached.sum()
 
 
 @pytest.mark.parametrize("name", ["stewart", "delta", "orthoglide"])

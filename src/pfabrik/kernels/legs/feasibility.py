@@ -14,9 +14,9 @@ from .poses import lean_to, load, put_pose
 from .records import CARRIAGE, CRANK, ROD, SLIDE
 from .table import open_table
 
-PARTS, PARTS_OF_ARMS = 4, 16
+PARTS, MORE_PARTS = 4, 16
 """Parts of the way from the start in which a pose is completed where, all at once, it does not close within limits; and
-where arms follow, which near where they are singular turn far at once, if neither did."""
+where in so many it did not close, or led arms beyond limits, which near where these are singular turn far at once."""
 
 
 @routine
@@ -66,14 +66,14 @@ def feasibility(
     n_limits = 2 * limited.shape[0] + cones.shape[0]
     for row in range(targets.shape[0]):
         margins[row], bindings[row] = math.nan, -1
-        for parts in (1, PARTS, PARTS_OF_ARMS):
+        is_pose, closed = True, False
+        for parts in (1, PARTS, MORE_PARTS):
             if parts > 1 and (task[0]["unset"] == 0 or not margins[row] < 0.0):
                 break
-            if parts > PARTS and task[0]["led"] == 0:
+            if parts == MORE_PARTS and closed and task[0]["led"] == 0:
                 break
             aim(begins[0], begins[0], 1.0, task[0], before)
             copy_row(sides[0], own)
-            is_pose, closed = True, True
             for part in range(1, parts + 1):
                 aim(targets[row], begins[0], part / parts, task[0], toward)
                 is_pose = load(toward, before, task[0], work.pose)
