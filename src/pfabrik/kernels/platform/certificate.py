@@ -1,19 +1,20 @@
 """Whether no feasible configuration is nearer than where a search has ended, of platforms that do not turn.
 
-A rod from a foot E, which a carrier may move, to a head y keeps to |y - E| = l (or a bound l of its length); with
+A rod from a foot E, which a carrier may move, to a head y keeps to |y - E| = l, or to a bound l of its length. With
 multipliers that balance the distance at the place x where a search has ended, and T the target,
 
-    |y - T|^2 / 2  >=  |y - T|^2 / 2 + sum_k m_k (l_k^2 - |y - E_k|^2) / 2 + sum_k b_k . (y - E_k)  +  const
+    |y - T|^2 / 2  >=  |y - T|^2 / 2 + sum_k (m_k (l_k^2 - |y - E_k|^2) / 2 + b_k . (y - E_k)) + const
 
-holds for every feasible y: the terms are zero, or not positive, there. Here b has the conditions that are linear in
-y - E: cones, c . (y - E) >= l cos(half angle), and hinges across. All of it is convex in y where M = sum_k m_k < 1
-(rods under tension have m < 0), and then least, for feet that have moved by d_k, at
+holds for every feasible y: the terms are zero, or not positive, there (m > 0 pushes, m < 0 pulls). Here b has the
+conditions that are linear in y - E: hinges across, and cones, c . (y - E) >= l cos(half angle); of those that turn with
+a crank, b turns too. All of it is convex in y where sum_k m_k < 1, and then least, for carriers moved by q_g, at
 
-    |x - T|^2 / 2 + sum_k ((m_k l_k u_k - b_k) . d_k - m_k |d_k|^2 / 2) - |sum_k m_k d_k|^2 / (2 (1 - M)),
+    |x - T|^2 / 2 + sum_g f_g(q_g) - |sum_g v_g(q_g)|^2 / (2 (1 - sum_k m_k)),
 
-the last term at least - (sum_k |m_k|) sum_k |m_k| |d_k|^2 / (2 (1 - M)): a sum over carriers, each a function of its
-own coordinate q, A (cos q - 1) + B sin q of a crank and a parabola of a carriage, whose least value within the limits
-of q is known. No configuration is nearer where these least values are zero: of any working mode.
+with f_g = A (cos q - 1) + B sin q and |v_g|^2 = 2 V^2 (1 - cos q) of a crank, B q - A q^2 / 2 and V^2 q^2 of a
+carriage. Since |sum_g v_g|^2 <= sum_g |v_g|^2 / s_g for any shares s_g that add up to one, nothing is nearer, in any
+working mode, if each carrier has a share with which f_g outweighs its part within the limits of q_g: at least
+V^2 / (1 - sum_k m_k) / (most - A), with most the largest A for which f_g is not negative there.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ NEARER = 1e-7
 """Share of the square of the distance by which something might be nearer that does not count."""
 
 BALANCED = 1e-7
-"""Share of the distance that multipliers may leave unbalanced, and of what limits and rods say, along directions that
-a crank does not turn."""
+"""Share of the distance that multipliers may leave unbalanced, and how far off a limit is met that has one [rad or
+L]."""
 
 
 @routine
@@ -55,34 +56,24 @@ def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
     linearise(table, row, aim, search.best, search, view)
     put_force(table, search, search.here)
     put_multipliers(search.here, view, search.balance)
-    unit, away, pushing, moving, main = search.gradient.unit[0], vec(search.force), 0.0, 0.0, 0
-    total, turned = away, NOWHERE
-    for k in range(table.legs.shape[0]):
-        if table.legs[k]["carrier"] != SHARED:
-            moving, turned, main = moving + norm(turned), NOWHERE, k
-        m, b, e = hold_of(table, k, main, search)
-        total = add(along(total, -m, vec(search.look.lines[k])), b)
-        turned = add(turned, velocity(table, k, main, m, e, search))
-        pushing += m
-    moving += norm(turned)
-    square = dot(away, away)
-    if norm(total) > BALANCED * math.sqrt(square) or pushing >= unit:
-        return False
-    least, k = 0.0, 0
+    unit, away = search.gradient.unit[0], vec(search.force)
+    nearer = NEARER * dot(away, away) / unit
+    total, pushing, shares, k = away, 0.0, 0.0, 0
     while k < table.legs.shape[0]:
-        main, A, B, turned = k, 0.0, 0.0, NOWHERE
+        main, A, B, v = k, 0.0, 0.0, NOWHERE
         while k < table.legs.shape[0] and (k == main or table.legs[k]["carrier"] == SHARED):
             m, b, e = hold_of(table, k, main, search)
-            line = vec(search.look.lines[k])
-            spoke, tangent, axis = arm_of(table, k, main, search)
-            v = sub(scale(m, line), b)
-            A += dot(v, spoke) + m * dot(tangent, tangent) - dot(line, flatten(e, axis)) - 2.0 * dot(e, spoke)
-            B += dot(v, tangent) - dot(line, cross(axis, e))
-            turned = add(turned, velocity(table, k, main, m, e, search))
+            line, (spoke, tangent, axis) = vec(search.look.lines[k]), arm_of(table, k, main, search)
+            total, pushing, pull = add(along(total, -m, line), b), pushing + m, sub(scale(m, line), b)
+            A += dot(pull, spoke) + m * dot(tangent, tangent) - dot(line, flatten(e, axis)) - 2.0 * dot(e, spoke)
+            B += dot(pull, tangent) - dot(line, cross(axis, e))
+            v = add(v, along(scale(m, tangent), -1.0, cross(axis, e)))
             k += 1
-        if A != 0.0 or B != 0.0:
-            least += least_of(table, main, A + moving * norm(turned) / (unit - pushing), B, search)
-    return bool(least >= -NEARER * square / unit)
+        room = most_of(table, main, B, nearer, search) - A
+        if room <= 0.0 and (A != 0.0 or B != 0.0):
+            return False
+        shares += dot(v, v) / room if room > 0.0 else 0.0
+    return bool(norm(total) <= BALANCED * norm(away) and shares < unit - pushing)
 
 
 @routine
@@ -142,34 +133,22 @@ def arm_of(table: Table, k: int, main: int, search: Search) -> tuple[Vec, Vec, V
 
 
 @routine
-def velocity(table: Table, k: int, main: int, m: float, e: Vec, search: Search) -> Vec:
-    """m d' - e', the rate at which a carrier moves what pushes."""
-    _, tangent, axis = arm_of(table, k, main, search)
-    return along(scale(m, tangent), -1.0, cross(axis, e))
-
-
-@routine
-def least_of(table: Table, k: int, A: float, B: float, search: Search) -> float:
-    """The least within the limits of a carrier, not more than the nothing that it is where the carrier is.
-
-    Of a crank A (cos q - 1) + B sin q, of a carriage B q - A q^2 / 2.
-    """
-    lo, hi = room(table, k, search)
-    if table.legs[k]["carrier"] == CARRIAGE:
-        if A < 0.0 and lo < B / A < hi:
-            return 0.5 * B * B / A
-        if lo == -math.inf or hi == math.inf:
+def most_of(table: Table, k: int, B: float, nearer: float, search: Search) -> float:
+    """The largest A for which a carrier's limits keep f_g from being negative, by more than counts as nothing."""
+    most, is_crank = math.inf, table.legs[k]["carrier"] == CRANK
+    for end in room_of(table, k, search):
+        if B * end < -nearer:
             return -math.inf
-        return min(0.0, B * lo - 0.5 * A * lo * lo, B * hi - 0.5 * A * hi * hi)
-    lowest = math.atan2(-B, -A)
-    if lowest + 2.0 * math.pi * math.ceil((lo - lowest) / (2.0 * math.pi)) < hi:
-        return -A - math.hypot(A, B)
-    return min(0.0, A * (math.cos(lo) - 1.0) + B * math.sin(lo), A * (math.cos(hi) - 1.0) + B * math.sin(hi))
+        if B * end > nearer:
+            most = min(most, B / math.tan(0.5 * end) if is_crank else 2.0 * B / end)
+        elif abs(end) > BALANCED:
+            most = min(most, 0.0)
+    return most
 
 
 @routine
-def room(table: Table, k: int, search: Search) -> tuple[float, float]:
-    """How far a carrier may go on from where it is."""
+def room_of(table: Table, k: int, search: Search) -> tuple[float, float]:
+    """How far a carrier may go on from where it is, either way."""
     is_crank = table.legs[k]["carrier"] == CRANK
     least, most = (-math.pi, math.pi) if is_crank else (-math.inf, math.inf)
     for i in range(table.limited.shape[0]):
@@ -179,4 +158,4 @@ def room(table: Table, k: int, search: Search) -> tuple[float, float]:
             lo, hi = limited["lo"] - now, limited["hi"] - now
             if not is_crank or hi - lo < 2.0 * math.pi:
                 least, most = (lo, hi) if limited["sense"] > 0.0 else (-hi, -lo)
-    return min(least, 0.0), max(most, 0.0)
+    return least, most
