@@ -15,7 +15,7 @@ from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of, platform_poses
 from .configurations import Configurations
-from .nearest import nearest
+from .descend import nearest_actuators
 from .starts import same_random_starts
 
 STRIDES = 8
@@ -129,12 +129,12 @@ def _project(
         waiting = np.flatnonzero(distance > NEAR)
         if not len(waiting):
             break
-        tried = _nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting])
+        tried = nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting])
         _take_nearer(closure, found, distance, waiting, tried, values)
     waiting = np.flatnonzero(np.isinf(distance))
     if len(waiting):
         asked = _within_sight(closure, start[0][waiting], values[waiting])
-        tried = _nearest_actuators(closure, start[0][waiting], start[1][waiting], asked)
+        tried = nearest_actuators(closure, start[0][waiting], start[1][waiting], asked)
         _take_nearer(closure, found, distance, waiting, tried, values)
     feasible = np.flatnonzero(found.feasible)
     best.take(rest[feasible], found, feasible)
@@ -155,15 +155,6 @@ def _take_nearer(
     better = np.flatnonzero(tried.feasible & (errors < (1.0 - SAME) * distance[rows]))
     distance[rows[better]] = errors[better]
     found.take(rows[better], tried, better)
-
-
-def _nearest_actuators(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
-    """Feasible configurations whose actuators differ least from the values, by least squares; a local search."""
-    anchors = coordinates.copy()
-    closure.put_actuators(anchors, values)
-    weights = np.zeros(len(closure.scale))
-    weights[closure.actuated] = 1.0
-    return nearest(closure, anchors, poses, weights=weights, anchors=anchors)
 
 
 def _within_sight(closure: Closure, coordinates: Floats, values: Floats) -> Floats:

@@ -174,9 +174,6 @@ def close(
     locked: frozenset[int] = frozenset(),
     platform: Sequence[float] = EVERYTHING_FREE,
     frame: int = K.BASE_AXES,
-    targets: Floats | None = None,
-    weights: Floats | None = None,
-    anchors: Floats | None = None,
     centres: Floats | None = None,
     limits: bool = False,
     margin: float = 0.0,
@@ -191,11 +188,9 @@ def close(
     ----------
     coordinates, poses : where to start, (n, columns) and (n, 4, 4).
     locked : columns of the coordinates that stay as they are.
-    platform : weights of the squares of the platform's distance from `targets` (default: `poses`), position [L], then
-        rotation [rad]; `LOCKED` holds that part where it starts.
-    frame : what the weights of the rotation are about: the axes of the base, those of the targets (of which the first
-        two tilt), or axes of which the third yaws; one of `K.BASE_AXES`, `K.TARGET_AXES`, `K.HALF_WAY`.
-    weights, anchors : weights of the squares of the coordinates' distances from anchors, (columns,), (n, columns).
+    platform : `LOCKED` for what of the platform's pose, position then rotation, stays where it starts; else 0.
+    frame : the axes of this rotation: those of the base, those of the pose (of which the first two tilt), or axes of
+        which the third yaws; one of `K.BASE_AXES`, `K.TARGET_AXES`, `K.HALF_WAY`.
     centres : wished joint centres, (n, joints, 3); NaN for none.
     limits : keep all limits too, by `margin` inside.
     chained : every row starts from the free coordinates of the one before.
@@ -214,14 +209,10 @@ def close(
         misses=np.full((n, groups), np.inf),
         iterations=np.zeros(n, np.int64),
     )
-    none = np.zeros((n, 0, 3))
     problem = K.ClosureProblem(
-        weights=np.zeros(len(closure.scale)) if weights is None else weights,
-        anchors=none[:, :, 0] if anchors is None else anchors * closure.scale,
         platform=np.array(platform, dtype=float),
         frame=frame,
-        targets=closed.poses.copy() if targets is None else _in_lengths(targets, 1.0 / length),
-        centres=none if centres is None else centres / length,
+        centres=np.zeros((n, 0, 3)) if centres is None else centres / length,
         limits=int(limits),
         margin=margin,
         chained=int(chained),
@@ -248,9 +239,7 @@ def _run(loops: K.Loops, layout: K.Layout, problem: K.ClosureProblem, closed: K.
     from ..kernels.closure.close import close as close_rows
 
     def run(block: slice) -> None:
-        own = problem._replace(
-            anchors=problem.anchors[block], targets=problem.targets[block], centres=problem.centres[block]
-        )
+        own = problem._replace(centres=problem.centres[block])
         close_rows(loops, layout, own, K.Closed._make(array[block] for array in closed))
 
     n = len(closed.poses)

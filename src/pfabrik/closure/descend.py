@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats
-from ..kernels.closure.loops import BASE_AXES, SIGHT, Closed, PoseObjective
+from ..kernels.closure.loops import BASE_AXES, SIGHT, Closed, Objective, PoseObjective
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
-from .close import MARGIN, Closing, Closure
+from .close import EVERYTHING_FREE, MARGIN, Closing, Closure, close
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -37,7 +37,27 @@ def approached(
     -------
     Closing : judge by `feasible`. Gaps and excesses are those of the whole, the same for every group.
     """
-    found = _run(closure, coordinates, _objective(closure, targets, platform, frame, MOST_STEPS))[0]
+    return _ended(closure, coordinates, _objective(closure, targets, platform, frame, MOST_STEPS))
+
+
+def nearest_actuators(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
+    """Feasible configurations whose actuators differ least from the values (n, n_a), by least squares; a local search.
+
+    Parameters
+    ----------
+    coordinates, poses : where to start, (n, columns) and (n, 4, 4); need not be closed, nor within limits.
+    """
+    anchors, weights = coordinates.copy(), np.zeros(len(closure.scale))
+    closure.put_actuators(anchors, values)
+    weights[closure.actuated] = 1.0
+    begin = close(closure, anchors, poses, limits=True, margin=MARGIN)
+    free = _objective(closure, begin.poses, EVERYTHING_FREE, BASE_AXES, MOST_STEPS)
+    return _ended(closure, begin.coordinates, free._replace(weights=weights, anchors=anchors * closure.scale))
+
+
+def _ended(closure: Closure, coordinates: Floats, objective: Objective) -> Closing:
+    """Where searches from coordinates (n, columns) end."""
+    found = _run(closure, coordinates, objective)[0]
     found.poses[:, :3, 3] *= closure.mechanism.characteristic_length
     return Closing(found.coordinates / closure.scale, *found[1:])
 
@@ -63,7 +83,7 @@ def within_sight(mechanism: Mechanism, targets: Floats) -> Floats:
     return near
 
 
-def _run(closure: Closure, coordinates: Floats, objective: PoseObjective) -> tuple[Closed, Floats]:
+def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[Closed, Floats]:
     """The kernel over all rows, on all cores: where they ended, or what holds them where they are."""
     from ..kernels.closure.descend import approach
 
@@ -72,16 +92,20 @@ def _run(closure: Closure, coordinates: Floats, objective: PoseObjective) -> tup
 
     def run(block: slice) -> None:
         own = Closed._make(array[block] for array in closed)
-        approach(closure.loops, layout, objective._replace(targets=objective.targets[block]), own, weights[block])
+        pose = objective.pose._replace(targets=objective.pose.targets[block])
+        asked = objective._replace(pose=pose, anchors=objective.anchors[block])
+        approach(closure.loops, layout, asked, own, weights[block])
 
     in_blocks(run, len(coordinates), rows_a_block=16)
     return closed, weights
 
 
-def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> PoseObjective:
+def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> Objective:
+    """What is to come near where no coordinate counts."""
     wanted = targets.copy()
     wanted[:, :3, 3] /= closure.mechanism.characteristic_length
-    return PoseObjective(wanted, np.array(platform, dtype=float), frame, MARGIN, TOLERANCES.active, steps)
+    pose = PoseObjective(wanted, np.array(platform, dtype=float), frame, MARGIN, TOLERANCES.active, steps)
+    return Objective(pose, np.zeros(len(closure.scale)), np.zeros((len(targets), 0)))
 
 
 def _closed(closure: Closure, coordinates: Floats) -> Closed:

@@ -16,10 +16,9 @@ from ..kernels.closure.loops import LOCKED
 from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
-from .close import Closing, Closure, close, closure_of, platform_poses
+from .close import MARGIN, Closing, Closure, close, closure_of, platform_poses
 from .descend import approached, weighed_limits
 from .known import corners_of
-from .nearest import nearest
 from .parasitic import strays
 
 SAME = 1e-7
@@ -34,6 +33,11 @@ class Way(NamedTuple):
 
     weights: Weights
     hold: int
+
+    @property
+    def held(self) -> Weights:
+        """What is held alone."""
+        return tuple(LOCKED if weight == LOCKED else 0.0 for weight in self.weights)
 
     def distances(self, closure: Closure, poses: Floats, targets: Floats) -> Floats:
         """How far poses (n, 4, 4) are from targets in what counts, (n,) [L]."""
@@ -142,7 +146,5 @@ def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Closi
     held = np.zeros((4, 4), bool)
     held[:3, 3], held[:3, :3] = np.array(way.weights[:3]) == LOCKED, LOCKED in way.weights[3:]
     placed = np.where(held, task.completed(targets, begin), begin)
-    closed = nearest(
-        closure, start, placed, platform=way.weights, frame=task.frame, targets=task.completed(targets, begin)
-    )
+    closed = close(closure, start, placed, platform=way.held, frame=task.frame, limits=True, margin=MARGIN)
     return approached(closure, closed.coordinates, targets, platform=way.weights, frame=task.frame)

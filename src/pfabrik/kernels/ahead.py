@@ -13,7 +13,7 @@ from ._pipeline import name_of
 from .closure.close import close
 from .closure.descend import approach
 from .closure.first_order import first_order
-from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Layout, Loops, PoseObjective
+from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Layout, Loops, Objective, PoseObjective
 from .lattice import join, number_points
 from .legs.answer import answer, measure_rows, read_coordinates
 from .legs.blocks import answer_blocks
@@ -57,9 +57,9 @@ _ANSWERS = tuple(_values("i f3 f3 f2 i1 f3 f2 f2"))
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, _ANSWERS),
     (answer, _ANSWERS),
-    (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 f2 f1 i f3 f3 i f i i i f i")), _CLOSED)),
+    (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 i f3 i f i i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
-    (approach, (_LOOPS, _LAYOUT, _POSE_OBJECTIVE, _CLOSED, np.zeros((0, 0)))),
+    (approach, (_LOOPS, _LAYOUT, Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
     (read_coordinates, tuple(_values("i f3 f2 f2"))),
     (first_order, (_LOOPS, _LAYOUT, FirstOrderPlan(*_values("f2 f1 f2 i1 i i i i f i")), _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),

@@ -130,8 +130,7 @@ class ReachingEngine:
             passes = settings._replace(max_iterations=1) if options.exact else settings
             reached = self._run(sought, begin, passes)
             placed = place(self.mechanism, self._compiled, begin, reached)
-        free = tuple(LOCKED if weight == LOCKED else 0.0 for weight in way.weights)
-        closed = close(closure, placed.coordinates, placed.poses, platform=free, limits=True, margin=MARGIN)
+        closed = close(closure, placed.coordinates, placed.poses, platform=way.held, limits=True, margin=MARGIN)
         errors = task_of(self.mechanism).errors(closed.poses, wanted)
         slipped = np.flatnonzero((reached.rounds == 0) & (errors[0] > settings.enough))
         if len(slipped):  # loops that close only off a target that chains came near to may close on it

@@ -13,13 +13,12 @@ from ...arrays import Floats
 from .._jit import inlined, routine, search
 from ..rotations import exponential, turn_about_z, turn_ball, yaw_of
 from .equations import (
-    add_anchors,
     add_cones,
     add_paths,
-    add_platform,
     add_ranges,
     clear,
     follow_platform,
+    hold_platform,
     out_of_frame,
     pose_frame,
     turn_equations,
@@ -200,11 +199,10 @@ def close_row(
             for group in range(len(layout.sizes)):
                 closed.excesses[row, group] = eq.excesses[group]
             break
-        found += add_anchors(loops, layout.slots, row, trial, problem, eq)
         if problem.frame != BASE_AXES:
-            pose_frame(row, trial, problem, eq)
+            pose_frame(trial, problem, eq)
             turn_equations(eq.frame, layout, eq)
-        found += add_platform(row, trial, problem, eq)
+        hold_platform(problem, eq)
         if turn == TRY:
             if found < cost or plunging:
                 gained, cost = cost - found, found

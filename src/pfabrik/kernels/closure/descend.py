@@ -35,6 +35,7 @@ from ..sqp import (
 )
 from .linearise import (
     Workspace,
+    add_anchors,
     add_cone,
     add_force,
     cone_excess,
@@ -42,21 +43,22 @@ from .linearise import (
     new_workspace,
     walk_all,
 )
-from .loops import BALL, Closed, Layout, Loops, PoseObjective
+from .loops import BALL, Closed, Layout, Loops, Objective
 from .path_kinematics import State, copy_state, load_row, new_state, store_row
 from .pose_objective import pose_gradient
 
 
 @routine
 def lagrangian_gradient(
-    loops: Loops, row: int, objective: PoseObjective, state: State, work: Workspace, out: Floats
+    loops: Loops, row: int, objective: Objective, state: State, work: Workspace, out: Floats
 ) -> None:
     """Gradient of the Lagrangian at a configuration, by multipliers of limits and the `balance` of the loops."""
     n, paths, multipliers = len(loops.lo), len(loops.paths) - 1, work.hessian.multipliers
     walk_all(loops, state, work)
-    _, held = pose_gradient(objective, objective.targets[row], state.X, work.gradient, True)
+    _, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, work.gradient, True)
     for j in range(n):
         out[j] = multipliers[2 * j + 1] - multipliers[2 * j]
+    add_anchors(row, objective, state, work.gradient.unit[0], out)
     for i in range(6):
         work.force[0, i] = work.gradient.force[i]
         for path in range(1, paths):
@@ -68,13 +70,13 @@ def lagrangian_gradient(
         add_force(loops, path, work.force[path], work, out)
     for cone in range(len(loops.cone_angles)):
         if multipliers[2 * n + cone] != 0.0:
-            cone_excess(loops, cone, objective.margin, state, work)
+            cone_excess(loops, cone, objective.pose.margin, state, work)
             add_cone(loops, cone, multipliers[2 * n + cone], work, out)
 
 
 @routine
 def lagrangian_hessian(
-    loops: Loops, row: int, objective: PoseObjective, state: State, trial: State, work: Workspace, view: FreeMotions
+    loops: Loops, row: int, objective: Objective, state: State, trial: State, work: Workspace, view: FreeMotions
 ) -> float:
     """Curvature of the objective and of the active limits along the loops, into `hessian`; the largest on its diagonal.
 
@@ -125,7 +127,7 @@ def take(loops: Loops, view: FreeMotions, x: Floats, state: State, work: Workspa
 def restore_feasibility(
     loops: Loops,
     row: int,
-    objective: PoseObjective,
+    objective: Objective,
     state: State,
     tolerance: float,
     work: Workspace,
@@ -150,7 +152,7 @@ def restore_feasibility(
 def descend(
     loops: Loops,
     row: int,
-    objective: PoseObjective,
+    objective: Objective,
     best: State,
     trial: State,
     work: Workspace,
@@ -159,7 +161,7 @@ def descend(
     p: QP,
 ) -> int:
     """From a feasible configuration, at which `first` is, down to the nearest; how many steps it took."""
-    view, other, hessian, control, most = first, second, work.hessian, work.control[0], objective.max_iterations
+    view, other, hessian, control, most = first, second, work.hessian, work.control[0], objective.pose.max_iterations
     work.gradient.unit[0] = scale_objective(view.linear)
     begin_descent(view.linear, hessian, control)
     while control["done"] == 0:
@@ -185,7 +187,7 @@ def descend(
 
 
 @search
-def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Closed, weights: Floats) -> None:
+def approach(loops: Loops, layout: Layout, objective: Objective, closed: Closed, weights: Floats) -> None:
     """Bring every row, from a configuration that is closed within its limits or nearly so, as near as it comes.
 
     With no steps to take, tell instead how hard every limit holds each row back where it is, (n, 2 columns + cones):
@@ -204,10 +206,10 @@ def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Clo
         load_row(loops, layout, False, row, closed, best)
         closed.iterations[row] = 0
         work.gradient.unit[0] = 1.0
-        if objective.max_iterations == 0:
+        if objective.pose.max_iterations == 0:
             linearise(loops, row, objective, best, work, first)
             scale_objective(first.linear)
-            for c in range(balance(first.linear, objective.near, p, pulls)):
+            for c in range(balance(first.linear, objective.pose.near, p, pulls)):
                 weights[row, first.linear.which[c]] = p.x[c]
             continue
         linearise(loops, row, objective, best, work, first)
@@ -217,5 +219,5 @@ def approach(loops: Loops, layout: Layout, objective: PoseObjective, closed: Clo
         store_row(loops, row, best, closed)
         for group in range(closed.gaps.shape[1]):  # the loops are looked at as a whole
             closed.gaps[row, group] = first.linear.totals[0]["gap"]
-            closed.excesses[row, group] = max(first.linear.totals[0]["excess"] - objective.margin, 0.0)
+            closed.excesses[row, group] = max(first.linear.totals[0]["excess"] - objective.pose.margin, 0.0)
             closed.misses[row, group] = 0.0

@@ -1,10 +1,10 @@
-"""The normal equations of closing loops, summed up term by term: paths, anchors, limits, cones and the platform.
+"""The normal equations of closing loops, summed up term by term: paths, wishes, limits, cones and the platform.
 
 Unknown are the free joint coordinates q, group by group, and the platform's twist V. With X the platform's pose and
 FK_i(q) the pose at the end of path i, the residuals are
 
     paths       position of FK_i - X [L], and the rotation vector of R_i R_X^T [rad]
-    wishes      sqrt(w) (q_j - anchor_j); sqrt(w) (X - target), as above
+    wishes      centres of joints less where they are wished [L]
     limits      q_j - hi, lo - q_j and angle - half_angle of cones, where they are positive
 
 and every group adds its J^T J to A (its own coordinates), C (with the twist), and b = J^T r; the twist's own are in G.
@@ -16,8 +16,8 @@ import math
 
 from ...arrays import Floats, Ints
 from .._jit import inlined, routine
-from ..rotations import UPSIDE_DOWN, difference, exponential, yaw_difference
-from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, TARGET_AXES, ClosureProblem, Layout, Loops
+from ..rotations import UPSIDE_DOWN, difference, exponential
+from .loops import BALL, LOCKED, SLIDE, TARGET_AXES, ClosureProblem, Layout, Loops
 from .path_kinematics import Equations, State, compare_end, end_path, pose_cone, walk_path
 
 
@@ -158,20 +158,6 @@ def add_centres(
 
 
 @inlined
-def add_anchors(loops: Loops, slots: Ints, row: int, state: State, problem: ClosureProblem, eq: Equations) -> float:
-    """Distances of single coordinates from their anchors; the sum of their weighted squares."""
-    square = 0.0
-    for j in range(len(slots)):
-        s, group, weight = slots[j], loops.group_of[j], problem.weights[j]
-        if s >= 0 and weight > 0.0:
-            off = state.q[j] - problem.anchors[row, j]
-            square += weight * off * off
-            eq.A[group, s, s] += weight
-            eq.b[group, s] += weight * off
-    return square
-
-
-@inlined
 def add_ranges(loops: Loops, slots: Ints, state: State, margin: float, eq: Equations) -> float:
     """Ranges that are exceeded; the sum of the squares of the excesses."""
     square = 0.0
@@ -226,36 +212,21 @@ def add_cones(loops: Loops, slots: Ints, state: State, margin: float, eq: Equati
 
 
 @inlined
-def add_platform(row: int, state: State, problem: ClosureProblem, eq: Equations) -> float:
-    """The platform's distance from its target, in its own equations; the weighted square."""
-    square, slope = 0.0, 1.0
-    difference(state.X, problem.targets[row], eq.e[3:])
-    if problem.frame != BASE_AXES:
-        into_frame(eq.frame, eq.e[3:])
-    if problem.frame == HALF_WAY:
-        eq.e[5] = yaw_difference(state.X, problem.targets[row])
-        slope = 1.0 / max(eq.frame[2, 2], UPSIDE_DOWN)
+def hold_platform(problem: ClosureProblem, eq: Equations) -> None:
+    """Hold what of the platform's pose stays where it is, in its own equations."""
     for i in range(6):
-        weight = problem.platform[i]
-        if weight == LOCKED:
-            eq.G[i, i] += weight
-        elif weight > 0.0:
-            off = state.X[i, 3] - problem.targets[row, i, 3] if i < 3 else eq.e[i]
-            rate = slope if i == 5 else 1.0
-            square += weight * off * off
-            eq.G[i, i] += weight * rate * rate
-            eq.G[i, 6] -= weight * rate * off
-    return square
+        if problem.platform[i] == LOCKED:
+            eq.G[i, i] += LOCKED
 
 
 @inlined
-def pose_frame(row: int, state: State, problem: ClosureProblem, eq: Equations) -> None:
-    """The axes that the weights of the platform's rotation are about, into `frame`."""
+def pose_frame(state: State, problem: ClosureProblem, eq: Equations) -> None:
+    """The axes about which the platform's rotation is held, into `frame`."""
     F = eq.frame
     if problem.frame == TARGET_AXES:
         for i in range(3):
             for j in range(3):
-                F[i, j] = problem.targets[row, i, j]
+                F[i, j] = state.X[i, j]
         return
     x, y, z = state.X[0, 2], state.X[1, 2], state.X[2, 2] + 1.0
     length = math.sqrt(x * x + y * y + z * z)

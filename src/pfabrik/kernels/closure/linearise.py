@@ -11,7 +11,7 @@ from ...arrays import Floats, Records
 from .._jit import allocator, routine
 from ..free_motions import Elimination, FreeMotions, add_limit, eliminate, new_elimination, project_gradient
 from ..sqp import CONTROL, REACH, Hessian, new_hessian
-from .loops import BALL, Layout, Loops, PoseObjective
+from .loops import BALL, Layout, Loops, Objective
 from .path_kinematics import Equations, State, compare_end, end_path, new_equations, pose_cone, walk_path
 from .pose_objective import PoseGradient, pose_gradient
 
@@ -86,23 +86,34 @@ def add_force(loops: Loops, path: int, force: Floats, work: Workspace, out: Floa
 
 
 @routine
-def linearise(
-    loops: Loops, row: int, objective: PoseObjective, state: State, work: Workspace, view: FreeMotions
-) -> None:
+def add_anchors(row: int, objective: Objective, state: State, unit: float, out: Floats) -> float:
+    """Half the weighted squares of distances of coordinates from their anchors, the gradient added to `out`."""
+    value = 0.0
+    for j in range(objective.weights.shape[0]):
+        if objective.weights[j] > 0.0:
+            off, weight = state.q[j] - objective.anchors[row, j], unit * objective.weights[j]
+            value += 0.5 * weight * off * off
+            out[j] += weight * off
+    return value
+
+
+@routine
+def linearise(loops: Loops, row: int, objective: Objective, state: State, work: Workspace, view: FreeMotions) -> None:
     """Look at a configuration."""
     linear, n, here = view.linear, len(loops.lo), work.here
     gap = walk_all(loops, state, work)
-    linear.totals[0]["value"], held = pose_gradient(objective, objective.targets[row], state.X, work.gradient, True)
+    value, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, work.gradient, True)
     for k in range(held):
         gap = max(gap, abs(work.gradient.errors[k]))
     linear.totals[0]["gap"] = gap
     for j in range(n):
         here[j] = 0.0
     add_force(loops, 0, work.gradient.force, work, work.here)
+    linear.totals[0]["value"] = value + add_anchors(row, objective, state, work.gradient.unit[0], work.here)
     rows = lay_out(loops, held, work)
     eliminate(rows, work.elimination, view, rows, 0)
     project_gradient(work.here, view)
-    linearise_limits(loops, objective.margin, state, work, view)
+    linearise_limits(loops, objective.pose.margin, state, work, view)
 
 
 @routine

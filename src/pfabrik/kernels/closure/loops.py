@@ -56,13 +56,10 @@ class Layout(NamedTuple):
 
 
 class ClosureProblem(NamedTuple):
-    """What is asked beyond closed loops. Weights multiply squares; lengths in L, angles in radians."""
+    """What is asked beyond closed loops; lengths in L, angles in radians."""
 
-    weights: Floats  # (columns,): of the distance of each free coordinate from its anchor
-    anchors: Floats  # (n, columns)
-    platform: Floats  # (6,): weights of the pose's distance from its target, position then rotation; LOCKED holds it
-    frame: int  # what the weights of the rotation are about: BASE_AXES, TARGET_AXES or HALF_WAY
-    targets: Floats  # (n, 4, 4)
+    platform: Floats  # (6,): LOCKED for what of the pose, position then rotation, stays where it starts; else 0
+    frame: int  # the axes of this rotation: BASE_AXES, TARGET_AXES (those of the pose) or HALF_WAY
     centres: Floats  # (n, joints, 3): where joint centres are wished to be; NaN where they are not
     limits: int  # 1: limits are to be kept
     margin: float  # by how much inside
@@ -128,3 +125,11 @@ class PoseObjective(NamedTuple):
     margin: float  # by how much inside their limits coordinates stay
     near: float  # limits farther away are not looked at when multipliers are asked for
     max_iterations: int
+
+
+class Objective(NamedTuple):
+    """What is to come near, on joint coordinates: the pose, and coordinates to their anchors; lengths in L."""
+
+    pose: PoseObjective
+    weights: Floats  # (columns,): of the squares of the coordinates' distances from their anchors
+    anchors: Floats  # (n, columns)
