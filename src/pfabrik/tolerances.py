@@ -33,7 +33,6 @@ class Tolerances:
     implied : singular value [L and rad] up to which a condition of the loops at home follows from the others exactly:
         rounding leaves 1e-15. From 1e-11 on, searches for nearest poses take conditions that miss each other for ones
         to keep, and stop early.
-    room : range that leaves a joint room to move [L or rad]: what has less is as good as rigid, and no strut.
     speed : share by which an actuator may be faster than its limit: a path that just keeps it must not be refused for
         the rounding of its answers.
     rank : sine or singular value [L and rad] up to which a direction of motion counts as lost at a configuration: its
@@ -61,7 +60,6 @@ class Tolerances:
     alignment: float = 1e-6
     nearly_implied: float = 1e-3
     implied: float = 1e-12
-    room: float = 1e-6
     same_mode: float = 1e-5
     meeting: float = 1e-12
     speed: float = 1e-6

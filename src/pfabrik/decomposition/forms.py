@@ -68,7 +68,6 @@ class BranchForm:
     normal: Floats
     end_normal: Floats | None
     align: bool
-    end_turn: Interval
     rail: Floats | None
     rail_range: Interval
     cones: tuple[ConeForm, ...]

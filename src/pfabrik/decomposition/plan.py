@@ -139,8 +139,7 @@ class _Builder:
 
     def _branch_record(self, form: BranchForm, first: int, carrier: int) -> dict[str, Any]:
         nodes, none = form.nodes, np.zeros(3)
-        several = len(nodes) > 1
-        reference = _unit(nodes[1].at - nodes[0].at) if several and form.planar else none
+        reference = _unit(nodes[1].at - nodes[0].at) if len(nodes) > 1 and form.planar else none
         return {
             "first": first,
             "last": first + len(nodes) - 1,
@@ -151,11 +150,6 @@ class _Builder:
             "end": nodes[-1].at - np.array(self.mechanism.reference_point),
             "end_plane": int(form.end_normal is not None and not form.align),
             "end_normal": none if form.end_normal is None else form.end_normal,
-            "end_reference": _unit(nodes[-2].at - nodes[-1].at) if several else none,
-            "end_ranged": int(np.isfinite(form.end_turn).any()),
-            "end_angle_lo": form.end_turn[0],
-            "end_angle_hi": form.end_turn[1],
-            "align": int(form.align),
             "rail": int(form.rail is not None),
             "rail_axis": none if form.rail is None else form.rail,
             "rail_lo": form.rail_range[0],

@@ -62,7 +62,8 @@ def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -
         draft.rail, draft.spots[0].slider = draft.spots[0].slider, None
     _classify(draft)
     nodes = _place_nodes(mechanism, draft)
-    end_turn = _end_turn(mechanism, draft)
+    if (draft.align or draft.ends_in_plane) and len(draft.spots) > 1:
+        draft.told.append(draft.spots[-1].steps[0].joint.name)
     cones = tuple(
         _cone(draft, nodes, k, step, near)
         for k, spot in enumerate(draft.spots)
@@ -76,7 +77,6 @@ def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -
         normal=draft.normal,
         end_normal=draft.normal if draft.align else (draft.spots[-1].axis if draft.ends_in_plane else None),
         align=draft.align,
-        end_turn=end_turn,
         rail=rail,
         rail_range=rail_range,
         cones=cones,
@@ -204,22 +204,6 @@ def _sense(step: Step, normal: Floats) -> float:
 
 def _angle_about(normal: Floats, a: Floats, b: Floats) -> float:
     return math.atan2(float(normal @ np.cross(a, b)), float(a @ b))
-
-
-def _end_turn(mechanism: Mechanism, draft: _Draft) -> Interval:
-    """Range of the revolute on the platform, read as the turn of the last link seen from there."""
-    if not (draft.align or draft.ends_in_plane) or len(draft.spots) < 2:
-        return FREE
-    spot = draft.spots[-1]
-    normal = draft.normal if draft.align else spot.axis
-    assert normal is not None
-    sense = -_sense(spot.steps[0], normal)
-    joint = spot.steps[0].joint
-    home = _home(mechanism, joint)
-    limits = _limits(joint, home)
-    draft.told.append(joint.name)
-    lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
-    return lo, hi
 
 
 def _rail(mechanism: Mechanism, draft: _Draft) -> tuple[Floats | None, Interval]:

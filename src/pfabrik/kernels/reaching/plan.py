@@ -44,11 +44,6 @@ BRANCH = np.dtype(
         ("end", *_vector),
         ("end_plane", "i8"),  # 1: the last segment stays in a plane of the platform
         ("end_normal", *_vector),
-        ("end_reference", *_vector),
-        ("end_ranged", "i8"),
-        ("end_angle_lo", "f8"),
-        ("end_angle_hi", "f8"),
-        ("align", "i8"),  # 1: the platform's end_normal must equal the branch's normal
         ("rail", "i8"),  # 1: the first node slides along rail_axis
         ("rail_axis", *_vector),
         ("rail_lo", "f8"),

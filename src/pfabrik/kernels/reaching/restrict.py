@@ -73,16 +73,6 @@ def hinge_angle(plan: Plan, branch: Records, k: int, carrier: Floats, normal: Ve
 
 
 @inlined
-def end_hinge_angle(branch: Records, pose: Floats, d: Vec) -> float:
-    """Angle from home of the hinge on the platform when the last segment, seen from there, is `d`."""
-    normal = turn(pose, vec(branch["end_normal"]))
-    angle = angle_about(normal, turn(pose, vec(branch["end_reference"])), d)
-    if branch["end_ranged"] == 1:
-        return wrap_into(angle, float(branch["end_angle_lo"]), float(branch["end_angle_hi"]))
-    return wrap(angle, 0.0)
-
-
-@inlined
 def cone_axis(cone: Records, carrier: Floats, pose: Floats, normal: Vec, nodes: Floats) -> Vec:
     """The present direction of a cone's axis."""
     a = vec(cone["axis"])
