@@ -23,7 +23,7 @@ _Function: Any = getattr(types, "BaseFunction", object)
 
 # Numba promises these to nobody: with a version that has others, all is compiled in its own way, which takes longer.
 _HOOKS = (
-    (_Library, "_optimize_functions _optimize_final_module _finalize_final_module codegen"),
+    (_Library, "_optimize_functions _optimize_final_module finalize codegen"),
     (_Codegen, "_function_pass_manager _module_pass_manager"),
     (_Compiler, "define_pipelines"),
     (_Flags, "summary copy"),
@@ -104,7 +104,8 @@ def _find_once(function: Any, find: Callable[..., Any], context: Any, arguments:
 
 
 class _PartLibrary(_Library):
-    """The code of a part, not optimised and no machine code: each kernel that it goes into does both, for the whole."""
+    """The code of a part alone, not optimised and no machine code: each kernel that it goes into takes in what the part
+    calls, and does both for the whole."""
 
     def _optimize_functions(self, module: Any) -> None:
         """Tidy each function by itself, all with the same passes; Numba makes them anew for each, also for those that
@@ -115,10 +116,7 @@ class _PartLibrary(_Library):
             if not function.is_declaration:
                 passes.run(function, builder)
 
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
+    def finalize(self) -> None:
         self._finalized = True
 
     @property
@@ -133,6 +131,14 @@ class _KernelLibrary(_Library):
     A mechanism by value is more than fifty arguments, of which most parts use a few. Optimised once: Numba does it
     twice, for the sake of counts of references, of which there are hardly any here; that is a sixth of all its time.
     """
+
+    def finalize(self) -> None:
+        """Take in the parts, and the parts of these, each once; Numba takes them in again at every step up to here."""
+        taken = self._linking_libraries
+        for library in taken:  # which grows meanwhile
+            if isinstance(library, _PartLibrary):
+                taken += [each for each in library._linking_libraries if each not in taken]
+        super().finalize()
 
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
