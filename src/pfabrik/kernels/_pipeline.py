@@ -12,7 +12,8 @@ from functools import partialmethod
 from types import SimpleNamespace
 from typing import Any
 
-from numba.core import codegen, compiler, types
+from numba.core import base, codegen, compiler, cpu, event, types
+from numba.core.registry import cpu_target
 
 # Numba is typed in some versions and not in others, and never for the options below the public ones.
 _Library: Any = getattr(codegen, "JITCodeLibrary", object)
@@ -20,6 +21,9 @@ _Codegen: Any = getattr(codegen, "CPUCodegen", object)
 _Compiler: Any = getattr(compiler, "Compiler", object)
 _Flags: Any = getattr(compiler, "Flags", object)
 _Function: Any = getattr(types, "BaseFunction", object)
+_Context: Any = getattr(base, "BaseContext", object)
+_CpuContext: Any = getattr(cpu, "CPUContext", object)
+_event: Any = event
 
 # Numba promises these to nobody: with a version that has others, all is compiled in its own way, which takes longer.
 _HOOKS = (
@@ -28,6 +32,9 @@ _HOOKS = (
     (_Compiler, "define_pipelines"),
     (_Flags, "summary copy"),
     (_Function, "get_call_type"),
+    (_Context, "get_abi_sizeof install_registry refresh"),
+    (_CpuContext, "load_additional_registries"),
+    (_event, "broadcast"),
 )
 IS_HOOKED = all(hasattr(owner, name) for owner, names in _HOOKS for name in names.split())
 
@@ -76,18 +83,20 @@ def _say(text: str) -> None:
 def in_haste() -> Iterator[None]:
     """Without what takes Numba long and gives nothing here, for as long as it compiles.
 
-    Collecting garbage among so many objects is a tenth of its time. Another is to find out what an operator means for
-    arguments of some types, at each place anew, by trying all that it could mean.
+    Collecting garbage among so many objects is a tenth of its time.
     """
-    collects, find = gc.isenabled(), getattr(_Function, "get_call_type", None)
+    collects = gc.isenabled()
     gc.disable()
     if IS_HOOKED:
-        _Function.get_call_type = partialmethod(_find_once, find)
+        cpu_target.target_context.refresh()
+        for owner, name, _, ours in _HASTENED:
+            setattr(owner, name, ours)
     try:
         yield
     finally:
         if IS_HOOKED:
-            _Function.get_call_type = find
+            for owner, name, theirs, _ in _HASTENED:
+                setattr(owner, name, theirs)
         if collects:
             gc.enable()
 
@@ -96,11 +105,49 @@ _FOUND: dict[Any, Any] = {}
 
 
 def _find_once(function: Any, find: Callable[..., Any], context: Any, arguments: Any, keywords: Any) -> Any:
-    """What a function of Numba's means for arguments of some types, found before or now."""
+    """What a function of Numba's means for arguments of some types, found before or now.
+
+    To find it out at each place anew, by trying all that an operator could mean, is another tenth.
+    """
     asked = function, context, arguments, tuple(keywords.items())
     if asked not in _FOUND:
         _FOUND[asked] = find(function, context, arguments, keywords)
     return _FOUND[asked]
+
+
+_SIZES: dict[str, int] = {}
+
+
+def _measure_once(context: Any, measure: Callable[..., int], kind: Any) -> int:
+    """The size of a type, for which LLVM is given a module with a variable of it, for every variable twice."""
+    if str(kind) not in _SIZES:
+        _SIZES[str(kind)] = measure(context, kind)
+    return _SIZES[str(kind)]
+
+
+def _install_new(context: Any) -> None:
+    """Take note of what was declared meanwhile; Numba imports all its own modules again before, a dozen times for every
+    function."""
+    for registry in list(context._registries):
+        context.install_registry(registry)
+
+
+def _tell_nobody(event: Any) -> None:
+    """Events, of which there are as many as calls of LLVM, tell times that nobody asks for."""
+
+
+def _hastened(owner: Any, name: str, ours: Callable[..., Any], *, asks: bool) -> tuple[Any, str, Any, Any]:
+    """What of Numba is replaced by what of ours, which is given the replaced one if it `asks` that."""
+    theirs = getattr(owner, name, None)
+    return owner, name, theirs, partialmethod(ours, theirs) if asks else ours
+
+
+_HASTENED = (
+    _hastened(_Function, "get_call_type", _find_once, asks=True),
+    _hastened(_Context, "get_abi_sizeof", _measure_once, asks=True),
+    _hastened(_CpuContext, "load_additional_registries", _install_new, asks=False),
+    _hastened(_event, "broadcast", _tell_nobody, asks=False),
+)
 
 
 class _PartLibrary(_Library):
