@@ -40,7 +40,7 @@ def kernel(function: F) -> F:
 
 
 def search(function: F) -> F:
-    """Compile `function` as a kernel that searches: much code, of which no loop is short enough for vectors.
+    """Compile `function` as a kernel that searches, or looks at rows one by one: no loop is short enough for vectors.
 
     A few in a hundred slower than a `kernel`, and optimised in half the time.
     """

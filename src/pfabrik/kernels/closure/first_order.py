@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ...arrays import Floats
-from .._jit import kernel, routine
+from .._jit import routine, search
 from ..rotations import turn_ball
 from .loops import BALL, CONSTRAINT, PARALLEL, PASSIVE, SERIAL, FirstOrder, FirstOrderPlan, Layout, Loops
 from .path_kinematics import Equations, State, end_path, new_equations, new_state, walk_path
@@ -24,7 +24,7 @@ ORTHOGONAL, NEARLY = 1e-14, 1e-8
 """Cosine of two rows that count as orthogonal, and cosines that one sweep brings there: it squares them."""
 
 
-@kernel
+@search
 def first_order(loops: Loops, layout: Layout, plan: FirstOrderPlan, coordinates: Floats, found: FirstOrder) -> None:
     """Fill what is told of dimensionless joint coordinates (n, columns); NaN where these are not numbers."""
     state, eq = new_state(loops), new_equations(loops, layout)

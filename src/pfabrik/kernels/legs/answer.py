@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
-from .._jit import allocator, kernel, routine
+from .._jit import allocator, kernel, routine, search
 from ..linear import solve_spd
 from ..rotations import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
@@ -349,7 +349,7 @@ def read_coordinates(machine: int, poses: Floats, sides: Floats, found: Floats) 
             found[row, known[i]["column"]] = deviation(known[i], work.values) * known[i]["unit"]
 
 
-@kernel
+@search
 def measure_rows(machine: int, poses: Floats, sides: Floats, rows: Floats, slopes: Floats) -> None:
     """Fill the constraints (n, rows) of all legs at poses [length], and their derivatives [L, rad].
 

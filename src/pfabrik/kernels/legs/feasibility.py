@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
-from .._jit import kernel, routine
+from .._jit import routine, search
 from ..vectors import angle_between, copy_row, vec
 from .answer import CLOSE, KEPT, complete, deviation, end_of_rows, new_completion, put_rows
 from .poses import lean_to, load, put_pose
@@ -45,7 +45,7 @@ def least_margin(limited: Records, cones: Records, values: Floats) -> tuple[floa
     return least, binding
 
 
-@kernel
+@search
 def feasibility(
     machine: int,
     targets: Floats,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
-from .._jit import kernel, routine, search
+from .._jit import routine, search
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import balance
@@ -75,7 +75,7 @@ class Work(NamedTuple):
     lost: Floats  # (1 + starts,): how far the first start, and each other, is from that; infinite where one is not lost
 
 
-@kernel
+@search
 def read_configurations(machine: int, poses: Floats, q: Floats, sides: Floats, found: Floats) -> None:
     """Fill deviations from home [length or rad], `found` (n, columns), of the coordinates that legs tell.
 

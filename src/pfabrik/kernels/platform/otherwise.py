@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats, Ints
-from .._jit import kernel, routine
+from .._jit import routine, search
 from ..legs.answer import (
     KEPT,
     Completion,
@@ -78,7 +78,7 @@ def note_choices(table: Table, sides: Floats, choosing: Ints) -> int:
     return n
 
 
-@kernel
+@search
 def answer_otherwise(
     machine: int,
     targets: Floats,
