@@ -120,18 +120,6 @@ def test_locked_joints_and_a_held_platform_stay() -> None:
     assert held.gap.max() <= 1e-12
 
 
-def test_a_chained_row_starts_from_the_one_before() -> None:
-    """A rod's spin, which nothing holds, stays where the row before left it."""
-    mechanism = pf.load("nrpm")
-    closure = closure_of(mechanism)
-    q = np.zeros((3, len(closure.scale)))
-    place = columns(mechanism)["EL1"].start
-    q[0, place : place + 3] = (0.0, 0.0, 0.4)
-    poses = np.repeat(mechanism.home_pose[None], 3, axis=0)
-    found = close(closure, q, poses, platform=HELD, chained=True, limits=True)
-    np.testing.assert_allclose(found.coordinates[1:], found.coordinates[:1].repeat(2, axis=0), atol=1e-9)
-
-
 def test_actuated_values_survive_the_way_into_coordinates_and_back() -> None:
     mechanism = pf.load("nrpm")
     values = np.random.default_rng(7).uniform(50, 150, (4, len(mechanism.actuator_names)))

@@ -177,7 +177,6 @@ def close(
     centres: Floats | None = None,
     limits: bool = False,
     margin: float = 0.0,
-    chained: bool = False,
     plunging: bool = False,
     closeness: float = 1e-13,
     max_iterations: int = 100,
@@ -193,7 +192,6 @@ def close(
         which the third yaws; one of `K.BASE_AXES`, `K.TARGET_AXES`, `K.HALF_WAY`.
     centres : wished joint centres, (n, joints, 3); NaN for none.
     limits : keep all limits too, by `margin` inside.
-    chained : every row starts from the free coordinates of the one before.
     plunging : undamped steps, up and down: finds more of many solutions, but not the nearest.
     closeness : largest gap, excess and miss that ends the search [L or rad].
     """
@@ -215,7 +213,6 @@ def close(
         centres=np.zeros((n, 0, 3)) if centres is None else centres / length,
         limits=int(limits),
         margin=margin,
-        chained=int(chained),
         balls_follow=int(follow),
         plunging=int(plunging),
         closeness=closeness,
@@ -243,7 +240,7 @@ def _run(loops: K.Loops, layout: K.Layout, problem: K.ClosureProblem, closed: K.
         close_rows(loops, layout, own, K.Closed._make(array[block] for array in closed))
 
     n = len(closed.poses)
-    if n <= ROWS_A_BLOCK or problem.chained:
+    if n <= ROWS_A_BLOCK:
         close_rows(loops, layout, problem, closed)
     else:
         in_blocks(run, n, ROWS_A_BLOCK)

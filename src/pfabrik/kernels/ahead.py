@@ -57,7 +57,7 @@ _ANSWERS = tuple(_values("i f3 f3 f2 i1 f3 f2 f2"))
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, _ANSWERS),
     (answer, _ANSWERS),
-    (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 i f3 i f i i i f i")), _CLOSED)),
+    (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 i f3 i f i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
     (approach, (_LOOPS, _LAYOUT, Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
     (read_coordinates, tuple(_values("i f3 f2 f2"))),

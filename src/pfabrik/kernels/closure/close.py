@@ -245,6 +245,6 @@ def close(loops: Loops, layout: Layout, problem: ClosureProblem, closed: Closed)
     """
     best, trial, eq = new_state(loops), new_state(loops), new_equations(loops, layout)
     for row in range(len(closed.coordinates)):
-        load_row(loops, layout, problem.chained == 1 and row > 0, row, closed, trial)
+        load_row(loops, row, closed, trial)
         closed.iterations[row] = close_row(loops, layout, problem, row, best, trial, eq, closed)
         store_row(loops, row, best, closed)

@@ -203,7 +203,7 @@ def approach(loops: Loops, layout: Layout, objective: Objective, closed: Closed,
     k = len(first.linear.h)
     p, pulls = new_qp(k, k), np.zeros((k, len(loops.lo)))
     for row in range(len(closed.coordinates)):
-        load_row(loops, layout, False, row, closed, best)
+        load_row(loops, row, closed, best)
         closed.iterations[row] = 0
         work.gradient.unit[0] = 1.0
         if objective.pose.max_iterations == 0:

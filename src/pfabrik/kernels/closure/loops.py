@@ -63,7 +63,6 @@ class ClosureProblem(NamedTuple):
     centres: Floats  # (n, joints, 3): where joint centres are wished to be; NaN where they are not
     limits: int  # 1: limits are to be kept
     margin: float  # by how much inside
-    chained: int  # 1: every row starts from the free coordinates of the one before
     balls_follow: int  # 1: the ball joints of `last_balls` follow the platform; they are locked in the layout
     plunging: int  # 1: undamped steps, up and down: finds more of many solutions, but not the nearest
     closeness: float  # largest gap that ends the search

@@ -87,11 +87,9 @@ def copy_state(source: State, target: State) -> None:
 
 
 @inlined
-def load_row(loops: Loops, layout: Layout, chained: bool, row: int, closed: Closed, state: State) -> None:
+def load_row(loops: Loops, row: int, closed: Closed, state: State) -> None:
     """The configuration where a row starts."""
     for j in range(len(state.q)):
-        if chained and layout.slots[j] >= 0:
-            closed.coordinates[row, j] = closed.coordinates[row - 1, j]
         state.q[j] = closed.coordinates[row, j]
     for k in range(len(loops.kinds)):
         if loops.kinds[k] == BALL:
