@@ -1,4 +1,4 @@
-"""The kinds of arrays that go from function to function."""
+"""The kinds of arrays that go from function to function, and the shape in which they are told."""
 
 from __future__ import annotations
 
@@ -12,3 +12,9 @@ Ints: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.bool_]
 Records: TypeAlias = NDArray[np.void]
 Record: TypeAlias = Any  # one of them: its fields are numbers and arrays
+
+
+def shaped(array: NDArray[Any], shape: tuple[int, ...]) -> Any:
+    """What was found row by row, (n, ...), in the shape of what was asked; a number where that is one."""
+    found = array.reshape(shape + array.shape[1:])
+    return found if found.ndim else found.item()

@@ -6,10 +6,9 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .answers.starts import Start, start_of
-from .arrays import Floats, Ints
+from .arrays import Floats, Ints, shaped
 from .closure.parasitic import has_parasitic_motion
 from .decomposition.leg_forms import LegForm, Rod
 from .decomposition.leg_table import LegTable, table_of_poses
@@ -65,7 +64,7 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
     asked = _Asked(mechanism, start)
     poses, shape = as_targets(mechanism, targets)
     margin, binding = asked.of_poses(poses)
-    return Feasibility(_shaped(margin, shape), _shaped(binding, shape), _limits(mechanism))
+    return Feasibility(shaped(margin, shape), shaped(binding, shape), _limits(mechanism))
 
 
 def feasibility_on_grid(
@@ -176,7 +175,3 @@ def _carrier(form: LegForm) -> str:
     carrier = form.carrier if isinstance(form, Rod) else None
     items = (carrier,) if carrier is not None else form.items
     return items[0].joint.name if items else ""
-
-
-def _shaped(array: NDArray[Any], shape: tuple[int, ...]) -> Any:
-    return array.reshape(shape) if shape else array.item()

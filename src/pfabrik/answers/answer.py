@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, shaped
 from ..closure.configurations import Configurations
 from ..closure.projection import ways_of
 from ..description.mechanism import Mechanism
@@ -73,8 +73,7 @@ class Answer:
         return self._found.coordinates
 
     def _shaped(self, array: NDArray[Any]) -> Any:
-        shaped = array.reshape(self.shape + array.shape[1:])
-        return shaped if shaped.ndim else shaped.item()
+        return shaped(array, self.shape)
 
     @property
     def status(self) -> Status | Ints:

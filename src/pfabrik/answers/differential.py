@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, shaped
 from ..closure.first_order import forward_map, inverse_map, singularities
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..motion.mobility import Mobility, generic_of
@@ -34,7 +34,7 @@ def forward_jacobian(solution: Solution) -> Floats:
     far as possible. At a type 2 singularity no such map exists: the direction gained is left out (see `singularity`).
     INVALID rows are NaN.
     """
-    forward: Floats = _shaped(solution, forward_map(*_of(solution)))
+    forward: Floats = shaped(forward_map(*_of(solution)), solution.shape)
     return forward
 
 
@@ -47,7 +47,7 @@ def inverse_jacobian(solution: Solution) -> Floats:
     nearest it can, and of all actuator rates that make a twist, the smallest are given. At a type 1 singularity the
     direction lost is left out (see `singularity`). INVALID rows are NaN.
     """
-    inverse: Floats = _shaped(solution, inverse_map(*_of(solution)))
+    inverse: Floats = shaped(inverse_map(*_of(solution)), solution.shape)
     return inverse
 
 
@@ -56,12 +56,12 @@ def singularity(solution: Solution) -> Singularity:
     found = singularities(*_of(solution))
     kinds = cast(list[tuple[str, ...]], found.kinds)
     return Singularity(
-        serial=_shaped(solution, np.asarray(found.serial)),
-        parallel=_shaped(solution, np.asarray(found.parallel)),
-        constraint=_shaped(solution, np.asarray(found.constraint)),
-        passive=_shaped(solution, np.asarray(found.passive)),
-        lost=_shaped(solution, found.lost),
-        gained=_shaped(solution, found.gained),
+        serial=shaped(np.asarray(found.serial), solution.shape),
+        parallel=shaped(np.asarray(found.parallel), solution.shape),
+        constraint=shaped(np.asarray(found.constraint), solution.shape),
+        passive=shaped(np.asarray(found.passive), solution.shape),
+        lost=shaped(found.lost, solution.shape),
+        gained=shaped(found.gained, solution.shape),
         kinds=kinds[0] if solution.shape == () else kinds,
     )
 
@@ -69,8 +69,3 @@ def singularity(solution: Solution) -> Singularity:
 def _of(solution: Solution) -> tuple[Mechanism, Floats]:
     """The mechanism of a solution, and its joint coordinates as deviations from home, (n, c)."""
     return checked_solution(solution).mechanism, solution._coordinates
-
-
-def _shaped(solution: Solution, rows: Floats) -> Any:
-    shaped = rows.reshape(solution.shape + rows.shape[1:])
-    return shaped if shaped.ndim else shaped.item()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, shaped
 from ..frozen import FrozenMapping
 from ..motion.limits import coned, ranges_of
 from ..tolerances import TOLERANCES
@@ -39,7 +39,7 @@ def margins(solution: Solution) -> Mapping[tuple[str, str], float | Floats]:
             found[joint.name, bound] = each[place] if before is None else np.minimum(each[place], before)
     for joint, angles, half_angle in coned(mechanism, q):
         found[joint.name, "cone"] = (half_angle - angles) / half_angle
-    return FrozenMapping({key: _shaped(margin, solution.shape) for key, margin in found.items()})
+    return FrozenMapping({key: shaped(margin, solution.shape) for key, margin in found.items()})
 
 
 def _shares(off: Floats, room: Floats, tolerances: Floats) -> Floats:
@@ -48,7 +48,3 @@ def _shares(off: Floats, room: Floats, tolerances: Floats) -> Floats:
         return off / room
     without = np.where(np.abs(off) <= tolerances, 0.0 * off, np.copysign(np.inf, off))
     return np.where(room > 0.0, off / np.where(room > 0.0, room, 1.0), without)
-
-
-def _shaped(array: Floats, shape: tuple[int, ...]) -> float | Floats:
-    return array.reshape(shape) if shape else float(array[0])
