@@ -21,14 +21,15 @@ from __future__ import annotations
 
 import math
 
+from ...arrays import Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES
 from ..free_motions import put_multipliers
 from ..legs.answer import deviation
 from ..legs.frames import NOWHERE
-from ..legs.records import CARRIAGE, CARRIER, CRANK, FOOT_LINE, FROM_BASE, HINGE, ROD, SHARED, SLIDE, Table
+from ..legs.records import CARRIAGE, CARRIER, CRANK, FOOT, FOOT_LINE, FROM_BASE, HEAD, HINGE, ROD, SHARED, SLIDE, Table
 from ..legs.rods import carried_foot
-from ..vectors import Vec, add, along, cross, dot, flatten, norm, scale, sub, vec
+from ..vectors import Vec, add, along, cross, dot, flatten, norm, rotate, scale, sub, vec
 from .equations import direction, is_carried, own_row
 from .lagrangian import put_force
 from .limits import AT_FOOT, AT_HEAD, cone_slope, seen
@@ -95,29 +96,45 @@ def hold_of(table: Table, k: int, main: int, search: Search) -> tuple[float, Vec
         row += 1
     if leg["head"] == HINGE:
         at_head = scale(search.balance[row], seen(table, k, main, AT_HEAD, vec(leg["head_axes"][0]), look))
-    for i in range(ranges):
-        limited = table.limited[i]
-        if limited["leg"] == k and limited["place"] == SLIDE:
-            now = deviation(limited, look.values)
-            if limited["hi"] - now < BALANCED:
-                pull += limited["sense"] * multipliers[2 * i + 1]
-            if now - limited["lo"] < BALANCED:
-                pull -= limited["sense"] * multipliers[2 * i]
+    u = direction(look.lines[k])
+    for i in range(table.limited.shape[0]):
+        limited, at_lo, at_hi = table.limited[i], multipliers[2 * i], multipliers[2 * i + 1]
+        if limited["leg"] != k or max(at_lo, at_hi) == 0.0:
+            continue
+        now, spot, sense = deviation(limited, look.values), limited["place"], limited["sense"]
+        at_lo = at_lo if now - limited["lo"] < BALANCED else 0.0
+        at_hi = at_hi if limited["hi"] - now < BALANCED else 0.0
+        half = 0.5 * (limited["hi"] - limited["lo"])
+        if spot == SLIDE:
+            pull += sense * (at_hi - at_lo)
+        elif half < math.pi and ((spot == FOOT and leg["foot"] == HINGE) or (spot == HEAD and leg["head"] == HINGE)):
+            end, hinge = (AT_FOOT, leg["foot_axes"]) if spot == FOOT else (AT_HEAD, leg["head_axes"])
+            middle = rotate(u, seen(table, k, main, end, vec(hinge[0]), look), sense * (limited["lo"] + half - now))
+            stretch, lengthwise, push = bound_by(leg, max(at_lo, at_hi) / length, half)
+            pull, at_head = pull + stretch, along(at_head, lengthwise, u)
+            at_foot = along(at_foot, -push, middle) if end == AT_FOOT else at_foot
+            at_head = along(at_head, -push, middle) if end == AT_HEAD else at_head
     for i in range(table.cones.shape[0]):
         cone, push = table.cones[i], multipliers[2 * ranges + i]
         if cone["leg"] != k or push == 0.0 or cone_slope(table, cone, look) < cone["half_angle"] - BALANCED:
             continue
-        cosine, sine = math.cos(cone["half_angle"]), math.sin(cone["half_angle"])
-        push /= length * max(sine, BALANCED)
-        if leg["slides"] == 0:
-            pull += push * cosine
-        elif cosine >= 0.0:
-            at_head = along(at_head, push * cosine, direction(look.lines[k]))
-        if cone["place"] == FOOT_LINE:
-            at_foot = along(at_foot, -push, seen(table, k, main, AT_FOOT, vec(cone["axis"]), look))
-        else:
-            at_head = along(at_head, -push, seen(table, k, main, AT_HEAD, vec(cone["axis"]), look))
+        end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
+        axis = seen(table, k, main, end, vec(cone["axis"]), look)
+        stretch, lengthwise, push = bound_by(leg, push / length, cone["half_angle"])
+        pull, at_head = pull + stretch, along(at_head, lengthwise, u)
+        at_foot = along(at_foot, -push, axis) if end == AT_FOOT else at_foot
+        at_head = along(at_head, -push, axis) if end == AT_HEAD else at_head
     return -pull / length, add(at_foot, at_head), scale(-1.0 if lead["carrier"] == CRANK else 0.0, at_foot)
+
+
+@routine
+def bound_by(leg: Record, push: float, half_angle: float) -> tuple[float, float, float]:
+    """What a rod that is kept within an angle from an axis pulls, and is pushed along itself and away from the axis."""
+    push /= max(math.sin(half_angle), BALANCED)
+    lengthwise = push * math.cos(half_angle)
+    if leg["slides"] == 0:
+        return lengthwise, 0.0, push
+    return 0.0, max(lengthwise, 0.0), push
 
 
 @routine
