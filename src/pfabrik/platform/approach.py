@@ -131,7 +131,8 @@ def _hits(table: LegTable) -> int:
     task = table.task[0]
     if table.leads_arms or task["unset"] + task["arms"] > task["rows"]:
         return HITS_OF_MANY
-    return HITS if table.task[0]["rows"] > 0 or len(carriers_of(table)) else HITS_OF_STRUTS
+    is_struts = task["rows"] == 0 and len(table.arms) + len(carriers_of(table)) == 0
+    return HITS_OF_STRUTS if is_struts else HITS
 
 
 def carriers_of(table: LegTable) -> Records:

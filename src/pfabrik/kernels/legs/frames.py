@@ -80,13 +80,15 @@ def place_arm(arm: Record, q: float, frames: Floats, own: Floats) -> None:
     own[CARRIER] = q
     put_rate_of_arm(arm, before, own)
     for j in range(3):
-        e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
-        heads, feet = turn(before, e), turn(before[AXES:], e)
-        if arm["at_head"] == 1:
-            heads = turn(before, turned(e, axis, cosine, sine))
-        else:
-            heads = turned(heads, axis, cosine, -sine)
-            feet = turn(before[AXES:], turned(e, axis, cosine, sine))
+        heads = (before[0, j], before[1, j], before[2, j])
+        feet = (before[AXES, j], before[AXES + 1, j], before[AXES + 2, j])
+        if is_hinge:
+            e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
+            e = turned(e, axis, cosine, sine)
+            if arm["at_head"] == 1:
+                heads = turn(before, e)
+            else:
+                heads, feet = turned(heads, axis, cosine, -sine), turn(before[AXES:], e)
         for i in range(3):
             after[i, j], after[AXES + i, j] = heads[i], feet[i]
     shift = (before[0, 3], before[1, 3], before[2, 3])

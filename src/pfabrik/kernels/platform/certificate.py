@@ -30,12 +30,12 @@ from ..legs.frames import NOWHERE
 from ..legs.records import CARRIAGE, CARRIER, CRANK, FOOT, FOOT_LINE, FROM_BASE, HEAD, HINGE, ROD, SHARED, SLIDE, Table
 from ..legs.rods import carried_foot
 from ..vectors import Vec, add, along, cross, dot, flatten, norm, rotate, scale, sub, vec
-from .equations import direction, is_carried, own_row
+from .equations import direction, is_carried, own_row, place
 from .lagrangian import put_force
 from .limits import AT_FOOT, AT_HEAD, cone_slope, seen
 from .linearise import linearise
 from .records import Aim
-from .search import Search
+from .search import Search, put_objective
 
 NEARER = 1e-7
 """Share of the square of the distance by which something might be nearer that does not count."""
@@ -54,9 +54,13 @@ def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
     for i in range(3):
         if pose.platform[i] != 1.0:
             return False
-    linearise(table, row, aim, search.best, search, view)
-    put_force(table, search, search.here)
-    put_multipliers(search.here, view, search.balance)
+    if search.look.rows.shape[0] == 0:
+        place(table, search.best, search.look)
+        put_objective(table, row, aim, search.best, search)
+    else:
+        linearise(table, row, aim, search.best, search, view)
+        put_force(table, search, search.here)
+        put_multipliers(search.here, view, search.balance)
     unit, away = search.gradient.unit[0], vec(search.force)
     nearer = NEARER * dot(away, away) / unit
     total, pushing, shares, k = away, 0.0, 0.0, 0

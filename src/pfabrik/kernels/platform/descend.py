@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Record
+from ...arrays import Floats, Ints, Record
 from .._jit import routine
 from ..free_motions import FreeMotions, put_step, restoring_step
 from ..legs.records import Table
@@ -97,15 +97,20 @@ def restore_feasibility(
 
 
 @routine
-def is_by(now: Now, met: Now) -> bool:
-    """Whether a configuration is so near to another that a descent would end there."""
+def is_by(now: Now, met: Now, holding: Ints) -> bool:
+    """Whether a configuration is so near to another that a descent would end there.
+
+    Parameters
+    ----------
+    holding : (legs,): 1 for those that hold the other where it is; arms of others may be anywhere.
+    """
     pose, other, q = now.pose, met.pose, now.q
     for i in range(3):
         for j in range(4):
             if abs(pose[i, j] - other[i, j]) > BY:
                 return False
     for k in range(q.shape[0]):
-        if abs(wrap(q[k] - met.q[k], 0.0)) > BY:
+        if holding[k] == 1 and abs(wrap(q[k] - met.q[k], 0.0)) > BY:
             return False
     return True
 
@@ -197,7 +202,7 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view
-                    if least < math.inf and is_by(search.best, met):
+                    if least < math.inf and is_by(search.best, met, search.holding):
                         return least
                     behind = view.linear.totals[0]["value"] - 0.5 * unit[0] * least * least
                     if is_hopeless(behind, share, control):

@@ -174,6 +174,8 @@ def take_nearer(distance: float, tally: Record, search: Search, best: Now) -> No
         tally["others"] += tally["hits"]
         tally["least"], tally["hits"] = distance, 1.0
         copy_now(search.best, best)
+        for k in range(search.holding.shape[0]):
+            search.holding[k] = search.pulled[k]
     elif distance <= (1.0 + SAME) * least and least < math.inf:
         tally["hits"] += 1.0
     else:

@@ -48,6 +48,7 @@ class Search(NamedTuple):
     target: Floats  # (4, 4): of the row [L]
     kept: Floats  # (legs,): the sides that carriers are to stay on; 0 for either
     pulled: Ints  # (legs,): 1 for those that the Lagrangian asks for
+    holding: Ints  # (legs,): 1 for those that hold the nearest configuration yet where it is
     near: Floats  # (1,): limits farther away are left out
     half_angles: Floats  # (cones, 3): of the cones that are minded, their cosines and sines
 
@@ -83,6 +84,7 @@ def new_search(table: Table, cones: int) -> Search:
         new_now(legs),
         np.zeros((4, 4)),
         np.zeros(legs),
+        np.zeros(legs, np.int64),
         np.zeros(legs, np.int64),
         np.full(1, NEAR),
         half_angles,
