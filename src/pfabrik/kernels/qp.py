@@ -29,8 +29,8 @@ class QP(NamedTuple):
     x: Floats  # (n,): the solution
     multipliers: Floats  # (k,): of the limits, >= 0; 0 for those that do not matter
     factor: Floats  # (n, n): Cholesky factor, one over its diagonal there
-    pull: Floats  # (n, n): H^-1 times the gradients of the active limits, one a row
-    system: Floats  # (n, n + 1)
+    pull: Floats  # (n + 1, n): H^-1 times the gradients of the active limits, and of the next, one a row
+    system: Floats  # (n + 1, n + 1): Cholesky factor of these times the gradients, one over its diagonal there
     step: Floats  # (n,)
     share: Floats  # (n,)
     active: Ints  # (n,)
@@ -47,8 +47,8 @@ def new_qp(n: int, k: int) -> QP:
         np.zeros(n),
         np.zeros(k),
         np.zeros((n, n)),
-        np.zeros((n, n)),
-        np.zeros((n, n + 1)),
+        np.zeros((n + 1, n)),
+        np.zeros((n + 1, n + 1)),
         np.zeros(n),
         np.zeros(n),
         np.zeros(n, np.int64),
@@ -107,42 +107,40 @@ def divide(p: QP, n: int, m: int, c: int) -> float:
 
     Returns how fast it falls along that direction; 0 where it depends on the active ones.
     """
-    G, S, pull, step, share, active = p.G, p.system, p.pull, p.step, p.share, p.active
-    apply_inverse(p.factor, n, G[c], p.step)
-    for a in range(m):
-        for b in range(a + 1):
-            S[a, b] = 0.0
-            for i in range(n):
-                S[a, b] += pull[a, i] * G[active[b], i]
-        share[a] = 0.0
-        for i in range(n):
-            share[a] += step[i] * G[active[a], i]
-    own = 0.0
-    for i in range(n):
-        own += step[i] * G[c, i]
-    for a in range(m):  # Cholesky, in place
-        for b in range(a + 1):
-            value = S[a, b]
-            for j in range(b):
-                value -= S[a, j] * S[b, j]
-            S[a, b] = value * S[b, b] if b < a else 1.0 / math.sqrt(max(value, 1e-300))
-    for a in range(m):
-        value = share[a]
-        for b in range(a):
-            value -= S[a, b] * share[b]
-        share[a] = value * S[a, a]
+    system, pull, step, share = p.system, p.pull, p.step, p.share
+    own, rate = put_pull(p, n, m, c)
     for a in range(m - 1, -1, -1):
-        value = share[a]
+        value = system[m, a]
         for b in range(a + 1, m):
-            value -= S[b, a] * share[b]
-        share[a] = value * S[a, a]
+            value -= system[b, a] * share[b]
+        share[a] = value * system[a, a]
     for i in range(n):
+        step[i] = pull[m, i]
         for a in range(m):
             step[i] -= share[a] * pull[a, i]
-    rate = 0.0
-    for i in range(n):
-        rate += step[i] * G[c, i]
     return rate if m < n and rate > DEPENDENT * own else 0.0
+
+
+@routine
+def put_pull(p: QP, n: int, m: int, c: int) -> tuple[float, float]:
+    """Fill the m-th row of `pull` and of `system` with limit `c`; how fast it falls along what its own gradient asks
+    for, and how fast with the active ones kept."""
+    G, system, pull, active = p.G, p.system, p.pull, p.active
+    apply_inverse(p.factor, n, G[c], pull[m])
+    own = 0.0
+    for i in range(n):
+        own += pull[m, i] * G[c, i]
+    rate = own
+    for a in range(m):
+        value = 0.0
+        for i in range(n):
+            value += pull[m, i] * G[active[a], i]
+        for b in range(a):
+            value -= system[m, b] * system[a, b]
+        system[m, a] = value * system[a, a]
+        rate -= system[m, a] * system[m, a]
+    system[m, m] = 1.0 / math.sqrt(max(rate, 1e-300))
+    return own, rate
 
 
 @routine
@@ -151,8 +149,7 @@ def drop(p: QP, n: int, m: int, a: int) -> None:
     p.multipliers[p.active[a]] = 0.0
     for b in range(a, m - 1):
         p.active[b] = p.active[b + 1]
-        for i in range(n):
-            p.pull[b, i] = p.pull[b + 1, i]
+        put_pull(p, n, b, p.active[b])
 
 
 @routine
@@ -179,7 +176,6 @@ def take_up(p: QP, n: int, m: int, c: int, violation: float) -> int:
         if full <= limit:
             p.active[m] = c
             p.multipliers[c] = multiplier
-            apply_inverse(p.factor, n, p.G[c], p.pull[m])
             return m + 1
         drop(p, n, m, first)
         m -= 1

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Ints, Record
+from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine
 from ..free_motions import FreeMotions, put_step, restoring_step
-from ..legs.records import Table
+from ..legs.records import ARM, Table
 from ..sqp import (
     CLOSED,
     CORRECTIONS,
@@ -97,7 +97,7 @@ def restore_feasibility(
 
 
 @routine
-def is_by(now: Now, met: Now, holding: Ints) -> bool:
+def is_by(legs: Records, now: Now, met: Now, holding: Ints) -> bool:
     """Whether a configuration is so near to another that a descent would end there.
 
     Parameters
@@ -110,7 +110,7 @@ def is_by(now: Now, met: Now, holding: Ints) -> bool:
             if abs(pose[i, j] - other[i, j]) > BY:
                 return False
     for k in range(q.shape[0]):
-        if holding[k] == 1 and abs(wrap(q[k] - met.q[k], 0.0)) > BY:
+        if (holding[k] == 1 or legs[k]["kind"] != ARM) and abs(wrap(q[k] - met.q[k], 0.0)) > BY:
             return False
     return True
 
@@ -202,7 +202,7 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view
-                    if least < math.inf and is_by(search.best, met, search.holding):
+                    if least < math.inf and is_by(table.legs, search.best, met, search.holding):
                         return least
                     behind = view.linear.totals[0]["value"] - 0.5 * unit[0] * least * least
                     if is_hopeless(behind, share, control):
