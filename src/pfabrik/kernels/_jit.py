@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from inspect import signature
 from typing import Any, TypeVar, cast
 
 import numba
 
 from ._cache import KernelCache, warn_of_no_cache
-from ._pipeline import IS_HOOKED, KernelCompiler, PartCompiler, SearchCompiler, compile_announced, name_of
+from ._pipeline import IS_HOOKED, KernelCompiler, Part, PartCompiler, SearchCompiler, compile_announced, name_of
 from .references import argument_type
 
 _njit: Any = numba.njit
@@ -34,9 +35,10 @@ if IS_HOOKED:
 def kernel(function: F) -> F:
     """Compile `function` for any thread: no GIL, IEEE division, results cached on disk.
 
-    The cache is beside the source if that can be written, else in the user's cache folder, else there is none.
+    The cache is beside the source if that can be written, else in the user's cache folder, else there is none. One that
+    takes the address of its `scratch` memory cannot allocate, see `routine`.
     """
-    return _cached(_njit(**_KERNEL)(function), function)
+    return _compiled(function, _KERNEL)
 
 
 def search(function: F) -> F:
@@ -44,11 +46,12 @@ def search(function: F) -> F:
 
     A few in a hundred slower than a `kernel`, and optimised in half the time.
     """
-    return _cached(_njit(**_SEARCH)(function), function)
+    return _compiled(function, _SEARCH)
 
 
-def _cached(dispatcher: Any, function: F) -> F:
-    """Keep what is compiled of a kernel, and say when it is compiled."""
+def _compiled(function: F, options: dict[str, Any]) -> F:
+    """Compile a kernel, keep it, and say when it is compiled."""
+    dispatcher = _njit(**options, _nrt="scratch" not in signature(function).parameters)(function)
     if not _config.DISABLE_JIT:
         compile_quietly = dispatcher._compiler.compile
         dispatcher._compiler.compile = partial(compile_announced, name_of(function), compile_quietly)
@@ -75,10 +78,11 @@ def _resolve_call(
 
 def _part(function: F, **options: Any) -> F:
     """Compile `function` as a part of kernels."""
-    dispatcher: Any = _njit(**_PART, **options)(function)
+    part: Any = _njit(**_PART, **options)(function)
     if not _config.DISABLE_JIT:
-        dispatcher.get_call_template = partial(_resolve_call, dispatcher, dispatcher.get_call_template, {})
-    return dispatcher
+        part.__class__ = Part
+        part.get_call_template = partial(_resolve_call, part, part.get_call_template, {})
+    return part
 
 
 def routine(function: F) -> F:

@@ -12,7 +12,7 @@ from functools import partialmethod
 from types import SimpleNamespace
 from typing import Any
 
-from numba.core import base, codegen, compiler, cpu, event, types
+from numba.core import base, codegen, compiler, cpu, dispatcher, event, types
 from numba.core.registry import cpu_target
 
 # Numba is typed in some versions and not in others, and never for the options below the public ones.
@@ -20,6 +20,7 @@ _Library: Any = getattr(codegen, "JITCodeLibrary", object)
 _Codegen: Any = getattr(codegen, "CPUCodegen", object)
 _Compiler: Any = getattr(compiler, "Compiler", object)
 _Flags: Any = getattr(compiler, "Flags", object)
+_Dispatcher: Any = dispatcher.Dispatcher
 _Function: Any = getattr(types, "BaseFunction", object)
 _Context: Any = getattr(base, "BaseContext", object)
 _CpuContext: Any = getattr(cpu, "CPUContext", object)
@@ -256,3 +257,10 @@ class SearchCompiler(KernelCompiler):
 
 class PartCompiler(KernelCompiler):
     library = _PartLibrary
+
+
+class Part(_Dispatcher):
+    """A part of kernels, compiled for them; Python that calls it has it interpreted."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.py_func(*arguments)

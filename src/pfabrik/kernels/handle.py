@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from threading import local
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays
+R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays, and of such NamedTuples
 
 
 class Handle(Generic[R]):
@@ -22,7 +24,7 @@ class Handle(Generic[R]):
 
         config: Any = numba.config
         self.record = record
-        self._memory = np.array([number for array in record for number in _descriptor(array)], dtype=np.int64)
+        self._memory = np.fromiter(_descriptors(record), np.int64)
         self.address: Any = record if config.DISABLE_JIT else self._memory.ctypes.data
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -30,7 +32,20 @@ class Handle(Generic[R]):
         return Handle, (self.record,)
 
 
-def _descriptor(array: Any) -> tuple[int, ...]:
-    """An array as Numba has it in memory: no owner, size, bytes of an element, where it is, shape, strides."""
-    assert array.flags.c_contiguous and array.flags.writeable
-    return (0, 0, array.size, array.itemsize, array.ctypes.data, *array.shape, *array.strides)
+class Scratch(local, Generic[R]):
+    """Scratch memory of kernels: each thread has its own, for calls that it makes itself."""
+
+    def __init__(self, new: Callable[..., R], *asked: Any) -> None:
+        """`new` is called, with what it is asked, by each thread that comes to need the address."""
+        self._handle = Handle(new(*asked))
+        self.address = self._handle.address
+
+
+def _descriptors(record: tuple[Any, ...]) -> Iterator[int]:
+    """Arrays as Numba has them in memory: no owner, size, bytes of an element, where it is, shape, strides."""
+    for each in record:
+        if isinstance(each, tuple):
+            yield from _descriptors(each)
+        else:
+            assert each.flags.c_contiguous and each.flags.writeable
+            yield from (0, 0, each.size, each.itemsize, each.ctypes.data, *each.shape, *each.strides)

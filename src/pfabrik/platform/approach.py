@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ..closure.close import MARGIN
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import LOCKED
-from ..kernels.handle import Handle
+from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
 from ..kernels.platform.records import SETTINGS, Found, Plan, Starts
 from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
@@ -20,6 +21,9 @@ from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .rotation import implied_rows, without_idle_legs
 from .table import OF_AIMS, machine_searched
+
+if TYPE_CHECKING:
+    from ..kernels.platform.nearest import Work
 
 HITS, HITS_OF_STRUTS, HITS_OF_VALUES = 4, 3, 8
 """How many searches must end at the nearest configuration, and one more for each that ends elsewhere: fewer where
@@ -82,6 +86,12 @@ class Approach:
 
         return approach
 
+    @cached_property
+    def _scratch(self) -> Scratch[Work]:
+        from ..kernels.platform.nearest import new_work
+
+        return Scratch(new_work, self._legs.record, self._plan.record)
+
     def find(self, targets: Floats, own: Starts, values: Floats | None = None) -> Found:
         """Where searches for targets (n, 4, 4) [length] end; see `fill`."""
         found = new_found(len(targets), self._table)
@@ -115,13 +125,14 @@ class Approach:
         return weights
 
     def _run(self, targets: Floats, own: Starts, found: Found, values: Floats, weights: Floats) -> int:
-        asked = self._legs.address, self._plan.address
+        kernel, machine, plan, scratch = self._kernel, self._legs.address, self._plan.address, self._scratch
         if len(targets) <= ROWS_A_BLOCK:
-            return self._kernel(*asked, targets, values, *own, *found, weights)
+            return kernel(machine, plan, scratch.address, targets, values, *own, *found, weights)
 
         def run(block: slice) -> int:
             near = values[block] if len(values) else values
-            return self._kernel(*asked, targets[block], near, *own.of(block), *found.at(block), weights[block])
+            told = *own.of(block), *found.at(block), weights[block]
+            return kernel(machine, plan, scratch.address, targets[block], near, *told)
 
         return sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
 

@@ -106,7 +106,7 @@ def _approach(
 def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: Way) -> Floats:
     """How hard every limit holds configurations back from targets (n, 4, 4) [length]: multipliers, in the order of
     those that `closure.descend.weighed_limits` gives."""
-    found = _approach(mechanism, table, way, {"steps": 0}, no_starts(table)).weigh(targets, present)
+    found = _weighing(mechanism, table, way).weigh(targets, present)
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
     coned = [joint.name for joint in mechanism.joints if joint.cone is not None]
     weights = np.zeros((len(targets), 2 * columns + len(coned)))
@@ -115,6 +115,12 @@ def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, prese
     cones = [2 * columns + coned.index(name) for name, bound in table.limits if bound == "cone"]
     weights[:, cones] = found[:, 2 * ranges : 2 * ranges + len(cones)]
     return weights
+
+
+@lru_cache(maxsize=256)
+def _weighing(mechanism: Mechanism, table: LegTable, way: Way) -> Approach:
+    """What takes no steps, and weighs limits."""
+    return _approach(mechanism, table, way, {"steps": 0}, no_starts(table))
 
 
 def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, corners: bool) -> Found:

@@ -9,5 +9,8 @@ from .records import CONE, COORDINATE, LEG, TASK, Table
 
 _RECORDS = (LEG, COORDINATE, CONE, COORDINATE, COORDINATE, TASK, np.dtype(np.int64))
 
-open_table = opener(Table._make(np.zeros(0, record) for record in _RECORDS))
+SAMPLE = Table._make(np.zeros(1, record) for record in _RECORDS)
+"""A table of the types that kernels are compiled for."""
+
+open_table = opener(SAMPLE)
 """The table of a mechanism, of which a kernel is given the address of a `Handle`."""

@@ -15,8 +15,8 @@ from ..holding import balance
 from ..legs.answer import deviation, excess_of
 from ..legs.poses import make_exact
 from ..legs.records import ARM, Table
-from ..legs.table import open_table
-from ..qp import new_qp
+from ..legs.table import SAMPLE, open_table
+from ..qp import QP, new_qp
 from ..references import opener
 from ..rotations import difference, yaw_difference
 from ..rows import (
@@ -61,18 +61,32 @@ TALLY = np.dtype(
 """Where searches for a row have ended."""
 
 
-open_plan = opener(Plan(np.zeros(0), np.zeros(0, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0))))
-"""What `approach` is asked, of which it is given the address of a `Handle`."""
-
-
 class Work(NamedTuple):
-    """Scratch memory of the searches for a row."""
+    """Scratch memory of one thread."""
 
     search: Search
     best: Now
     met: Records  # (1,): TALLY
     away: Records  # (1,): TALLY of searches that did not come to what is held
     lost: Floats  # (1 + starts,): how far the first start, and each other, is from that; infinite where one is not lost
+    held: Floats  # (6,): what is held, alone, as the weights of an objective
+    p: QP  # to weigh limits
+    pulls: Floats  # (limits, n)
+
+
+def new_work(table: Table, plan: Plan) -> Work:
+    """Scratch memory of one thread."""
+    setting, starts = plan.settings[0], plan.poses.shape[0]
+    search, best = new_search(table, setting["cones"]), new_now(table.legs.shape[0])
+    k, n = search.first.linear.G.shape
+    k = k if setting["steps"] == 0 else 0
+    tallies = np.zeros(1, TALLY), np.zeros(1, TALLY)
+    return Work(search, best, *tallies, np.zeros(1 + starts), np.zeros(6), new_qp(k, k), np.zeros((k, n)))
+
+
+_PLAN = Plan(np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
+open_plan, open_work = opener(_PLAN), opener(new_work(SAMPLE, _PLAN))
+"""What `approach` is asked, and its scratch memory: it is given the addresses of their handles."""
 
 
 @search
@@ -290,6 +304,7 @@ def judge(own: Record, row: int, found: Found) -> None:
 def approach(
     machine: int,
     plan: int,
+    scratch: int,
     targets: Floats,
     values: Floats,
     begins: Floats,
@@ -314,6 +329,7 @@ def approach(
     ----------
     machine : see `open_table`.
     plan : the address of a `Plan`.
+    scratch : that of `Work`, made for both.
     targets, values : see `Aim`.
     begins, q, sides : the first start of each row, or one for all, as of `Starts`; the others follow until the nearest
         configuration has been met often enough: `is_enough`.
@@ -329,16 +345,13 @@ def approach(
         Starts(asked.poses, asked.q, asked.sides),
         Found(distances, ends, ends_q, ends_sides, counters, actuators, measures, status),
     )
-    search, best = new_search(table, setting["cones"]), new_now(table.legs.shape[0])
-    work = Work(search, best, np.zeros(1, TALLY), np.zeros(1, TALLY), np.zeros(1 + others.poses.shape[0]))
+    work = open_work(scratch)
+    search, best, held, p, pulls = work.search, work.best, work.held, work.p, work.pulls
     frame, margin, near, weighs = setting["frame"], setting["margin"], setting["near"], setting["steps"] == 0
-    pose, held = PoseObjective(targets, asked.weights, frame, margin, near, setting["steps"]), np.zeros(6)
+    pose = PoseObjective(targets, asked.weights, frame, margin, near, setting["steps"])
     aim = Aim(pose, values, setting["implied"])
     steps = setting["steps"] if holds_some(table, aim, held) else 0
     toward = Aim(PoseObjective(targets, held, frame, margin, near, steps), values, setting["implied"])
-    k, n = search.first.linear.G.shape
-    k = k if weighs else 0
-    p, pulls = new_qp(k, k), np.zeros((k, n))
     for row in range(distances.shape[0]):
         distances[row] = math.inf
         if not load_target(table, pose, row, search):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Records
-from .._jit import allocator, routine
+from .._jit import routine
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
@@ -53,7 +53,6 @@ class Search(NamedTuple):
     half_angles: Floats  # (cones, 3): of the cones that are minded, their cosines and sines
 
 
-@allocator
 def new_search(table: Table, cones: int) -> Search:
     """Scratch memory of one thread, for searches that mind so many cones, the first ones."""
     n, legs = count_unknowns(table), table.legs.shape[0]
