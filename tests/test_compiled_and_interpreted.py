@@ -195,13 +195,20 @@ def test_a_plan_is_not_shared_with_its_answers() -> None:
 def test_calls_from_several_threads_answer_as_one_after_the_other() -> None:
     mechanisms = [machine(name) for name in ("five_bar", "stewart", "nrpm")] * (1 if INTERPRETED else 8)
     tasks = [(m, some_targets(m, 3 if INTERPRETED else 200, seed)) for seed, m in enumerate(mechanisms)]
-    expected = [pf.solve_ik(*task) for task in tasks]
+    expected = [there_and_back(*task) for task in tasks]
     with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(lambda task: pf.solve_ik(*task), tasks))
-    for one, other in zip(expected, found, strict=True):
-        np.testing.assert_array_equal(other.status, one.status)
-        np.testing.assert_array_equal(other.pose, one.pose)
-        np.testing.assert_array_equal(other.actuators, one.actuators)
+        found = list(pool.map(lambda task: there_and_back(*task), tasks))
+    for ones, others in zip(expected, found, strict=True):
+        for one, other in zip(ones, others, strict=True):
+            np.testing.assert_array_equal(other.status, one.status)
+            np.testing.assert_array_equal(other.pose, one.pose)
+            np.testing.assert_array_equal(other.actuators, one.actuators)
+
+
+def there_and_back(mechanism: pf.Mechanism, targets: np.ndarray) -> tuple[pf.Solution, pf.Solution]:
+    """Targets answered, and the actuators of the answers."""
+    answers = pf.solve_ik(mechanism, targets)
+    return answers, pf.solve_fk(mechanism, answers.actuators)
 
 
 @pytest.fixture

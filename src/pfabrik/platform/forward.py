@@ -19,7 +19,7 @@ from ..kernels.threads import in_blocks
 from .approach import home_start, no_starts, starts_at
 from .corners import corners_of
 from .nearest import nearest_actuators
-from .one import Ends
+from .one import Ends, scratch_of
 from .table import machine_searched
 
 ROWS_A_BLOCK = 256
@@ -113,10 +113,10 @@ def _assemble(
     """Assemble rows on all cores; the arrays are the actuators, then what is filled: see the kernel."""
     from ..kernels.platform.forward import assemble
 
-    legs, turns, elsewhere = machine_searched(table), not mechanism.end_effector_is_joint, Handle(others)
+    legs, scratch, elsewhere = machine_searched(table), scratch_of(mechanism, table), Handle(others)
 
     def run(block: slice) -> None:
         first, (values, *filled) = Handle(own.of(block)), (a[block] for a in arrays)
-        assemble(legs.address, values, turns, first.address, elsewhere.address, *filled)
+        assemble(legs.address, scratch.address, values, first.address, elsewhere.address, *filled)
 
     in_blocks(run, len(arrays[0]), ROWS_A_BLOCK)

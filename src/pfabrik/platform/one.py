@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, partial
-from typing import Any, NamedTuple
+from functools import cached_property, lru_cache, partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,14 @@ from ..arrays import Floats
 from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting
 from ..description.mechanism import Mechanism
-from ..kernels.handle import Handle
+from ..kernels.handle import Handle, Scratch
 from ..kernels.platform.records import Starts
 from ..kernels.rows import N_COUNTERS, Rows
 from .approach import home_start, no_starts
 from .table import machine, machine_nearby, machine_searched, resting_at_home
+
+if TYPE_CHECKING:
+    from ..kernels.platform.forward import Newton
 
 
 class OneTarget:
@@ -104,9 +107,8 @@ class OneAssembly:
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
-        self._turns = not mechanism.end_effector_is_joint
         self.home, self._nowhere = Handle(home_start(mechanism, table)), Handle(no_starts(table))
-        self._legs = machine_searched(table)
+        self._legs, self._scratched = machine_searched(table), (mechanism, table)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -114,19 +116,38 @@ class OneAssembly:
 
         return assemble
 
+    @cached_property
+    def _scratch(self) -> Scratch[Newton]:
+        return scratch_of(*self._scratched)
+
     def new_ends(self) -> Ends:
         """Room for where carriers and legs of one row are in the end."""
         return Ends(np.empty((1, self._n_actuators)), np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
 
-    def prepared(self, own: Handle[Starts], rows: Rows, ends: Ends) -> Callable[[], int]:
-        """A call that assembles what stands in `rows.actuators` from one start within all limits, as long as the start
-        and this object are kept; it returns 0 where it does."""
-        asked = self._legs.address, rows.actuators, self._turns, own.address, self._nowhere.address
+    def prepared(
+        self, own: Handle[Starts], scratch: Handle[Newton] | Scratch[Newton], rows: Rows, ends: Ends
+    ) -> Callable[[], int]:
+        """A call that assembles what stands in `rows.actuators` from one start within all limits, as long as the start,
+        the scratch memory and this object are kept; it returns 0 where it does."""
+        asked = self._legs.address, scratch.address, rows.actuators, own.address, self._nowhere.address
         return partial(self._kernel, *asked, rows.status, ends.wanted, rows.poses, ends.q, ends.sides, rows.measures)
 
     def assemble(self, own: Handle[Starts], rows: Rows, ends: Ends) -> bool:
         """The same, at once; whether it does."""
-        return self.prepared(own, rows, ends)() == 0
+        return self.prepared(own, self._scratch, rows, ends)() == 0
+
+
+def new_scratch(mechanism: Mechanism, table: LegTable) -> Newton:
+    """Scratch memory of assembly."""
+    from ..kernels.platform.forward import new_newton
+
+    return new_newton(machine_searched(table).record, not mechanism.end_effector_is_joint)
+
+
+@lru_cache(maxsize=64)
+def scratch_of(mechanism: Mechanism, table: LegTable) -> Scratch[Newton]:
+    """The same for each thread."""
+    return Scratch(new_scratch, mechanism, table)
 
 
 def _filled(rows: Rows) -> tuple[NDArray[Any], ...]:

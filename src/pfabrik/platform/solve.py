@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +29,12 @@ from .approach import in_lengths, starts_at
 from .coordinates import settled
 from .forward import assembled
 from .nearest import weighed_limits
-from .one import Ends, OneAssembly, OneTarget
+from .one import Ends, OneAssembly, OneTarget, new_scratch
 from .table import Machine, machine, machine_nearby, resting_at_home
 from .unreached import Question, Unreached, answer_unreached
+
+if TYPE_CHECKING:
+    from ..kernels.platform.forward import Newton
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of a kernel that answers one by one, or in blocks."""
@@ -229,10 +233,14 @@ class LegsEngine:
             put_rows(rows, rest, others.rows)
         return self._answers(rows, sides, carriers, start, first, rest, others)
 
-    def prepared_forward(self, own: Handle[Starts], rows: Rows) -> Callable[[], int]:
-        """A call that answers `rows.actuators` into the rest of one row, as long as its start is kept; it returns 0
-        where they assemble."""
-        return self._one_forward.prepared(own, rows, self._one_forward.new_ends())
+    def prepared_forward(self, own: Handle[Starts], scratch: Handle[Newton], rows: Rows) -> Callable[[], int]:
+        """A call that answers `rows.actuators` into the rest of one row, as long as its start and scratch memory are
+        kept; it returns 0 where they assemble."""
+        return self._one_forward.prepared(own, scratch, rows, self._one_forward.new_ends())
+
+    def forward_scratch(self) -> Handle[Newton]:
+        """Scratch memory of its own for such a call."""
+        return Handle(new_scratch(self.mechanism, self._table))
 
     def forward_start(self, start: Configurations | None) -> Handle[Starts]:
         """Where one row starts to be assembled."""

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Record
-from .._jit import allocator, kernel, routine
+from .._jit import kernel, routine
 from ..legs.answer import KEPT, deviation, excess_of, worst_of
 from ..legs.poses import make_exact
 from ..legs.records import CARRIER, PIVOT, Table
-from ..legs.table import open_table
+from ..legs.table import SAMPLE, open_table
 from ..linear import solve_spd, solve_square
 from ..references import opener
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
@@ -45,10 +45,6 @@ FAR_STEP = 0.5
 """Longest step of Newton's method [L or rad]."""
 
 
-open_starts = opener(Starts(np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0))))
-"""Starts, of which a kernel is given the address of a `Handle`."""
-
-
 class Newton(NamedTuple):
     """Scratch memory of one thread."""
 
@@ -63,9 +59,13 @@ class Newton(NamedTuple):
     first: Now
 
 
-@allocator
 def new_newton(table: Table, turns: bool) -> Newton:
-    """Scratch memory of one thread; without `turns` the platform does not turn."""
+    """Scratch memory of one thread.
+
+    Parameters
+    ----------
+    turns : whether the platform turns; a point that is an end effector does not.
+    """
     n, legs, n_driven = count_unknowns(table), table.legs.shape[0], table.driven.shape[0]
     look, kept = new_view(table), np.zeros(n, np.int64)
     equations = look.rows.shape[0]
@@ -299,11 +299,16 @@ def write_assembled(table: Table, row: int, work: Newton, ends: Starts, measures
     copy_row(work.now.sides, ends.sides[row])
 
 
+open_starts = opener(Starts(np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0))))
+open_newton = opener(new_newton(SAMPLE, True))
+"""Starts and scratch memory, of which a kernel is given the addresses of handles."""
+
+
 @kernel
 def assemble(
     machine: int,
+    scratch: int,
     values: Floats,
-    turns: bool,
     own: int,
     others: int,
     status: Ints,
@@ -320,8 +325,8 @@ def assemble(
     Parameters
     ----------
     machine : see `open_table`.
+    scratch : the address of `Newton`.
     values : (n, n_a) [length or rad].
-    turns : whether the platform turns; a point that is an end effector does not.
     own : where each row starts, or all of them; as `others` the address of `Starts`.
     others : starts that follow; of the configurations that they find, the one nearest to the row's start is taken.
     wanted : of the values, see `put_deviations`.
@@ -333,7 +338,7 @@ def assemble(
     How many are PENDING.
     """
     table, first, rest, left = open_table(machine), open_starts(own), open_starts(others), 0
-    work = new_newton(table, turns)
+    work = open_newton(scratch)
     for row in range(values.shape[0]):
         status[row] = PENDING
         if assemble_row(table, values, first, row, rest, wanted, work):
