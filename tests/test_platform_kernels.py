@@ -16,6 +16,7 @@ from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
 from pfabrik.kernels.legs import records as K
 from pfabrik.kernels.legs.records import Table
 from pfabrik.kernels.platform import equations as E
+from pfabrik.kernels.platform import forward as F
 from pfabrik.kernels.platform import limits
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
 from pfabrik.kernels.platform.records import Aim
@@ -29,6 +30,7 @@ pytestmark = [
 
 MACHINES = [*pf.catalog(), *closure.ON_ARMS]
 STEP = 1e-6
+ON_SPHERES = ["delta", "hexaglide", "linear_delta", "psu", "reachy_mini", "servo_hexapod", "stewart", "ucu"]
 
 
 def moved(now: E.Now, unknown: int, step: float, columns: np.ndarray) -> E.Now:
@@ -135,3 +137,29 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
         lagrangian_gradient(table, 0, aim, now, search, every)
         np.testing.assert_allclose(own, every, rtol=0, atol=1e-12)
     assert min(seen) < len(table.legs)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> None:
+    """Equation by equation, in another order and the sense of the actuator."""
+    mechanism, described, table = described_by_name(name)
+    rng = np.random.default_rng(2)
+    work = F.new_newton(table, not mechanism.end_effector_is_joint)
+    assert (len(work.spheres.legs) > 0) == (name in ON_SPHERES)
+    if name not in ON_SPHERES:
+        return
+    no_spheres = work.spheres._replace(legs=np.zeros(0, np.int64))
+    by_leg = work._replace(spheres=no_spheres, equations=np.zeros_like(work.equations))
+    for _ in range(3):
+        now = somewhere(mechanism, described, rng)
+        for to, source in zip(work.now, now, strict=True):
+            to[:] = source
+        work.values[:] = rng.uniform(-0.3, 0.3, len(work.values))
+        F.put_drivers(table, work)
+        F.set_spheres(table, work.values, work.now, work.look, work.spheres)
+        worst = F.put_residuals(table, work)
+        assert worst == pytest.approx(F.put_residuals(table, by_leg), abs=1e-12)
+        F.put_equations(table, by_leg)
+        own, others = work.equations[:, None], by_leg.equations[None]
+        apart = np.minimum(np.abs(own - others).max(axis=2), np.abs(own + others).max(axis=2))
+        assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-12

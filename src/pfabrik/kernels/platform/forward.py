@@ -26,6 +26,7 @@ from .equations import Now, View, count_unknowns, new_now, new_view, place, put_
 from .limits import coordinate_slope, counts_turns
 from .records import Starts
 from .search import copy_now, move
+from .spheres import Spheres, new_spheres, put_spheres, set_spheres
 from .starts import put_carriers, put_sides
 
 ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
@@ -57,6 +58,7 @@ class Newton(NamedTuple):
     begin: Floats  # (n_a,)
     now: Now
     first: Now
+    spheres: Spheres  # none where equations are others too
 
 
 def new_newton(table: Table, turns: bool) -> Newton:
@@ -88,6 +90,7 @@ def new_newton(table: Table, turns: bool) -> Newton:
         np.zeros(n_driven),
         new_now(legs),
         new_now(legs),
+        new_spheres(table),
     )
 
 
@@ -122,8 +125,18 @@ def off_by(driven: Record, value: float, work: Newton) -> float:
 
 
 @routine
+def has_spheres(work: Newton) -> bool:
+    return work.spheres.legs.shape[0] > 0
+
+
+@routine
 def put_residuals(table: Table, work: Newton) -> float:
-    """Read the legs at the present configuration, and fill the right-hand sides; the largest residual."""
+    """Read the legs at the present configuration, and fill the right-hand sides; the largest residual.
+
+    Spheres are all that there is to read, and fill the left-hand sides too.
+    """
+    if has_spheres(work):
+        return put_spheres(work.now.pose, work.spheres, work.equations)
     worst, rows, equations = place(table, work.now, work.look), work.look.rows, work.equations
     m, e = work.free.shape[0], rows.shape[0]
     for r in range(e):
@@ -175,11 +188,14 @@ def newton(table: Table, steps: int, work: Newton) -> float:
     free, normal, step = work.free, work.normal, work.step
     m, before = free.shape[0], math.inf
     put_drivers(table, work)
+    if has_spheres(work):
+        set_spheres(table, work.values, work.now, work.look, work.spheres)
     for taken in range(steps):
         worst = put_residuals(table, work)
         if not worst < math.inf or worst <= ASSEMBLED or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * before):
             return worst
-        if taken == 0 or not worst * worst <= ASSEMBLED * before:  # else the same slopes, once more, leave less
+        is_near = taken > 0 and worst * worst <= ASSEMBLED * before  # the same slopes, once more, leave less
+        if not is_near and not has_spheres(work):
             put_equations(table, work)
         if not solve(work):
             return math.inf
@@ -212,6 +228,8 @@ def lead(table: Table, values: Floats, work: Newton) -> float:
 @routine
 def is_feasible(table: Table, values: Floats, work: Newton) -> bool:
     """Whether the present configuration, assembled, keeps all limits, and its actuators those of theirs."""
+    if has_spheres(work):
+        place(table, work.now, work.look)
     for i in range(table.driven.shape[0]):
         value = values[table.driven[i]["column"]]
         if not max(table.driven[i]["lo"] - value, value - table.driven[i]["hi"]) <= KEPT:

@@ -1,0 +1,88 @@
+"""Legs that, with all actuators at their values, are points of the platform on spheres, as those of most machines are.
+
+Nothing but these points and spheres enters the equations then: |R h + p - f| = l, with h in the platform, and f and l
+what actuators make them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from .._jit import routine
+from ..legs.records import CARRIER, COSINE, FROM_BASE, HINGE, IDLE, NO_CARRIER, ROD, SINE, SLIDE, Table
+from ..legs.rods import carried_foot
+from ..vectors import add, cross, dot, put, scale, sub, turn, vec
+from .equations import Now, View, is_carried, main_of
+
+
+class Spheres(NamedTuple):
+    """One for each equation."""
+
+    legs: Ints  # (e,): the rod that is its radius
+    drivers: Ints  # (e,): the actuator that makes the rod longer; -1 if none does
+    heads: Floats  # (e, 3): points of the platform
+    feet: Floats  # (e, 3): centres
+    lengths: Floats  # (e,): radii
+
+
+def new_spheres(table: Table) -> Spheres:
+    """Room for them; none where equations are not all such."""
+    driven = {(each["leg"], each["place"]): i for i, each in enumerate(table.driven)}
+    radii = [
+        k for k, leg in enumerate(table.legs) if leg["kind"] == ROD and (leg["slides"] == 0 or (k, SLIDE) in driven)
+    ]
+    rods = radii if _are_spheres(table, driven) else []
+    drivers = np.array([driven.get((k, SLIDE), -1) for k in rods], dtype=np.int64)
+    heads, e = table.legs["head_point"][rods], len(rods)
+    return Spheres(np.array(rods, dtype=np.int64), drivers, heads, np.zeros((e, 3)), np.zeros(e))
+
+
+def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
+    """Whether legs leave the platform nothing but points at distances, and no carriers are left but those driven."""
+    for k, leg in enumerate(table.legs):
+        is_loose = leg["carrier"] != NO_CARRIER and (main_of(table, k), CARRIER) not in driven
+        turns = leg["foot"] == HINGE or leg["head"] == HINGE or leg["twists"] == 1
+        is_rod = leg["kind"] == ROD and leg["frame"] == FROM_BASE and leg["inner"] == 0
+        if leg["kind"] != IDLE and (not is_rod or is_loose or turns):
+            return False
+    return all(place in (CARRIER, SLIDE) for _, place in driven)
+
+
+@routine
+def set_spheres(table: Table, values: Floats, now: Now, look: View, spheres: Spheres) -> None:
+    """Fill centres and radii where carriers are, and actuators have values (n_a,), deviations from home [L]."""
+    legs, own, q = table.legs, look.values, now.q
+    for k in range(q.shape[0]):
+        if is_carried(legs[k]):
+            own[k, CARRIER], own[k, COSINE], own[k, SINE] = q[k], math.cos(q[k]), math.sin(q[k])
+    for e in range(spheres.legs.shape[0]):
+        k, i = spheres.legs[e], spheres.drivers[e]
+        main = main_of(table, k)
+        put(spheres.feet[e], carried_foot(legs[k], legs[main], own[main]))
+        spheres.lengths[e] = legs[k]["length"]
+        if i >= 0:
+            spheres.lengths[e] += table.driven[i]["sense"] * values[table.driven[i]["column"]]
+
+
+@routine
+def put_spheres(pose: Floats, spheres: Spheres, equations: Floats) -> float:
+    """Fill the equations (e, m + 1), right-hand side last, at a pose; the largest residual, infinite where one is
+    not a number."""
+    heads, feet, lengths, worst = spheres.heads, spheres.feet, spheres.lengths, 0.0
+    p, m = (pose[0, 3], pose[1, 3], pose[2, 3]), equations.shape[1] - 1
+    for e in range(lengths.shape[0]):
+        arm, own = turn(pose, vec(heads[e])), equations[e]
+        x = sub(add(arm, p), vec(feet[e]))
+        length = math.sqrt(dot(x, x))
+        u, off = scale(1.0 / length, x), length - lengths[e]
+        put(own, u)
+        if m > 3:
+            put(own[3:], cross(arm, u))
+        own[m] = -off
+        worst = max(worst, abs(off)) if abs(off) < math.inf else math.inf
+    return worst
