@@ -30,7 +30,7 @@ pytestmark = [
 
 MACHINES = [*pf.catalog(), *closure.ON_ARMS]
 STEP = 1e-6
-ON_SPHERES = ["delta", "hexaglide", "linear_delta", "psu", "reachy_mini", "servo_hexapod", "stewart", "ucu"]
+ON_SPHERES = ["delta", "hexaglide", "linear_delta", "nrpm", "psu", "reachy_mini", "servo_hexapod", "stewart", "ucu"]
 
 
 def moved(now: E.Now, unknown: int, step: float, columns: np.ndarray) -> E.Now:

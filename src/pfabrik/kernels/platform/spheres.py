@@ -14,7 +14,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from .._jit import routine
-from ..legs.records import CARRIER, COSINE, FROM_BASE, HINGE, IDLE, NO_CARRIER, ROD, SINE, SLIDE, Table
+from ..legs.frames import AXES, place_arm, set_frames
+from ..legs.records import ARM, CARRIER, COSINE, FROM_BASE, HINGE, IDLE, NO_CARRIER, ROD, SINE, SLIDE, Table
 from ..legs.rods import carried_foot
 from ..vectors import add, cross, dot, put, scale, sub, turn, vec
 from .equations import Now, View, is_carried, main_of
@@ -43,28 +44,38 @@ def new_spheres(table: Table) -> Spheres:
 
 
 def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
-    """Whether legs leave the platform nothing but points at distances, and no carriers are left but those driven."""
+    """Whether legs leave the platform nothing but points at distances, and all that carries them is driven, on the
+    base."""
     for k, leg in enumerate(table.legs):
         is_loose = leg["carrier"] != NO_CARRIER and (main_of(table, k), CARRIER) not in driven
-        turns = leg["foot"] == HINGE or leg["head"] == HINGE or leg["twists"] == 1
-        is_rod = leg["kind"] == ROD and leg["frame"] == FROM_BASE and leg["inner"] == 0
-        if leg["kind"] != IDLE and (not is_rod or is_loose or turns):
+        turns = leg["kind"] != ARM and (leg["foot"] == HINGE or leg["head"] == HINGE or leg["twists"] == 1)
+        is_on_base = leg["frame"] == FROM_BASE or leg["arm"] >= 0
+        is_read = leg["kind"] in (ROD, ARM) and is_on_base and leg["at_head"] == leg["reversed"] == leg["inner"] == 0
+        if leg["kind"] != IDLE and (is_loose or turns or not is_read):
             return False
     return all(place in (CARRIER, SLIDE) for _, place in driven)
 
 
 @routine
 def set_spheres(table: Table, values: Floats, now: Now, look: View, spheres: Spheres) -> None:
-    """Fill centres and radii where carriers are, and actuators have values (n_a,), deviations from home [L]."""
-    legs, own, q = table.legs, look.values, now.q
+    """Fill centres and radii where carriers and arms are, actuators at values (n_a,), deviations from home [L]."""
+    legs, own, q, frames, pose = table.legs, look.values, now.q, look.frames, now.pose
+    p = (pose[0, 3], pose[1, 3], pose[2, 3])
+    set_frames(now.pose, table.task[0], look.frames)
     for k in range(q.shape[0]):
-        if is_carried(legs[k]):
+        if legs[k]["kind"] == ARM:
+            place_arm(legs[k], q[k], look.frames, own[k])
+        elif is_carried(legs[k]):
             own[k, CARRIER], own[k, COSINE], own[k, SINE] = q[k], math.cos(q[k]), math.sin(q[k])
     for e in range(spheres.legs.shape[0]):
         k, i = spheres.legs[e], spheres.drivers[e]
-        main = main_of(table, k)
-        put(spheres.feet[e], carried_foot(legs[k], legs[main], own[main]))
-        spheres.lengths[e] = legs[k]["length"]
+        leg, main = legs[k], main_of(table, k)
+        foot = carried_foot(leg, legs[main], own[main])
+        if leg["arm"] >= 0:
+            frame = frames[leg["frame"]]
+            foot = add(p, turn(frame[AXES:], sub(foot, (frame[0, 3], frame[1, 3], frame[2, 3]))))
+        put(spheres.feet[e], foot)
+        spheres.lengths[e] = leg["length"]
         if i >= 0:
             spheres.lengths[e] += table.driven[i]["sense"] * values[table.driven[i]["column"]]
 
