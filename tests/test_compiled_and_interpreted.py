@@ -54,9 +54,9 @@ def some_targets(mechanism: pf.Mechanism, n: int, seed: int = 0, share: float = 
 def answers(name: str) -> dict[str, np.ndarray]:
     """What is compared; the home pose, and targets nearby: for some out of reach, where the interpreter is quick."""
     mechanism = machine(name)
-    targets = some_targets(mechanism, 4, share=0.05 if name in ("hexapod_rus", "mixed") else 0.2)
+    targets = some_targets(mechanism, 4, share=0.05 if name in ("hexapod_rus", "mixed", "nrpm") else 0.2)
     targets[0] = mechanism.home_pose
-    if name in ("five_bar", "stewart", "nrpm"):
+    if name in ("five_bar", "stewart"):
         targets[3, :3, 3] += 5 * mechanism.characteristic_length
     answer = pf.solve_ik(mechanism, targets)
     values = {"status": answer.status, "pose": answer.pose, "actuators": answer.actuators}
