@@ -17,8 +17,6 @@ from ..engine import engine_of
 from ..frozen import FrozenMapping
 from ..kernels.rows import (
     ACTUATOR_ERROR,
-    CERTIFIED,
-    HOLD,
     HOLD_NOTHING,
     ITERATIONS,
     LIMIT_EXCESS,
@@ -114,13 +112,13 @@ class Answer:
     @property
     def held(self) -> Held | NDArray[np.object_]:
         names = np.array([None, "orientation", "position"], dtype=object)
-        held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.counters[:, HOLD], HOLD_NOTHING)]
+        held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.holds, HOLD_NOTHING)]
         return held[0] if self.shape == () else held.reshape(self.shape)
 
     @property
     def certified(self) -> bool | NDArray[np.bool_]:
         status = self._rows.status
-        is_nearest = (status == Status.PROJECTED) & (self._rows.counters[:, CERTIFIED] == 1)
+        is_nearest = (status == Status.PROJECTED) & self._rows.certain
         return cast("bool | NDArray[np.bool_]", self._shaped((status == Status.REACHED) | is_nearest))
 
     @property
@@ -178,7 +176,7 @@ class Answer:
         found: dict[int, tuple[ActiveLimit, ...]] = {}
         engine = engine_of(self.mechanism)
         holds, ways = (
-            self._rows.counters[projected, HOLD],
+            self._rows.holds[projected],
             ways_of(self.mechanism, wanted.hold, wanted.rotation_length),
         )
         for way in ways:

@@ -21,9 +21,9 @@ def new_rows(mechanism: Mechanism, n: int) -> Rows:
     All but the actuators, which callers keep, is one piece of memory: allocators hold on to about as much as was given
     back at once, and to get what is more anew, page by page, takes longer than to answer.
     """
-    room, actuators = np.empty((26, n)), np.empty((n, len(mechanism.actuator_names)))
+    room, actuators = np.empty((25, n)), np.empty((n, len(mechanism.actuator_names)))
     room[16:] = 0.0
-    counters, status = room[21:25].view(np.int64).reshape(n, N_COUNTERS), room[25].view(np.int64)
+    counters, status = room[21:24].view(np.int64).reshape(n, N_COUNTERS), room[24].view(np.int64)
     status[:] = PENDING
     return Rows(status, counters, room[:16].reshape(n, 4, 4), actuators, room[16:21].reshape(n, 5))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
-from ..kernels.rows import HOLD, PROJECTED, REACHED, Rows
+from ..kernels.rows import PROJECTED, REACHED, Rows
 from ..options import Options
 from .close import closure_of
 from .first_order import are_stretched
@@ -56,7 +56,7 @@ class Bends:
         if found.status[0] != PROJECTED:
             return False
         holds = [way.hold for way in self._ways]
-        ours, theirs = (holds.index(rows.counters[0, HOLD]) for rows in (found, other))
+        ours, theirs = (holds.index(rows.holds[0]) for rows in (found, other))
         if ours != theirs:
             return theirs < ours
         closure, way = closure_of(self._mechanism), self._ways[ours]

@@ -20,7 +20,7 @@ from ..qp import QP, new_qp
 from ..references import opener
 from ..rotations import difference, yaw_difference
 from ..rows import (
-    CERTIFIED,
+    CERTAIN,
     HOLD,
     HOLD_NOTHING,
     ITERATIONS,
@@ -370,9 +370,9 @@ def approach(
         distances[row] = least
         if least < math.inf:
             counters[row, ITERATIONS] = search.control[0]["steps"]
-            counters[row, CERTIFIED] = int(work.met[0]["hits"] == math.inf)
             write(table, row, pose, search, best, found)
             judge(setting, row, found)
+            counters[row, HOLD] += CERTAIN if work.met[0]["hits"] == math.inf else 0
         else:
             left += 1
     return left

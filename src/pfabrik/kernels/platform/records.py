@@ -74,7 +74,7 @@ class Found(NamedTuple):
     poses: Floats  # (n, 4, 4) [length]
     q: Floats  # (n, legs)
     sides: Floats  # (n, legs)
-    counters: Ints  # (n, N_COUNTERS): steps, what is held, and whether none is nearer for certain, as of `Rows`
+    counters: Ints  # (n, N_COUNTERS): steps and what is held, as of `Rows`
     actuators: Floats  # (n, n_a)
     measures: Floats  # (n, 5): distances from the target [length, rad], the largest equation [length], limit excess
     status: Ints  # (n,): REACHED or PROJECTED
