@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from pfabrik import Options, Status
 from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.engine import engine_of
 from pfabrik.errors import InvalidArgument
 from pfabrik.platform.table import machine, machine_nearby
 
@@ -159,6 +160,7 @@ def test_what_is_no_mechanism_or_no_single_start_is_refused() -> None:
 @pytest.mark.parametrize("started", [False, True])
 def test_what_kernels_are_given_is_kept_as_long_as_a_solver(started: bool) -> None:
     """Kernels take an address: what it leads to must not go when a cache has forgotten the machine."""
+    engine_of.cache_clear()  # an engine of before may have been given what its cache has forgotten since
     mechanism = pf.load("stewart")
     home = mechanism.home_pose
     solver = pf.Solver(mechanism, start=pf.solve_ik(mechanism, home) if started else None)
