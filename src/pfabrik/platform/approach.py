@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -12,14 +12,15 @@ from ..arrays import Floats, Records
 from ..closure.close import MARGIN
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..kernels.closure.loops import LOCKED
+from ..description.task import task_of
+from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
 from ..kernels.platform.records import SETTINGS, Found, Plan, Starts
 from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
-from .rotation import implied_rows, without_idle_legs
+from .rotation import implied_rows, keeps_rotation, without_idle_legs
 from .table import OF_AIMS, machine_searched
 
 if TYPE_CHECKING:
@@ -43,8 +44,8 @@ class Approach:
 
     Parameters
     ----------
-    weights : what counts of the pose, (6,), as of `PoseObjective`.
-    settings : of `SETTINGS`, by name, those that do not follow from the machine.
+    weights : what counts of the pose, (6,), as of `PoseObjective`; what does not turn is held as it is.
+    settings : of `SETTINGS`, by name, those that do not follow from the machine and its task.
     others : starts that follow each row's own.
     driven : the coordinates that are to be near to values; None where only poses count.
     minds_aims : keep on the way, too, to where crossed hinges can point their rods. Rows that end where they cannot are
@@ -55,7 +56,7 @@ class Approach:
         self,
         mechanism: Mechanism,
         table: LegTable,
-        weights: Floats,
+        weights: Sequence[float],
         settings: Mapping[str, float],
         others: Starts,
         driven: Records | None = None,
@@ -63,7 +64,9 @@ class Approach:
         minds_aims: bool = False,
     ) -> None:
         self._table, searches = table, settings["steps"] > 0
-        at_home = table.task[0]["rotations"] == 0 and weights[3] == LOCKED and searches
+        counted, rests = np.array(weights, dtype=float), keeps_rotation(mechanism)
+        counted[3:] = LOCKED if rests else counted[3:]
+        at_home = table.task[0]["rotations"] == 0 and counted[3] == LOCKED and searches
         legs = without_idle_legs(table) if at_home and not len(table.arms) else machine_searched(table)
         self._legs = legs if driven is None else Handle(legs.record._replace(driven=driven))
         cones = self._legs.record.cones
@@ -72,9 +75,10 @@ class Approach:
         own["margin"], own["near"], own["cones"] = MARGIN, TOLERANCES.active, minded
         own["implied"] = 0 if len(table.arms) else implied_rows(mechanism)
         own["hits"] = _hits(table) if driven is None else HITS_OF_VALUES
-        for name, value in settings.items():
+        for name, value in {"frame": task_of(mechanism).frame, **settings}.items():
             own[name] = value
-        self._plan = Handle(Plan(weights, own, *others))
+        own["frame"] = BASE_AXES if rests else own["frame"]
+        self._plan = Handle(Plan(counted, own, *others))
         self._no_values = np.zeros((0, len(self._legs.record.driven)))
         self._minding: Approach | None = None
         if minded < len(cones):

@@ -11,7 +11,7 @@ from ..arrays import Floats
 from ..closure.configurations import new_rows
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
-from ..kernels.closure.loops import BASE_AXES, LOCKED
+from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Starts
 from ..kernels.rows import REACHED
@@ -95,10 +95,7 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
         bound = directions[: (sizes > TOLERANCES.alignment).sum()]
         twists -= twists @ bound.T @ bound  # what the legs do not allow at home they hardly do elsewhere
     poses[:, :3, 3] += twists[:, :3]
-    weights = np.array([1.0, 1.0, 1.0, TURNING, TURNING, TURNING])
-    if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
-        weights[3:] = LOCKED
-    else:
+    if not keeps_rotation(mechanism):
         poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
     q = np.zeros((n, len(table.legs)))
     for carrier in (*carriers_of(table), *table.arms):
@@ -108,8 +105,8 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     pivots = _sided_pivots(table)
     sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
     targets = in_lengths(poses, mechanism.characteristic_length)
-    settings = {"frame": BASE_AXES, "steps": DRAWN_STEPS}
-    approach = Approach(mechanism, table, weights, settings, no_starts(table))
+    weights = (1.0, 1.0, 1.0, TURNING, TURNING, TURNING)
+    approach = Approach(mechanism, table, weights, {"frame": BASE_AXES, "steps": DRAWN_STEPS}, no_starts(table))
     found = approach.find(targets, Starts(poses, q, sides))
     found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
     return Starts(*found[1:4]).at(np.flatnonzero(np.isfinite(found.distances)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 
@@ -14,15 +13,14 @@ from ..decomposition.leg_table import LegTable, leg_table
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..kernels.closure.loops import BASE_AXES, LOCKED
+from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Found, Starts
-from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
+from ..kernels.rows import HOLD_ORIENTATION, HOLD_POSITION
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .approach import Approach, in_lengths, new_found, no_starts
 from .corners import corners_of
-from .rotation import keeps_rotation
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
@@ -85,22 +83,8 @@ def _ways(
             "held_position": TOLERANCES.held * length if way.hold == HOLD_POSITION else np.inf,
             "held_rotation": TOLERANCES.held if way.hold == HOLD_ORIENTATION else np.inf,
         }
-        ways.append(_approach(mechanism, table, way, settings | held, others))
+        ways.append(Approach(mechanism, table, way.weights, settings | held, others))
     return tuple(ways)
-
-
-def _approach(
-    mechanism: Mechanism,
-    table: LegTable,
-    way: Way,
-    settings: Mapping[str, float],
-    others: Starts,
-    driven: Records | None = None,
-) -> Approach:
-    weights, frame = np.array(way.weights, dtype=float), task_of(mechanism).frame
-    if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
-        weights[3:], frame = LOCKED, BASE_AXES
-    return Approach(mechanism, table, weights, {"frame": frame, **settings}, others, driven)
 
 
 def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: Way) -> Floats:
@@ -120,7 +104,7 @@ def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, prese
 @lru_cache(maxsize=256)
 def _weighing(mechanism: Mechanism, table: LegTable, way: Way) -> Approach:
     """What takes no steps, and weighs limits."""
-    return _approach(mechanism, table, way, {"steps": 0}, no_starts(table))
+    return Approach(mechanism, table, way.weights, {"steps": 0}, no_starts(table))
 
 
 def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, corners: bool) -> Found:
@@ -135,12 +119,9 @@ def _toward_values(mechanism: Mechanism, corners: bool) -> Approach:
     """Searches for actuators that have values; the pose does not count."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    weights = np.zeros(6)
-    if mechanism.end_effector_is_joint or keeps_rotation(mechanism):
-        weights[3:] = LOCKED
     others = corners_of(mechanism) if corners else no_starts(table)
     settings = {"frame": BASE_AXES, "steps": MOST_STEPS}
-    return Approach(mechanism, table, weights, settings, others, table.driven)
+    return Approach(mechanism, table, (0.0,) * 6, settings, others, table.driven)
 
 
 def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
@@ -162,9 +143,9 @@ def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: St
 @lru_cache(maxsize=64)
 def _toward_arms(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, slice, Approach], ...]:
     """Searches for each set of arms at poses that are held: the arms, and which legs these are."""
-    way = Way(task_of(mechanism).weights(LOCKED, LOCKED), HOLD_NOTHING)
+    held = task_of(mechanism).held
     return tuple(
-        (part.arms, legs, _approach(mechanism, part, way, {"steps": MOST_STEPS}, no_starts(part), part.arms))
+        (part.arms, legs, Approach(mechanism, part, held, {"steps": MOST_STEPS}, no_starts(part), part.arms))
         for part, legs in _apart_by_arms(table)
     )
 

@@ -24,12 +24,15 @@ SAMPLES, NEARBY = 8, 0.05
 
 @lru_cache(maxsize=64)
 def keeps_rotation(mechanism: Mechanism) -> bool:
-    """Whether legs keep the platform from turning, though its task leaves the rotation open: parallelograms do.
+    """Whether the platform does not turn: a joint has no orientation; and legs such as parallelograms keep it from
+    that, though its task leaves the rotation open.
 
     A platform that has turned over on its rods is of no use, though its loops close, and no answer.
     """
+    if mechanism.end_effector_is_joint:
+        return True
     table = leg_table(mechanism)
-    if not isinstance(table, LegTable) or task_of(mechanism).rotations > 0 or mechanism.end_effector_is_joint:
+    if not isinstance(table, LegTable) or task_of(mechanism).rotations > 0:
         return False
     if table.task[0]["rows"] < 3:
         return False
