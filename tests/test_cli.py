@@ -1084,7 +1084,7 @@ def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
             process.kill()  # where it has ended, nothing happens
     assert "Traceback" not in said
     # a shell calls both 130; Python sends itself the signal again if it arrived in code that it was just generating
-    assert process.returncode in (130, -signal.SIGINT)
+    assert process.returncode in (130, -signal.SIGINT), said
     assert os.listdir(tmp_path) == []
 
 
