@@ -221,7 +221,7 @@ IN_A_PLANE = {"five_bar": (0.0, 1.0, 1.0), "rrr": (1.0, 1.0, 0.0), "rpr": (1.0, 
 @pytest.mark.parametrize("count", [8 if INTERPRETED else 100, pytest.param(5000, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize(
     "name",
-    [*IN_A_PLANE, "delta", "linear_delta", "orthoglide", "psu", "stewart", "ucu", "servo_hexapod", "hexaglide"],
+    [*IN_A_PLANE, "delta", "linear_delta", "orthoglide", "psu", "stewart", "ucu", "servo_hexapod", "hexaglide", "nrpm"],
 )
 def test_nothing_is_reached_that_is_nearer_than_what_is_certified(name: str, count: int) -> None:
     mechanism, rng, axes = pf.load(name), np.random.default_rng(1), IN_A_PLANE.get(name, 1.0)

@@ -11,10 +11,14 @@ a crank, b turns too. All of it is convex in y where sum_k m_k < 1, and then lea
 
     |x - T|^2 / 2 + sum_g f_g(q_g) - |sum_g v_g(q_g)|^2 / (2 (1 - sum_k m_k)),
 
-with f_g = A (cos q - 1) + B sin q and |v_g|^2 = 2 V^2 (1 - cos q) of a crank, B q - A q^2 / 2 and V^2 q^2 of a
-carriage. Since |sum_g v_g|^2 <= sum_g |v_g|^2 / s_g for any shares s_g that add up to one, nothing is nearer, in any
-working mode, if each carrier has a share with which f_g outweighs its part within the limits of q_g: at least
-V^2 / (1 - sum_k m_k) / (most - A), with most the largest A for which f_g is not negative there.
+with f_g = A (cos q - 1) + B sin q and |v_g|^2 = 2 V^2 (1 - cos q) of a hinge, b q - m q^2 / 2 and m^2 q^2 of a slide,
+m the sum of the m_k on it. Since |sum_g v_g|^2 <= sum_g |v_g|^2 / s_g for any shares s_g that add up to one, nothing is
+nearer, in any working mode, if each carrier has a share with which f_g outweighs its part within the limits of q_g: at
+least V^2 / (1 - sum_k m_k) / (most - A), with most the largest A for which f_g is not negative there.
+
+Of an arm, a slide d on a hinge or a hinge on a slide, f_g has d (lean (cos q - 1) + twist sin q) besides. The first is
+at least the largest lean d, as if it were part of A; the second at least - w d^2 / 2 + twist^2 / w (cos q - 1) for any
+w, here half of what the slide has left.
 """
 
 from __future__ import annotations
@@ -26,11 +30,23 @@ from .._jit import routine
 from ..closure.loops import BASE_AXES
 from ..free_motions import put_multipliers
 from ..legs.answer import deviation
-from ..legs.frames import NOWHERE
-from ..legs.records import CARRIAGE, CARRIER, CRANK, FOOT, FOOT_LINE, FROM_BASE, HEAD, HINGE, ROD, SHARED, SLIDE, Table
-from ..legs.rods import carried_foot
-from ..vectors import Vec, add, along, cross, dot, flatten, norm, rotate, scale, sub, vec
-from .equations import direction, is_carried, own_row, place
+from ..legs.frames import AXES, NOWHERE
+from ..legs.records import (
+    CARRIAGE,
+    CARRIER,
+    CRANK,
+    FOOT,
+    FOOT_LINE,
+    FROM_BASE,
+    HEAD,
+    HINGE,
+    NO_CARRIER,
+    ROD,
+    SLIDE,
+    Table,
+)
+from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
+from .equations import View, direction, is_carried, main_of, own_row, place
 from .lagrangian import put_force
 from .limits import AT_FOOT, AT_HEAD, cone_slope, seen
 from .linearise import linearise
@@ -63,31 +79,102 @@ def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
         put_multipliers(search.here, view, search.balance)
     unit, away = search.gradient.unit[0], vec(search.force)
     nearer = NEARER * dot(away, away) / unit
-    total, pushing, shares, k = away, 0.0, 0.0, 0
-    while k < table.legs.shape[0]:
-        main, A, B, v = k, 0.0, 0.0, NOWHERE
-        while k < table.legs.shape[0] and (k == main or table.legs[k]["carrier"] == SHARED):
-            m, b, e = hold_of(table, k, main, search)
-            line, (spoke, tangent, axis) = vec(search.look.lines[k]), arm_of(table, k, main, search)
-            total, pushing, pull = add(along(total, -m, line), b), pushing + m, sub(scale(m, line), b)
-            A += dot(pull, spoke) + m * dot(tangent, tangent) - dot(line, flatten(e, axis)) - 2.0 * dot(e, spoke)
-            B += dot(pull, tangent) - dot(line, cross(axis, e))
-            v = add(v, along(scale(m, tangent), -1.0, cross(axis, e)))
-            k += 1
-        room = most_of(table, main, B, nearer, search) - A
-        if room <= 0.0 and (A != 0.0 or B != 0.0):
-            return False
-        shares += dot(v, v) / room if room > 0.0 else 0.0
+    total, pushing, shares = away, 0.0, 0.0
+    for root in range(table.legs.shape[0]):
+        force, push, share = share_of(table, root, nearer, search)
+        total, pushing, shares = add(total, force), pushing + push, shares + share
     return bool(norm(total) <= BALANCED * norm(away) and shares < unit - pushing)
 
 
 @routine
-def hold_of(table: Table, k: int, main: int, search: Search) -> tuple[float, Vec, Vec]:
-    """How much a rod pushes, m, what else holds it, b, and what of - b turns with its crank, e; times the unit of the
-    objective."""
-    leg, lead, look, multipliers = table.legs[k], table.legs[main], search.look, search.hessian.multipliers
-    if leg["kind"] != ROD or leg["frame"] != FROM_BASE:
-        return 0.0, NOWHERE, NOWHERE
+def share_of(table: Table, root: int, nearer: float, search: Search) -> tuple[Vec, float, float]:
+    """How rods that reach the base by one leg, see `way_of`, hold the platform: with what force, how much they push,
+    and what share their carriers need; infinite where these may bring something nearer."""
+    view, force, pushing, moved = search.look, NOWHERE, 0.0, NOWHERE
+    A, B, b, push, lean, twist = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    hinge, slide = -1, -1
+    for k in range(root, table.legs.shape[0]):
+        first, on_hinge, on_slide = way_of(table, k)
+        if first != root:
+            continue
+        m, at_foot, at_head = hold_of(table, k, search)
+        if m == 0.0 and norm(at_foot) + norm(at_head) == 0.0:
+            continue
+        if (hinge >= 0 and on_hinge not in (-1, hinge)) or (slide >= 0 and on_slide not in (-1, slide)):
+            return force, pushing, math.inf
+        axes = view.frames[table.legs[k]["frame"], AXES:]
+        line, at_foot, at_head = turn(axes, vec(view.lines[k])), turn(axes, at_foot), turn(axes, at_head)
+        pull = along(scale(m, line), -1.0, at_head)
+        force, pushing = add(force, sub(at_foot, pull)), pushing + m
+        axis, arm, course = NOWHERE, NOWHERE, NOWHERE
+        if on_hinge >= 0:
+            hinge, axis = on_hinge, axis_of(table, on_hinge, view)
+            arm = sub(head_from(table, k, on_hinge, view), line)
+            spoke, turned, rod = flatten(arm, axis), flatten(at_foot, axis), add(line, arm)
+            A += dot(pull, spoke) + m * dot(spoke, spoke) + dot(turned, rod)
+            B += dot(pull, cross(axis, spoke)) + dot(cross(axis, turned), rod)
+            moved = add(moved, along(turned, m, spoke))
+        if on_slide >= 0:
+            slide, course = on_slide, axis_of(table, on_slide, view)
+            b, push = b + dot(sub(pull, at_foot), course), push + m
+            turns = on_slide != root
+            both = along(pull if turns else at_foot, m, arm)
+            lean += dot(both, flatten(course, axis)) if turns else -dot(both, flatten(course, axis))
+            twist += dot(both, cross(axis, course))
+    share = 0.0
+    if slide >= 0 and (b != 0.0 or push != 0.0):
+        room = (most_of(table, slide, b, nearer, search) - push) * (0.5 if hinge >= 0 else 1.0)
+        if room <= 0.0:
+            return force, pushing, math.inf
+        share = push * push / room
+        if hinge >= 0:
+            back, forth = room_of(table, slide, search)
+            A += twist * twist / room + (max(lean * back, lean * forth) if lean != 0.0 else 0.0)
+    if hinge >= 0 and (A != 0.0 or B != 0.0):
+        room = most_of(table, hinge, B, nearer, search) - A
+        share = share + dot(moved, moved) / room if room > 0.0 else math.inf
+    return force, pushing, share
+
+
+@routine
+def way_of(table: Table, k: int) -> tuple[int, int, int]:
+    """The leg by which a rod reaches the base, its own or the first of the arms that it is on, and the hinge and the
+    slide on its way there, -1 for none; all -1 where there are more, or it is no such rod."""
+    leg, at, first, hinge, slide = table.legs[k], main_of(table, k), -1, -1, -1
+    while at >= 0 and leg["kind"] == ROD:
+        lead = table.legs[at]
+        if lead["at_head"] == 1 or lead["twin"] >= 0 or (lead["arm"] < 0 and lead["frame"] != FROM_BASE):
+            return -1, -1, -1
+        if lead["carrier"] == CRANK and hinge < 0:
+            hinge = at
+        elif lead["carrier"] == CARRIAGE and slide < 0:
+            slide = at
+        elif lead["carrier"] != NO_CARRIER:
+            return -1, -1, -1
+        first, at = at, lead["arm"]
+    return first, hinge, slide
+
+
+@routine
+def axis_of(table: Table, carrier: int, view: View) -> Vec:
+    """The axis of a carrier as it is now."""
+    lead = table.legs[carrier]
+    return turn(view.frames[lead["frame"], AXES:], vec(lead["carrier_axis"]))
+
+
+@routine
+def head_from(table: Table, k: int, hinge: int, view: View) -> Vec:
+    """Where the head of a rod is, from a hinge that it is on."""
+    lead = table.legs[hinge]
+    frame = view.frames[lead["frame"]]
+    return turn(frame[AXES:], sub(move(frame, vec(table.legs[k]["head_point"])), vec(lead["carrier_point"])))
+
+
+@routine
+def hold_of(table: Table, k: int, search: Search) -> tuple[float, Vec, Vec]:
+    """How much a rod pushes, m, and what else holds it at its foot and at its head, parts of b; times the unit of the
+    objective, as the body of the foot sees it."""
+    leg, main, look, multipliers = table.legs[k], main_of(table, k), search.look, search.hessian.multipliers
     length, ranges, row, pull = norm(vec(look.lines[k])), table.limited.shape[0], leg["first_row"], 0.0
     at_foot, at_head = NOWHERE, NOWHERE
     if is_carried(leg):
@@ -128,7 +215,7 @@ def hold_of(table: Table, k: int, main: int, search: Search) -> tuple[float, Vec
         pull, at_head = pull + stretch, along(at_head, lengthwise, u)
         at_foot = along(at_foot, -push, axis) if end == AT_FOOT else at_foot
         at_head = along(at_head, -push, axis) if end == AT_HEAD else at_head
-    return -pull / length, add(at_foot, at_head), scale(-1.0 if lead["carrier"] == CRANK else 0.0, at_foot)
+    return -pull / length, at_foot, at_head
 
 
 @routine
@@ -139,18 +226,6 @@ def bound_by(leg: Record, push: float, half_angle: float) -> tuple[float, float,
     if leg["slides"] == 0:
         return lengthwise, 0.0, push
     return 0.0, max(lengthwise, 0.0), push
-
-
-@routine
-def arm_of(table: Table, k: int, main: int, search: Search) -> tuple[Vec, Vec, Vec]:
-    """The foot of a rod as seen from the axis of its crank, its velocity by the carrier's coordinate, and that axis;
-    of a carriage, the velocity alone."""
-    lead, foot = table.legs[main], carried_foot(table.legs[k], table.legs[main], search.look.values[main])
-    axis = vec(lead["carrier_axis"])
-    if lead["carrier"] == CRANK:
-        arm = flatten(sub(foot, vec(lead["carrier_point"])), axis)
-        return arm, cross(axis, arm), axis
-    return NOWHERE, axis if lead["carrier"] == CARRIAGE else NOWHERE, NOWHERE
 
 
 @routine
