@@ -122,7 +122,8 @@ def batch_rows(
 ) -> Iterator[Row]:
     n, solve = len(targets), partial(pf.solve_ik, mechanism, targets)
     with one_core():
-        ours, with_points, *theirs = best_times(runs, solve, lambda: solve().points, *baselines.values())
+        ours, *theirs = best_times(runs, solve, *baselines.values())
+        with_points, *_ = best_times(runs, lambda: solve().points)
     for baseline, seconds in zip(baselines, theirs, strict=True):
         yield Row(f"{what}, one core", n, ours / n, baseline, seconds / n)
     ours, *theirs = best_times(runs, solve, *baselines.values())
