@@ -43,7 +43,7 @@ FINE, ROUNDING = 1e-11, 1e-13
 """Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
 it did not lead up by more than the second, or than it costs to close what counts as closed: it is known no better."""
 
-LAST, NEXT, CONVERGING = 1e-18, 1e-22, 1e-2
+LAST, NEXT, CONVERGING = 1e-18, 1e-20, 1e-2
 """Share of the objective that the last step promises: its length is a billionth of the distance. That a step after it
 would promise. And, of a fine step, share of what the one before promised: if it is more, what moves is rounding."""
 

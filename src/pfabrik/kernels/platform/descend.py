@@ -45,8 +45,9 @@ step was short for damping."""
 THERE = 1e-12
 """Distance at which a search has arrived, and which counts as none [L]."""
 
-OF_CARRIERS = 0.6
-"""What the steps of carriers count beside those of the platform: they end where rods have their lengths."""
+OF_CARRIERS, ALONE = 0.6, 0.5
+"""What the steps of carriers count beside those of the platform: they end where rods have their lengths. And those of
+the platform where it alone has unknowns: the squares of rods' lengths are then quadratic in its position."""
 
 STUCK = 0.2
 """Share of a gap that a step which closes it leaves at most: at a double root Newton's method leaves a quarter."""
@@ -67,7 +68,7 @@ def take(table: Table, view: FreeMotions, x: Floats, now: Now, search: Search) -
     put_step(x, view, search.step)
     most = 0.0
     for j in range(n):
-        most = max(most, abs(step[j]) * (1.0 if j < 6 else OF_CARRIERS))
+        most = max(most, abs(step[j]) * (ALONE if n == 6 else 1.0 if j < 6 else OF_CARRIERS))
     share = LONGEST_STEP / max(most, LONGEST_STEP)
     move(table, search.step, share, now)
     close_rods(table, now, search.look)
