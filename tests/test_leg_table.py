@@ -269,6 +269,22 @@ def test_feasibility_turns_what_a_leg_does_not_reach_as_it_stands_at_home() -> N
     assert feasible.sum() > 0.98 * reached.sum()
 
 
+def test_feasibility_tells_where_three_hinges_through_a_point_cannot_point() -> None:
+    """Two hinges at an angle a, the outer of them and the platform's at b: the first and the last are |a - b| to a + b
+    apart."""
+    mechanism = closure.coaxial_rrr().without_limits()
+    first, second, last = (np.array([mechanism.joint(f"R{leg}.{k}").axis for leg in (1, 2, 3)]) for k in (1, 2, 3))
+    turns = Rotation.from_rotvec(np.random.default_rng(4).uniform(-1.2, 1.2, (200, 3))).as_matrix()
+    apart = np.arccos(np.einsum("li,nij,lj->nl", first, turns, last))
+    a, b = np.arccos((first * second).sum(axis=1)), np.arccos((second * last).sum(axis=1))
+    beyond = np.maximum(apart - (a + b), np.abs(a - b) - apart).max(axis=1)
+    found = pf.feasibility(mechanism, pf.pose([0, 0, 0], rotation=turns))
+    np.testing.assert_array_equal(found.margin >= 0.0, beyond <= 0.0)
+    np.testing.assert_allclose(found.margin[beyond > 0.0], -beyond[beyond > 0.0], atol=1e-9)
+    assert {found.limits[each][1] for each in found.binding[beyond > 0.0]} == {"closed"}
+    assert 20 < (beyond > 0.0).sum() < 180
+
+
 @pytest.mark.parametrize("name", ["stewart", "delta", "orthoglide"])
 def test_feasibility_on_a_grid_is_that_of_its_targets(name: str) -> None:
     mechanism = machine(name)

@@ -10,7 +10,7 @@ import math
 
 from ...arrays import Floats
 from .._jit import routine
-from ..vectors import Vec, along, cross, dot, scale
+from ..vectors import Vec, along, angle_between, cross, dot, scale
 
 # Sine of the angle from a dead point, or from aligned hinges, below which a solution is not sure to half its digits.
 SURE = 1e-6
@@ -64,6 +64,14 @@ def aim(axes: Floats, u: Vec, w: Vec, side: float, angles: Floats) -> float:
     angles[0] = angle_to(a, turned(u, b, cosine, sine), w)
     angles[1] = math.atan2(sine, cosine)
     return sure
+
+
+@routine
+def missed_by(axes: Floats, u: Vec, w: Vec, angles: Floats) -> float:
+    """Angle from where two crossed hinges, at such angles, turn `u` to `w`: what `aim` leaves where they cannot."""
+    a, b = (axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])
+    by_last = turned(u, b, math.cos(angles[1]), math.sin(angles[1]))
+    return angle_between(w, turned(by_last, a, math.cos(angles[0]), math.sin(angles[0])))
 
 
 @routine

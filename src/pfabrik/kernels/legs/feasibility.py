@@ -10,8 +10,9 @@ from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
 from ..vectors import angle_between, copy_row, vec
 from .answer import CLOSE, KEPT, complete, deviation, end_of_rows, new_completion, put_rows
+from .endings import missed_by
 from .poses import lean_to, load, put_pose
-from .records import CARRIAGE, CRANK, ROD, SLIDE
+from .records import CARRIAGE, CRANK, CROSS, FOOT, FOOT_LINE, HEAD, HEAD_LINE, PIVOT, ROD, SLIDE, TRIPLE
 from .table import open_table
 
 PARTS, MORE_PARTS = 4, 16
@@ -57,7 +58,8 @@ def feasibility(
     """Fill the least margin of each target (n, 4, 4) [length], and which limit it is of.
 
     After the limits of `least_margin` come, for each leg, that it reaches (margin: minus the gap, as a share of the
-    rod) and, for each, that it closes (minus its largest constraint). NaN and -1 where a target is no pose.
+    rod) and, for each, that it closes (minus its largest constraint, or the angle by which crossed hinges cannot point
+    where they should). NaN and -1 where a target is no pose.
     """
     table = open_table(machine)
     work, legs, task, limited, cones = new_completion(table), table.legs, table.task, table.limited, table.cones
@@ -93,7 +95,7 @@ def feasibility(
                     share = reach_of(legs[k], work.values[k])
                     if share < -CLOSE and share < least:
                         least, binding = share, n_limits + k
-                    share = -largest_row(legs, work.rows, k)
+                    share = -max(largest_row(legs, work.rows, k), missed_by_ends(legs[k], work.values[k]))
                     if share < -CLOSE and share < least:
                         least, binding = share, n_limits + n_legs + k
             if parts == 1 or least > margins[row]:
@@ -126,6 +128,20 @@ def reach_of(leg: Record, own: Floats) -> float:
     if leg["kind"] == ROD and (leg["carrier"] == CRANK or leg["carrier"] == CARRIAGE):
         return -abs(own[SLIDE]) / leg["length"]
     return 0.0
+
+
+@routine
+def missed_by_ends(leg: Record, own: Floats) -> float:
+    """The largest angle by which crossed hinges of a leg, or the first two of three, cannot point where they should."""
+    if leg["kind"] == PIVOT and leg["foot"] == TRIPLE:
+        axes = leg["foot_axes"]
+        return missed_by(axes, vec(axes[2]), vec(own[FOOT_LINE:]), own[FOOT:])
+    worst = 0.0
+    if leg["kind"] == ROD and leg["foot_aimed"] == 1 and leg["foot"] == CROSS:
+        worst = missed_by(leg["foot_axes"], vec(leg["line"]), vec(own[FOOT_LINE:]), own[FOOT:])
+    if leg["kind"] == ROD and leg["head_aimed"] == 1 and leg["head"] == CROSS:
+        worst = max(worst, missed_by(leg["head_axes"], vec(leg["line"]), vec(own[HEAD_LINE:]), own[HEAD:]))
+    return worst
 
 
 @routine
