@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from checks import excess_of_points, gap_of_points
+from checks import excess_of_joints, excess_of_points, gap_of_joints, gap_of_points
 from machines import closure, positions
 from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
@@ -515,6 +515,24 @@ def test_the_second_forearm_of_a_parallelogram_keeps_its_own_cone(name: str) -> 
     assert (on_first.position_error > wide.position_error + 1e-3 * length).any()
     np.testing.assert_allclose(on_second.position_error, on_first.position_error, atol=1e-6 * length)
     assert all(margin.min() >= -1e-8 for margin in pf.margins(on_second).values())
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "strut"),
+    [(pf.load("stewart"), "BL1"), (closure.gripper_on_platform(), "P1.2")],
+    ids=["in the pose", "on joint coordinates"],
+)
+def test_the_nearest_with_a_joint_locked_is_that_with_it_fixed(mechanism: Mechanism, strut: str) -> None:
+    at, length = mechanism.joint(strut), float(mechanism.home_coordinate(strut))
+    locked = mechanism.with_limits({strut: (length, length)})
+    weld = Joint(strut, "fixed", at.connects, at=mechanism.reference_point)
+    fixed = replace(mechanism, joints=tuple(weld if joint.name == strut else joint for joint in mechanism.joints))
+    targets = drawn_targets(mechanism, np.random.default_rng(3), 2 if INTERPRETED else 12)
+    answers, others = (pf.solve_ik(each, targets, options=Options(hold=None)) for each in (locked, fixed))
+    assert gap_of_joints(locked, answers).max() <= FEASIBLE
+    assert excess_of_joints(locked, answers).max() <= FEASIBLE
+    np.testing.assert_allclose(distances(locked, answers), distances(mechanism, others), rtol=SAME)
+    assert (answers.status == Status.PROJECTED).any()
 
 
 def test_a_working_mode_with_a_small_room_of_its_own_is_searched() -> None:

@@ -14,6 +14,8 @@ class Tolerances:
     position : pose and closure tolerance [L]. Machine precision leaves three decimal orders of room below it.
     rotation : rotation tolerance [rad], the same in angle.
     limit : excess up to which a limit counts as kept [L or rad].
+    inside : how far inside their limits answers are put [L or rad]: what is met to the last digit counts as
+        kept. A range with less room than that on both sides, as of a locked joint, is kept in its middle.
     home_slack : how far home may lie outside its own limits [L or rad]: files are written with rounded numbers, so
         home on a bound must not be refused for its last digit.
     active : distance from a bound below which a limit is reported as active [L or rad]; above the inward margin that
@@ -52,6 +54,7 @@ class Tolerances:
     position: float = 1e-9
     rotation: float = 1e-9
     limit: float = 1e-9
+    inside: float = 1e-10
     home_slack: float = 1e-9
     active: float = 1e-7
     held: float = 1e-6

@@ -28,9 +28,6 @@ HELD = (K.LOCKED,) * 6
 CLOSED = 0.3 * TOLERANCES.position
 """Gap of a path that counts as closed [L or rad]: loops, which lead along two paths, may add their gaps up."""
 
-MARGIN = 0.1 * TOLERANCES.limit
-"""How far inside their limits answers are put: limits that are met to the last digit count as kept."""
-
 
 @dataclass(frozen=True)
 class Closure:

@@ -11,7 +11,7 @@ from ..arrays import Floats
 from ..kernels.closure.loops import BASE_AXES, SIGHT, Closed, Objective, PoseObjective
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
-from .close import EVERYTHING_FREE, MARGIN, Closing, Closure, close
+from .close import EVERYTHING_FREE, Closing, Closure, close
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -50,7 +50,7 @@ def nearest_actuators(closure: Closure, coordinates: Floats, poses: Floats, valu
     anchors, weights = coordinates.copy(), np.zeros(len(closure.scale))
     closure.put_actuators(anchors, values)
     weights[closure.actuated] = 1.0
-    begin = close(closure, anchors, poses, limits=True, margin=MARGIN)
+    begin = close(closure, anchors, poses, limits=True, margin=TOLERANCES.inside)
     free = _objective(closure, begin.poses, EVERYTHING_FREE, BASE_AXES, MOST_STEPS)
     return _ended(closure, begin.coordinates, free._replace(weights=weights, anchors=anchors * closure.scale))
 
@@ -104,7 +104,7 @@ def _objective(closure: Closure, targets: Floats, platform: Sequence[float], fra
     """What is to come near where no coordinate counts."""
     wanted = targets.copy()
     wanted[:, :3, 3] /= closure.mechanism.characteristic_length
-    pose = PoseObjective(wanted, np.array(platform, dtype=float), frame, MARGIN, TOLERANCES.active, steps)
+    pose = PoseObjective(wanted, np.array(platform, dtype=float), frame, TOLERANCES.inside, TOLERANCES.active, steps)
     return Objective(pose, np.zeros(len(closure.scale)), np.zeros((len(targets), 0)))
 
 

@@ -11,7 +11,8 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES
 from ..poses import pose
-from .close import EVERYTHING_FREE, MARGIN, close, closure_of
+from ..tolerances import TOLERANCES
+from .close import EVERYTHING_FREE, close, closure_of
 from .descend import approached
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .starts import random_starts
@@ -65,6 +66,6 @@ def chanced_upon(mechanism: Mechanism) -> tuple[Floats, Floats]:
     if keeps_rest:
         poses = task.completed(poses, np.repeat(mechanism.home_pose[None], CHANCES, axis=0))
     platform, frame = (rest.held, rest.frame) if keeps_rest else (EVERYTHING_FREE, BASE_AXES)
-    found = close(closure, coordinates, poses, platform=platform, frame=frame, limits=True, margin=MARGIN)
+    found = close(closure, coordinates, poses, platform=platform, frame=frame, limits=True, margin=TOLERANCES.inside)
     feasible = found.feasible
     return found.coordinates[feasible], found.poses[feasible]

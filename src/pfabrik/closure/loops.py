@@ -14,7 +14,7 @@ from ..description.home_mobility import universal_axes
 from ..description.mechanism import Joint, Mechanism
 from ..description.paths import Path, independent_paths
 from ..kernels.closure import loops as K
-from ..motion.displacements import columns, home_coordinates, rate_units
+from ..motion.displacements import columns, rate_units
 from ..tolerances import TOLERANCES
 
 
@@ -192,8 +192,9 @@ def _ranges(mechanism: Mechanism) -> tuple[Floats, Floats]:
 
     A coordinate that is a distance has one even where the description gives none: it is not negative.
     """
-    bounds = np.reshape([each.bounds for each in mechanism.coordinates], (-1, 2)).T
-    lo, hi = np.ascontiguousarray((bounds - home_coordinates(mechanism)) / rate_units(mechanism))
+    units = rate_units(mechanism).tolist()
+    room = [each.room(unit) for each, unit in zip(mechanism.coordinates, units, strict=True)]
+    lo, hi = np.ascontiguousarray(np.reshape(room, (-1, 2)).T)
     return lo, hi
 
 

@@ -16,7 +16,7 @@ from ..kernels.closure.loops import LOCKED
 from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
-from .close import MARGIN, Closing, Closure, close, closure_of, platform_poses
+from .close import Closing, Closure, close, closure_of, platform_poses
 from .descend import approached, weighed_limits
 from .known import corners_of
 from .parasitic import strays
@@ -146,5 +146,5 @@ def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Closi
     held = np.zeros((4, 4), bool)
     held[:3, 3], held[:3, :3] = np.array(way.weights[:3]) == LOCKED, LOCKED in way.weights[3:]
     placed = np.where(held, task.completed(targets, begin), begin)
-    closed = close(closure, start, placed, platform=way.held, frame=task.frame, limits=True, margin=MARGIN)
+    closed = close(closure, start, placed, platform=way.held, frame=task.frame, limits=True, margin=TOLERANCES.inside)
     return approached(closure, closed.coordinates, targets, platform=way.weights, frame=task.frame)

@@ -19,7 +19,7 @@ from ..options import Options
 from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
 from .assemble import assemble, judged
-from .close import HELD, MARGIN, Closing, Closure, close, closure_of, measured, platform_poses
+from .close import HELD, Closing, Closure, close, closure_of, measured, platform_poses
 from .configurations import Configurations, coordinates_for, joint_coordinates, new_rows, put_rows, write_closing
 from .descend import within_sight
 from .known import chanced_upon
@@ -135,7 +135,7 @@ def begin_of(mechanism: Mechanism, start: Configurations | None) -> Floats:
     away = np.flatnonzero(~present.feasible)
     if len(away):
         closure, poses = closure_of(mechanism), present.poses[away]
-        present.take(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=MARGIN))
+        present.take(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=TOLERANCES.inside))
     return present.coordinates
 
 
@@ -287,7 +287,7 @@ def _close_below(
         platform=held,
         frame=BASE_AXES if held == HELD else task_of(closure.mechanism).frame,
         limits=limits,
-        margin=MARGIN,
+        margin=TOLERANCES.inside,
         max_iterations=max_iterations,
     )
 

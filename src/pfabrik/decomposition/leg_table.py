@@ -205,15 +205,13 @@ def _coordinate(mechanism: Mechanism, leg: int, item: Item, place: int) -> tuple
     key = item.joint.name, item.place
     own = next(each for each in mechanism.coordinates if (each.joint.name, each.place) == key)
     unit = 1.0 if own.kind == "angle" else mechanism.characteristic_length
-    lo, hi = own.bounds
     return (
         leg,
         place,
         own.column,
         int(own.joint.type in ("revolute", "cylindrical") and own.kind == "angle"),
         item.sense,
-        (lo - own.home) / unit,
-        (hi - own.home) / unit,
+        *own.room(unit),
         own.home,
         unit,
     )

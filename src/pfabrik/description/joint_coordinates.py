@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..tolerances import TOLERANCES
 from .joint_types import KINDS, Coordinate
 from .joints import Joint, Range
 
@@ -47,3 +48,9 @@ class JointCoordinate:
         """The same, but that a distance is not negative where nothing says so either."""
         low, high = self.limits
         return (low if self.joint.along is None else max(low, 0.0)), high
+
+    def room(self, unit: float) -> Range:
+        """Its bounds as deviations from home, in a unit [length or rad], with room for answers that are put inside."""
+        low, high = ((bound - self.home) / unit for bound in self.bounds)
+        lacking = max(TOLERANCES.inside - 0.5 * (high - low), 0.0)
+        return low - lacking, high + lacking

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
-from ..closure.close import HELD, MARGIN, Closing, Closure, close, platform_poses
+from ..closure.close import HELD, Closing, Closure, close, platform_poses
 from ..closure.starts import random_starts
 from ..description.joint_types import TASK_TURNS
 from ..description.task import task_of
@@ -217,7 +217,7 @@ class BranchSearch:
         from_home[:, self.closure.actuated] = best[:, self.closure.actuated]
         for start, wishes in (
             (from_home, {"centres": marks.wished_centres(best)}),
-            (best, {"limits": True, "margin": MARGIN}),
+            (best, {"limits": True, "margin": TOLERANCES.inside}),
         ):
             poses = self._poses_of(best)
             tried = close(self.closure, start, poses, locked=locked, platform=held, frame=self.task.frame, **wishes)

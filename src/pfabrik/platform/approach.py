@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats, Records
-from ..closure.close import MARGIN
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
@@ -72,7 +71,7 @@ class Approach:
         cones = self._legs.record.cones
         minded = len(cones) if minds_aims or not searches else int((cones["leader"] != OF_AIMS).sum())
         own = np.zeros(1, SETTINGS)
-        own["margin"], own["near"], own["cones"] = MARGIN, TOLERANCES.active, minded
+        own["margin"], own["near"], own["cones"] = TOLERANCES.inside, TOLERANCES.active, minded
         own["implied"] = 0 if len(table.arms) else implied_rows(mechanism)
         own["hits"] = _hits(table) if driven is None else HITS_OF_VALUES
         for name, value in {"frame": task_of(mechanism).frame, **settings}.items():

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.close import MARGIN, Closing, close, closure_of
+from ..closure.close import Closing, close, closure_of
 from ..closure.configurations import Configurations, new_rows, put_rows
 from ..closure.descend import within_sight
 from ..closure.projection import Way, kept, ways_of
@@ -130,12 +130,13 @@ class ReachingEngine:
             passes = settings._replace(max_iterations=1) if options.exact else settings
             reached = self._run(sought, begin, passes)
             placed = place(self.mechanism, self._compiled, begin, reached)
-        closed = close(closure, placed.coordinates, placed.poses, platform=way.held, limits=True, margin=MARGIN)
+        margin = TOLERANCES.inside
+        closed = close(closure, placed.coordinates, placed.poses, platform=way.held, limits=True, margin=margin)
         errors = task_of(self.mechanism).errors(closed.poses, wanted)
         slipped = np.flatnonzero((reached.rounds == 0) & (errors[0] > settings.enough))
         if len(slipped):  # loops that close only off a target that chains came near to may close on it
             start = placed.coordinates[slipped], placed.poses[slipped]
-            closed.improve(slipped, close(closure, *start, platform=self._held, limits=True, margin=MARGIN))
+            closed.improve(slipped, close(closure, *start, platform=self._held, limits=True, margin=margin))
             errors = task_of(self.mechanism).errors(closed.poses, wanted)
         holds = kept(self.mechanism, np.full(len(wanted), way.hold), *errors)
         found = told(closure, closed, wanted, holds, options)
