@@ -535,6 +535,16 @@ def test_the_nearest_with_a_joint_locked_is_that_with_it_fixed(mechanism: Mechan
     assert (answers.status == Status.PROJECTED).any()
 
 
+@pytest.mark.parametrize("count", [4 if INTERPRETED else 60])
+def test_a_tool_that_rods_keep_upright_is_never_answered_lying_down(count: int) -> None:
+    """Loops of a delta with a shaft close with its platform turned over too: no answer, though the tool may yaw."""
+    mechanism = closure.picker()
+    shifts = np.random.default_rng(0).uniform(-1.0, 1.0, (count, 3)) * mechanism.characteristic_length
+    answers = pf.solve_ik(mechanism, mechanism.reference_point + shifts)
+    np.testing.assert_allclose(answers.pose[:, 2, 2], 1.0, atol=1e-9)
+    assert set(answers.status.tolist()) == {Status.REACHED, Status.PROJECTED}
+
+
 def test_a_working_mode_with_a_small_room_of_its_own_is_searched() -> None:
     """A delta's platform can be above its base, where nothing leads from below: a target under that room is nearest to
     it."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.configurations import new_rows
+from ..closure.parasitic import strays
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import BASE_AXES
@@ -108,8 +109,9 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     weights = (1.0, 1.0, 1.0, TURNING, TURNING, TURNING)
     approach = Approach(mechanism, table, weights, {"frame": BASE_AXES, "steps": DRAWN_STEPS}, no_starts(table))
     found = approach.find(targets, Starts(poses, q, sides))
+    counts = np.isfinite(found.distances) & ~strays(mechanism, found.poses)
     found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
-    return Starts(*found[1:4]).at(np.flatnonzero(np.isfinite(found.distances)))
+    return Starts(*found[1:4]).at(np.flatnonzero(counts))
 
 
 def _far_apart(first: Starts, drawn: Starts, most: int) -> Starts:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
 from ..closure.configurations import new_rows, put_rows, rows_at
+from ..closure.parasitic import strays
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Found, Starts
@@ -140,7 +141,9 @@ def _reach_from(corners: Starts, question: Question, some: Unreached) -> Mask:
         targets, rows = np.repeat(own.targets, k, axis=0), new_rows(question.mechanism, n * k)
         every = Unreached(targets, begins, ends, np.empty_like(ends), rows)
         _complete(legs, begins, ends, every)
-        reached = (rows.status == REACHED).reshape(n, k)
+        reached = rows.status == REACHED
+        reached[reached] = ~strays(question.mechanism, rows.poses[reached])
+        reached = reached.reshape(n, k)
         found = reached.any(axis=1)
         if np.count_nonzero(found):
             wanted = in_lengths(own.targets, 1.0 / length)[:, None]
