@@ -6,6 +6,7 @@ import gc
 import sys
 import threading
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partialmethod
@@ -33,7 +34,7 @@ _HOOKS = (
     (_Compiler, "define_pipelines"),
     (_Flags, "summary copy"),
     (_Function, "get_call_type"),
-    (_Context, "get_abi_sizeof install_registry refresh"),
+    (_Context, "get_abi_sizeof install_registry mangler refresh"),
     (_CpuContext, "load_additional_registries"),
     (_event, "broadcast"),
 )
@@ -126,6 +127,12 @@ def _measure_once(context: Any, measure: Callable[..., int], kind: Any) -> int:
     return _SIZES[str(kind)]
 
 
+def _mangle_briefly(context: Any, mangle: Callable[..., str], name: str, taken: Any, **tags: Any) -> str:
+    """The name of a function in machine code, with a checksum of the types it takes: the types of records are thousands
+    of letters, and every call would repeat them."""
+    return mangle(context, name, (f"{zlib.crc32(repr(taken).encode()):08x}",), **tags)
+
+
 def _install_new(context: Any) -> None:
     """Take note of what was declared meanwhile; Numba imports all its own modules again before, a dozen times for every
     function."""
@@ -146,6 +153,7 @@ def _hastened(owner: Any, name: str, ours: Callable[..., Any], *, asks: bool) ->
 _HASTENED = (
     _hastened(_Function, "get_call_type", _find_once, asks=True),
     _hastened(_Context, "get_abi_sizeof", _measure_once, asks=True),
+    _hastened(_Context, "mangler", _mangle_briefly, asks=True),
     _hastened(_CpuContext, "load_additional_registries", _install_new, asks=False),
     _hastened(_event, "broadcast", _tell_nobody, asks=False),
 )
@@ -180,6 +188,8 @@ class _KernelLibrary(_Library):
     twice, for the sake of counts of references, of which there are hardly any here; that is a sixth of all its time.
     """
 
+    _optimize_functions = _PartLibrary._optimize_functions
+
     def finalize(self) -> None:
         """Take in the parts, and the parts of these, each once; Numba takes them in again at every step up to here."""
         taken = self._linking_libraries
@@ -198,6 +208,10 @@ class _KernelLibrary(_Library):
 
 class _SearchLibrary(_KernelLibrary):
     """The code of a search, whose large parts are called where they are used, and not taken in whole at each place."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Nothing yet: what is the search's own is optimised with all it takes in, and has no loop to be vectors."""
+        module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
