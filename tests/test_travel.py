@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -102,6 +103,25 @@ def elbows(solution: Solution) -> list[bool]:
     """Of a 5-bar in the plane x = 0: which way each arm is bent."""
     p = solution.points
     return [bool(np.cross(p[b] - p[a], p["p3"] - p[b])[0] > 0) for a, b in (("p1", "p2"), ("p5", "p4"))]
+
+
+def test_what_nothing_else_determines_gives_way_before_a_limit_stops_it() -> None:
+    """A delta on a gantry goes as far as both of them; across the gantry as far as the delta alone."""
+    delta, length = pf.load("delta"), 500.0
+    carried = [
+        replace(
+            joint,
+            connects=tuple("gantry" if body == "base" else body for body in joint.connects),
+            cone=joint.cone and replace(joint.cone, fixed_to=joint.cone.fixed_to.replace("base", "gantry")),
+        )
+        for joint in delta.joints
+    ]
+    stage = Joint("stage", "prismatic", ("base", "gantry"), axis=X, actuated=True, range=(0.0, length))
+    hybrid = Mechanism("delta on a gantry", [stage, *carried], "platform", delta.reference_point, task=delta.task)
+    alone, both = (pf.travel(home_of(each), along=[X, -X, Y]) for each in (delta, hybrid))
+    np.testing.assert_allclose(both.distances - alone.distances, [length, 0.0, 0.0], atol=1e-5)
+    stops = {limit.joint for limit in alone[0].stopped_by}
+    assert {limit.joint for limit in both[0].stopped_by} == {"stage"} | stops
 
 
 def test_every_working_mode_goes_its_own_way() -> None:

@@ -102,6 +102,11 @@ class LegTable:
         return bool(self.task["led"][0])
 
     @cached_property
+    def leaves_open(self) -> bool:
+        """Whether task and legs do not tell all of a pose, or arms are led."""
+        return self.leads_arms or bool((self.task["unset"] + self.task["arms"] > self.task["rows"])[0])
+
+    @cached_property
     def is_for_blocks(self) -> bool:
         """Whether blocks of poses serve: rods read from the base, of which no angle of crossed hinges is asked for."""
         legs = self.legs

@@ -143,7 +143,7 @@ class Approach:
 @lru_cache(maxsize=64)
 def _hits(table: LegTable) -> int:
     task = table.task[0]
-    if table.leads_arms or task["unset"] + task["arms"] > task["rows"]:
+    if table.leaves_open:
         return HITS_OF_MANY
     is_struts = task["rows"] == 0 and len(table.arms) + len(carriers_of(table)) == 0
     return HITS_OF_STRUTS if is_struts else HITS

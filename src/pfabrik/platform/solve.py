@@ -173,7 +173,8 @@ class LegsEngine:
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Go on to targets (n, 4, 4) in the working mode of as many configurations; PENDING where not reached.
 
-        Where legs can be as they are at the start, they decide; joint coordinates do where they are at dead points.
+        Where legs can be as they are at the start, and leave nothing open that could give way to a limit, they decide;
+        joint coordinates do elsewhere.
         """
         mechanism, table, first = self.mechanism, self._table, sides_at(self.mechanism, self._table, start)
         rows, present = (new_rows(mechanism, len(targets)) for _ in range(2))
@@ -183,7 +184,8 @@ class LegsEngine:
         coordinates[own] = settled(mechanism, table, rows.poses[own], rows.actuators[own], sides[own], coordinates[own])
         if len(own) < len(targets):
             self._reach(start.rows.poses, start, first, True, present)
-            rest = np.flatnonzero((rows.status != REACHED) & (present.status != REACHED))
+            decided = (present.status == REACHED) & ~np.bool_(table.leaves_open)
+            rest = np.flatnonzero((rows.status != REACHED) & ~decided)
             others = self._inner.advance(targets[rest], start.at(rest))
             put_rows(rows, rest, others.rows)
             coordinates[rest] = others.coordinates
