@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from types import SimpleNamespace
 from typing import Any
@@ -356,6 +357,21 @@ def test_joint_coordinates_place_every_body_where_the_pose_is(name: str) -> None
         assert pf.closure_residual(answer) <= 1e-9 * mechanism.characteristic_length
         driven = np.array([answer.joints[actuator] for actuator in mechanism.actuator_names])
         assert np.abs(deviation(mechanism, driven, answer.actuators)).max() <= 1e-9
+
+
+@pytest.mark.parametrize("name", ["stewart", "rps"])
+def test_where_the_reference_point_is_does_not_change_what_assembles(name: str) -> None:
+    """A telescope's mirror turns about a point hundreds of times as far away as its hexapod is large."""
+    near, rng = pf.load(name), np.random.default_rng(2)
+    lever = 300.0 * near.characteristic_length * np.array([0.6, 0.0, 0.8])
+    far = dataclasses.replace(near, reference_point=near.reference_point + lever)
+    values = home_values(near) + rng.uniform(-0.2, 0.2, (20, len(near.actuator_names))) * near.characteristic_length
+    answers, others = (pf.solve_fk(each, values) for each in (near, far))
+    np.testing.assert_array_equal(answers.status == Status.REACHED, others.status == Status.REACHED)
+    assert (answers.status == Status.REACHED).sum() >= 5
+    for one, other in zip(answers, others, strict=True):
+        if one:
+            np.testing.assert_allclose(other.pose[:3, :3], one.pose[:3, :3], atol=1e-9)
 
 
 def test_a_seed_keeps_its_assembly_mode() -> None:

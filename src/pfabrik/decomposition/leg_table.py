@@ -254,6 +254,9 @@ def _task(mechanism: Mechanism, legs: Records) -> Records:
     task, asked = np.zeros(1, K.TASK), task_of(mechanism)
     task["length"] = mechanism.characteristic_length
     task["reference"] = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
+    points = mechanism.platform_points
+    if len(points):
+        task["centre"] = points.mean(axis=0) / mechanism.characteristic_length - task["reference"]
     task["axes"], task["rotations"] = asked.axes, asked.rotations
     task["unset"] = 0 if mechanism.end_effector_is_joint else 6 - sum(asked.axes) - asked.rotations
     if mechanism.end_effector_is_joint:  # it has no orientation: home's

@@ -160,9 +160,15 @@ class Structure:
         The root mean square distance of the joints on the end effector from their centre: turning it by a small angle
         moves them by about that much. The characteristic length where it has fewer than two, or all in one place.
         """
-        centres = np.array([j.at for j in self.joints if self.end_effector in j.connects and j.at is not None])
+        centres = self.platform_points
         spread = float(np.sqrt(centres.var(axis=0).sum())) if len(centres) else 0.0
         return spread or self.characteristic_length
+
+    @property
+    def platform_points(self) -> Floats:
+        """Centres of the joints on the end effector at home, (n, 3) [length]."""
+        points = [j.at for j in self.joints if self.end_effector in j.connects and j.at is not None]
+        return np.array(points, float).reshape(-1, 3)
 
     @cached_property
     def _by_name(self) -> dict[str, Joint]:

@@ -111,6 +111,7 @@ TASK = np.dtype(
     [
         ("length", "f8"),
         ("reference", *_vector),  # at home [L]
+        ("centre", *_vector),  # from there to the middle of the joints on the platform, at home [L]
         ("axes", "i8", (3,)),  # 1: this coordinate of the position is set
         ("rotations", "i8"),  # 3: the rotation is set, 2: the direction of the z axis, 1: the yaw, 0: nothing
         ("unset", "i8"),  # how many coordinates of the pose are not

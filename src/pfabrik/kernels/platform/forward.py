@@ -21,7 +21,8 @@ from ..legs.table import SAMPLE, open_table
 from ..linear import solve_spd, solve_square
 from ..references import opener
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
-from ..vectors import copy_row, copy_table, wrap
+from ..sqp import longest
+from ..vectors import add, copy_row, copy_table, cross, put, sub, turn, vec, wrap
 from .equations import Now, View, count_unknowns, new_now, new_view, place, put_slopes
 from .limits import coordinate_slope, counts_turns
 from .records import Starts
@@ -199,12 +200,26 @@ def newton(table: Table, steps: int, work: Newton) -> float:
             put_equations(table, work)
         if not solve(work):
             return math.inf
-        before, most = worst, 0.0
+        before = worst
         for a in range(m):
             step[free[a]] = normal[a, m]
-            most = max(most, abs(normal[a, m]))
-        move(table, step, min(1.0, FAR_STEP / max(most, FAR_STEP)), work.now)
+        take_step(table, work)
     return put_residuals(table, work)
+
+
+@routine
+def take_step(table: Table, work: Newton) -> None:
+    """Take a step, no longer than it tells anything: of how the platform's middle moves, and how it turns about that.
+
+    The reference point may be far away.
+    """
+    pose, step, centre = work.now.pose, work.step, vec(table.task[0]["centre"])
+    arm = turn(pose, centre)
+    put(step, add(vec(step), cross(vec(step[3:]), arm)))
+    move(table, step, min(1.0, FAR_STEP / max(longest(step, step.shape[0]), FAR_STEP)), work.now)
+    off = sub(arm, turn(pose, centre))
+    for i in range(3):
+        pose[i, 3] += off[i]
 
 
 @routine
