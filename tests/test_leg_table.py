@@ -246,6 +246,17 @@ def test_feasibility_is_the_least_margin_and_tells_what_is_reached(name: str) ->
         assert named == pytest.approx(found.margin[row], abs=1e-9)
 
 
+def test_a_locked_joint_leaves_no_room_at_its_value_and_less_beside_it() -> None:
+    free = machine("stewart")
+    length = free.home_coordinate("BL1")
+    locked = free.with_limits(BL1=(length, length))
+    here = pf.solve_ik(locked, locked.home_pose)
+    above = here.pose + [[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1.0], [0, 0, 0, 0]]
+    found = pf.feasibility(locked, np.stack([here.pose, above]))
+    assert found.margin.tolist() == [min(pf.margins(here).values()), -np.inf] == [0.0, -np.inf]
+    assert {found.limits[each][0] for each in found.binding} == {"BL1"}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [120, pytest.param(10_000, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("name", SERVED)

@@ -22,8 +22,11 @@ where in so many it did not close, or led arms beyond limits, which near where t
 
 @routine
 def share_of(off: float, room: float) -> float:
-    """Distance from a bound as a share of the room there is: of half the range, or of a cone's half angle."""
-    if room > 0.0:
+    """Distance from a bound as a share of the room there is: of half the range, or of a cone's half angle.
+
+    A locked joint has none: 0 on its value, infinite off it.
+    """
+    if room > KEPT:
         return off / room
     return 0.0 if abs(off) <= KEPT else math.copysign(math.inf, off)
 
