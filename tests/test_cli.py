@@ -28,6 +28,8 @@ from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import template, templates
 from pfabrik.cli import main
 from pfabrik.cli.answer import describe_modes
+from pfabrik.cli.group import exit_code
+from pfabrik.cli.whole import new_folder
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy
 
@@ -1085,6 +1087,25 @@ def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
     assert "Traceback" not in said
     # a shell calls both 130; Python sends itself the signal again if it arrived in code that it was just generating
     assert process.returncode in (130, -signal.SIGINT), said
+    assert os.listdir(tmp_path) == []
+
+
+def test_an_interruption_while_a_folder_is_removed_is_told_as_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    close = os.close
+
+    def interrupted(descriptor: int) -> None:  # Python's `rmtree` then closes it once more, which fails
+        monkeypatch.setattr(os, "close", close)
+        close(descriptor)
+        raise KeyboardInterrupt
+
+    def work() -> None:
+        with new_folder(tmp_path / "out"):
+            monkeypatch.setattr(os, "close", interrupted)
+
+    assert exit_code(work) == 130
+    assert capsys.readouterr().err == "pfabrik: interrupted\n"
     assert os.listdir(tmp_path) == []
 
 

@@ -92,7 +92,7 @@ def take_closed_places() -> None:
 def exit_code(run: Callable[[], Any]) -> int:
     """Run, and say how it went: the returned integer, or the code of the failure, which is told on stderr."""
     try:
-        with plain_warnings():
+        with plain_warnings(), interruptions_first():
             result = run()
         return result if isinstance(result, int) else 0
     except click.UsageError as error:
@@ -129,6 +129,20 @@ def plain_warnings() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.showwarning = show
         yield
+
+
+@contextmanager
+def interruptions_first() -> Iterator[None]:
+    """Have an interruption told, not what failed on its way out: a clean-up that it met may close a file twice."""
+    try:
+        yield
+    except Exception as error:
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, KeyboardInterrupt):
+            cause = cause.__context__
+        if cause is not None:
+            raise KeyboardInterrupt from error
+        raise
 
 
 def leave(code: int) -> NoReturn:

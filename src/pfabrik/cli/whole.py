@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -84,13 +84,18 @@ def open_new(part: Path, path: Path) -> TextIO:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def new_folder(path: Path) -> tempfile.TemporaryDirectory[str]:
-    """An empty folder beside `path`; a failure speaks of `path`, the name that the user knows."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.")
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """An empty folder beside `path` that goes when the block ends; a failure speaks of `path`, which the user knows."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with ExitStack() as removals:
+        for _ in range(2):  # an interruption may come while it is removed
+            removals.callback(shutil.rmtree, part, ignore_errors=True)
+        try:
+            part.mkdir(parents=True)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        yield part
 
 
 @contextmanager
@@ -100,7 +105,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
     if path.exists() and not path.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(path))
     with new_folder(path) as part:
-        yield Path(part)
+        yield part
         path.mkdir(exist_ok=True)
-        for item in sorted(Path(part).iterdir()):
+        for item in sorted(part.iterdir()):
             item.replace(path / item.name)
