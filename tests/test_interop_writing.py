@@ -190,6 +190,13 @@ def test_a_unit_of_length_that_nobody_knows_is_refused(tmp_path: Path) -> None:
     assert models[0].splitlines()[2:] == models[1].splitlines()[2:]
 
 
+def test_what_cannot_be_written_is_told_by_its_own_name(tmp_path: Path) -> None:
+    path = tmp_path / f"{'n' * 250}.xml"
+    with pytest.raises(OSError) as caught:
+        to_mjcf(pf.load("five_bar"), path)
+    assert caught.value.filename == str(path)
+
+
 def test_names_that_clash_in_a_model_are_told_apart() -> None:
     """A joint called as the reference point's site, and as a coordinate of another."""
     joints = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .checks import require_path
@@ -15,7 +15,7 @@ from .checks import require_path
 def whole_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A path to write to, which takes the name `path` only when the block ends without an error, or an interruption.
 
-    Its ending is that of `path`, which writers tell the format by.
+    Its ending is that of `path`, which writers tell the format by. Where it cannot be written, the error names `path`.
     """
     final = require_path("path", path).resolve()  # a link keeps pointing where it points
     if not final.parent.is_dir():
@@ -26,5 +26,10 @@ def whole_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield part
         part.replace(final)
+    except OSError as error:
+        if str(error.filename) != str(part):
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink()

@@ -48,7 +48,7 @@ def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
         with path.open("w", newline="", encoding="utf-8") as direct:
             yield direct
         return
-    with whole_path(path) as part, open_new(part, path) as handle:
+    with whole_path(path) as part, part.open("x", newline="", encoding="utf-8") as handle:
         yield handle
 
 
@@ -74,14 +74,6 @@ def is_same_file(path: Path, read: Path) -> bool:
         return path.is_file() and os.path.samestat(path.stat(), os.fstat(sys.stdin.fileno()))
     except (OSError, ValueError):  # standard input is closed, or no file at all
         return False
-
-
-def open_new(part: Path, path: Path) -> TextIO:
-    """Open `part` for writing; a failure speaks of `path`, the name that the user knows."""
-    try:
-        return part.open("x", newline="", encoding="utf-8")
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 @contextmanager
