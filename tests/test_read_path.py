@@ -59,6 +59,19 @@ def test_an_arc_by_its_radius_and_a_helix(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.linalg.norm(helix[:, :2] - helix[0, :2] - [5.0, 0.0], axis=1), 5.0, atol=1e-9)
 
 
+def test_words_of_a_printers_settings_are_no_places(tmp_path: Path) -> None:
+    settings = "M205 X8 Y8 ; jerk\nN5 M204 P500 R1000\nM900 K0.2\nM117 Layer G1 X9\nM84 X Y E\nG4 F5\n"
+    found = read(tmp_path, f"M201 X500 Y500\nG1 X10 F600\n{settings}G2 X5 Y5 R5\n{settings}", longest=1000.0)
+    plain = read(tmp_path, "G1 X10 F600\nG2 X5 Y5 R5\n", longest=1000.0)
+    np.testing.assert_array_equal(found.targets, plain.targets)
+    np.testing.assert_array_equal(found.feeds, plain.feeds)
+
+
+def test_a_line_that_ends_a_program_is_followed_first(tmp_path: Path) -> None:
+    found = read(tmp_path, "G1 X10 F600\nG0 X0 M30\nX99\n", longest=1000.0)
+    assert positions(found)[1:, 0].tolist() == [10.0, 0.0]
+
+
 def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
     found = read(tmp_path, "G1 Z185 A5 B-3 C2 F100", longest=1000.0)
     expected = pf.pose([*pf.load("stewart").home_pose[:2, 3], 185.0], rpy=[5, -3, 2], degrees=True)
@@ -81,6 +94,12 @@ def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
         ("G1 X99999999999", "line 1: found X"),
         ("G1 X1 " + "X" * 200_000, "no text of a path"),
         ("G1 X1\0", "no text of a path"),
+        ("G1 X1\nG3 X1 I5 P3", "line 2: found P3"),
+        ("G1 X1 U5", "line 1: found U5"),
+        ("G1 X1 Y2 X3", "line 1: found X twice"),
+        ("G1 X1\nG4 X2", "line 2: found G4"),
+        ("G1 X1\nM98 P100", "line 2: found M98"),
+        ("G1 X1\nM206 X5", "line 2: found M206"),
     ],
 )
 def test_gcode_that_cannot_be_followed_is_one_sentence(text: str, said: str, tmp_path: Path) -> None:

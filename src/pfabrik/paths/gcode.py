@@ -19,11 +19,19 @@ COMMENT = re.compile(r"\([^()]*\)|;.*")
 AXES = "XYZABC"
 OFFSETS = "IJK"
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
-IGNORED = {4, 40, 49, 54, 61, 64, 80, 94}
-"""Codes that change no position here: dwell, no compensation of the tool, the first work offset, feed per minute."""
+IGNORED = {40, 49, 54, 61, 64, 80, 94}
+"""Codes that change no position here: no compensation of the tool, the first work offset, feed per minute."""
 
-MESSAGES = ("M117", "M118")
+OTHER_AXES = "UVW"
+
+CODE = re.compile(r"(?:N\s*\d+\s*)?M\s*(\d{1,9})(?![\d.])")
+"""How a line begins that has a code of M first."""
+
+MESSAGES = (117, 118)
 """Codes followed by words for people."""
+
+CALLS = (97, 98, 206)
+"""Codes of M that change positions: calls of other programs, and an offset."""
 
 FARTHEST = 1e9
 """Numbers beyond are no places of a machine."""
@@ -83,22 +91,20 @@ def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: fl
     yield Step(state.place.copy(), math.nan, 0)
     for number, text in enumerate(lines, 1):
         words = _words(text, number)
-        if _obey(state, words, number):
-            return
+        _obey(state, words, number)
         moves = any(letter in words for letter in AXES)
-        if not moves and not any(letter in words for letter in OFFSETS + "R"):
-            continue
-        if state.motion is None:
-            if moves:
-                raise WrongPath(f"line {number}: a position without G0, G1, G2 or G3")
-            continue
-        yield from _move(state, words, number, tolerance, longest)
+        if state.motion is None and moves:
+            raise WrongPath(f"line {number}: a position without G0, G1, G2 or G3")
+        if state.motion is not None and (moves or any(letter in words for letter in OFFSETS + "R")):
+            yield from _move(state, words, number, tolerance, longest)
+        if any(code in (2, 30) for code in words.get("M", [])):
+            return
 
 
 def _words(text: str, number: int) -> dict[str, list[float]]:
     """The words of a line by their letter."""
     plain = COMMENT.sub(" ", text).strip().upper()
-    if plain.startswith(("%", "/", *MESSAGES)):
+    if plain.startswith(("%", "/")) or _is_setting(plain):
         return {}
     found: dict[str, list[float]] = {}
     rest = WORD.sub(" ", plain).split()
@@ -107,12 +113,27 @@ def _words(text: str, number: int) -> dict[str, list[float]]:
     for letter, value in WORD.findall(plain):
         if abs(float(value)) > FARTHEST:
             raise WrongPath(f"line {number}: found {letter}{value[:20]}; expected a number below {FARTHEST:g}")
+        if letter in OTHER_AXES:
+            raise WrongPath(f"line {number}: found {letter}{value[:20]}; expected axes {', '.join(AXES)}")
+        if letter in found and letter in AXES:
+            raise WrongPath(f"line {number}: found {letter} twice; expected one place")
         found.setdefault(letter, []).append(float(value))
     return found
 
 
-def _obey(state: State, words: dict[str, list[float]], number: int) -> bool:
-    """Take in what is no motion; whether the program ends."""
+def _is_setting(plain: str) -> bool:
+    """Whether all words of a line belong to a code of M, as those of printers do: `M205 X8` sets what a jerk may be."""
+    begin = CODE.match(plain)
+    code = int(begin[1]) if begin else 0
+    is_printers = code in (17, 18) or code >= 80  # others may stand beside a motion
+    return code in MESSAGES or (is_printers and code not in CALLS and "G" not in plain)
+
+
+def _obey(state: State, words: dict[str, list[float]], number: int) -> None:
+    """Take in what is no motion."""
+    for code in words.get("M", []):
+        if code in CALLS:
+            raise WrongPath(f"line {number}: found M{code:g}; expected all moves in one program, without offsets")
     for code in words.get("G", []):
         if code in (0, 1, 2, 3):
             state.motion = int(code)
@@ -122,17 +143,16 @@ def _obey(state: State, words: dict[str, list[float]], number: int) -> bool:
             state.unit = state.units[int(code)]
         elif code in (90, 91):
             state.is_relative = code == 91
-        elif code == 92 and not any(letter in words for letter in AXES):
-            continue  # of the extruder alone
+        elif code in (4, 92) and not any(letter in words for letter in AXES):
+            continue  # a dwell; of the extruder alone
         elif code == 28 and state.motion is None:
             continue  # homing, before anything else
         elif code not in IGNORED and code != 91.1:
             raise WrongPath(f"line {number}: found G{code:g}; expected G0 to G3, G17 to G21, G90 or G91")
-    if "F" in words:
+    if "F" in words and 4.0 not in words.get("G", []):  # whose F is a time
         state.feed = words["F"][-1]
         if not state.feed > 0.0:
             raise WrongPath(f"line {number}: found F{state.feed:g}; expected a feed above zero")
-    return any(code in (2, 30) for code in words.get("M", []))
 
 
 def _move(state: State, words: dict[str, list[float]], number: int, tolerance: float, longest: float) -> Iterator[Step]:
@@ -165,6 +185,8 @@ def _arc(
     state: State, words: dict[str, list[float]], end: Floats, number: int, tolerance: float, longest: float
 ) -> Iterator[Floats]:
     """Places on a circle or a helix, clockwise (G2) or not, seen against the plane's normal."""
+    if words.get("P", [1.0])[-1] != 1.0:
+        raise WrongPath(f"line {number}: found P{words['P'][-1]:g}; expected an arc of one turn at most")
     u, v, _ = plane = PLANES[state.plane]
     begin, sense = state.place, -1.0 if state.motion == 2 else 1.0
     chord = end[[u, v]] - begin[[u, v]]
