@@ -159,6 +159,8 @@ def test_steps_are_divided_or_made_at_a_rate(tmp_path: Path) -> None:
     np.testing.assert_allclose(positions(sampled)[:, 1:], [[0, 180], [3, 180.5], [3, 183], [3, 184]])
     with pytest.raises(InvalidArgument, match="without a time"):
         read(tmp_path, "x,y,z\n0,0,180\n0,0,181\n", "path.csv", rate=1.0)
+    with pytest.raises(InvalidArgument, match="line 3: more than 1000000 samples"):
+        read(tmp_path, "t,x,y,z\n-1e308,0,0,180\n7e307,0,0,181\n", "path.csv", rate=10.0)
 
 
 @pytest.mark.parametrize(

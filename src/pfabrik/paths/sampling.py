@@ -73,15 +73,16 @@ def at_rate(blocks: Iterable[Path], rate: float) -> Iterator[Path]:
             said = "a step without a time; expected a column t or feed, or feeds and a speed of rapid moves"
             raise WrongPath(f"line {block.lines[place]}: {said}")
         begin = float(times[0]) if is_first else begin
-        total = math.floor((float(times[-1]) - begin) * rate * (1.0 + 1e-12)) + 1
-        if total - count > MOST_STEPS:
+        passed = (float(times[-1]) - begin) * rate * (1.0 + 1e-12)
+        if passed >= count + MOST_STEPS:  # it may be infinite
             raise WrongPath(f"line {block.lines[-1]}: more than {MOST_STEPS} samples; expected a lower rate")
+        total = math.floor(passed) + 1
         for start in range(count, total, BLOCK):
             when = np.minimum(begin + np.arange(start, min(start + BLOCK, total)) / rate, times[-1])
             ends = np.clip(np.searchsorted(times, when, side="left"), 0, len(times) - 1)
             before = np.maximum(ends - 1, 0)
-            passed = times[ends] - times[before]
-            shares = np.divide(when - times[before], passed, out=np.ones(len(when)), where=passed > 0.0)
+            steps = times[ends] - times[before]
+            shares = np.divide(when - times[before], steps, out=np.ones(len(when)), where=steps > 0.0)
             yield block.at(ends, shares)
         count = max(total, count)
         last = block.after(len(block.lines) - 1)
