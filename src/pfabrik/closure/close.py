@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any, NamedTuple
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,14 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints, Mask
 from ..description.mechanism import Mechanism
 from ..kernels.closure import loops as K
+from ..kernels.handle import Handle, Scratch
 from ..kernels.threads import in_blocks
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
 from .loops import loops_of
+
+if TYPE_CHECKING:
+    from ..kernels.closure.close import Work
 
 EVERYTHING_FREE = (0.0,) * 6
 HELD = (K.LOCKED,) * 6
@@ -67,9 +71,10 @@ class Closure:
         """Write actuated values (n, n_a) into coordinates (n, columns)."""
         coordinates[:, self.actuated] = values - self.home
 
-    def layout(self, locked: frozenset[int]) -> K.Layout:
-        """The layout in which the coordinates of some columns do not move."""
-        return _layout(self.mechanism, self.whole, locked)
+    @cached_property
+    def machine(self) -> Handle[K.Loops]:
+        """What kernels are given of the loops."""
+        return Handle(self.loops)
 
 
 @lru_cache(maxsize=64)
@@ -92,7 +97,10 @@ def closure_of(mechanism: Mechanism, whole: bool = True) -> Closure:
 
 
 @lru_cache(maxsize=256)
-def _layout(mechanism: Mechanism, whole: bool, locked: frozenset[int]) -> K.Layout:
+def _locking(mechanism: Mechanism, whole: bool, locked: frozenset[int]) -> tuple[Handle[K.Layout], Scratch[Work]]:
+    """The layout in which the coordinates of some columns do not move, and memory to close loops in it."""
+    from ..kernels.closure.close import new_work
+
     loops = closure_of(mechanism, whole).loops
     free = np.ones(len(loops.group_of), bool)
     free[list(locked)] = False
@@ -102,7 +110,8 @@ def _layout(mechanism: Mechanism, whole: bool, locked: frozenset[int]) -> K.Layo
         group = loops.group_of[j]
         slots[j] = sizes[group]
         sizes[group] += 1
-    return K.Layout(slots, sizes)
+    layout = K.Layout(slots, sizes)
+    return Handle(layout), Scratch(new_work, loops, layout)
 
 
 def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
@@ -215,8 +224,7 @@ def close(
         closeness=closeness,
         max_iterations=max_iterations,
     )
-    layout = closure.layout(locked | closure.last_balls if follow else locked)
-    _run(closure.loops, layout, problem, closed)
+    _run(closure, locked | closure.last_balls if follow else locked, problem, closed)
     return Closing(closed.coordinates / closure.scale, _in_lengths(closed.poses, length), *closed[2:])
 
 
@@ -228,17 +236,20 @@ def measured(mechanism: Mechanism, coordinates: Floats) -> Closing:
 ROWS_A_BLOCK = 64
 
 
-def _run(loops: K.Loops, layout: K.Layout, problem: K.ClosureProblem, closed: K.Closed) -> None:
+def _run(closure: Closure, locked: frozenset[int], problem: K.ClosureProblem, closed: K.Closed) -> None:
     """The kernel over all rows, on all cores."""
     from ..kernels.closure.close import close as close_rows
 
+    machine = closure.machine.address
+    layout, scratch = _locking(closure.mechanism, closure.whole, locked)
+
     def run(block: slice) -> None:
         own = problem._replace(centres=problem.centres[block])
-        close_rows(loops, layout, own, K.Closed._make(array[block] for array in closed))
+        close_rows(machine, layout.address, scratch.address, own, K.Closed._make(array[block] for array in closed))
 
     n = len(closed.poses)
     if n <= ROWS_A_BLOCK:
-        close_rows(loops, layout, problem, closed)
+        close_rows(machine, layout.address, scratch.address, problem, closed)
     else:
         in_blocks(run, n, ROWS_A_BLOCK)
 

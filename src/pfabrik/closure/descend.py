@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Floats
 from ..kernels.closure.loops import BASE_AXES, SIGHT, Closed, Objective, PoseObjective
+from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
-from .close import EVERYTHING_FREE, Closing, Closure, close
+from .close import EVERYTHING_FREE, Closing, Closure, close, closure_of
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
+    from ..kernels.closure.linearise import Workspace
 
 
 MOST_STEPS = 200
@@ -87,17 +90,24 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
     """The kernel over all rows, on all cores: where they ended, or what holds them where they are."""
     from ..kernels.closure.descend import approach
 
-    closed, layout = _closed(closure, coordinates), closure.layout(frozenset())
+    closed, scratch = _closed(closure, coordinates), _scratch(closure.mechanism, closure.whole)
     weights = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
 
     def run(block: slice) -> None:
         own = Closed._make(array[block] for array in closed)
         pose = objective.pose._replace(targets=objective.pose.targets[block])
         asked = objective._replace(pose=pose, anchors=objective.anchors[block])
-        approach(closure.loops, layout, asked, own, weights[block])
+        approach(closure.machine.address, scratch.address, asked, own, weights[block])
 
     in_blocks(run, len(coordinates), rows_a_block=16)
     return closed, weights
+
+
+@lru_cache(maxsize=64)
+def _scratch(mechanism: Mechanism, whole: bool) -> Scratch[Workspace]:
+    from ..kernels.closure.linearise import new_workspace
+
+    return Scratch(new_workspace, closure_of(mechanism, whole).loops)
 
 
 def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> Objective:

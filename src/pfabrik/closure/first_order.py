@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import FirstOrder, FirstOrderPlan
+from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..motion.displacements import rate_units
 from ..motion.first_order import actuated_columns, graph_of
@@ -16,6 +18,9 @@ from ..motion.mobility import generic_of
 from ..motion.singularities import Singularity, measures, singularity_of
 from ..tolerances import TOLERANCES
 from .close import closure_of
+
+if TYPE_CHECKING:
+    from ..kernels.closure.first_order import Tables
 
 ROWS_A_BLOCK = 64
 
@@ -66,13 +71,21 @@ def _first_order(mechanism: Mechanism, q: Floats, *, whole: bool) -> FirstOrder:
         np.empty((n, twists)),
         np.empty((n, twists)),
     )
-    layout = closure.layout(frozenset())
+    scratch = _scratch(mechanism, whole)
 
     def run(block: slice) -> None:
-        first_order(closure.loops, layout, plan, coordinates[block], FirstOrder._make(each[block] for each in found))
+        own = FirstOrder._make(each[block] for each in found)
+        first_order(closure.machine.address, scratch.address, plan, coordinates[block], own)
 
     in_blocks(run, n, ROWS_A_BLOCK)
     return found
+
+
+@lru_cache(maxsize=128)
+def _scratch(mechanism: Mechanism, whole: bool) -> Scratch[Tables]:
+    from ..kernels.closure.first_order import new_tables
+
+    return Scratch(new_tables, closure_of(mechanism).loops, _plan(mechanism, whole))
 
 
 @lru_cache(maxsize=128)

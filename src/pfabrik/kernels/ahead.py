@@ -12,8 +12,8 @@ import numpy as np
 from ._pipeline import name_of
 from .closure.close import close
 from .closure.descend import approach
-from .closure.first_order import first_order
-from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Layout, Loops, Objective, PoseObjective
+from .closure.first_order import PLAN, first_order
+from .closure.loops import Closed, ClosureProblem, FirstOrder, Objective, PoseObjective
 from .lattice import join, number_points
 from .legs.answer import answer, measure_rows, read_coordinates
 from .legs.blocks import answer_blocks
@@ -39,8 +39,6 @@ def _values(codes: str) -> list[Any]:
     return [numbers[c] if len(c) == 1 else np.zeros((0,) * int(c[1]), c[0] + "8") for c in codes.split()]
 
 
-_LOOPS = Loops(*_values("i1 f2 f2 i1 i2 i1 i1 i1 i1 i1 i1 f1 f1 f1 i2 f2 f2 f1 i1 i2 i1 f2 i2 i1"))
-_LAYOUT = Layout(*_values("i1 i1"))
 _CLOSED = Closed(*_values("f2 f3 f2 f2 f2 i1"))
 _F2, _FIRST_ORDER = np.zeros((0, 0)), FirstOrder(*_values("f3 f3 f2 f2 f2"))
 _PASSES = (
@@ -57,11 +55,11 @@ _ANSWERS = tuple(_values("i f3 f3 f2 i1 f3 f2 f2"))
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, _ANSWERS),
     (answer, _ANSWERS),
-    (close, (_LOOPS, _LAYOUT, ClosureProblem(*_values("f1 i f3 i f i i f i")), _CLOSED)),
+    (close, (*_values("i i i"), ClosureProblem(*_values("f1 i f3 i f i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
-    (approach, (_LOOPS, _LAYOUT, Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
+    (approach, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
     (read_coordinates, tuple(_values("i f3 f2 f2"))),
-    (first_order, (_LOOPS, _LAYOUT, FirstOrderPlan(*_values("f2 f1 f2 i1 i i i i f i")), _F2, _FIRST_ORDER)),
+    (first_order, (*_values("i i"), PLAN, _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
     (answer_otherwise, _ANSWERS),
     (approach_by_pose, tuple(_values("i i i f3 f2 f3 f2 f2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ._jit import allocator, routine
+from ._jit import routine
 from .qp import QP, factorise, solve_qp
 from .sqp import Linearisation, new_linearisation
 
@@ -41,7 +41,6 @@ class Elimination(NamedTuple):
     used: Ints  # (unknowns,): 0 for what does not move, more than 1 for what legs have in common
 
 
-@allocator
 def new_free_motions(n: int, rows: int, limits: int) -> FreeMotions:
     """Memory for what is known of one configuration."""
     linear = new_linearisation(n, limits)
@@ -49,7 +48,6 @@ def new_free_motions(n: int, rows: int, limits: int) -> FreeMotions:
     return FreeMotions(linear, np.zeros((n, n)), np.zeros(n), np.zeros((rows, rows)), columns, own)
 
 
-@allocator
 def new_elimination(n: int, rows: int) -> Elimination:
     """Memory for equations; `used` is to be filled."""
     width = n + 1 + rows

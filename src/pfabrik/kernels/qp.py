@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ._jit import allocator, routine
+from ._jit import routine
 
 # A limit violated by no more counts as kept, and one that rounding alone violates by no more ends the search; a
 # gradient that has no more of its square left beside the active ones depends on them.
@@ -36,7 +36,6 @@ class QP(NamedTuple):
     active: Ints  # (n,)
 
 
-@allocator
 def new_qp(n: int, k: int) -> QP:
     """Memory for up to n unknowns and k limits."""
     return QP(

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints, Record, Records
-from ._jit import allocator, routine
+from ._jit import routine
 from .qp import QP, factorise, solve_qp
 
 LONGEST_STEP, AT_FIRST = 0.4, 0.1
@@ -119,7 +119,6 @@ class Hessian(NamedTuple):
     multipliers: Floats  # one for every limit, by its number
 
 
-@allocator
 def new_linearisation(n: int, k: int) -> Linearisation:
     """Room for n unknowns and k limits."""
     return Linearisation(
@@ -133,7 +132,6 @@ def new_linearisation(n: int, k: int) -> Linearisation:
     )
 
 
-@allocator
 def new_hessian(n: int, k: int) -> Hessian:
     return Hessian(np.zeros((n, n)), np.zeros(k))
 

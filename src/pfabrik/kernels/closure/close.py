@@ -8,9 +8,11 @@ equations in the platform's twist remain: the work grows with the number of legs
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from ...arrays import Floats
 from .._jit import inlined, routine, search
+from ..references import opener
 from ..rotations import exponential, turn_about_z, turn_ball, yaw_of
 from .equations import (
     add_cones,
@@ -24,7 +26,19 @@ from .equations import (
     turn_equations,
 )
 from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Layout, Loops
-from .path_kinematics import Equations, State, copy_state, load_row, new_equations, new_state, store_row
+from .path_kinematics import (
+    LAYOUT,
+    LOOPS,
+    Equations,
+    State,
+    copy_state,
+    load_row,
+    new_equations,
+    new_state,
+    open_layout,
+    open_loops,
+    store_row,
+)
 
 LONGEST_STEP = 0.5
 """Longest step of any coordinate [rad or L]: beyond it the linear model says nothing."""
@@ -38,6 +52,22 @@ DAMPING = 0.01
 LEAST_DAMPING, MOST_DAMPING = 1e-14, 1e6
 """Damping of the normal equations, whose entries are of order one: the least keeps idle motions (a rod's own spin)
 still without slowing convergence, the most ends a search that finds no way down."""
+
+
+class Work(NamedTuple):
+    """Scratch memory of one thread."""
+
+    best: State
+    trial: State
+    eq: Equations
+
+
+def new_work(loops: Loops, layout: Layout) -> Work:
+    """Scratch memory of one thread."""
+    return Work(new_state(loops), new_state(loops), new_equations(loops, layout))
+
+
+open_work = opener(new_work(LOOPS, LAYOUT))
 
 
 @inlined
@@ -172,17 +202,9 @@ def is_close(problem: ClosureProblem, eq: Equations) -> bool:
 
 
 @routine
-def close_row(
-    loops: Loops,
-    layout: Layout,
-    problem: ClosureProblem,
-    row: int,
-    best: State,
-    trial: State,
-    eq: Equations,
-    closed: Closed,
-) -> int:
-    """Close the loops of a row, from `trial`, into `best`; how many steps it took."""
+def close_row(loops: Loops, layout: Layout, problem: ClosureProblem, row: int, work: Work, closed: Closed) -> int:
+    """Close the loops of a row, from `work.trial`, into `work.best`; how many steps it took."""
+    best, trial, eq = work.best, work.trial, work.eq
     plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
     copy_state(trial, best)
     cost, factor, step = math.inf, 1.0, math.inf
@@ -237,14 +259,18 @@ def close_row(
 
 
 @search
-def close(loops: Loops, layout: Layout, problem: ClosureProblem, closed: Closed) -> None:
+def close(machine: int, locked: int, scratch: int, problem: ClosureProblem, closed: Closed) -> None:
     """Close the loops of every row, nearest to what is wished.
 
     A row ends when all that must hold is within `problem.closeness`, when its steps or gains vanish, or after
     `problem.max_iterations`; what was measured of it tells how far it came.
+
+    Parameters
+    ----------
+    machine, locked, scratch : see `open_loops`, `open_layout` and `new_work`.
     """
-    best, trial, eq = new_state(loops), new_state(loops), new_equations(loops, layout)
+    loops, layout, work = open_loops(machine), open_layout(locked), open_work(scratch)
     for row in range(len(closed.coordinates)):
-        load_row(loops, row, closed, trial)
-        closed.iterations[row] = close_row(loops, layout, problem, row, best, trial, eq, closed)
-        store_row(loops, row, best, closed)
+        load_row(loops, row, closed, work.trial)
+        closed.iterations[row] = close_row(loops, layout, problem, row, work, closed)
+        store_row(loops, row, work.best, closed)

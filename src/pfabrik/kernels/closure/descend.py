@@ -8,13 +8,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ...arrays import Floats
 from .._jit import routine, search
-from ..free_motions import FreeMotions, new_free_motions, project, put_multipliers, put_step, restoring_step
+from ..free_motions import FreeMotions, project, put_multipliers, put_step, restoring_step
 from ..holding import balance
-from ..qp import QP, new_qp
 from ..rotations import turn_ball
 from ..sqp import (
     CLOSED,
@@ -40,11 +37,11 @@ from .linearise import (
     add_force,
     cone_excess,
     linearise,
-    new_workspace,
+    open_workspace,
     walk_all,
 )
-from .loops import BALL, Closed, Layout, Loops, Objective
-from .path_kinematics import State, copy_state, load_row, new_state, store_row
+from .loops import BALL, Closed, Loops, Objective
+from .path_kinematics import State, copy_state, load_row, open_loops, store_row
 from .pose_objective import pose_gradient
 
 
@@ -75,26 +72,24 @@ def lagrangian_gradient(
 
 
 @routine
-def lagrangian_hessian(
-    loops: Loops, row: int, objective: Objective, state: State, trial: State, work: Workspace, view: FreeMotions
-) -> float:
-    """Curvature of the objective and of the active limits along the loops, into `hessian`; the largest on its diagonal.
+def lagrangian_hessian(loops: Loops, row: int, objective: Objective, work: Workspace, view: FreeMotions) -> float:
+    """Curvature of the objective and of the active limits along the loops, at `work.best`; the largest on the diagonal.
 
     By differences of the gradient of the Lagrangian, whose multipliers of the loops balance it at pivot coordinates.
     """
-    n, linear, H = len(loops.lo), view.linear, work.hessian.H
+    n, linear, H, trial = len(loops.lo), view.linear, work.hessian.H, work.trial
     motions = linear.totals[0]["motions"]
     basis, here, there, along = view.basis, work.here, work.there, work.row
     for i in range(work.balance.shape[0]):
         work.balance[i] = 0.0
-    lagrangian_gradient(loops, row, objective, state, work, work.here)
+    lagrangian_gradient(loops, row, objective, work.best, work, work.here)
     work.control[0]["holding"] = put_multipliers(work.here, view, work.balance)
-    lagrangian_gradient(loops, row, objective, state, work, work.here)
+    lagrangian_gradient(loops, row, objective, work.best, work, work.here)
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
         for j in range(n):
             along[j] = basis[j, a]
-        copy_state(state, trial)
+        copy_state(work.best, trial)
         move(loops, work.row, probe, trial)
         lagrangian_gradient(loops, row, objective, trial, work, work.there)
         for j in range(n):
@@ -132,7 +127,6 @@ def restore_feasibility(
     tolerance: float,
     work: Workspace,
     view: FreeMotions,
-    p: QP,
 ) -> bool:
     """Bring a configuration, at which `view` is, onto its loops and within its limits, by the shortest way.
 
@@ -141,31 +135,22 @@ def restore_feasibility(
     for _step in range(RESTORING):
         if is_closed(view.linear, tolerance):
             return True
-        if not restoring_step(view, False, p):  # by all, steps leap over wrists' singularities
+        if not restoring_step(view, False, work.p):  # by all, steps leap over wrists' singularities
             return False
-        take(loops, view, p.x, state, work)
+        take(loops, view, work.p.x, state, work)
         linearise(loops, row, objective, state, work, view)
     return is_closed(view.linear, max(tolerance, NEARLY_CLOSED))
 
 
 @routine
-def descend(
-    loops: Loops,
-    row: int,
-    objective: Objective,
-    best: State,
-    trial: State,
-    work: Workspace,
-    first: FreeMotions,
-    second: FreeMotions,
-    p: QP,
-) -> int:
-    """From a feasible configuration, at which `first` is, down to the nearest; how many steps it took."""
-    view, other, hessian, control, most = first, second, work.hessian, work.control[0], objective.pose.max_iterations
+def descend(loops: Loops, row: int, objective: Objective, work: Workspace) -> int:
+    """From a feasible `work.best`, at which `work.first` is, down to the nearest; how many steps it took."""
+    view, other, best, trial, p = work.first, work.second, work.best, work.trial, work.p
+    hessian, control, most = work.hessian, work.control[0], objective.pose.max_iterations
     work.gradient.unit[0] = scale_objective(view.linear)
     begin_descent(view.linear, hessian, control)
     while control["done"] == 0:
-        control["largest"] = lagrangian_hessian(loops, row, objective, best, trial, work, view)
+        control["largest"] = lagrangian_hessian(loops, row, objective, work, view)
         led_down = False
         while not led_down and control["done"] == 0:
             if plan_step(view.linear, hessian, control, most, p):
@@ -173,48 +158,44 @@ def descend(
                 share = take(loops, view, p.x, trial, work)
                 linearise(loops, row, objective, trial, work, other)
                 tolerance = on_the_way(control, share)
-                feasible = restore_feasibility(loops, row, objective, trial, tolerance, work, other, p)
+                feasible = restore_feasibility(loops, row, objective, trial, tolerance, work, other)
                 led_down = judge_step(view.linear, other.linear, feasible, share, control)
                 if led_down:
                     copy_state(trial, best)
                     view, other = other, view
             if rests_open(view.linear, led_down, most, control):
-                if restore_feasibility(loops, row, objective, best, CLOSED, work, view, p):
+                if restore_feasibility(loops, row, objective, best, CLOSED, work, view):
                     go_on(control)
                 led_down = True
-    restore_feasibility(loops, row, objective, best, CLOSED, work, view, p)
+    restore_feasibility(loops, row, objective, best, CLOSED, work, view)
     return int(control["steps"])
 
 
 @search
-def approach(loops: Loops, layout: Layout, objective: Objective, closed: Closed, weights: Floats) -> None:
+def approach(machine: int, scratch: int, objective: Objective, closed: Closed, weights: Floats) -> None:
     """Bring every row, from a configuration that is closed within its limits or nearly so, as near as it comes.
 
     With no steps to take, tell instead how hard every limit holds each row back where it is, (n, 2 columns + cones):
     the multiplier of the limit, by how much nearer the target comes per unit by which it gives way; else 0.
+
+    Parameters
+    ----------
+    machine, scratch : see `open_loops` and `new_workspace`.
     """
-    rows = 6 * len(loops.paths)  # of all paths but the first, and six that may be held
-    best, trial, n = new_state(loops), new_state(loops), len(loops.lo)
-    first, second, work = (
-        new_free_motions(n, rows, 2 * n + len(loops.cone_angles)),
-        new_free_motions(n, rows, 2 * n + len(loops.cone_angles)),
-        new_workspace(loops, layout, rows),
-    )
-    k = len(first.linear.h)
-    p, pulls = new_qp(k, k), np.zeros((k, len(loops.lo)))
+    loops, work = open_loops(machine), open_workspace(scratch)
+    best, first = work.best, work.first
     for row in range(len(closed.coordinates)):
         load_row(loops, row, closed, best)
         closed.iterations[row] = 0
         work.gradient.unit[0] = 1.0
-        if objective.pose.max_iterations == 0:
-            linearise(loops, row, objective, best, work, first)
-            scale_objective(first.linear)
-            for c in range(balance(first.linear, objective.pose.near, p, pulls)):
-                weights[row, first.linear.which[c]] = p.x[c]
-            continue
         linearise(loops, row, objective, best, work, first)
-        if restore_feasibility(loops, row, objective, best, CLOSED, work, first, p):
-            closed.iterations[row] = descend(loops, row, objective, best, trial, work, first, second, p)
+        if objective.pose.max_iterations == 0:
+            scale_objective(first.linear)
+            for c in range(balance(first.linear, objective.pose.near, work.p, work.pulls)):
+                weights[row, first.linear.which[c]] = work.p.x[c]
+            continue
+        if restore_feasibility(loops, row, objective, best, CLOSED, work, first):
+            closed.iterations[row] = descend(loops, row, objective, work)
         linearise(loops, row, objective, best, work, first)
         store_row(loops, row, best, closed)
         for group in range(closed.gaps.shape[1]):  # the loops are looked at as a whole

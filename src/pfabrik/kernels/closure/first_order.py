@@ -8,14 +8,16 @@ that make their rates orthogonal give the forward Jacobian, those that make thei
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Floats
 from .._jit import routine, search
+from ..references import opener
 from ..rotations import turn_ball
-from .loops import BALL, CONSTRAINT, PARALLEL, PASSIVE, SERIAL, FirstOrder, FirstOrderPlan, Layout, Loops
-from .path_kinematics import Equations, State, end_path, new_equations, new_state, walk_path
+from .loops import BALL, CONSTRAINT, PARALLEL, PASSIVE, SERIAL, FirstOrder, FirstOrderPlan, Loops
+from .path_kinematics import LAYOUT, LOOPS, Equations, State, end_path, new_equations, new_state, open_loops, walk_path
 
 SWEEPS = 40
 """Most sweeps of rotations: they take four to eight."""
@@ -24,15 +26,53 @@ ORTHOGONAL, NEARLY = 1e-14, 1e-8
 """Cosine of two rows that count as orthogonal, and cosines that one sweep brings there: it squares them."""
 
 
+class Tables(NamedTuple):
+    """Scratch memory of one thread."""
+
+    state: State
+    eq: Equations
+    screws: Floats  # (columns, 6)
+    table: Floats  # (conditions + width, columns): what the loops ask, and below it twists and rates, of every column
+    motions: Floats  # (motions, width): the twists and rates that the loops allow
+    pairs: Floats  # (shown, width)
+    conditions: Floats  # (rank, conditions)
+    sizes: Floats  # (columns,)
+
+
+def new_tables(loops: Loops, plan: FirstOrderPlan) -> Tables:
+    """Scratch memory of one thread."""
+    n, m, width = len(loops.lo), 6 * plan.loops.shape[0], plan.twists + plan.actuated.shape[0]
+    return Tables(
+        new_state(loops),
+        new_equations(loops, LAYOUT),
+        np.zeros((n, 6)),
+        np.zeros((m + width, n)),
+        np.zeros((n - plan.rank, width)),
+        np.zeros((plan.shown, width)),
+        np.zeros((plan.rank, m)),
+        np.zeros(n),
+    )
+
+
+PLAN = FirstOrderPlan(np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64), 0, 0, 0, 0, 0.0, 0)
+"""A plan of the types that kernels are compiled for."""
+
+open_tables = opener(new_tables(LOOPS, PLAN))
+
+
 @search
-def first_order(loops: Loops, layout: Layout, plan: FirstOrderPlan, coordinates: Floats, found: FirstOrder) -> None:
-    """Fill what is told of dimensionless joint coordinates (n, columns); NaN where these are not numbers."""
-    state, eq = new_state(loops), new_equations(loops, layout)
+def first_order(machine: int, scratch: int, plan: FirstOrderPlan, coordinates: Floats, found: FirstOrder) -> None:
+    """Fill what is told of dimensionless joint coordinates (n, columns); NaN where these are not numbers.
+
+    Parameters
+    ----------
+    machine, scratch : see `open_loops` and `new_tables`.
+    """
+    loops, work = open_loops(machine), open_tables(scratch)
+    state, eq, screws, table = work.state, work.eq, work.screws, work.table
+    motions, pairs, conditions, sizes = work.motions, work.pairs, work.conditions, work.sizes
     n, m, shown = coordinates.shape[1], 6 * plan.loops.shape[0], plan.shown
     width = plan.twists + plan.actuated.shape[0]
-    screws, table = np.zeros((n, 6)), np.zeros((m + width, n))
-    motions, pairs = np.zeros((n - plan.rank, width)), np.zeros((shown, width))
-    conditions, sizes = np.zeros((plan.rank, m)), np.zeros(n)
     for row in range(coordinates.shape[0]):
         if not load_coordinates(loops, coordinates[row], state):
             blank(found, row)

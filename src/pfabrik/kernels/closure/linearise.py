@@ -8,17 +8,44 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Records
-from .._jit import allocator, routine
-from ..free_motions import Elimination, FreeMotions, add_limit, eliminate, new_elimination, project_gradient
+from .._jit import routine
+from ..free_motions import (
+    Elimination,
+    FreeMotions,
+    add_limit,
+    eliminate,
+    new_elimination,
+    new_free_motions,
+    project_gradient,
+)
+from ..qp import QP, new_qp
+from ..references import opener
 from ..sqp import CONTROL, REACH, Hessian, new_hessian
-from .loops import BALL, Layout, Loops, Objective
-from .path_kinematics import Equations, State, compare_end, end_path, new_equations, pose_cone, walk_path
+from .loops import BALL, Loops, Objective
+from .path_kinematics import (
+    LAYOUT,
+    LOOPS,
+    Equations,
+    State,
+    compare_end,
+    end_path,
+    new_equations,
+    new_state,
+    pose_cone,
+    walk_path,
+)
 from .pose_objective import PoseGradient, pose_gradient
 
 
 class Workspace(NamedTuple):
     """Scratch memory of one thread."""
 
+    best: State
+    trial: State
+    first: FreeMotions
+    second: FreeMotions
+    p: QP
+    pulls: Floats  # (limits, columns)
     eq: Equations
     gradient: PoseGradient
     hessian: Hessian
@@ -32,19 +59,24 @@ class Workspace(NamedTuple):
     there: Floats  # (columns,)
 
 
-@allocator
-def new_workspace(loops: Loops, layout: Layout, rows: int) -> Workspace:
+def new_workspace(loops: Loops) -> Workspace:
     """Scratch memory of one thread."""
-    n, paths = len(loops.lo), len(loops.paths) - 1
+    n, paths, rows = len(loops.lo), len(loops.paths) - 1, 6 * len(loops.paths)
+    limits = 2 * n + len(loops.cone_angles)
     elimination = new_elimination(n, rows)
     for r in range(len(loops.row_columns)):
-        elimination.used[loops.row_columns[r]] += (
-            2 if r < loops.visit_rows[loops.paths[1]] else 1
-        )  # the first is in all equations
+        is_first = r < loops.visit_rows[loops.paths[1]]  # which is in all equations
+        elimination.used[loops.row_columns[r]] += 2 if is_first else 1
     return Workspace(
-        new_equations(loops, layout),
+        new_state(loops),
+        new_state(loops),
+        new_free_motions(n, rows, limits),
+        new_free_motions(n, rows, limits),
+        new_qp(limits, limits),
+        np.zeros((limits, n)),
+        new_equations(loops, LAYOUT),
         PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
-        new_hessian(n, 2 * n + len(loops.cone_angles)),
+        new_hessian(n, limits),
         np.zeros(1, CONTROL),
         np.zeros((paths, 6)),
         elimination,
@@ -54,6 +86,9 @@ def new_workspace(loops: Loops, layout: Layout, rows: int) -> Workspace:
         np.zeros(n),
         np.zeros(n),
     )
+
+
+open_workspace = opener(new_workspace(LOOPS))
 
 
 @routine

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats
-from .._jit import allocator, inlined, routine
+from .._jit import inlined, routine
+from ..references import opener
 from ..rotations import difference, logarithm, rotate_by, turn_ball
 from .loops import BALL, SLIDE, Closed, Layout, Loops
 
@@ -43,16 +44,14 @@ class Equations(NamedTuple):
     misses: Floats
 
 
-@allocator
 def new_state(loops: Loops) -> State:
     """Memory for a configuration."""
     return State(np.zeros(len(loops.lo)), np.zeros((len(loops.kinds), 4)), np.zeros((3, 4)))
 
 
-@allocator
 def new_equations(loops: Loops, layout: Layout) -> Equations:
     """Memory for the equations of one thread."""
-    groups, m, rows = len(loops.groups) - 1, max(1, layout.sizes.max()), len(loops.row_columns)
+    groups, m, rows = len(loops.groups) - 1, max(1, layout.sizes.max(initial=0)), len(loops.row_columns)
     return Equations(
         np.zeros((rows, 6)),
         np.zeros((rows, 3)),
@@ -72,6 +71,17 @@ def new_equations(loops: Loops, layout: Layout) -> Equations:
         np.zeros(groups),
         np.zeros(groups),
     )
+
+
+_TYPES = "i1 f2 f2 i1 i2 i1 i1 i1 i1 i1 i1 f1 f1 f1 i2 f2 f2 f1 i1 i2 i1 f2 i2 i1"
+
+LOOPS = Loops._make(np.zeros((2,) * int(each[1]), f"{each[0]}8") for each in _TYPES.split())
+"""Loops of the types that kernels are compiled for."""
+
+LAYOUT = Layout(np.zeros(2, np.int64), np.zeros(1, np.int64))
+
+open_loops, open_layout = opener(LOOPS), opener(LAYOUT)
+"""The loops of a mechanism, and what of them moves, of which kernels are given the addresses of a `Handle`."""
 
 
 @inlined
