@@ -17,13 +17,14 @@ from pfabrik.description.home_mobility import end_effector_freedom
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.feasibility import _Asked, feasibility_on_grid
-from pfabrik.kernels.legs.answer import measure_rows, read_coordinates
+from pfabrik.kernels.platform.read import read
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
 from pfabrik.platform.answers import sides_at
+from pfabrik.platform.coordinates import read_into
 from pfabrik.platform.solve import LegsEngine
 from pfabrik.platform.table import machine as legs_of
-from pfabrik.platform.table import machine_aimed
+from pfabrik.platform.table import reading_of
 
 SERVED = [name for name in pf.catalog() if isinstance(table_of_poses(pf.load(name)), LegTable)]
 IN_FRONT = [name for name in SERVED if isinstance(engine_of(pf.load(name)), LegsEngine)]
@@ -88,9 +89,10 @@ def off(name: str, actuators: np.ndarray, others: np.ndarray) -> np.ndarray:
 def constraints(name: str, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     own = table(name)
     rows = np.zeros((len(poses), own.task["rows"][0]))
-    slopes = np.zeros((*rows.shape, 6))
-    measure_rows(legs_of(own).address, poses, own.home_sides, rows, slopes)
-    return rows, slopes
+    slopes = np.zeros((*rows.shape, 6 + len(own.arms)))
+    none = np.zeros((0, 0))
+    read(legs_of(own).address, reading_of(own).address, poses, own.home_sides, none, none, rows, slopes)
+    return rows, slopes[:, :, :6]
 
 
 @pytest.mark.parametrize("name", IN_FRONT)
@@ -119,7 +121,7 @@ def test_coordinates_told_by_legs_are_those_of_closed_loops(name: str) -> None:
     at_home = np.asarray(answers.status) == pf.Status.REACHED
     poses = np.ascontiguousarray(answers.pose[at_home])
     told = np.zeros((len(poses), len(mechanism.coordinate_names)))
-    read_coordinates(machine_aimed(own).address, poses, own.home_sides, told)
+    read_into(own, poses, own.home_sides, told)
     columns = own.known["column"]
     closed = answers.q[at_home] - home_coordinates(mechanism)
     away = (told - closed)[:, columns] / own.known["unit"]

@@ -15,14 +15,14 @@ from .closure.descend import approach
 from .closure.first_order import PLAN, first_order
 from .closure.loops import Closed, ClosureProblem, FirstOrder, Objective, PoseObjective
 from .lattice import join, number_points
-from .legs.answer import answer, measure_rows, read_coordinates
+from .legs.answer import answer
 from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
 from .legs.maps import margins_in_blocks
 from .platform.forward import assemble
 from .platform.nearest import approach as approach_by_pose
-from .platform.nearest import read_configurations
 from .platform.otherwise import answer_otherwise
+from .platform.read import read
 from .reaching import plan as P
 from .reaching.solve import solve_by_passes
 from .timing import fastest, second_derivatives
@@ -58,15 +58,13 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (close, (*_values("i i i"), ClosureProblem(*_values("f1 i f3 i f i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
     (approach, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
-    (read_coordinates, tuple(_values("i f3 f2 f2"))),
+    (read, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
     (first_order, (*_values("i i"), PLAN, _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
     (answer_otherwise, _ANSWERS),
     (approach_by_pose, tuple(_values("i i i f3 f2 f3 f2 f2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
-    (read_configurations, tuple(_values("i f3 f2 f2 f2"))),
     (assemble, tuple(_values("i i f2 i i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i f3 f2 i1 i f3 f2 i f1 i1"))),
-    (measure_rows, tuple(_values("i f3 f2 f2 f3"))),
     (number_points, (*_values("i1 i1 i1 i"), True, *_values("i1"))),
     (join, tuple(_values("i2 i1"))),
     (second_derivatives, tuple(_values("f1 f2 f2"))),

@@ -12,7 +12,9 @@ from ..motion.displacements import gaps
 from ..motion.limits import within_turns
 from ..motion.meeting import meeting_joints, put_meeting_joints
 from ..tolerances import TOLERANCES
-from .table import machine_aimed
+from .table import machine_aimed, reading_of
+
+NO_ROWS, NO_SLOPES = np.zeros((0, 0)), np.zeros((0, 0, 0))
 
 RESTARTS = 24
 """Random starts for joints that closed forms do not tell and that do not close from where they began."""
@@ -44,10 +46,7 @@ def settled(
         found[:] = begin
     if not len(poses):
         return found
-    read_into(table, poses, sides, found)
-    if carriers is not None:
-        rows = np.flatnonzero(np.isfinite(carriers).all(axis=1))
-        found[rows] = _read_with(mechanism, table, poses[rows], sides[rows], carriers[rows], found[rows])
+    read_into(table, poses, sides, found, carriers)
     closure.put_actuators(found, actuators)
     rest = np.flatnonzero(~_put_others(mechanism, table, poses, found))
     if len(rest):
@@ -85,22 +84,15 @@ def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, found: Float
     return closing.coordinates
 
 
-def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats) -> None:
-    """Write the coordinates that legs tell at poses (n, 4, 4) [length] into joint coordinates (n, columns)."""
-    from ..kernels.legs.answer import read_coordinates
+def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats, carriers: Floats | None = None) -> None:
+    """Write the coordinates that legs tell at poses (n, 4, 4) [length] into joint coordinates (n, columns).
 
-    legs = machine_aimed(table)
-    read_coordinates(legs.address, np.require(poses, requirements=["C", "W"]), sides, found)
+    Parameters
+    ----------
+    carriers : as of `settled`.
+    """
+    from ..kernels.platform.read import read
 
-
-def _read_with(
-    mechanism: Mechanism, table: LegTable, poses: Floats, sides: Floats, carriers: Floats, found: Floats
-) -> Floats:
-    """The same into joint coordinates (n, columns), with the carriers where they are told to be."""
-    from ..kernels.platform.nearest import read_configurations
-
-    scaled = poses.copy()
-    scaled[:, :3, 3] /= mechanism.characteristic_length
-    legs = machine_aimed(table)
-    read_configurations(legs.address, scaled, carriers, sides, found)
-    return found
+    legs, given = machine_aimed(table), NO_ROWS if carriers is None else carriers
+    own = np.require(poses, requirements=["C", "W"])
+    read(legs.address, reading_of(table).address, own, sides, given, found, NO_ROWS, NO_SLOPES)

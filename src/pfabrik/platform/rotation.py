@@ -16,7 +16,7 @@ from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..motion.walks import around_home
 from ..tolerances import TOLERANCES
-from .table import Machine, kernel_table, machine, machine_searched, with_aims
+from .table import Machine, kernel_table, machine, machine_searched, reading_of, with_aims
 
 SAMPLES, NEARBY = 8, 0.05
 """How many poses about home are looked at, and how far off they are [L]."""
@@ -114,12 +114,13 @@ def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
 
     Where arms follow, without what these give way to. Of the poses, those that legs reach short of dead points.
     """
-    from ..kernels.legs.answer import measure_rows
+    from ..kernels.platform.read import read
 
     n_rows = table.task[0]["rows"]
     rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6 + len(table.arms)))
     legs = machine(table)
-    measure_rows(legs.address, np.require(poses, requirements=["C", "W"]), table.home_sides, rows, slopes)
+    own, nothing = np.require(poses, requirements=["C", "W"]), np.zeros((0, 0))
+    read(legs.address, reading_of(table).address, own, table.home_sides, nothing, nothing, rows, slopes)
     known = np.isfinite(slopes).all(axis=(1, 2))
     rows, by_pose, by_arms = rows[known], slopes[known, :, :6], slopes[known, :, 6:]
     return rows, by_pose - by_arms @ (np.linalg.pinv(by_arms) @ by_pose) if table.task["arms"][0] else by_pose

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -11,9 +11,12 @@ from ..arrays import Records
 from ..closure.solve import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting, at_rest
-from ..kernels.handle import Handle
+from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
+
+if TYPE_CHECKING:
+    from ..kernels.platform.read import Reading
 
 Machine: TypeAlias = Handle[K.Table]
 
@@ -77,6 +80,14 @@ def with_aims(legs: Records, cones: Records) -> Records:
 def machine_aimed(table: LegTable) -> Machine:
     """The same with the angles of all endings asked for."""
     return Handle(kernel_table(table)._replace(legs=table.aimed))
+
+
+@lru_cache(maxsize=64)
+def reading_of(table: LegTable) -> Scratch[Reading]:
+    """Memory to read what legs tell at poses."""
+    from ..kernels.platform.read import new_reading
+
+    return Scratch(new_reading, kernel_table(table))
 
 
 @lru_cache(maxsize=64)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
-from .._jit import allocator, kernel, routine, search
+from .._jit import allocator, kernel, routine
 from ..linear import solve_spd
 from ..rotations import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
@@ -16,7 +16,7 @@ from ..vectors import copy_row, cross, dot, norm, put, scale, vec, wrap_into
 from .endings import SURE
 from .frames import by_arm, coordinate_of, facing, new_frames, place_arm, set_frames
 from .pivots import any_across, pivot_rows, pivot_slopes, place_pivot
-from .poses import bring_yaw, load, load_pose, turn_pose
+from .poses import bring_yaw, load, turn_pose
 from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Table
 from .rods import place_rod, rod_rows, rod_slopes
 from .table import open_table
@@ -334,36 +334,3 @@ def complete(table: Table, sides: Floats, work: Completion) -> bool:
             return False
         before = worst
     return False
-
-
-@kernel
-def read_coordinates(machine: int, poses: Floats, sides: Floats, found: Floats) -> None:
-    """Fill deviations from home [length or rad], `found` (n, columns), of the coordinates that legs tell at poses."""
-    table = open_table(machine)
-    work, known = new_completion(table), table.known
-    for row in range(poses.shape[0]):
-        load_pose(poses[row], table.task[0]["length"], work.pose)
-        set_frames(work.pose, table.task[0], work.frames)
-        place_legs(table.legs, work.frames, sides[row if sides.shape[0] > 1 else 0], work.values, work.lines)
-        for i in range(known.shape[0]):
-            found[row, known[i]["column"]] = deviation(known[i], work.values) * known[i]["unit"]
-
-
-@search
-def measure_rows(machine: int, poses: Floats, sides: Floats, rows: Floats, slopes: Floats) -> None:
-    """Fill the constraints (n, rows) of all legs at poses [length], and their derivatives [L, rad].
-
-    These are (n, rows, 6 + arms), by the pose and by arms; NaN where a leg is at a dead point, or beyond.
-    """
-    table = open_table(machine)
-    work, legs = new_completion(table), table.legs
-    for row in range(poses.shape[0]):
-        load_pose(poses[row], table.task[0]["length"], work.pose)
-        set_frames(work.pose, table.task[0], work.frames)
-        side = sides[row if sides.shape[0] > 1 else 0]
-        _, bearing = place_legs(legs, work.frames, side, work.values, work.lines)
-        put_rows(legs, work.frames, work.values, work.lines, rows[row])
-        put_slopes(legs, work.frames, work.values, work.lines, work.follow, work.slopes)
-        for i in range(rows.shape[1]):
-            for j in range(slopes.shape[2]):
-                slopes[row, i, j] = work.slopes[i, j] if bearing > SURE * SURE else math.nan

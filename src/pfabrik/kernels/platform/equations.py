@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Record
-from .._jit import allocator, routine
+from .._jit import routine
 from ..legs.answer import end_of_rows
 from ..legs.endings import turned
 from ..legs.frames import NOWHERE, by_arm, coordinate_of, facing, new_frames, place_arm, put_pose_slope, set_frames
@@ -68,13 +68,11 @@ class View(NamedTuple):
     slope: Floats  # (n,): that of a limit
 
 
-@allocator
 def new_now(legs: int) -> Now:
     """Memory for a configuration."""
     return Now(np.zeros((4, 4)), np.zeros(legs), np.zeros(legs))
 
 
-@allocator
 def new_view(table: Table) -> View:
     """Memory for what is told of it."""
     legs, n = table.legs.shape[0], count_unknowns(table)

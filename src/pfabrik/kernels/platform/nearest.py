@@ -35,7 +35,7 @@ from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global
 from .descend import descend
-from .equations import Now, is_carried, new_now, new_view, place
+from .equations import Now, is_carried, new_now, place
 from .linearise import linearise
 from .records import SETTINGS, Aim, Found, Plan, Starts
 from .search import Search, copy_now, fix, new_search
@@ -87,26 +87,6 @@ def new_work(table: Table, plan: Plan) -> Work:
 _PLAN = Plan(np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
 open_plan, open_work = opener(_PLAN), opener(new_work(SAMPLE, _PLAN))
 """What `approach` is asked, and its scratch memory: it is given the addresses of their handles."""
-
-
-@search
-def read_configurations(machine: int, poses: Floats, q: Floats, sides: Floats, found: Floats) -> None:
-    """Fill deviations from home [length or rad], `found` (n, columns), of the coordinates that legs tell.
-
-    Parameters
-    ----------
-    machine : see `open_table`.
-    poses, q, sides : as of `Found`.
-    """
-    table = open_table(machine)
-    now, look, known = new_now(table.legs.shape[0]), new_view(table), table.known
-    for row in range(poses.shape[0]):
-        copy_table(poses[row], now.pose)
-        copy_row(q[row], now.q)
-        copy_row(sides[row], now.sides)
-        place(table, now, look)
-        for i in range(known.shape[0]):
-            found[row, known[i]["column"]] = deviation(known[i], look.values) * known[i]["unit"]
 
 
 @routine

@@ -1,0 +1,85 @@
+"""What legs in closed form tell at poses: the coordinates of their joints, and the constraints that are left."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Floats
+from .._jit import search
+from ..legs.answer import deviation, place_legs, put_rows, put_slopes
+from ..legs.endings import SURE
+from ..legs.frames import set_frames
+from ..legs.poses import load_pose
+from ..legs.records import Table
+from ..legs.table import SAMPLE, open_table
+from ..references import opener
+from ..vectors import copy_row
+from .equations import Now, View, new_now, new_view, place
+
+
+class Reading(NamedTuple):
+    """Scratch memory of one thread."""
+
+    now: Now
+    look: View
+    follow: Floats  # (legs, 6): derivatives of carriers' coordinates
+
+
+def new_reading(table: Table) -> Reading:
+    """Scratch memory of one thread."""
+    return Reading(new_now(len(table.legs)), new_view(table), np.zeros((len(table.legs), 6)))
+
+
+open_reading = opener(new_reading(SAMPLE))
+
+
+@search
+def read(
+    machine: int,
+    scratch: int,
+    poses: Floats,
+    sides: Floats,
+    carriers: Floats,
+    found: Floats,
+    rows: Floats,
+    slopes: Floats,
+) -> None:
+    """Tell what is asked for of legs at poses (n, 4, 4) [length].
+
+    Parameters
+    ----------
+    machine, scratch : see `open_table` and `new_reading`.
+    sides : which of its two solutions each leg takes, (n or 1, legs).
+    carriers : coordinates of the legs' carriers, (n or 0, legs) [L or rad]; NaN to ask closed forms.
+    found : filled with the coordinates that legs tell, deviations from home, (n or 0, columns) [length or rad].
+    rows, slopes : filled with the constraints of all legs, (n or 0, rows), and their derivatives by the pose and by
+        arms, (n or 0, rows, 6 + arms) [L, rad]: NaN where a leg is at a dead point, or beyond.
+    """
+    table, work = open_table(machine), open_reading(scratch)
+    now, look, legs, known = work.now, work.look, table.legs, table.known
+    for row in range(poses.shape[0]):
+        load_pose(poses[row], table.task[0]["length"], now.pose)
+        copy_row(sides[row if sides.shape[0] > 1 else 0], now.sides)
+        total = math.nan
+        if carriers.shape[0] > 0:
+            total = 0.0
+            copy_row(carriers[row], now.q)
+            for k in range(now.q.shape[0]):
+                total += now.q[k]
+        bearing = 1.0
+        if abs(total) < math.inf:
+            place(table, now, look)
+        else:
+            set_frames(now.pose, table.task[0], look.frames)
+            _, bearing = place_legs(legs, look.frames, now.sides, look.values, look.lines)
+        for i in range(known.shape[0] if found.shape[0] > 0 else 0):
+            found[row, known[i]["column"]] = deviation(known[i], look.values) * known[i]["unit"]
+        if rows.shape[0] > 0:
+            put_rows(legs, look.frames, look.values, look.lines, rows[row])
+            put_slopes(legs, look.frames, look.values, look.lines, work.follow, slopes[row])
+            for i in range(rows.shape[1] if not bearing > SURE * SURE else 0):
+                for j in range(slopes.shape[2]):
+                    slopes[row, i, j] = math.nan
