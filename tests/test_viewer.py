@@ -151,10 +151,10 @@ def test_turns_are_those_of_scipy() -> None:
         w, x, y, z = quaternion(rotation.as_matrix())
         assert (Rotation.from_quat([x, y, z, w]) * rotation.inv()).magnitude() < 1e-7
     for direction in (*rng.normal(size=(20, 3)), np.array([0, 0, -2.0]), np.array([0, 0, 1.0])):
-        w, x, y, z = upright_to(direction)
+        w, x, y, z = upright_to(direction[None])[0]
         turned = Rotation.from_quat([x, y, z, w]).apply([0, 0, 1])
         assert turned == pytest.approx(direction / np.linalg.norm(direction))
-    assert upright_to(np.zeros(3)) == pytest.approx([1, 0, 0, 0])
+    assert upright_to(np.zeros((1, 3)))[0] == pytest.approx([1, 0, 0, 0])
 
 
 def test_a_face_is_triangles_about_its_middle() -> None:

@@ -162,9 +162,8 @@ class Scene:
         along = lines[:, 1] - lines[:, 0]
         lengths = np.linalg.norm(along, axis=1)
         scales = np.stack([radii, radii, np.maximum(lengths, 1e-9)], axis=1)
-        turns = np.array([upright_to(each) for each in along])
-        middles = lines.mean(axis=1)
-        middles, turns, scales = (each.astype(np.float32) for each in (middles, turns, scales))
+        found = (lines.mean(axis=1), upright_to(along), scales)
+        middles, turns, scales = (each.astype(np.float32) for each in found)
         return middles, turns, scales, np.array(colours, np.uint8)
 
     def _name(self, skeleton: Skeleton) -> None:
