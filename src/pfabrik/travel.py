@@ -199,12 +199,10 @@ def _lines(mechanism: Mechanism, along: ArrayLike | None, default: bool) -> Floa
 
 def _axes(mechanism: Mechanism, solution: Solution, about: ArrayLike | None, default: bool) -> Floats:
     """Axes to turn about, unit vectors (n, 3)."""
-    rotations = task_of(mechanism).rotations
+    task = task_of(mechanism)
+    rotations = task.rotations
     if about is None:
-        chosen = np.zeros((0, 3))
-        if default and rotations:
-            base = np.eye(3)
-            chosen = {3: base, 2: solution.pose[:3, :2].T, 1: base[2:]}[rotations]
+        chosen = task.turning_axes(solution.pose) if default else np.zeros((0, 3))
         return np.stack([chosen, -chosen], axis=1).reshape(-1, 3)
     axes = _directions("about", about)
     off = np.abs(axes[:, :2]).max(axis=1, initial=0.0) > TOLERANCES.alignment

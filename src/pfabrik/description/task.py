@@ -36,14 +36,23 @@ class Task:
         return all(self.axes) and self.rotations == 3
 
     @property
+    def turns(self) -> tuple[bool, bool, bool]:
+        """Which rotations count, about x, y and z; of a tilt, about those of the target."""
+        return self.rotations > 1, self.rotations > 1, self.rotations % 2 == 1
+
+    def turning_axes(self, pose: Floats) -> Floats:
+        """What they are about at a pose (4, 4): unit vectors (k, 3) in the base frame."""
+        axes = pose[:3, :3].T if self.rotations == 2 else np.eye(3)
+        return np.asarray(axes[list(self.turns)])
+
+    @property
     def frame(self) -> int:
         """What rotations count about, for the closure kernel: axes of which those count that the weights say."""
         return {2: TARGET_AXES, 1: HALF_WAY}.get(self.rotations, BASE_AXES)
 
     def weights(self, position: float, rotation: float) -> Weights:
         """Weights of a pose's coordinates, for the closure kernel: those given; 0 for what does not count."""
-        counted = (2,) if self.rotations == 1 else range(self.rotations)
-        turns = [rotation if place in counted else 0.0 for place in range(3)]
+        turns = (rotation if counts else 0.0 for counts in self.turns)
         return (*(position if counts else 0.0 for counts in self.axes), *turns)
 
     @property

@@ -109,8 +109,7 @@ def _of_task(mechanism: Mechanism, q: Floats) -> Floats:
     if task.rotations == 2:
         moved = displacements(mechanism, q)[mechanism.end_effector_body]
         every[:, 3:, 3:] = (moved @ mechanism.home_pose)[:, :3, :3]
-    turned = {0: (), 1: (5,), 2: (3, 4), 3: (3, 4, 5)}[task.rotations]
-    return every[:, :, [*np.flatnonzero(task.axes).tolist(), *turned]]
+    return every[:, :, [*task.axes, *task.turns]]
 
 
 def _set_aside(q: Floats) -> tuple[Mask, Floats]:

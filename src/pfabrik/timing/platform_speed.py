@@ -83,10 +83,8 @@ def platform_speed(
 
 def _twists(solution: Solution) -> Floats:
     """The motions that a task sets, unit vectors (m, 6), each along or about one axis."""
-    task, turns = task_of(solution.mechanism), np.zeros((0, 3))
-    if task.rotations:
-        turns = {3: np.eye(3), 2: solution.pose[:3, :2].T, 1: np.eye(3)[2:]}[task.rotations]
-    lines = np.eye(3)[list(task.axes)]
+    task = task_of(solution.mechanism)
+    lines, turns = np.eye(3)[list(task.axes)], task.turning_axes(solution.pose)
     return np.block([[lines, np.zeros((len(lines), 3))], [np.zeros((len(turns), 3)), turns]])
 
 

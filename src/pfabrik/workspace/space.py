@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -147,14 +148,12 @@ def free_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
             "a base frame turned so that it moves along its axes",
         )
     turned = moves[3:] if len(moves) > 3 else np.zeros(3, bool)
-    counts = {3: (True, True, True), 2: (True, True, False), 1: (False, False, True), 0: (False,) * 3}[task.rotations]
-    return (*places, *(name for name, each, free in zip(TURNS, counts, turned, strict=True) if each and free))
+    return (*places, *compress(TURNS, np.logical_and(task.turns, turned)))
 
 
 def _require_task(mechanism: Mechanism, argument: str, names: Sequence[str]) -> None:
     task = task_of(mechanism)
-    sets = {name for name, counts in zip(POSITIONS, task.axes, strict=True) if counts}
-    sets |= set({3: TURNS, 2: TURNS[:2], 1: TURNS[2:], 0: ()}[task.rotations])
+    sets = tuple(compress((*POSITIONS, *TURNS), (*task.axes, *task.turns)))
     for name in names:
         if name not in sets:
             expected = f"coordinates within the task, {' '.join(mechanism.task)}: what it leaves out follows by itself"

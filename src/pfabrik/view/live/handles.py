@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 FAR = 1e6
 """How far a handle goes [L]: the answer, not the handle, says what is out of reach."""
 
-TURNS = {3: (True, True, True), 2: (True, True, False), 1: (False, False, True)}
-
 
 class Handles:
     """Where the target is, in the user's hand.
@@ -42,7 +40,7 @@ class Handles:
             self._add(server, "move", active_axes=task.axes, disable_rotations=True, **common)
         if task.rotations:
             still = {"disable_axes": True, "disable_sliders": True}
-            self._add(server, "turn", active_axes=TURNS[task.rotations], **still, **common)
+            self._add(server, "turn", active_axes=task.turns, **still, **common)
 
     def show(self, target: Floats) -> None:
         """Bring the handles to a target, but for the one in the user's hand."""

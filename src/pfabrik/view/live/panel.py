@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,9 +32,6 @@ FAR = 2.0
 
 STEPS = 1000.0
 """Steps of a slider, about."""
-
-TURNS = {3: ("roll", "pitch", "yaw"), 2: ("roll", "pitch"), 1: ("yaw",), 0: ()}
-"""Angles that have a slider, by how many freedoms of the rotation the task counts."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +188,7 @@ class Panel:
 def coordinates_of(mechanism: Mechanism) -> tuple[str, ...]:
     """What a target's sliders are called: the coordinates that the task counts, a rotation as angles."""
     task = task_of(mechanism)
-    return (*(name for name, counts in zip("xyz", task.axes, strict=True) if counts), *TURNS[task.rotations])
+    return tuple(compress(("x", "y", "z", "roll", "pitch", "yaw"), (*task.axes, *task.turns)))
 
 
 def _of_users(listen: Callable[[Any], None]) -> Callable[[Any], None]:
