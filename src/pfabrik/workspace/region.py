@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints, Mask
-from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..poses import as_floats
 from .parts import Parts
@@ -25,30 +24,12 @@ class Region:
         self, question: Question, resolution: Floats, mesh: Mesh, coarser: Mesh, parts: Parts, part: int | None = None
     ) -> None:
         self._question, self._mesh, self._coarser, self._parts, self._part = question, mesh, coarser, parts, part
+        self.mechanism, self.names, self.units = question.mechanism, question.space.names, question.space.units
+        self.vertices, self.faces, self.vertex_limit = mesh.vertices, mesh.faces, mesh.limits
         self.resolution = resolution
         self.limits: Limits = question.limits
         for array in (*mesh, resolution):
             array.setflags(write=False)
-
-    @property
-    def mechanism(self) -> Mechanism:
-        return self._question.mechanism
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self._question.space.names
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        return self._question.space.units
-
-    @property
-    def vertices(self) -> Floats:
-        return self._mesh.vertices
-
-    @property
-    def faces(self) -> Ints:
-        return self._mesh.faces
 
     @cached_property
     def face_limit(self) -> Ints:
@@ -57,11 +38,6 @@ class Region:
         found = np.where((own[:, 1:2] == own[:, 2:]).any(axis=1), own[:, 1], own[:, 0])
         found.setflags(write=False)
         return found
-
-    @property
-    def vertex_limit(self) -> Ints:
-        """Which of `limits` forms the border at each vertex, (v,)."""
-        return self._mesh.limits
 
     @property
     def size(self) -> float:

@@ -32,7 +32,7 @@ class Workspace(Region):
         inside on their left. They are closed.
     limits : (joint, bound) of what may form the border, as of `Feasibility`; a coordinate and "min" or "max" where
         `within` cut the workspace off.
-    face_limit : which of `limits` forms each face, (f,).
+    face_limit, vertex_limit : which of `limits` forms each face, (f,), and the border at each vertex, (v,).
     """
 
     @cached_property
