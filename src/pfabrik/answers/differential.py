@@ -10,7 +10,7 @@ from ..arrays import Floats, shaped
 from ..closure.first_order import forward_map, inverse_map, singularities
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..motion.mobility import Mobility, generic_of
-from ..motion.singularities import Singularity
+from ..motion.singularities import NUMBERS, Singularity
 from .solution import Solution, checked_solution
 
 __all__ = ["Mobility", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]
@@ -54,16 +54,9 @@ def inverse_jacobian(solution: Solution) -> Floats:
 def singularity(solution: Solution) -> Singularity:
     """How near every configuration of a solution is to a singularity of each kind; INVALID rows are NaN."""
     found = singularities(*_of(solution))
+    numbers = {name: shaped(np.asarray(getattr(found, name)), solution.shape) for name in NUMBERS}
     kinds = cast(list[tuple[str, ...]], found.kinds)
-    return Singularity(
-        serial=shaped(np.asarray(found.serial), solution.shape),
-        parallel=shaped(np.asarray(found.parallel), solution.shape),
-        constraint=shaped(np.asarray(found.constraint), solution.shape),
-        passive=shaped(np.asarray(found.passive), solution.shape),
-        lost=shaped(found.lost, solution.shape),
-        gained=shaped(found.gained, solution.shape),
-        kinds=kinds[0] if solution.shape == () else kinds,
-    )
+    return Singularity(**numbers, kinds=kinds[0] if solution.shape == () else kinds)
 
 
 def _of(solution: Solution) -> tuple[Mechanism, Floats]:

@@ -15,7 +15,7 @@ from ..kernels.threads import in_blocks
 from ..motion.displacements import rate_units
 from ..motion.first_order import actuated_columns, graph_of
 from ..motion.mobility import generic_of
-from ..motion.singularities import Singularity, measures, singularity_of
+from ..motion.singularities import KINDS, Singularity, measures, singularity_of
 from ..tolerances import TOLERANCES
 from .close import closure_of
 
@@ -46,7 +46,7 @@ def singularities(mechanism: Mechanism, q: Floats) -> Singularity:
     near = np.flatnonzero(found.measures.min(axis=1) < TOLERANCES.singular)
     if len(near):
         exactly = measures(mechanism, q[near])
-        found.measures[near] = np.stack([exactly.serial, exactly.parallel, exactly.constraint, exactly.passive], axis=1)
+        found.measures[near] = np.stack([getattr(exactly, kind) for kind in KINDS], axis=1)
         found.lost[near], found.gained[near] = exactly.lost, exactly.gained
     return singularity_of(found.measures, found.lost, found.gained)
 

@@ -11,6 +11,7 @@ sine (type 2) or a cosine (type 1) vanishes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from .first_order import actuated_columns, first_order, right_singular
 from .mobility import Generic, generic_of
 
 KINDS = ("serial", "parallel", "constraint", "passive")
+NUMBERS = (*KINDS, "lost", "gained")
+"""The fields of a `Singularity` that are arrays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +76,8 @@ def measures(mechanism: Mechanism, q: Floats) -> Singularity:
 def singularity_of(found: Floats, lost: Floats, gained: Floats) -> Singularity:
     """A `Singularity` of measures (n, 4), in the order of `KINDS`, and twists (n, r) of any length."""
     near = TOLERANCES.singular > found
-    return Singularity(
-        serial=found[:, 0],
-        parallel=found[:, 1],
-        constraint=found[:, 2],
-        passive=found[:, 3],
-        lost=_unit(lost),
-        gained=_unit(gained),
-        kinds=[tuple(kind for kind, is_near in zip(KINDS, row, strict=True) if is_near) for row in near],
-    )
+    kinds = [tuple(compress(KINDS, row)) for row in near]
+    return Singularity(**dict(zip(KINDS, found.T, strict=True)), lost=_unit(lost), gained=_unit(gained), kinds=kinds)
 
 
 def parallel_signs(mechanism: Mechanism, q: Floats) -> Floats:

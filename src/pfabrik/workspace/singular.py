@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import reprlib
 from dataclasses import dataclass
-from itertools import chain
 from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..checks import require_positive
 from ..description.mechanism import Mechanism, checked_mechanism, told_apart
 from ..errors import InvalidArgument
 from ..ik import solve_ik
-from ..motion.singularities import Singularity, parallel_signs
+from ..motion.singularities import NUMBERS, Singularity, parallel_signs
 from ..options import Options
 from ..telling import OnProgress, telling
 from .lattice import codes, corners
@@ -226,18 +225,9 @@ def _measured(over: Workspace, points: Floats, tell: OnProgress | None) -> tuple
 
 
 def _joined(blocks: list[Singularity]) -> Singularity:
-    def every(name: str) -> Floats:
-        return np.concatenate([np.asarray(getattr(block, name)) for block in blocks])
-
-    kinds = [cast(list[tuple[str, ...]], block.kinds) for block in blocks]
+    numbers = {name: np.concatenate([np.asarray(getattr(block, name)) for block in blocks]) for name in NUMBERS}
     return Singularity(
-        serial=every("serial"),
-        parallel=every("parallel"),
-        constraint=every("constraint"),
-        passive=every("passive"),
-        lost=every("lost"),
-        gained=every("gained"),
-        kinds=list(chain(*kinds)),
+        **numbers, kinds=[kinds for block in blocks for kinds in cast(list[tuple[str, ...]], block.kinds)]
     )
 
 
