@@ -14,6 +14,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import Weights
 from ..kernels.reaching import plan as P
 from ..motion.displacements import columns, displacements
+from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 
 RESTARTS = 24
@@ -150,8 +151,6 @@ def _motion(joint: Any, values: Floats) -> Floats:
     if joint["kind"] == P.SLIDE:
         moved[:, :3, 3] = values[:, None] * axis
         return moved
-    K = np.cross(np.eye(3), axis).T * -1.0
-    sine, versine = np.sin(values)[:, None, None], (1.0 - np.cos(values))[:, None, None]
-    moved[:, :3, :3] = np.eye(3) + sine * K + versine * (K @ K)
+    moved[:, :3, :3] = from_rotvec(values[:, None] * axis)
     moved[:, :3, 3] = point - moved[:, :3, :3] @ point
     return moved
