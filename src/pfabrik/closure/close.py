@@ -207,7 +207,7 @@ def close(
     groups = len(closure.loops.groups) - 1
     closed = K.Closed(
         coordinates=coordinates * closure.scale,
-        poses=_in_lengths(poses, 1.0 / length),
+        poses=in_lengths(poses, 1.0 / length),
         gaps=np.full((n, groups), np.inf),
         excesses=np.full((n, groups), np.inf),
         misses=np.full((n, groups), np.inf),
@@ -225,7 +225,7 @@ def close(
         max_iterations=max_iterations,
     )
     _run(closure, locked | closure.last_balls if follow else locked, problem, closed)
-    return Closing(closed.coordinates / closure.scale, _in_lengths(closed.poses, length), *closed[2:])
+    return Closing(closed.coordinates / closure.scale, in_lengths(closed.poses, length), *closed[2:])
 
 
 def measured(mechanism: Mechanism, coordinates: Floats) -> Closing:
@@ -254,7 +254,14 @@ def _run(closure: Closure, locked: frozenset[int], problem: K.ClosureProblem, cl
         in_blocks(run, n, ROWS_A_BLOCK)
 
 
-def _in_lengths(poses: Floats, scale: float) -> Floats:
-    scaled = np.array(poses)
-    scaled[:, :3, 3] *= scale
-    return scaled
+def in_lengths(poses: Floats, scale: float) -> Floats:
+    """Poses with their positions scaled, copied."""
+    return np.asarray(poses * _scaling(scale))
+
+
+@lru_cache(maxsize=64)
+def _scaling(scale: float) -> Floats:
+    """What the numbers of a pose are multiplied with."""
+    factors = np.ones((4, 4))
+    factors[:3, 3] = scale
+    return factors

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,9 @@ from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDING, RESIDUAL, Rows
 from .close import Closing, Closure, closure_of
+
+STEPS_A_REPORT = 16
+"""Steps along a path between two reports of progress."""
 
 
 def new_rows(mechanism: Mechanism, n: int) -> Rows:
@@ -37,6 +40,15 @@ def put_rows(rows: Rows, places: Any, others: Rows) -> None:
     """Write other rows at some places."""
     for array, own in zip(rows, others, strict=True):
         array[places] = own
+
+
+def steps_of(known: Mask, on_progress: Callable[[int, int], None] | None) -> Iterator[int]:
+    """The steps of a path that are poses, one after the other; every few steps it is told how far it is."""
+    for i, is_pose in enumerate(known.tolist()):
+        if is_pose:
+            yield i
+        if on_progress is not None and ((i + 1) % STEPS_A_REPORT == 0 or i + 1 == len(known)):
+            on_progress(i + 1, len(known))
 
 
 def write_closing(closure: Closure, closing: Closing, rows: Rows) -> None:

@@ -20,7 +20,15 @@ from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
 from .assemble import assemble, judged
 from .close import HELD, Closing, Closure, close, closure_of, measured, platform_poses
-from .configurations import Configurations, coordinates_for, joint_coordinates, new_rows, put_rows, write_closing
+from .configurations import (
+    Configurations,
+    coordinates_for,
+    joint_coordinates,
+    new_rows,
+    put_rows,
+    steps_of,
+    write_closing,
+)
 from .descend import within_sight
 from .known import chanced_upon
 from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
@@ -77,14 +85,11 @@ class ClosureEngine:
         known, begin = are_poses(targets), begin_of(self.mechanism, start)
         found = [np.zeros((0, begin.shape[1]))]
         rows, bends = new_rows(self.mechanism, int(known.sum())), Bends(self.mechanism, options)
-        for i, target in enumerate(targets):
-            if known[i]:
-                answer = self._follow_one(made_exact(target[None]), begin, options, bends)
-                put_rows(rows, slice(len(found) - 1, len(found)), answer.rows)
-                begin = answer.coordinates
-                found.append(begin)
-            if on_progress is not None:
-                on_progress(i + 1, len(targets))
+        for i in steps_of(known, on_progress):
+            answer = self._follow_one(made_exact(targets[i : i + 1]), begin, options, bends)
+            put_rows(rows, slice(len(found) - 1, len(found)), answer.rows)
+            begin = answer.coordinates
+            found.append(begin)
         return Configurations(rows, np.concatenate(found)).among(known)
 
     def _follow_one(self, target: Floats, begin: Floats, options: Options, bends: Bends) -> Configurations:

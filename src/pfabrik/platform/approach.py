@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats, Records
+from ..closure.close import in_lengths
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
@@ -182,16 +183,3 @@ def home_start(mechanism: Mechanism, table: LegTable) -> Starts:
     """Home, as a start."""
     poses = in_lengths(mechanism.home_pose[None], 1.0 / mechanism.characteristic_length)
     return Starts(poses, np.zeros((1, len(table.legs))), table.home_sides)
-
-
-def in_lengths(poses: Floats, scale: float) -> Floats:
-    """Poses with their positions scaled, copied."""
-    return np.asarray(poses * _scaling(scale))
-
-
-@lru_cache(maxsize=64)
-def _scaling(scale: float) -> Floats:
-    """What the numbers of a pose are multiplied with."""
-    factors = np.ones((4, 4))
-    factors[:3, 3] = scale
-    return factors

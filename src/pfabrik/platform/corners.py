@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..closure.close import in_lengths
 from ..closure.configurations import new_rows
 from ..closure.parasitic import strays
 from ..decomposition.leg_table import LegTable, leg_table
@@ -18,7 +19,7 @@ from ..kernels.platform.records import Starts
 from ..kernels.rows import REACHED
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
-from .approach import Approach, carriers_of, home_start, in_lengths, no_starts
+from .approach import Approach, carriers_of, home_start, no_starts
 from .rotation import constraints_at, keeps_rotation
 from .table import machine
 

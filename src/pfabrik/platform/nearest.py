@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Floats, Records
+from ..closure.close import in_lengths
 from ..closure.projection import Way, ways_of
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.home_mobility import column_joints
@@ -19,7 +20,7 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import HOLD_ORIENTATION, HOLD_POSITION
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .approach import Approach, in_lengths, new_found, no_starts
+from .approach import Approach, new_found, no_starts
 from .corners import corners_of
 
 MOST_STEPS = 200

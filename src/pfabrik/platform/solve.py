@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.close import Closing
-from ..closure.configurations import Configurations, new_rows, put_rows, rows_at
+from ..closure.close import Closing, in_lengths
+from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
 from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import Way
 from ..closure.solve import ClosureEngine
@@ -25,7 +25,7 @@ from ..motion.displacements import centres_at
 from ..options import Options
 from ..poses import are_poses
 from .answers import LegAnswers, begins_of, coordinates_of, sides_at
-from .approach import in_lengths, starts_at
+from .approach import starts_at
 from .coordinates import settled
 from .forward import assembled
 from .nearest import weighed_limits
@@ -38,9 +38,6 @@ if TYPE_CHECKING:
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of a kernel that answers one by one, or in blocks."""
-
-STEPS_A_REPORT = 16
-"""Steps along a path between two reports of progress."""
 
 
 class LegsEngine:
@@ -130,12 +127,9 @@ class LegsEngine:
             return self._inner.follow(targets, start, options, on_progress)
         targets, known = np.require(targets, requirements=["C", "W"]), are_poses(targets)
         found: list[Configurations] = []
-        for i in range(len(targets)):
-            if known[i]:
-                before = found[-1] if found else start
-                found.append(self.answer(targets[i : i + 1], before, options, keep_mode=True, nearby=True))
-            if on_progress is not None and ((i + 1) % STEPS_A_REPORT == 0 or i + 1 == len(targets)):
-                on_progress(i + 1, len(targets))
+        for i in steps_of(known, on_progress):
+            before = found[-1] if found else start
+            found.append(self.answer(targets[i : i + 1], before, options, keep_mode=True, nearby=True))
         return self._joined(found, start).among(known)
 
     def _joined(self, found: Sequence[Configurations], start: Configurations | None) -> Configurations:

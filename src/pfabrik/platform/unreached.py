@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
+from ..closure.close import in_lengths
 from ..closure.configurations import new_rows, put_rows, rows_at
 from ..closure.parasitic import strays
 from ..decomposition.leg_table import LegTable
@@ -18,7 +19,7 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import PENDING, POSITION_ERROR, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options
-from .approach import in_lengths, starts_at
+from .approach import starts_at
 from .corners import assembled_otherwise
 from .nearest import project
 from .table import Machine, machine, machine_nearby

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.close import Closing, close, closure_of
-from ..closure.configurations import Configurations, new_rows, put_rows
+from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
 from ..closure.descend import within_sight
 from ..closure.projection import Way, kept, ways_of
 from ..closure.solve import ClosureEngine, begin_of, told
@@ -37,9 +37,6 @@ STEPS = 8
 """Steps to come as near as chains can, each round."""
 
 ROWS_A_BLOCK = 64
-
-STEPS_A_REPORT = 16
-"""Steps along a path between two reports of progress."""
 
 
 class ReachingEngine:
@@ -87,17 +84,14 @@ class ReachingEngine:
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
         known, before = are_poses(targets), start
-        rows = new_rows(self.mechanism, len(targets))
-        coordinates = np.full((len(targets), begin_of(self.mechanism, start).shape[1]), np.nan)
-        for i in range(len(targets)):
-            found = self.answer(targets[i : i + 1], before, options, keep_mode=True)
-            put_rows(rows, slice(i, i + 1), found.rows)
-            if known[i]:
-                coordinates[i] = found.coordinates[0]
-                before = Configurations(found.rows, found.coordinates)
-            if on_progress is not None and ((i + 1) % STEPS_A_REPORT == 0 or i + 1 == len(targets)):
-                on_progress(i + 1, len(targets))
-        return Configurations(rows, coordinates)
+        found = new_rows(self.mechanism, len(targets))
+        coordinates = np.zeros((len(targets), begin_of(self.mechanism, start).shape[1]))
+        for i in steps_of(known, on_progress):
+            answer = self.answer(targets[i : i + 1], before, options, keep_mode=True)
+            before = Configurations(answer.rows, answer.coordinates)
+            put_rows(found, slice(i, i + 1), before.rows)
+            coordinates[i] = before.coordinates[0]
+        return Configurations(rows_at(found, known), coordinates[known]).among(known)
 
     def _by_passes(
         self, wanted: Floats, start: Configurations | None, options: Options, keep_mode: bool
