@@ -66,8 +66,7 @@ class Solver:
         if isinstance(self._engine, LegsEngine):
             keep_mode = keeps_mode(self.options, start)
             self._reach = self._engine.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
-            self._own, self._scratch = self._engine.forward_start(begin), self._engine.forward_scratch()
-            self._assemble = self._engine.prepared_forward(self._own, self._scratch, self._rows)
+            self._assemble, self._kept = self._engine.prepared_forward(begin, self._rows)
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))
         self.pose, self.actuators = _read_only(self._rows.poses[0]), _read_only(self._rows.actuators[0])
         self.status = Status.INVALID

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Records
 from ..closure.close import in_lengths
@@ -20,7 +21,7 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import HOLD_ORIENTATION, HOLD_POSITION
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .approach import Approach, new_found, no_starts
+from .approach import Approach, new_found, no_starts, starts_at
 from .corners import corners_of
 
 MOST_STEPS = 200
@@ -125,7 +126,34 @@ def _toward_values(mechanism: Mechanism, corners: bool) -> Approach:
     return Approach(mechanism, table, (0.0,) * 6, settings, others, table.driven)
 
 
-def nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
+def move_arms(
+    mechanism: Mechanism,
+    table: LegTable,
+    targets: Floats,
+    begins: Floats,
+    sides: Floats,
+    places: NDArray[np.intp],
+) -> tuple[NDArray[np.intp], Floats]:
+    """Move the arms of some rows to where legs reach their targets within all limits, as little as can be.
+
+    Parameters
+    ----------
+    targets, begins : (n, 4, 4) and (n or 1, 4, 4) [length].
+    sides : where arms are, (n, legs), and where they go.
+    places : the rows that are asked for.
+
+    Returns
+    -------
+    The rows for which there is such a place, and the poses that the searches ended at, (rows, 4, 4) [length].
+    """
+    own = starts_at(mechanism, table, begins if len(begins) == 1 else begins[places], sides[places])
+    found = _nearest_arms(mechanism, table, targets[places], own)
+    placed = np.isfinite(found.distances)
+    sides[places[placed]] = found.sides[placed]
+    return places[placed], found.poses[placed]
+
+
+def _nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
     """Feasible configurations at targets (n, 4, 4) [length] whose arms are near to where the starts (n,) have them.
 
     Searches start there alone: what they miss, projections from elsewhere find.

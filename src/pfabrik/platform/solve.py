@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +27,10 @@ from .answers import LegAnswers, begins_of, coordinates_of, sides_at
 from .approach import starts_at
 from .coordinates import settled
 from .forward import assembled
-from .nearest import weighed_limits
+from .nearest import move_arms, weighed_limits
 from .one import Ends, OneAssembly, OneTarget, new_scratch
 from .table import Machine, machine, machine_nearby, resting_at_home
 from .unreached import Question, Unreached, answer_unreached
-
-if TYPE_CHECKING:
-    from ..kernels.platform.forward import Newton
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of a kernel that answers one by one, or in blocks."""
@@ -229,18 +225,12 @@ class LegsEngine:
             put_rows(rows, rest, others.rows)
         return self._answers(rows, sides, carriers, start, first, rest, others)
 
-    def prepared_forward(self, own: Handle[Starts], scratch: Handle[Newton], rows: Rows) -> Callable[[], int]:
-        """A call that answers `rows.actuators` into the rest of one row, as long as its start and scratch memory are
-        kept; it returns 0 where they assemble."""
-        return self._one_forward.prepared(own, scratch, rows, self._one_forward.new_ends())
-
-    def forward_scratch(self) -> Handle[Newton]:
-        """Scratch memory of its own for such a call."""
-        return Handle(new_scratch(self.mechanism, self._table))
-
-    def forward_start(self, start: Configurations | None) -> Handle[Starts]:
-        """Where one row starts to be assembled."""
-        return self._forward_start(start, self._sides_of(start))
+    def prepared_forward(self, start: Configurations | None, rows: Rows) -> tuple[Callable[[], int], object]:
+        """A call that answers `rows.actuators` into the rest of one row, and what is to be kept for it: where it starts
+        and its own scratch memory. It returns 0 where they assemble."""
+        own = self._forward_start(start, self._sides_of(start))
+        scratch = Handle(new_scratch(self.mechanism, self._table))
+        return self._one_forward.prepared(own, scratch, rows, self._one_forward.new_ends()), (own, scratch)
 
     def _forward_start(self, start: Configurations | None, sides: Floats) -> Handle[Starts]:
         if start is None:
@@ -310,8 +300,6 @@ class LegsEngine:
 
     def _reach_by_arms(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
         """Answer rows whose legs reach once arms have moved, and note where; how many these are."""
-        from .arms import move_arms
-
         before, rest = sides.copy(), np.flatnonzero(rows.status != REACHED)
         some, poses = move_arms(self.mechanism, self._table, targets, begins, sides, rest)
         if not len(some):

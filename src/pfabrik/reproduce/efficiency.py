@@ -21,7 +21,7 @@ from ..description.mechanism import Mechanism
 from ..engine import inverse_engine_of
 from ..geometric.topologies import closed_form
 from ..ik import solve_ik
-from ..platform.arms import move_arms
+from ..platform.nearest import move_arms
 from ..platform.table import machine
 from ..poses import pose
 from ..reaching.positions import new_reached, positions_of
