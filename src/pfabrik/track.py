@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .answers.answer import Wanted
-from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track, pace_of
@@ -74,7 +73,7 @@ def track(
         _count_on(mechanism, found.rows, begin.rows.actuators[0])
     refuse_invalid(poses, shape, found.rows.status, options)
     wanted = Wanted(poses.copy(), options.hold, options.rotation_length)
-    return Track(mechanism, found, wanted, partial(_tracked, mechanism, options), pace)
+    return Track(mechanism, found, wanted, partial(track, mechanism, options=options), pace)
 
 
 def _count_on(mechanism: Mechanism, rows: Rows, begin: Floats) -> None:
@@ -88,7 +87,3 @@ def _count_on(mechanism: Mechanism, rows: Rows, begin: Floats) -> None:
         values += 2.0 * np.pi * np.round((begin[column] - values[0]) / (2.0 * np.pi))
         if (values >= low - TOLERANCES.limit).all() and (values <= high + TOLERANCES.limit).all():
             rows.actuators[known, column] = values
-
-
-def _tracked(mechanism: Mechanism, options: Options, targets: Floats, start: Solution) -> Track:
-    return track(mechanism, targets, start=start, options=options)

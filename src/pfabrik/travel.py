@@ -91,13 +91,14 @@ class Travel(Sequence[Reach]):
 
     def __str__(self) -> str:
         """A table of them, angles in degrees."""
-        rows = ((*_direction(each), *self._distance(each), short_names(each.stopped_by)) for each in self)
-        return aligned(_HEADER, rows)
+        return aligned(_HEADER, self._rows())
 
     def _repr_html_(self) -> str:
         """The same for notebooks."""
-        rows = [(*_direction(each), *self._distance(each), short_names(each.stopped_by)) for each in self]
-        return card(self.origin.mechanism.name, ["how far the end effector can go"], _HEADER, rows, "")
+        return card(self.origin.mechanism.name, ["how far the end effector can go"], _HEADER, self._rows(), "")
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        return [(*_direction(each), *self._distance(each), short_names(each.stopped_by)) for each in self]
 
     def _distance(self, reach: Reach) -> tuple[str, str]:
         """How far it is, and the unit: degrees about an axis."""

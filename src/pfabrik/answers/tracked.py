@@ -75,7 +75,7 @@ class Track(Solution):
         mechanism: Mechanism,
         found: Configurations,
         wanted: Wanted,
-        follow: Callable[[Floats, Solution], Solution],
+        follow: Callable[..., Solution],
         pace: Pace | None,
     ) -> None:
         """Wrap answers; `follow` answers another path, (k, 4, 4), from a start, in the same way."""
@@ -132,7 +132,8 @@ class Track(Solution):
     @cached_property
     def jumps(self) -> Mask:
         found = np.zeros(self.shape, bool)
-        moved = np.maximum(_moves(self.mechanism, self.pose), self._actuator_moves().max(axis=1, initial=0.0))
+        actuators = _scaled(self.mechanism, self.actuators).max(axis=1, initial=0.0)
+        moved = np.maximum(_moves(self.mechanism, self.pose), actuators)
         asked = np.maximum(SUSPICIOUS * _moves(self.mechanism, self.targets), LEAST)
         for row in np.flatnonzero(moved > asked).tolist():
             # where links are stretched out, only one direction may tell which way they bend
@@ -144,7 +145,7 @@ class Track(Solution):
         """Whether a step from one row to the next, or back, stays a leap where it is divided, or leads elsewhere."""
         shares = np.arange(1, SUBSTEPS + 1)[:, None, None] / SUBSTEPS
         here, there = (np.repeat(self.targets[row : row + 1], SUBSTEPS, axis=0) for row in (start, end))
-        way = [self[start], self._follow(between(here, there, shares), self[start]), self[end]]
+        way = [self[start], self._follow(between(here, there, shares), start=self[start]), self[end]]
         poses = np.concatenate([each.pose.reshape(-1, 4, 4) for each in way])
         actuators = np.concatenate([each.actuators.reshape(-1, self.actuators.shape[1]) for each in way])
         steps = np.maximum(_moves(self.mechanism, poses), _scaled(self.mechanism, actuators).max(axis=1, initial=0.0))
@@ -159,9 +160,6 @@ class Track(Solution):
             plain[name] = None if value is None else as_plain(value)
         plain["too_fast"] = None if self.too_fast is None else [list(names) for names in self.too_fast]
         return plain
-
-    def _actuator_moves(self) -> Floats:
-        return _scaled(self.mechanism, self.actuators)
 
     @property
     def speeds(self) -> Floats | None:

@@ -67,16 +67,11 @@ def demo(out: Path, steps: int, quick: bool) -> int:
     return 0 if all(holds(run.solution) for run in runs) else 1
 
 
-def rehearse(case: Case, steps: int) -> None:
-    """Ask for a few steps inside and outside, for each has kernels of its own."""
-    pf.track(case.mechanism, case.leaving.poses(steps)[:: max(1, steps // 12)])
-
-
 def follow(case: Case, steps: int) -> Run:
     """Track one circle, and time it without the compilation of the kernels."""
     mechanism = case.mechanism
     targets = case.leaving.poses(steps)
-    rehearse(case, steps)
+    pf.track(mechanism, targets[:: max(1, steps // 12)])  # inside and outside: each has kernels of its own
     with telling(f"{mechanism.name}: {steps} steps") as on_progress:
         start = time.perf_counter()
         solution = pf.track(mechanism, targets, on_progress=on_progress)

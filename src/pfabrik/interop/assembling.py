@@ -19,7 +19,7 @@ from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
 from ..motion.displacements import centres, columns, displacements, screws
 from ..tolerances import TOLERANCES
 from .closing import CLOSED, Closer, Placed, bounds, closed
-from .opened import ROWS, Loop, Note, OpenMechanism
+from .opened import ROWS, Note, OpenMechanism
 from .simplify import simplified
 from .straighten import straightened
 
@@ -85,7 +85,7 @@ def _placed(opened: OpenMechanism, closer: Closer, told: list[Note]) -> tuple[Pl
     outside = [joint.name for joint, at in _outside(opened, np.zeros(len(owners))) if at]
     if outside:
         told.append(Note("home was outside the range, and is moved into it", tuple(outside)))
-    tried = [closed(closer, free | (low > 0.0) | (high < 0.0), low, high) for free in (~driven,)]
+    tried = [closed(closer, ~driven | (low > 0.0) | (high < 0.0), low, high)]
     if tried[-1].gap > CLOSED:
         tried.append(closed(closer, everything, low, high))
     if min(each.gap for each in tried) > TOLERANCES.file_gap:
@@ -156,13 +156,10 @@ def _moved(opened: OpenMechanism, placed: Placed) -> list[Joint]:
 
 def _met(opened: OpenMechanism, closer: Closer, placed: Placed) -> list[Joint]:
     """The loops as the joints that they have become."""
-    meetings = zip(opened.loops, closer.meeting(placed.q), strict=True)
-    return [_as_joint(loop, point, frame) for loop, (point, frame) in meetings]
-
-
-def _as_joint(loop: Loop, point: Floats, frame: Floats) -> Joint:
-    axis = frame[:, 2] if loop.type == "revolute" else None
-    return Joint(loop.name, loop.type, loop.connects, at=point, axis=axis)
+    return [
+        Joint(loop.name, loop.type, loop.connects, at=point, axis=frame[:, 2] if loop.type == "revolute" else None)
+        for loop, (point, frame) in zip(opened.loops, closer.meeting(placed.q), strict=True)
+    ]
 
 
 def _reference(opened: OpenMechanism, placed: Placed) -> Floats | None:

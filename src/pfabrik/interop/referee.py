@@ -109,20 +109,13 @@ def reached_at_random(mechanism: Mechanism, count: int, rng: np.random.Generator
     Answers to random targets, nearer to home while most are out of reach; where targets are hardly ever reached, as
     where they set more than the end effector can do, answers to random actuator values.
     """
-
-    def by_target(near: float) -> Solution:
-        return solve_ik(mechanism, _targets(mechanism, count, near, rng))
-
-    def by_actuators(near: float) -> Solution:
-        return solve_fk(mechanism, _actuators(mechanism, count, near, rng))
-
     found: list[Solution] = []
-    for ask in (by_target, by_actuators):
+    for ask, drawn in ((solve_ik, _targets), (solve_fk, _actuators)):
         near = 1.0
         for _ in range(MOST_DRAWS):
             if len(found) == count:
                 return found
-            answers = ask(near)
+            answers = ask(mechanism, drawn(mechanism, count, near, rng))
             reached = np.flatnonzero(np.asarray(answers.status) == Status.REACHED)
             found += [answers[int(row)] for row in reached[: count - len(found)]]
             near *= 0.6 if 2 * len(reached) < count else 1.0

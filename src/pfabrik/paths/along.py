@@ -27,7 +27,7 @@ def least_margins(solution: Solution) -> Extremes:
     """The smallest margin of all limits, as of `margins`, and the limit: its joint and bound."""
     found = margins(solution)
     if not found:
-        return _nothing(len(solution))
+        return Extremes(np.full(len(solution), np.nan), [""] * len(solution))
     names = [f"{joint} {bound}" for joint, bound in found]
     return _extremes(np.stack([np.asarray(each) for each in found.values()], axis=-1), names)
 
@@ -72,7 +72,3 @@ def _extremes(values: Floats, names: list[str]) -> Extremes:
     """The least of each row, (n, k) to (n,)."""
     places = np.argmin(np.where(np.isnan(values), np.inf, values), axis=1)
     return Extremes(values[np.arange(len(values)), places], [names[place] for place in places.tolist()])
-
-
-def _nothing(count: int) -> Extremes:
-    return Extremes(np.full(count, np.nan), [""] * count)

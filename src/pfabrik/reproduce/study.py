@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib.resources import files
 from typing import Any
 
@@ -84,9 +84,9 @@ class Case:
     turn: float
     printed: Printed
 
-    @property
+    @cached_property
     def mechanism(self) -> Mechanism:
-        return _loaded(self.key)
+        return load(self.key)
 
 
 @dataclass(frozen=True)
@@ -131,8 +131,3 @@ def _case(key: str, entry: dict[str, Any]) -> Case:
 
 def _circle(entry: dict[str, Any]) -> Circle:
     return Circle(tuple(entry["center"]), float(entry["radius"]), tuple(entry.get("swing", (0.0, 0.0, 0.0))))
-
-
-@lru_cache(maxsize=8)
-def _loaded(key: str) -> Mechanism:
-    return load(key)

@@ -143,7 +143,8 @@ class _Film:
             canvas.line(taken, color=ACHIEVED, linewidth=1.8, zorder=21),
             canvas.line(asked[step][None], marker="x", color=ASKED, markersize=6, zorder=22),
         ]
-        self._caption.set(text=_caption(track[step], step, len(track)), color=_colour(track[step]))
+        colour = ACHIEVED if track.status[step] == Status.REACHED else HELD
+        self._caption.set(text=_caption(track[step], step, len(track)), color=colour)
 
 
 def _caption(solution: Solution, step: int, steps: int) -> str:
@@ -151,7 +152,3 @@ def _caption(solution: Solution, step: int, steps: int) -> str:
     held = short_names(solution._limits[0])
     told = as_sentence(solution).partition(";")[0]
     return f"step {step + 1} of {steps}: {told}\n{held or ' '}"
-
-
-def _colour(solution: Solution) -> str:
-    return ACHIEVED if solution.status == Status.REACHED else HELD

@@ -51,7 +51,7 @@ def plot(found: Region, ax: Axes | None = None) -> Axes:
             title_fontsize=SMALL,
         )
         legend.set_title("border formed by")
-    axes.set_title(_title(found), fontsize=SMALL + 1)
+    axes.set_title(f"{found.mechanism.name}: {in_words(found)}", fontsize=SMALL + 1)
     return axes
 
 
@@ -118,10 +118,6 @@ def shown(found: Region, points: Floats) -> Floats:
 
 def labels(found: Region) -> list[str]:
     return [f"{name} [{'deg' if unit == 'rad' else unit}]" for name, unit in zip(found.names, found.units, strict=True)]
-
-
-def _title(found: Region) -> str:
-    return f"{found.mechanism.name}: {in_words(found)}"
 
 
 def _smooth(normals: Floats, faces: Ints, n: int) -> Floats:

@@ -64,7 +64,8 @@ class Scene:
             for place, part in enumerate(skeleton.parts)
             if len(part.corners) >= 3
         ]
-        self._joints = {kind: self._add_joints(kind, skeleton) for kind in _kinds(skeleton)}
+        kinds = sorted({mark.joint.type for mark in skeleton.marks})
+        self._joints = {kind: self._add_joints(kind, skeleton) for kind in kinds}
         if len(skeleton.rails):
             rails = (skeleton.rails / self._length).astype(np.float32)
             self._scene.add_line_segments(f"{MACHINE}/rails", rails, rgb(EDGE), thickness=1.5)
@@ -181,10 +182,6 @@ class Scene:
 
 def _colour_of(part: Part) -> tuple[int, int, int]:
     return rgb(BASE if part.role == "base" else of_a_body(part.role))
-
-
-def _kinds(skeleton: Skeleton) -> list[str]:
-    return sorted({mark.joint.type for mark in skeleton.marks})
 
 
 def _of_kind(skeleton: Skeleton, kind: str) -> list[Mark]:
