@@ -16,7 +16,7 @@ from pfabrik.decomposition.leg_table import LegTable, leg_table, table_of_poses
 from pfabrik.description.home_mobility import end_effector_freedom
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
-from pfabrik.feasibility import _Asked, feasibility_on_grid
+from pfabrik.feasibility import _Asked
 from pfabrik.kernels.platform.read import read
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
@@ -296,21 +296,6 @@ def test_feasibility_tells_where_three_hinges_through_a_point_cannot_point() -> 
     np.testing.assert_allclose(found.margin[beyond > 0.0], -beyond[beyond > 0.0], atol=1e-9)
     assert {found.limits[each][1] for each in found.binding[beyond > 0.0]} == {"closed"}
     assert 20 < (beyond > 0.0).sum() < 180
-
-
-@pytest.mark.parametrize("name", ["stewart", "delta", "orthoglide"])
-def test_feasibility_on_a_grid_is_that_of_its_targets(name: str) -> None:
-    mechanism = machine(name)
-    begin, counts = mechanism.home_pose.copy(), (5, 4, 7)
-    steps = Rotation.from_rotvec([0.1, 0.2, 0.3]).as_matrix() * mechanism.characteristic_length * 0.2
-    begin[:3, 3] -= 2.0 * steps.sum(axis=0)
-    targets = np.tile(begin, (140, 1, 1))
-    targets[:, :3, 3] += np.stack(np.unravel_index(np.arange(140), counts), axis=1) @ steps
-    found, each = feasibility_on_grid(mechanism, begin, steps, counts), pf.feasibility(mechanism, targets)
-    assert found.margin.shape == counts
-    np.testing.assert_allclose(found.margin.ravel(), each.margin, rtol=1e-9, atol=1e-9)
-    np.testing.assert_array_equal(found.margin.ravel() > 0.0, each.margin > 0.0)
-    assert 0 < (each.margin > 0.0).sum() < 140
 
 
 @pytest.mark.parametrize("name", ["stewart", "hexaglide", "delta", "rrr"])

@@ -19,8 +19,8 @@ from .platform.answers import sides_at
 from .platform.table import machine
 from .targets import Target, as_targets
 
-ROWS_A_BLOCK, ROWS_A_RUN, POSES_MADE = 1024, 4096, 65536
-"""Rows of one call of a kernel that measures one by one, or in blocks; poses of a grid that are made at a time."""
+ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
+"""Rows of one call of a kernel that measures one by one, or in blocks."""
 
 UNKNOWN = -2
 """Binding of rows whose margin blocks do not tell, see `kernels.legs.maps`."""
@@ -67,23 +67,6 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
     return Feasibility(shaped(margin, shape), shaped(binding, shape), _limits(mechanism))
 
 
-def feasibility_on_grid(
-    mechanism: Mechanism, target: Target, steps: Floats, counts: tuple[int, int, int], *, start: Start | None = None
-) -> Feasibility:
-    """Margins of the targets of a grid, in its shape: what `feasibility` tells of each, which need not be made.
-
-    Parameters
-    ----------
-    target : one, at which the grid begins; all have its orientation.
-    steps : from a target to the next along each of three lines, (3, 3) [length].
-    counts : how many there are on each line.
-    """
-    asked = _Asked(mechanism, start)
-    begin, _ = as_targets(mechanism, target)
-    margin, binding = asked.of_grid(begin, np.array(steps, dtype=float), np.array(counts))
-    return Feasibility(margin.reshape(counts), binding.reshape(counts), _limits(mechanism))
-
-
 class _Asked:
     """A mechanism's legs in the working mode of a start."""
 
@@ -104,41 +87,22 @@ class _Asked:
         """Margins (n,) of poses (n, 4, 4), and which limits they are of."""
         if not self._table.is_for_blocks:
             return self._one_by_one(poses)
-        margin, binding, unknown = self._in_blocks(len(poses), poses, np.zeros((3, 3)), np.zeros(0, np.int64))
+        margin, binding, unknown = self._in_blocks(poses)
         if unknown:
             some = np.flatnonzero(binding == UNKNOWN)
             margin[some], binding[some] = self._one_by_one(poses[some])
         return margin, binding
 
-    def of_grid(self, begin: Floats, steps: Floats, counts: Ints) -> tuple[Floats, Ints]:
-        """Margins (n,) of the poses of a grid, the last line's running fastest, and which limits they are of."""
-        steps = steps * self._table.task["axes"][0]
-        n = int(np.prod(counts))
-        if self._table.is_for_blocks:
-            margin, binding, unknown = self._in_blocks(n, begin, steps, counts)
-            places = np.flatnonzero(binding == UNKNOWN) if unknown else np.zeros(0, np.int64)
-        else:
-            margin, binding, places = np.empty(n), np.empty(n, np.int64), np.arange(n)
-        for block in (places[start : start + POSES_MADE] for start in range(0, len(places), POSES_MADE)):
-            poses = np.tile(begin, (len(block), 1, 1))
-            poses[:, :3, 3] += np.stack(np.unravel_index(block, counts), axis=1) @ steps
-            margin[block], binding[block] = self._one_by_one(poses)
-        return margin, binding
-
-    def _in_blocks(self, n: int, poses: Floats, steps: Floats, counts: Ints) -> tuple[Floats, Ints, int]:
-        """Margins and bindings of n poses, or of a grid that begins at one, and how many of them are UNKNOWN."""
+    def _in_blocks(self, poses: Floats) -> tuple[Floats, Ints, int]:
+        """Margins and bindings of poses, and how many of them are UNKNOWN."""
         from .kernels.legs.maps import margins_in_blocks
 
-        margin, binding = np.empty(n), np.empty(n, np.int64)
+        margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
 
         def run(block: slice) -> int:
-            targets = poses if len(counts) else poses[block]
             return margins_in_blocks(
                 self._machine.address,
-                targets,
-                steps,
-                counts,
-                block.start,
+                poses[block],
                 self._begin,
                 self._sides,
                 self._follows,
@@ -146,7 +110,7 @@ class _Asked:
                 binding[block],
             )
 
-        return margin, binding, sum(in_blocks(run, n, ROWS_A_RUN))
+        return margin, binding, sum(in_blocks(run, len(poses), ROWS_A_RUN))
 
     def _one_by_one(self, poses: Floats) -> tuple[Floats, Ints]:
         from .kernels.legs.feasibility import feasibility as measure

@@ -64,7 +64,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_otherwise, _ANSWERS),
     (approach_by_pose, tuple(_values("i i i f3 f2 f3 f2 f2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i f2 i i i1 f2 f3 f2 f2 f2"))),
-    (margins_in_blocks, tuple(_values("i f3 f2 i1 i f3 f2 i f1 i1"))),
+    (margins_in_blocks, tuple(_values("i f3 f3 f2 i f1 i1"))),
     (number_points, (*_values("i1 i1 i1 i"), True, *_values("i1"))),
     (join, tuple(_values("i2 i1"))),
     (second_derivatives, tuple(_values("f1 f2 f2"))),

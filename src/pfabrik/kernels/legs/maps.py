@@ -1,4 +1,4 @@
-"""How far poses are inside, or beyond, the limits of rods in closed form: in blocks, and on grids made here.
+"""How far poses are inside, or beyond, the limits of rods in closed form: in blocks.
 
 Whatever a choice needs is read before it: a loop that reads memory in one of two cases does not vectorise.
 """
@@ -20,17 +20,14 @@ from .columns import (
     IS_SURE,
     LENGTH,
     MORE,
-    PX,
     ROW,
     VALUE,
     VALUES,
-    XX,
     arctangent,
     lay_inverse,
     lay_out,
 )
 from .feasibility import share_of
-from .poses import load
 from .records import CARRIAGE, CRANK, HINGE, NO_CARRIER, SHARED, SLIDE
 from .table import open_table
 
@@ -44,36 +41,10 @@ LEAST, BINDING, IS_KNOWN, LARGEST, IS_POSE, CONES = EXCESS, MORE, MORE + 1, MORE
 
 
 @routine
-def lay_rotation(begin: Floats, S: Floats) -> None:
-    """Fill the rotation of all columns with that of a pose."""
-    for row in range(9):
-        for column in range(BLOCK):
-            S[XX + row, column] = begin[row // 3, row % 3]
-
-
-@routine
-def lay_grid(begin: Floats, steps: Floats, counts: Ints, first: int, n: int, L: float, S: Floats) -> None:
-    """Positions of a grid's poses from the `first` on, the last line's running fastest; it begins at a pose [L]."""
-    along, across = counts[2], counts[1]
-    k, j, i = first % along, first // along % across, first // (along * across)
-    for column in range(n):
-        for row in range(3):
-            way = i * steps[0, row] + j * steps[1, row] + k * steps[2, row]
-            S[PX + row, column] = begin[row, 3] + way / L
-        S[IS_SURE, column], S[ROW, column] = 1.0, 0.0
-        k += 1
-        if k == along:
-            k, j = 0, j + 1
-            if j == across:
-                j, i = 0, i + 1
-
-
-@routine
 def begin_margins(n_cones: int, n: int, S: Floats) -> None:
     for i in range(n):
         S[LEAST, i], S[BINDING, i], S[IS_KNOWN, i], S[LARGEST, i] = math.inf, -1.0, 1.0, 0.0
-        is_sure, first = S[IS_SURE, i], S[XX, i]  # NaN where a grid begins at no pose
-        S[IS_POSE, i] = is_sure if first == first else 0.0
+        S[IS_POSE, i] = S[IS_SURE, i]
     for c in range(n_cones):
         for i in range(n):
             S[CONES + 2 * c, i] = math.inf
@@ -160,9 +131,6 @@ def has_rows(rod: Record) -> bool:
 def margins_in_blocks(
     machine: int,
     targets: Floats,
-    steps: Floats,
-    counts: Ints,
-    first: int,
     begins: Floats,
     sides: Floats,
     follows: int,
@@ -174,10 +142,7 @@ def margins_in_blocks(
     Parameters
     ----------
     machine : see `open_table`.
-    targets : (n, 4, 4) [length]; or one, at which a grid begins.
-    steps, counts : of a grid, (3, 3) [length] and (3,): from a pose to the next along each of three lines, and how many
-        there are on each; the last line's run fastest. No counts, (0,), for `targets` themselves.
-    first : which of the grid's poses is the first to be told of.
+    targets : (n, 4, 4) [length].
     follows : whether what the task leaves open changes with what it sets. Then a leg that does not reach a pose as it
         is may reach it completed; else it does not, and blocks tell by how much.
     """
@@ -186,16 +151,9 @@ def margins_in_blocks(
     S, pose, unknown = np.empty((CONES + 2 * cones.shape[0], BLOCK)), np.zeros((4, 4)), 0
     n_legs, n_limits = legs.shape[0], 2 * limited.shape[0] + cones.shape[0]
     enough = CLOSED if task[0]["unset"] > 0 else CLOSE
-    if counts.shape[0] > 0:
-        if not load(targets[0], begins[0], task[0], pose):
-            pose[0, 0] = math.nan
-        lay_rotation(pose, S)
     for start in range(0, margins.shape[0], BLOCK):
         n = min(BLOCK, margins.shape[0] - start)
-        if counts.shape[0] == 0:
-            lay_out(targets, begins, task[0], start, n, pose, S)
-        else:
-            lay_grid(pose, steps, counts, first + start, n, task[0]["length"], S)
+        lay_out(targets, begins, task[0], start, n, pose, S)
         begin_margins(cones.shape[0], n, S)
         main, a, c = 0, 0, 0
         for k in range(n_legs):
