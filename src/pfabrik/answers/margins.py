@@ -42,6 +42,12 @@ def margins(solution: Solution) -> Mapping[tuple[str, str], float | Floats]:
     return FrozenMapping({key: shaped(margin, solution.shape) for key, margin in found.items()})
 
 
+def nearest_first(solution: Solution) -> list[tuple[str, str, float]]:
+    """Joint, bound and margin of every limit of one answer, the nearest first."""
+    named = ((joint, bound, float(margin)) for (joint, bound), margin in margins(solution).items())
+    return sorted(named, key=lambda limit: limit[2])
+
+
 def _shares(off: Floats, room: Floats, tolerances: Floats) -> Floats:
     """Distances from bounds (n, k) as shares of the room there is, (k,)."""
     if (room > 0.0).all():

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-import pfabrik as pf
-
 from ..answers.table import aligned, plain
 from ..answers.words import as_sentence, by_bound, exceeded, loop_gap
 from ..arrays import Floats
@@ -64,16 +62,11 @@ def in_units(shown: Sequence[Readout], values: Floats) -> list[str]:
     return [plain(float(readout.display(value)), 1e-9) for readout, value in zip(shown, values, strict=True)]
 
 
-def margins_of(solution: Solution) -> list[tuple[str, str, float]]:
-    """Joint, bound and margin of every limit, nearest first."""
-    found = pf.margins(solution)
-    named = ((joint, bound, float(margin)) for (joint, bound), margin in found.items())
-    return sorted(named, key=lambda limit: limit[2])
-
-
 def margins_table(solution: Solution) -> str:
-    """The same as a table."""
-    rows = [(joint, bound, plain(margin, TOLERANCES.active)) for joint, bound, margin in margins_of(solution)]
+    """Joint, bound and margin of every limit, nearest first."""
+    from ..answers.margins import nearest_first
+
+    rows = [(joint, bound, plain(margin, TOLERANCES.active)) for joint, bound, margin in nearest_first(solution)]
     return aligned(["joint", "bound", "margin"], rows) if rows else "no limits"
 
 

@@ -9,7 +9,7 @@ import click
 
 import pfabrik as pf
 
-from .answer import describe, in_units, margins_of, margins_table, pose_header, pose_texts, tell_modes
+from .answer import describe, in_units, margins_table, pose_header, pose_texts, tell_modes
 from .mech import MECH, load
 from .projecting import note_left_out, note_unused, options_projecting, projecting
 from .target import Triple, target_of, targeted
@@ -60,8 +60,10 @@ def ik(
     if as_json:
         answer = solution.to_dict()
         if with_margins:
+            from ..answers.margins import nearest_first
+
             names = ("joint", "bound", "margin")
-            answer["margins"] = [dict(zip(names, limit, strict=True)) for limit in margins_of(solution)]
+            answer["margins"] = [dict(zip(names, limit, strict=True)) for limit in nearest_first(solution)]
         click.echo(json.dumps(answer, allow_nan=False))
     else:
         click.echo("\n\n".join([describe(solution), *[margins_table(solution)] * with_margins]))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...answers.margins import nearest_first
 from ...answers.solution import Solution
 from ...answers.status import Status
 from ...description.mechanism import Mechanism
@@ -229,10 +230,10 @@ def status_html(session: Session) -> str:
 
 def margins_html(session: Session) -> str:
     """The nearest limits as bars, 1 in the middle of a range and 0 on the limit."""
-    found = session.margins
+    found = nearest_first(session.solution)
     if not found:
         return ""
-    rows = "".join(_bar(margin.name, margin.value) for margin in found[:BARS])
+    rows = "".join(_bar(f"{joint} {bound}", margin) for joint, bound, margin in found[:BARS])
     more = f"<div>and {len(found) - BARS} others, farther off</div>" if len(found) > BARS else ""
     return f'<div data-pfabrik="margins" style="{BOX}">{rows}{more}</div>'
 

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from ...answers.margins import margins
 from ...answers.solution import Solution
 from ...answers.status import Status
 from ...answers.words import as_sentence
@@ -26,14 +22,6 @@ DIGITS = 9
 """Digits after the point of what is shown: below is rounding, and no -0.0."""
 
 
-@dataclass(frozen=True)
-class Margin:
-    """How far a limit is from being met, as of `margins`."""
-
-    name: str
-    value: float
-
-
 class Session:
     """One machine, what it is asked for, and what it answers.
 
@@ -46,7 +34,6 @@ class Session:
     solution : the answer.
     start : the last feasible answer, which the next one starts from.
     asked : what was asked for last: a "pose", "actuators", or a "configuration" that was given.
-    seconds : how long the answer took to find [s].
     """
 
     def __init__(self, mechanism: Mechanism, solution: Solution | None = None) -> None:
@@ -58,22 +45,19 @@ class Session:
 
     def go_to(self, target: Floats) -> None:
         """Ask for a pose (4, 4)."""
-        start = time.perf_counter()
-        self._answer(solve_ik(self.mechanism, target, start=self.start), "pose", start)
+        self._answer(solve_ik(self.mechanism, target, start=self.start), "pose")
         self.target = np.array(target)
 
     def drive(self, actuators: Floats) -> None:
         """Ask for actuator values (n_a,)."""
-        start = time.perf_counter()
-        self._answer(solve_fk(self.mechanism, actuators, start=self.start), "actuators", start)
+        self._answer(solve_fk(self.mechanism, actuators, start=self.start), "actuators")
         self.actuators = np.array(actuators, float)
 
     def show(self, solution: Solution) -> None:
         """Take a configuration as it is: a working mode, a step of a track."""
-        self._answer(solution, "configuration", time.perf_counter())
+        self._answer(solution, "configuration")
 
-    def _answer(self, solution: Solution, asked: Literal["pose", "actuators", "configuration"], start: float) -> None:
-        self.seconds = time.perf_counter() - start
+    def _answer(self, solution: Solution, asked: Literal["pose", "actuators", "configuration"]) -> None:
         self.solution, self.asked = solution, asked
         self.target, self.actuators = np.array(solution.pose), np.array(solution.actuators)
         if solution.status <= Status.PROJECTED:
@@ -83,12 +67,6 @@ class Session:
     def sentence(self) -> str:
         """What became of what was asked for."""
         return as_sentence(self.solution, self.actuators if self.asked == "actuators" else None)
-
-    @property
-    def margins(self) -> Sequence[Margin]:
-        """All limits, the nearest first."""
-        found = [Margin(f"{joint} {bound}", float(value)) for (joint, bound), value in margins(self.solution).items()]
-        return sorted(found, key=lambda margin: margin.value)
 
     @property
     def pose_as_python(self) -> str:
