@@ -14,6 +14,7 @@ from ..errors import ContinuumOfSolutions, InvalidArgument
 from ..fk import Actuators, as_values, assembled
 from ..motion.walks import stepped_freely
 from ..tolerances import TOLERANCES
+from .fingerprints import pose_marks
 from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes, as_count
 
 
@@ -128,7 +129,5 @@ class _Search:
 
     def _marks(self, poses: Floats) -> Floats:
         """What modes are told apart by, (n, 3 or 12): positions [L], and rotation matrices of a body."""
-        positions = poses[:, :3, 3] / self.closure.mechanism.characteristic_length
-        if self.closure.mechanism.end_effector_is_joint:
-            return np.asarray(positions)
-        return np.concatenate([positions, poses[:, :3, :3].reshape(-1, 9)], axis=1)
+        marks = pose_marks(self.closure.mechanism, poses)
+        return marks[:, :3] if self.closure.mechanism.end_effector_is_joint else marks

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..closure.close import Closing, Closure, close
+from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..motion.displacements import centres, columns
 from ..motion.limits import within_turns
@@ -50,7 +51,7 @@ class Fingerprints:
             return np.asarray((shifts(closure, coordinates, pose, read, locked) == 0.0).all(axis=(0, 2)))
 
         groups = np.arange(len(closure.loops.groups) - 1)
-        self.pose_rests = bool(rests(lambda closing: self._placed(closing.poses)[:, None]).all())
+        self.pose_rests = bool(rests(lambda closing: pose_marks(mechanism, closing.poses)[:, None]).all())
         self.leg_of_group = groups if self.pose_rests else 0 * groups
         self.leg_of_column = self.leg_of_group[closure.loops.group_of]
         self._joints = [joint.name for joint in mechanism.joints if joint.at is not None and joint.type != "fixed"]
@@ -70,7 +71,7 @@ class Fingerprints:
 
     def of_poses(self, poses: Floats) -> Floats:
         """Fingerprints of platforms (n, 4, 4): positions [L], rotation matrices; (n, 0) if platforms tell nothing."""
-        return self._placed(poses) if self.pose_rests else np.zeros((len(poses), 0))
+        return pose_marks(self.mechanism, poses) if self.pose_rests else np.zeros((len(poses), 0))
 
     def of_legs(self, coordinates: Floats) -> Floats:
         """Fingerprints of legs of closed configurations (n, columns): actuators [L, or cosine, sine], centres [L]."""
@@ -97,15 +98,17 @@ class Fingerprints:
                 wished[:, place] = points[:, self._joints.index(joint.name)]
         return wished
 
-    def _placed(self, poses: Floats) -> Floats:
-        positions = poses[:, :3, 3] / self.mechanism.characteristic_length
-        return np.concatenate([positions, poses[:, :3, :3].reshape(-1, 9)], axis=1)
-
     def _centres(self, coordinates: Floats) -> Floats:
         """Centres of the joints that are looked at, (n, looked at, 3) [L]."""
         points = centres(self.mechanism, coordinates)
         own = [points[name] for name in self._joints]
         return np.reshape(own, (-1, len(coordinates), 3)).swapaxes(0, 1) / self.mechanism.characteristic_length
+
+
+def pose_marks(mechanism: Mechanism, poses: Floats) -> Floats:
+    """What platforms (n, 4, 4) are told apart by: positions [L], and rotation matrices, (n, 12)."""
+    positions = poses[:, :3, 3] / mechanism.characteristic_length
+    return np.concatenate([positions, poses[:, :3, :3].reshape(-1, 9)], axis=1)
 
 
 def shifts(
