@@ -201,18 +201,9 @@ def close(
     plunging : undamped steps, up and down: finds more of many solutions, but not the nearest.
     closeness : largest gap, excess and miss that ends the search [L or rad].
     """
-    n = len(coordinates)
+    n, length = len(coordinates), closure.mechanism.characteristic_length
     follow = centres is None and not limits
-    length = closure.mechanism.characteristic_length
-    groups = len(closure.loops.groups) - 1
-    closed = K.Closed(
-        coordinates=coordinates * closure.scale,
-        poses=in_lengths(poses, 1.0 / length),
-        gaps=np.full((n, groups), np.inf),
-        excesses=np.full((n, groups), np.inf),
-        misses=np.full((n, groups), np.inf),
-        iterations=np.zeros(n, np.int64),
-    )
+    closed = new_closed(closure, coordinates, in_lengths(poses, 1.0 / length), np.inf)
     problem = K.ClosureProblem(
         platform=np.array(platform, dtype=float),
         frame=frame,
@@ -225,7 +216,20 @@ def close(
         max_iterations=max_iterations,
     )
     _run(closure, locked | closure.last_balls if follow else locked, problem, closed)
-    return Closing(closed.coordinates / closure.scale, in_lengths(closed.poses, length), *closed[2:])
+    return closing_of(closure, closed)
+
+
+def new_closed(closure: Closure, coordinates: Floats, poses: Floats, gap: float) -> K.Closed:
+    """What the kernels fill, from coordinates (n, columns), poses (n, 4, 4) [L], and gaps before anything is known."""
+    n, groups = len(coordinates), len(closure.loops.groups) - 1
+    gaps, excesses, misses = np.full((3, n, groups), gap)
+    return K.Closed(coordinates * closure.scale, poses, gaps, excesses, misses, np.zeros(n, np.int64))
+
+
+def closing_of(closure: Closure, closed: K.Closed) -> Closing:
+    """What they have filled, in the mechanism's unit."""
+    poses = in_lengths(closed.poses, closure.mechanism.characteristic_length)
+    return Closing(closed.coordinates / closure.scale, poses, *closed[2:])
 
 
 def measured(mechanism: Mechanism, coordinates: Floats) -> Closing:

@@ -13,7 +13,7 @@ from ..kernels.closure.loops import BASE_AXES, SIGHT, Closed, Objective, PoseObj
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
-from .close import EVERYTHING_FREE, Closing, Closure, close, closure_of
+from .close import EVERYTHING_FREE, Closing, Closure, close, closing_of, closure_of, new_closed
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -60,9 +60,7 @@ def nearest_actuators(closure: Closure, coordinates: Floats, poses: Floats, valu
 
 def _ended(closure: Closure, coordinates: Floats, objective: Objective) -> Closing:
     """Where searches from coordinates (n, columns) end."""
-    found = _run(closure, coordinates, objective)[0]
-    found.poses[:, :3, 3] *= closure.mechanism.characteristic_length
-    return Closing(found.coordinates / closure.scale, *found[1:])
+    return closing_of(closure, _run(closure, coordinates, objective)[0])
 
 
 def weighed_limits(
@@ -90,7 +88,8 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
     """The kernel over all rows, on all cores: where they ended, or what holds them where they are."""
     from ..kernels.closure.descend import approach
 
-    closed, scratch = _closed(closure, coordinates), _scratch(closure.mechanism, closure.whole)
+    closed = new_closed(closure, coordinates, np.tile(np.eye(4), (len(coordinates), 1, 1)), 0.0)
+    scratch = _scratch(closure.mechanism, closure.whole)
     weights = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
 
     def run(block: slice) -> None:
@@ -116,15 +115,3 @@ def _objective(closure: Closure, targets: Floats, platform: Sequence[float], fra
     wanted[:, :3, 3] /= closure.mechanism.characteristic_length
     pose = PoseObjective(wanted, np.array(platform, dtype=float), frame, TOLERANCES.inside, TOLERANCES.active, steps)
     return Objective(pose, np.zeros(len(closure.scale)), np.zeros((len(targets), 0)))
-
-
-def _closed(closure: Closure, coordinates: Floats) -> Closed:
-    n, groups = len(coordinates), len(closure.loops.groups) - 1
-    return Closed(
-        coordinates=coordinates * closure.scale,
-        poses=np.zeros((n, 4, 4)) + np.eye(4),
-        gaps=np.zeros((n, groups)),
-        excesses=np.zeros((n, groups)),
-        misses=np.zeros((n, groups)),
-        iterations=np.zeros(n, np.int64),
-    )
