@@ -51,12 +51,10 @@ def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[Activ
     values, near = ranges.values(coordinates), TOLERANCES.active * ranges.units
     low, high = values - ranges.low <= near, ranges.high - values <= near
     for k, (joint, place) in enumerate(zip(ranges.joints, ranges.places, strict=True)):
-        for row in np.flatnonzero(low[:, k]):
-            limit = ActiveLimit(joint.name, "min", float(values[row, k]), float(ranges.low[k]), None, place)
-            found[row].append(limit)
-        for row in np.flatnonzero(high[:, k] & ~low[:, k]):
-            limit = ActiveLimit(joint.name, "max", float(values[row, k]), float(ranges.high[k]), None, place)
-            found[row].append(limit)
+        for row in np.flatnonzero(low[:, k] | high[:, k]):
+            bound: Literal["min", "max"] = "min" if low[row, k] else "max"
+            limit = float((ranges.low if bound == "min" else ranges.high)[k])
+            found[row].append(ActiveLimit(joint.name, bound, float(values[row, k]), limit, None, place))
     for joint, angles, half_angle in coned(mechanism, coordinates):
         for row in np.flatnonzero(half_angle - angles <= TOLERANCES.active):
             found[row].append(ActiveLimit(joint.name, "cone", float(angles[row]), half_angle))
