@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism, checked_mechanism
-from .forms import BranchForm, NotExpressible, TrunkForm
+from .forms import BranchForm, NotExpressible, TrunkJoint
 from .parallelograms import Parallelogram, parallelogram_of
 from .positions import express_branch, express_trunk
 from .stages import TIP, Stage, graph_of, is_tree, leads, stages
@@ -64,7 +64,7 @@ class SubChain:
 
     parts: tuple[Part, ...]
     reason: str | None
-    trunk_form: TrunkForm | None = None
+    trunk_joints: tuple[TrunkJoint, ...] = ()
     branch_forms: tuple[BranchForm, ...] = ()
 
     @property
@@ -174,19 +174,19 @@ def _express(mechanism: Mechanism, chain: SubChain) -> SubChain:
     try:
         if splits and not chain.trunk:
             raise NotExpressible("branches more than once")
-        trunk_form = express_trunk(mechanism, chain.trunk) if chain.trunk else None
+        trunk = express_trunk(mechanism, chain.trunk)
         forms = tuple(express_branch(mechanism, branch, on_base=not chain.trunk) for branch in chain.branches)
     except NotExpressible as reason:
         return SubChain(chain.parts, str(reason))
-    return SubChain(chain.parts, None, trunk_form, forms)
+    return SubChain(chain.parts, None, trunk, forms)
 
 
 def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
     """Why positions alone cannot express a mechanism: sub-chains with their reasons, or motors in none of them."""
     chains = decompose(mechanism)
     reasons = tuple(f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None)
-    forms = (form for chain in chains for form in (chain.trunk_form, *chain.branch_forms) if form is not None)
-    known = {joint for form in forms for joint in form.told}
+    known = {joint.name for chain in chains for joint in chain.trunk_joints}
+    known |= {joint for chain in chains for form in chain.branch_forms for joint in form.told}
     driven = dict.fromkeys(drive.joint.name for drive in mechanism.drives)
     missing = (f"actuated joint {name} is in no sub-chain" for name in driven if name not in known)
     return reasons or tuple(missing)

@@ -49,14 +49,14 @@ class ConeForm:
 
 
 @dataclass(frozen=True)
-class TrunkForm:
-    """The joints between the base and the body that carries several branches; `told` are their names."""
+class TrunkJoint:
+    """A joint between the base and the body that carries several branches; its range counts from home."""
 
-    points: tuple[Floats, ...]
-    axes: tuple[Floats, ...]
-    slides: tuple[bool, ...]
-    ranges: tuple[Interval, ...]
-    told: tuple[str, ...]
+    name: str
+    point: Floats
+    axis: Floats
+    slides: bool
+    range: Interval
 
 
 @dataclass(frozen=True)

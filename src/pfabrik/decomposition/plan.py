@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -13,7 +14,7 @@ from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.reaching import plan as P
 from .decompose import SubChain, beyond_positions, decompose
-from .forms import BranchForm, TrunkForm
+from .forms import BranchForm, TrunkJoint
 
 _CONE_KINDS = {"carrier": P.CARRIER_CONE, "link": P.LINK_CONE, "platform": P.PLATFORM_CONE}
 
@@ -80,23 +81,21 @@ class _Builder:
     def add_chain(self, chain: SubChain) -> None:
         trunk = -1
         first = len(self.branches)
-        if chain.trunk_form is not None:
+        if chain.trunk_joints:
             trunk = len(self.trunks)
-            self._add_trunk(chain.trunk_form)
+            self._add_trunk(chain.trunk_joints)
         for form in chain.branch_forms:
             self._add_branch(form, carrier=trunk + 1 if trunk >= 0 else 0)
         self.chains.append({"first": first, "last": len(self.branches), "trunk": trunk})
 
-    def _add_trunk(self, form: TrunkForm) -> None:
+    def _add_trunk(self, joints: Sequence[TrunkJoint]) -> None:
         first = len(self.trunk_joints)
-        for name, point, axis, slides, limits in zip(
-            form.told, form.points, form.axes, form.slides, form.ranges, strict=True
-        ):
-            if self.mechanism.joint(name).at is not None:
-                self.trunk_points.append((name, len(self.trunk_joints)))
-            kind = P.SLIDE if slides else P.TURN
-            self.trunk_joints.append({"kind": kind, "point": point, "axis": axis, "lo": limits[0], "hi": limits[1]})
-            self.trunk_names.append(name)
+        for each in joints:
+            if self.mechanism.joint(each.name).at is not None:
+                self.trunk_points.append((each.name, len(self.trunk_joints)))
+            kind, (lo, hi) = P.SLIDE if each.slides else P.TURN, each.range
+            self.trunk_joints.append({"kind": kind, "point": each.point, "axis": each.axis, "lo": lo, "hi": hi})
+            self.trunk_names.append(each.name)
         self.trunks.append({"first": first, "last": len(self.trunk_joints)})
 
     def _add_branch(self, form: BranchForm, carrier: int) -> None:

@@ -18,7 +18,7 @@ from ..arrays import Floats
 from ..description.graph import Step
 from ..description.mechanism import Joint, Mechanism
 from ..tolerances import TOLERANCES
-from .forms import FREE, BranchForm, ConeForm, Interval, NodeForm, NotExpressible, TrunkForm
+from .forms import FREE, BranchForm, ConeForm, Interval, NodeForm, NotExpressible, TrunkJoint
 from .spots import Spot, spots_along
 
 
@@ -35,21 +35,16 @@ class _Draft:
     told: list[str] = field(default_factory=list)
 
 
-def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> TrunkForm:
+def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[TrunkJoint, ...]:
     """The trunk of a branched chain: revolute and prismatic joints in any order."""
-    points, axes, slides, ranges = [], [], [], []
+    found = []
     for step in steps:
         joint = step.joint
         if joint.type not in ("revolute", "prismatic"):
             raise NotExpressible(f"joint {joint.name}, below a branching body, is {joint.type}")
-        axes.append(np.array(mechanism.home_axis(joint.name)) * step.sign)
-        points.append(np.array(joint.at if joint.at is not None else (0.0, 0.0, 0.0)))
-        slides.append(joint.type == "prismatic")
-        home = _home(mechanism, joint)
-        limits = _limits(joint, home)
-        ranges.append((limits[0] - home, limits[1] - home))
-    names = tuple(step.joint.name for step in steps)
-    return TrunkForm(tuple(points), tuple(axes), tuple(slides), tuple(ranges), names)
+        point, axis = np.array(joint.at or (0.0, 0.0, 0.0)), np.array(mechanism.home_axis(joint.name)) * step.sign
+        found.append(TrunkJoint(joint.name, point, axis, joint.type == "prismatic", _from_home(mechanism, joint)))
+    return tuple(found)
 
 
 def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -> BranchForm:
@@ -89,6 +84,13 @@ def _home(mechanism: Mechanism, joint: Joint) -> float:
     if not isinstance(home, float):
         raise NotExpressible(f"joint {joint.name} has more than one coordinate")
     return home
+
+
+def _from_home(mechanism: Mechanism, joint: Joint) -> Interval:
+    """The range of a joint as deviations from home."""
+    home = _home(mechanism, joint)
+    lo, hi = _limits(joint, home)
+    return lo - home, hi - home
 
 
 def _limits(joint: Joint, home: float) -> Interval:
@@ -188,10 +190,8 @@ def _range_hinge(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: 
     """Node k with the range of its hinge, as deviation from home about the branch's normal."""
     step = draft.spots[k].steps[0]
     sense = _sense(step, draft.normal)
-    home = _home(mechanism, step.joint)
-    limits = _limits(step.joint, home)
     draft.told.append(step.joint.name)
-    lo, hi = sorted(((limits[0] - home) * sense, (limits[1] - home) * sense))
+    lo, hi = sorted(bound * sense for bound in _from_home(mechanism, step.joint))
     before = nodes[k].at - nodes[k - 1].at if k > 0 else None
     angle_home = _angle_about(draft.normal, before, nodes[k + 1].at - nodes[k].at) if before is not None else 0.0
     return replace(nodes[k], turn=(lo, hi), angle_home=angle_home)
@@ -210,11 +210,8 @@ def _rail(mechanism: Mechanism, draft: _Draft) -> tuple[Floats | None, Interval]
     if draft.rail is None:
         return None, FREE
     joint = draft.rail.joint
-    axis = np.array(mechanism.home_axis(joint.name)) * draft.rail.sign
-    home = _home(mechanism, joint)
-    limits = _limits(joint, home)
     draft.told.append(joint.name)
-    return axis, (limits[0] - home, limits[1] - home)
+    return np.array(mechanism.home_axis(joint.name)) * draft.rail.sign, _from_home(mechanism, joint)
 
 
 def _cone(draft: _Draft, nodes: list[NodeForm], k: int, step: Step, near: float) -> ConeForm:
