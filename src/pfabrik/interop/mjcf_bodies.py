@@ -30,26 +30,23 @@ THICKNESS = 0.015
 
 @dataclass(frozen=True)
 class Names:
-    """Names of the sites of a model.
+    """Names of the sites of a model, but for those at the centres of joints on their first bodies: the joints' own.
 
     Attributes
     ----------
-    sites : joint -> the site at its centre, on its first body.
     ends : joint that is cut -> the site at its centre on its second body.
     reference : of the site at the reference point.
     """
 
-    sites: Mapping[str, str]
     ends: Mapping[str, str]
     reference: str
 
 
 def names_of(mechanism: Mechanism, tree: CutTree) -> Names:
-    """Names for all sites: those of their joints."""
+    """Names for all other sites."""
     taken = {joint.name for joint in mechanism.joints}
-    sites = {name: name for name in taken}
     ends = {joint.name: unique(f"{joint.name}:end", taken) for joint in tree.cuts}
-    return Names(sites, ends, unique(REFERENCE_POINT, taken))
+    return Names(ends, unique(REFERENCE_POINT, taken))
 
 
 def vector(values: Floats) -> str:
@@ -101,7 +98,7 @@ def _sites(mechanism: Mechanism, tree: CutTree, names: Names, metres: float) -> 
     for joint in mechanism.joints:
         place = reference if joint.at is None else np.array(joint.at) * metres
         if joint.at is not None or joint in tree.cuts:
-            yield names.sites[joint.name], joint.connects[0], place
+            yield joint.name, joint.connects[0], place
         if joint in tree.cuts:
             yield names.ends[joint.name], joint.connects[1], place
     yield names.reference, mechanism.end_effector_body, reference

@@ -128,7 +128,7 @@ def _equalities(tree: CutTree, names: Names, physics: Physics) -> ET.Element:
     equality = ET.Element("equality")
     for joint in tree.cuts:
         kind = "connect" if joint.type == "spherical" else "weld"
-        site1, site2 = names.sites[joint.name], names.ends[joint.name]
+        site1, site2 = joint.name, names.ends[joint.name]
         ET.SubElement(equality, kind, {"name": joint.name, "site1": site1, "site2": site2, **stiff})
     for branch in tree.branches:
         if branch.twin_of is not None:
