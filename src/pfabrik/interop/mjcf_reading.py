@@ -18,7 +18,7 @@ from .cuts import unique
 from .mjcf_plain import plain_model
 from .mjcf_writing import NOTE
 from .opened import Loop, LoopType, Note
-from .robots import Rates, Robot, Wanted, mechanism_of
+from .robots import Rates, Robot, mechanism_of
 from .xml_reading import fault, read_xml
 
 AXES = "xyz"
@@ -67,7 +67,6 @@ def from_mjcf(
     InvalidArgument : no end effector given, and none that is evident.
     """
     require("reading a MuJoCo model", "mujoco", "mujoco")
-    wanted = Wanted(base, end_effector, actuated, fixed, length_unit, task)
     root = read_xml(source, "mujoco")
     told: list[Note] = []
     model = _Model(plain_model(root, told), configuration)
@@ -77,7 +76,7 @@ def from_mjcf(
         places[own["end_effector"]] = (own["end_effector"], site[1])
     joints, loops = list(model.joints(told)), list(model.loops(told))
     robot = Robot(root.get("model", "mechanism"), joints, loops, model.body(0), places, order=model.driven, **own)
-    return mechanism_of(robot, wanted, told)
+    return mechanism_of(robot, told, base, end_effector, actuated, fixed, length_unit, task)
 
 
 class _Model:

@@ -58,24 +58,21 @@ class Robot:
     rates: Mapping[str, Rates] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What of a robot is asked for; see `from_mjcf`."""
-
-    base: str | None
-    end_effector: str | None
-    actuated: Iterable[str] | None
-    fixed: Iterable[str]
-    length_unit: str
-    task: Sequence[str] | None
-
-
-def mechanism_of(robot: Robot, wanted: Wanted, told: list[Note]) -> Imported:
-    """The mechanism between the base and the end effector of a robot, its loops closed."""
-    metres = metres_of(wanted.length_unit)
-    robot = _driven(_locked(robot, wanted.fixed), wanted.actuated)
-    base = _base(robot, wanted.base)
-    end_effector = _end_effector(robot, wanted.end_effector, base, told)
+def mechanism_of(
+    robot: Robot,
+    told: list[Note],
+    base: str | None,
+    end_effector: str | None,
+    actuated: Iterable[str] | None,
+    fixed: Iterable[str],
+    length_unit: str,
+    task: Sequence[str] | None,
+) -> Imported:
+    """The mechanism between the base and the end effector of a robot, its loops closed; asked for as of `from_mjcf`."""
+    metres = metres_of(length_unit)
+    robot = _driven(_locked(robot, fixed), actuated)
+    base = _base(robot, base)
+    end_effector = _end_effector(robot, end_effector, base, told)
     tip, point = _place(robot, end_effector)
     as_told = (base, end_effector) == (robot.base, robot.end_effector)
     joints, loops = _merged(robot, base, tip)
@@ -88,8 +85,8 @@ def mechanism_of(robot: Robot, wanted: Wanted, told: list[Note]) -> Imported:
         tip,
         None if point is None else tuple((point / metres).tolist()),
         base,
-        wanted.length_unit,
-        require_names("task", wanted.task) if wanted.task is not None else robot.task if as_told else None,
+        length_unit,
+        require_names("task", task) if task is not None else robot.task if as_told else None,
         robot.cones,
     )
     found = assemble(prune(opened, told), told)

@@ -16,7 +16,7 @@ from ..rotations import from_rpy, square_to
 from .assembling import Imported
 from .loops_file import LoopsFile, read_loops
 from .opened import Note
-from .robots import Rates, Robot, Wanted, mechanism_of
+from .robots import Rates, Robot, mechanism_of
 from .xml_reading import fault, read_xml
 
 UNTOLD = ("link", "joint", "transmission", "material", "gazebo")
@@ -70,7 +70,7 @@ def from_urdf(
     if unknown:
         told.append(Note("told of in the loops, but no joint of the robot", unknown))
     driven = [name for name in closing.actuated if name in links.link_of] or _with_transmission(root)
-    wanted = Wanted(base, end_effector, driven if actuated is None else actuated, fixed, length_unit, task)
+    actuated = driven if actuated is None else actuated
     robot = Robot(
         root.get("name", "mechanism"),
         joints,
@@ -79,7 +79,7 @@ def from_urdf(
         {link: (link, frame[:3, 3]) for link, frame in links.frames.items()},
         rates={element.get("name", ""): Rates(_speed(element)) for element in links.joints},
     )
-    return mechanism_of(robot, wanted, told)
+    return mechanism_of(robot, told, base, end_effector, actuated, fixed, length_unit, task)
 
 
 class _Links:
