@@ -136,6 +136,32 @@ def test_a_file_without_an_ending_is_what_its_first_line_says(text: str, heights
     assert positions(found)[:, 2].tolist() == heights
 
 
+def test_turns_as_quaternions_of_any_length_and_columns_in_capitals(tmp_path: Path) -> None:
+    found = read(tmp_path, "qw,X,Y,Z,qx,qy,qz\n2,1,0,190,0.2,0.4,-0.6\n", "path.csv")
+    expected = pf.pose([[1, 0, 190]], quat_xyzw=[[0.1, 0.2, -0.3, 1.0]])
+    np.testing.assert_allclose(found.targets, expected, atol=1e-12)
+    capitals = read(tmp_path, "x,y,z,Roll,T\n1,0,190,10,7\n", "path.csv")
+    np.testing.assert_allclose(capitals.targets, pf.pose([[1, 0, 190]], rpy=[[np.radians(10), 0, 0]]), atol=1e-12)
+    assert capitals.times is None
+    assert list(capitals.others) == ["T"]
+
+
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        ("qx,qy,qz", "line 1: found columns qx, qy, qz"),
+        ("qx,qy,qz,qw,yaw", "line 1: found columns yaw, qx, qy, qz, qw"),
+        ("qx,qy,qz,qw", "line 2: found a zero quaternion"),
+        ("rx,ry,rz", "line 1: found columns rx, ry, rz for turns"),
+    ],
+)
+def test_turns_that_could_be_misread_are_refused(header: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument, match=said):
+        read(tmp_path, f"x,y,z,{header}\n1,2,180{',0' * len(header.split(','))}\n", "path.csv")
+    handed_on = read(tmp_path, "x,y,z,rx\n1,2,-100,5\n", "path.csv", "delta")  # whose task has no turns
+    assert [*handed_on.others["rx"]] == ["5"]
+
+
 def test_turns_and_times_by_the_names_of_machine_tools(tmp_path: Path) -> None:
     table = read(tmp_path, "b_rad,x,y,z,a_deg\n0.1,0,0,190,3\n", "path.csv")
     np.testing.assert_allclose(table.targets, pf.pose([[0, 0, 190]], rpy=[[np.radians(3), 0.1, 0]]), atol=1e-12)

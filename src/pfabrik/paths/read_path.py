@@ -50,10 +50,10 @@ def read_path(
     """A path for a mechanism from a CSV file, or from G-code.
 
     A CSV file has a header with columns in any order: x, y, z, and roll, pitch, yaw (in degrees, or in the unit that
-    their names end in; or a_deg, b_rad and the like), t [s] and feed [length/s]; others are handed on, and coordinates
-    that the machine cannot change may be missing. G-code, by its file's ending or if the first line is no header,
-    begins at home and has G0 to G3, planes, G20, G21, G90, G91 and F per minute; A, B, C are roll, pitch, yaw [deg].
-    Its moves come in steps.
+    their names end in; or a_deg, b_rad and the like) or the quaternion qx, qy, qz, qw, then t [s] and feed [length/s];
+    others are handed on, and coordinates that the machine cannot change may be missing. G-code, by its file's ending or
+    if the first line is no header, begins at home and has G0 to G3, planes, G20, G21, G90, G91 and F per minute; A, B,
+    C are roll, pitch, yaw [deg]. Its moves come in steps.
 
     Parameters
     ----------

@@ -27,9 +27,13 @@ UNITS: tuple[AngleUnit, ...] = ("deg", "rad")
 OF_ANGLES = {
     name: (name, *(f"{each}_{unit}" for each in (name, letter) for unit in UNITS)) for name, letter in ANGLES.items()
 }
-OF_POSES = (*POSITION, *(column for columns in OF_ANGLES.values() for column in columns))
+QUATERNION = ("qx", "qy", "qz", "qw")
+AMBIGUOUS = ("rx", "ry", "rz")
+"""Angles to some, parts of a rotation vector to others."""
+
+OF_POSES = (*POSITION, *(column for columns in OF_ANGLES.values() for column in columns), *QUATERNION)
 NUMERIC = (*OF_POSES, "t", "feed")
-EXPECTED = "expected x, y, z and roll, pitch, yaw"
+EXPECTED = "expected x, y, z and roll, pitch, yaw or qx, qy, qz, qw"
 
 
 class Table:
@@ -47,9 +51,10 @@ class Table:
     def __init__(self, lines: Iterable[str], mechanism: Mechanism) -> None:
         self._mechanism = mechanism
         self._rows = ((number, cells) for number, cells in _numbered(lines) if any(cells))
-        number, self._header = next(self._rows, (1, []))
-        if not self._header:
+        number, header = next(self._rows, (1, []))
+        if not header:
             raise WrongPath("empty; expected a header with x, y, z")
+        self._header = [name.lower() if name.lower() in OF_POSES else name for name in header]
         _check_header(number, self._header, mechanism)
         self.has_times = "t" in self._header or "feed" in self._header
 
@@ -108,6 +113,13 @@ def _check_header(line: int, header: Sequence[str], mechanism: Mechanism) -> Non
         ways = [name for name in columns if name in header]
         if len(ways) > 1:
             raise WrongPath(f"line {line}: found columns {' and '.join(ways)}; expected one of them")
+    turning = [name for name in OF_POSES if name in header and name not in POSITION]
+    parts = [name for name in turning if name in QUATERNION]
+    if parts and turning != [*QUATERNION]:
+        raise WrongPath(f"line {line}: found columns {', '.join(turning)}; expected {', '.join(QUATERNION)} alone")
+    unread = [name for name in header if name.lower() in AMBIGUOUS]
+    if unread and not turning and task_of(mechanism).rotations:
+        raise WrongPath(f"line {line}: found columns {', '.join(unread)} for turns; {EXPECTED}")
     if not any(name in OF_POSES for name in header):
         raise WrongPath(f"line {line}: no column of a pose; {EXPECTED}")
 
@@ -135,8 +147,20 @@ def _path(
     if (feeds <= 0.0).any():
         place = int(np.flatnonzero(feeds <= 0.0)[0])
         raise WrongPath(f"line {lines[place]}: column 'feed': found {feeds[place]:g}; expected a feed above zero")
-    targets = pose(np.array(positions).T, rpy=np.array(turned).T)
+    if QUATERNION[0] in columns:
+        targets = pose(np.array(positions).T, quat_xyzw=_quaternions(columns, lines))
+    else:
+        targets = pose(np.array(positions).T, rpy=np.array(turned).T)
     return Path(targets, columns.get("t"), feeds, lines, others, (units[0], units[1], units[2]))
+
+
+def _quaternions(columns: Mapping[str, Floats], lines: Sequence[int]) -> Floats:
+    """Quaternions (n, 4), of any length but zero."""
+    found = np.stack([columns[name] for name in QUATERNION], axis=-1)
+    zero = np.flatnonzero(~found.any(axis=-1))
+    if len(zero):
+        raise WrongPath(f"line {lines[int(zero[0])]}: found a zero quaternion; expected one that is a rotation")
+    return found
 
 
 def _check_times(times: Floats, lines: Sequence[int]) -> None:
