@@ -846,6 +846,7 @@ def test_wrong_speeds_are_told_in_a_line(
         ("\n\n", "empty"),
         ("x,y,z\n", "no targets"),
         ("x,y\n1,2\n", "no column z"),
+        ("x;y;z\n1;2;3\n", "with commas between"),
         ("x,y,z,x\n1,2,3,4\n", "'x' appears twice"),
         ("x,y,z\n1,2,3\n1,b,3\n", "line 3: column 'y': found 'b'"),
         ("x,y,z\n1,2,nan\n", "line 2: column 'z': found 'nan'"),

@@ -108,7 +108,8 @@ def _check_header(line: int, header: Sequence[str], mechanism: Mechanism) -> Non
     ]
     if missing:
         hint = near_miss(missing[0], [name for name in header if name not in NUMERIC])
-        raise WrongPath(f"line {line}: no column {', '.join(missing)}{hint}; {EXPECTED}")
+        between = ", with commas between" if len(header) == 1 else ""
+        raise WrongPath(f"line {line}: no column {', '.join(missing)}{hint}; {EXPECTED}{between}")
     for columns in OF_ANGLES.values():
         ways = [name for name in columns if name in header]
         if len(ways) > 1:
