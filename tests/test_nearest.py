@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from dataclasses import replace
 from functools import partial
@@ -205,6 +206,27 @@ def special_targets(mechanism: Mechanism) -> np.ndarray:
     far = [pf.pose(mechanism.characteristic_length * size * each) for each in away for size in (1e6, 1e12)]
     targets = np.array([pf.pose((0, 0, 0)), *half_turns, quarter, *far])
     return targets[:: 4 if INTERPRETED else 1]
+
+
+@pytest.mark.parametrize("name", ["stewart", "ucu", "nrpm"])
+def test_where_the_reference_point_is_does_not_change_what_is_held(name: str) -> None:
+    """Platforms turn about their middle on the way to a target, not about a point far away."""
+    near, rng = pf.load(name), np.random.default_rng(3)
+    lever = 300.0 * near.characteristic_length * np.array([0.0, 0.0, 1.0])
+    far = dataclasses.replace(near, reference_point=near.reference_point + lever)
+    moves = pf.pose(
+        rng.normal(size=(30, 3)) * 0.3 * near.characteristic_length,
+        rotation=Rotation.from_rotvec(0.1 * rng.normal(size=(30, 3))).as_matrix(),
+    )
+    targets = near.home_pose @ moves
+    answers = pf.solve_ik(near, targets)
+    others = pf.solve_ik(far, targets @ pf.pose(lever))
+    np.testing.assert_array_equal(others.status, answers.status)
+    np.testing.assert_array_equal(others.held, answers.held)
+    held = answers.held == "orientation"
+    assert held.sum() >= 2
+    away = answers.position_error[held] / near.characteristic_length
+    np.testing.assert_allclose(others.position_error[held] / near.characteristic_length, away, atol=1e-6)
 
 
 @pytest.mark.parametrize(("name", "hold"), CASES)

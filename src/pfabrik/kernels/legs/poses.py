@@ -7,7 +7,7 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..rotations import UPSIDE_DOWN, turn_about_z, yaw_of
-from ..vectors import Vec, cross, dot, norm, scale, vec
+from ..vectors import Vec, cross, dot, norm, scale, turn, vec
 from .endings import SURE, turned
 
 # Deviation from an orthonormal matrix up to which a target is a pose, and from which on it is not made one.
@@ -25,6 +25,12 @@ def turn_pose(pose: Floats, spin: Vec) -> None:
         column = turned((pose[0, j], pose[1, j], pose[2, j]), axis, math.cos(angle), math.sin(angle))
         for i in range(3):
             pose[i, j] = column[i]
+
+
+@routine
+def middle_of(pose: Floats, task: Record) -> Vec:
+    """The middle of the joints on the platform, from its reference point, which may be far away."""
+    return turn(pose, vec(task["centre"]))
 
 
 @routine

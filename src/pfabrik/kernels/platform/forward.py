@@ -15,14 +15,14 @@ import numpy as np
 from ...arrays import Floats, Ints, Record
 from .._jit import kernel, routine
 from ..legs.answer import KEPT, deviation, excess_of, worst_of
-from ..legs.poses import make_exact
+from ..legs.poses import make_exact, middle_of
 from ..legs.records import CARRIER, PIVOT, Table
 from ..legs.table import SAMPLE, open_table
 from ..linear import solve_spd, solve_square
 from ..references import opener
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..sqp import longest
-from ..vectors import add, copy_row, copy_table, cross, put, sub, turn, vec, wrap
+from ..vectors import add, copy_row, copy_table, cross, put, sub, vec, wrap
 from .equations import Now, View, count_unknowns, new_now, new_view, place, put_slopes
 from .limits import coordinate_slope, counts_turns
 from .records import Starts
@@ -213,11 +213,10 @@ def take_step(table: Table, work: Newton) -> None:
 
     The reference point may be far away.
     """
-    pose, step, centre = work.now.pose, work.step, vec(table.task[0]["centre"])
-    arm = turn(pose, centre)
-    put(step, add(vec(step), cross(vec(step[3:]), arm)))
+    pose, step, middle = work.now.pose, work.step, middle_of(work.now.pose, table.task[0])
+    put(step, add(vec(step), cross(vec(step[3:]), middle)))
     move(table, step, min(1.0, FAR_STEP / max(longest(step, step.shape[0]), FAR_STEP)), work.now)
-    off = sub(arm, turn(pose, centre))
+    off = sub(middle, middle_of(pose, table.task[0]))
     for i in range(3):
         pose[i, 3] += off[i]
 

@@ -8,12 +8,12 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
-from ..legs.frames import coordinate_of, facing, place_arm, set_frames
-from ..legs.poses import bring_yaw, column, is_pose, make_exact, turn_pose
+from ..legs.frames import NOWHERE, coordinate_of, facing, place_arm, set_frames
+from ..legs.poses import bring_yaw, column, is_pose, make_exact, middle_of, turn_pose
 from ..legs.records import ARM, CARRIER, CRANK, Table
 from ..legs.rods import carry
 from ..rotations import yaw_of
-from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, vec, wrap
+from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, sub, vec, wrap
 from .equations import Now, View, is_carried, side_of_arm
 from .records import STRETCHED, Starts
 from .search import Search
@@ -83,11 +83,12 @@ def put_carriers(table: Table, now: Now, look: View) -> None:
 
 @routine
 def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, now: Now) -> None:
-    """Place the platform as it is to be held, and carriers where rods then put them."""
-    pose, q = now.pose, now.q
+    """Place the platform as it is to be held, and carriers where rods then put them.
+
+    It turns about its middle, but where legs complete the position: they do so from where it was.
+    """
+    pose, q, middle = now.pose, now.q, middle_of(now.pose, table.task[0])
     for i in range(3):
-        if aim.platform[i] == LOCKED:
-            pose[i, 3] = target[i, 3]
         for j in range(3):
             if aim.frame == BASE_AXES and aim.platform[3] == LOCKED:
                 pose[i, j] = target[i, j]
@@ -98,6 +99,9 @@ def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, now: 
             turn_pose(now.pose, scale(math.atan2(sine, dot(column(now.pose, 2), column(target, 2))) / sine, axis))
     if aim.frame == HALF_WAY and aim.platform[5] == LOCKED:
         bring_yaw(now.pose, yaw_of(target))
+    off = sub(middle, middle_of(pose, table.task[0])) if table.task[0]["unset"] == 0 else NOWHERE
+    for i in range(3):
+        pose[i, 3] = target[i, 3] if aim.platform[i] == LOCKED else pose[i, 3] + off[i]
     set_frames(now.pose, table.task[0], view.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
