@@ -81,21 +81,24 @@ def out_of_reach(name: str, what: str, rng: np.random.Generator, runs: int) -> I
 
 
 def first_order(rng: np.random.Generator, runs: int) -> Iterator[Row]:
-    """Jacobians, singularity and margins of one answer of the 6-UPS whose joints are known."""
+    """Jacobians, singularity and margins of new answers of the 6-UPS."""
     mechanism = pf.load("stewart")
-    struts, answer = Struts(mechanism), pf.solve_ik(mechanism, near(mechanism, rng)[0])
+    struts, targets = Struts(mechanism), near(mechanism, rng)[:20]
+    answer = pf.solve_ik(mechanism, targets[0])
     pose, q = answer.pose, answer._coordinates
     inverse, near_singular, margins, lines, by_numpy = best_times(
         runs,
-        lambda: [pf.inverse_jacobian(answer) for _ in range(20)],
-        lambda: [pf.singularity(answer) for _ in range(20)],
-        lambda: [pf.margins(answer) for _ in range(20)],
+        lambda: [pf.inverse_jacobian(pf.solve_ik(mechanism, target)) for target in targets],
+        lambda: [pf.singularity(pf.solve_ik(mechanism, target)) for target in targets],
+        lambda: [pf.margins(pf.solve_ik(mechanism, target)) for target in targets],
         lambda: [strut_jacobian(struts, pose) for _ in range(20)],
         lambda: [measures(mechanism, q) for _ in range(20)],
     )
-    yield Row("6-UPS, one inverse_jacobian", 20, inverse / 20, "NumPy, lines of the struts", lines / 20)
-    yield Row("6-UPS, one singularity", 20, near_singular / 20, "NumPy, all singular vectors", by_numpy / 20)
-    yield Row("6-UPS, margins of one answer", 20, margins / 20)
+    yield Row("6-UPS, one solve_ik and inverse_jacobian", 20, inverse / 20, "NumPy, lines of the struts", lines / 20)
+    yield Row(
+        "6-UPS, one solve_ik and singularity", 20, near_singular / 20, "NumPy, all singular vectors", by_numpy / 20
+    )
+    yield Row("6-UPS, one solve_ik and margins", 20, margins / 20)
 
 
 def calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:

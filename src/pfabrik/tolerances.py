@@ -48,7 +48,6 @@ class Tolerances:
     file_angle : angle [rad] up to which axes in such a file may have been meant to be parallel: `1.57` is off by 8e-4.
     same_mode : largest difference of positions [L] and rotation matrices of two solutions that count as one: where two
         solutions meet, closing the loops to 1e-13 places each to 3e-7 only.
-    meeting : gap of loops [L] up to which joints that closed forms tell need no closing: rounding leaves 1e-15 a joint.
     """
 
     position: float = 1e-9
@@ -64,7 +63,6 @@ class Tolerances:
     nearly_implied: float = 1e-3
     implied: float = 1e-12
     same_mode: float = 1e-5
-    meeting: float = 1e-12
     speed: float = 1e-6
     rank: float = 1e-9
     singular: float = 1e-4

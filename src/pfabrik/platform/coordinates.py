@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Mask
+from ..arrays import Floats
 from ..closure.close import HELD, close, closure_of
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..motion.displacements import gaps
 from ..motion.limits import within_turns
-from ..motion.meeting import meeting_joints, put_meeting_joints
 from ..tolerances import TOLERANCES
 from .table import machine_aimed, reading_of
 
@@ -48,21 +46,9 @@ def settled(
         return found
     read_into(table, poses, sides, found, carriers)
     closure.put_actuators(found, actuators)
-    rest = np.flatnonzero(~_put_others(mechanism, table, poses, found))
-    if len(rest):
-        found[rest] = _closed(mechanism, poses[rest], actuators[rest], found[rest])
+    found = _closed(mechanism, poses, actuators, found)
     within_turns(mechanism, found)
     return found
-
-
-def _put_others(mechanism: Mechanism, table: LegTable, poses: Floats, found: Floats) -> Mask:
-    """Write what legs do not tell, where it is where bodies meet, into joint coordinates (n, columns); which close."""
-    known = frozenset(table.known["column"].tolist()) | closure_of(mechanism, whole=False).driven
-    meeting = meeting_joints(mechanism, known)
-    if meeting is None:
-        return np.zeros(len(found), bool)
-    put_meeting_joints(mechanism, meeting, poses, found)
-    return gaps(mechanism, found) <= TOLERANCES.meeting * mechanism.characteristic_length
 
 
 def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, found: Floats) -> Floats:
