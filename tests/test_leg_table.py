@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -257,6 +258,30 @@ def test_a_locked_joint_leaves_no_room_at_its_value_and_less_beside_it() -> None
     found = pf.feasibility(locked, np.stack([here.pose, above]))
     assert found.margin.tolist() == [min(pf.margins(here).values()), -np.inf] == [0.0, -np.inf]
     assert {found.limits[each][0] for each in found.binding} == {"BL1"}
+
+
+def test_a_locked_passive_joint_is_a_constraint_as_a_rigid_strut_is() -> None:
+    free, name = machine("stewart"), "BL1"
+    length = free.home_coordinate(name)
+    joints = [
+        replace(joint, actuated=False, range=(length, length)) if joint.name == name else joint for joint in free.joints
+    ]
+    weld = pf.Joint(name, "fixed", free.joint(name).connects, at=free.reference_point)
+    tilting = ("x", "y", "z", "tilt")
+    locked = replace(free, joints=tuple(joints), task=tilting)
+    rigid = replace(locked, joints=tuple(weld if joint.name == name else joint for joint in joints))
+    targets = targets_around_home("stewart", 20, 0.05, 0.1)
+    answers, others = pf.solve_ik(locked, targets), pf.solve_ik(rigid, targets)
+    assert (answers.status == pf.Status.REACHED).sum() > 10
+    np.testing.assert_array_equal(answers.joints[name], length)
+    np.testing.assert_allclose(answers.pose, others.pose, rtol=0, atol=1e-7)
+    np.testing.assert_array_equal(pf.feasibility(locked, targets).margin, pf.feasibility(rigid, targets).margin)
+    here, there = (pf.solve_ik(each, each.home_pose) for each in (locked, rigid))
+    np.testing.assert_allclose(pf.travel(here).distances, pf.travel(there).distances, rtol=0, atol=1e-6)
+    assert pf.travel(here).distances.min() > 0.01
+    assert pf.mobility(locked) == pf.mobility(rigid)
+    assert pf.singularity(answers[0]).parallel == pytest.approx(pf.singularity(others[0]).parallel)
+    assert len(pf.assembly_modes(locked, here.actuators)) == len(pf.assembly_modes(rigid, here.actuators)) > 0
 
 
 @pytest.mark.slow

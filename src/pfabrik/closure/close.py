@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Mask
+from ..description.home_mobility import column_moves
 from ..description.mechanism import Mechanism
 from ..kernels.closure import loops as K
 from ..kernels.handle import Handle, Scratch
@@ -43,7 +44,7 @@ class Closure:
     turning : 1 for angles, 0 for lengths, (columns,).
     last_balls : columns of ball joints at the platform, each at the end of a path that shares no joint.
     actuated, home : columns of the actuators, and their values at home, (n_a,).
-    driven : the columns of the actuators, to be locked.
+    driven : the columns of the actuators and of locked joints: they stay where they are put.
     """
 
     mechanism: Mechanism
@@ -68,7 +69,8 @@ class Closure:
         return np.asarray(coordinates[:, self.actuated] + self.home)
 
     def put_actuators(self, coordinates: Floats, values: Floats) -> None:
-        """Write actuated values (n, n_a) into coordinates (n, columns)."""
+        """Write actuated values (n, n_a), and where locked joints are, into coordinates (n, columns)."""
+        coordinates[:, list(self.driven)] = 0.0
         coordinates[:, self.actuated] = values - self.home
 
     @cached_property
@@ -93,7 +95,9 @@ def closure_of(mechanism: Mechanism, whole: bool = True) -> Closure:
     home = np.array([drive.home for drive in mechanism.drives])
     ending = loops.columns[loops.visits[loops.paths[1:][loops.last_balls == 1] - 1, 0]]
     balls = frozenset((ending[:, None] + np.arange(3)).ravel().tolist())
-    return Closure(mechanism, loops, scale, turning, actuated, frozenset(actuated.tolist()), balls, home, whole)
+    locked = [each.column for each in mechanism.coordinates if each.joint.is_rigid]
+    driven = frozenset([*actuated.tolist(), *locked])
+    return Closure(mechanism, loops, scale, turning, actuated, driven, balls, home, whole)
 
 
 @lru_cache(maxsize=256)
@@ -102,7 +106,7 @@ def _locking(mechanism: Mechanism, whole: bool, locked: frozenset[int]) -> tuple
     from ..kernels.closure.close import new_work
 
     loops = closure_of(mechanism, whole).loops
-    free = np.ones(len(loops.group_of), bool)
+    free = column_moves(mechanism) > 0.0
     free[list(locked)] = False
     slots = np.full(len(free), -1)
     sizes = np.zeros(len(loops.groups) - 1, np.int64)
@@ -187,7 +191,7 @@ def close(
     closeness: float = 1e-13,
     max_iterations: int = 100,
 ) -> Closing:
-    """Close loops from given configurations, nearest to what is wished.
+    """Close loops from given configurations, nearest to what is wished; locked joints are put where they are locked.
 
     Parameters
     ----------
@@ -202,6 +206,8 @@ def close(
     closeness : largest gap, excess and miss that ends the search [L or rad].
     """
     n, length = len(coordinates), closure.mechanism.characteristic_length
+    if max_iterations:
+        coordinates = coordinates * column_moves(closure.mechanism)
     follow = centres is None and not limits
     closed = new_closed(closure, coordinates, in_lengths(poses, 1.0 / length), np.inf)
     problem = K.ClosureProblem(

@@ -90,13 +90,14 @@ def _scratch(mechanism: Mechanism, whole: bool) -> Scratch[Tables]:
 
 @lru_cache(maxsize=128)
 def _plan(mechanism: Mechanism, whole: bool) -> FirstOrderPlan:
-    graph, counts = graph_of(mechanism), generic_of(mechanism).mobility
+    graph, generic = graph_of(mechanism), generic_of(mechanism)
+    counts = generic.mobility
     return FirstOrderPlan(
         loops=np.ascontiguousarray(graph.orthonormal),
         way=np.array(graph.path, float),
         rates=np.array(graph.rates),
         actuated=np.array(actuated_columns(mechanism), np.int64),
-        rank=len(graph.path) - counts.mobility,
+        rank=generic.rank,
         shown=counts.platform + counts.internal,
         freedoms=counts.platform,
         twists=3 if mechanism.end_effector_is_joint else 6,

@@ -201,7 +201,8 @@ def _require_all(mechanism: Mechanism, seen: set[tuple[str, int]]) -> None:
     """Every range and every motor is one that legs tell."""
     for each in mechanism.coordinates:
         joint = each.joint
-        if (joint.range is not None or each.place in joint.driven) and (joint.name, each.place) not in seen:
+        limited = joint.range is not None and not joint.is_rigid
+        if (limited or each.place in joint.driven) and (joint.name, each.place) not in seen:
             raise NoLeg(f"joint {joint.name} has a motor or a limit that no closed form tells")
 
 

@@ -1,4 +1,4 @@
-"""A mechanism's graph between base and end effector, its fixed joints welded: what lies in series, what in parallel."""
+"""A mechanism's graph between base and end effector, rigid joints welded: what lies in series, what in parallel."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ def graph_of(mechanism: Structure) -> Graph:
         first, second = (weld.get(body, body) for body in joint.connects)
         if mechanism.end_effector_is_joint and joint.name == mechanism.end_effector:
             edges += [Edge(joint, (first, TIP)), Edge(joint, (second, TIP))]
-        elif joint.type != "fixed":
+        elif not joint.is_rigid:
             edges.append(Edge(joint, (first, second)))
     end = TIP if mechanism.end_effector_is_joint else weld.get(mechanism.end_effector, mechanism.end_effector)
     return Graph(tuple(edges), mechanism.base, end)
 
 
 def _welded(mechanism: Structure) -> dict[str, str]:
-    """Bodies that fixed joints hold together -> the one that stands for them: the base, or the first mentioned."""
-    fixed = [joint for joint in mechanism.joints if joint.type == "fixed" and joint.name != mechanism.end_effector]
+    """Bodies that fixed or locked joints hold together -> the one that stands for them: the base, or the first."""
+    fixed = [joint for joint in mechanism.joints if joint.is_rigid and joint.name != mechanism.end_effector]
     weld: dict[str, str] = {}
     for group in components(edges_of(fixed)):
         bodies = [body for edge in group for body in edge.bodies]

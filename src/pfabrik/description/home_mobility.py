@@ -7,6 +7,7 @@ the twists of its two bodies differ by its own screws only. The null space of th
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -181,6 +182,14 @@ def column_joints(mechanism: Structure) -> NDArray[np.intp]:
     return np.repeat(np.arange(len(counts)), counts)
 
 
+@lru_cache(maxsize=64)
+def column_moves(mechanism: Structure) -> Floats:
+    """1 for every coordinate of the mechanism, 0 for those of locked joints, shape (c,)."""
+    moves = np.array([float(not mechanism.joints[owner].is_rigid) for owner in column_joints(mechanism)])
+    moves.setflags(write=False)
+    return moves
+
+
 def orthonormal_rates(mechanism: Structure) -> Floats:
     """Combinations of coordinates that turn a joint about orthonormal axes, shape (c, c), one a row.
 
@@ -203,8 +212,9 @@ def _rotations(axes: ArrayLike, centre: Floats) -> Floats:
 
 
 def _screws(mechanism: Structure) -> Floats:
-    """Unit screws of all coordinates at home, (c, 6), with the velocity at the reference point [L]."""
-    return np.vstack([joint_screws(mechanism, joint, mechanism.reference_point) for joint in mechanism.joints])
+    """Unit screws of all coordinates at home, (c, 6), with the velocity at the reference point [L]; 0 if locked."""
+    screws = np.vstack([joint_screws(mechanism, joint, mechanism.reference_point) for joint in mechanism.joints])
+    return np.asarray(screws * column_moves(mechanism)[:, None])
 
 
 def _home_motion(mechanism: Structure, locked: frozenset[int]) -> tuple[Floats, Floats]:

@@ -115,6 +115,14 @@ class Joint:
         """Which of its coordinates are driven: (0,) of an actuated R or P."""
         return driven_places(self.type, self.actuated)
 
+    @property
+    def is_rigid(self) -> bool:
+        """Whether its two bodies are as one: it is fixed, or a passive R or P whose range is a single value."""
+        if self.type == "fixed":
+            return True
+        one = self.type in ("revolute", "prismatic") and not self.actuated and self.range is not None
+        return one and self.range[0] == self.range[1]  # type: ignore[index]
+
 
 def set_fields(frozen: object, **values: object) -> None:
     """Set fields of a frozen object that is still being made."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..description.graph import tree_of
-from ..description.home_mobility import body_twist, column_joints, loop_conditions, orthonormal_rates
+from ..description.home_mobility import body_twist, column_joints, column_moves, loop_conditions, orthonormal_rates
 from ..description.mechanism import Mechanism
 from .displacements import end_effector_pose, screws, stepped
 
@@ -25,7 +25,7 @@ def actuated_columns(mechanism: Mechanism) -> list[int]:
 
 @dataclass(frozen=True)
 class Graph:
-    """How twists and loop conditions sum up the screws, per column of q.
+    """How twists and loop conditions sum up the screws, per column of q; locked joints have no part in them.
 
     Attributes
     ----------
@@ -45,7 +45,9 @@ def graph_of(mechanism: Mechanism) -> Graph:
     tree, owners = tree_of(mechanism), column_joints(mechanism)
     path = tree.paths[mechanism.end_effector_body][owners]
     orthonormal = np.linalg.qr(tree.loops.T)[0].T
-    return Graph(path, tree.loops[:, owners], orthonormal[:, owners], orthonormal_rates(mechanism))
+    moves = column_moves(mechanism)
+    loops, rates = tree.loops[:, owners] * moves, moves[:, None] * orthonormal_rates(mechanism)
+    return Graph(path * moves, loops, orthonormal[:, owners] * moves, rates)
 
 
 def first_order(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats]:

@@ -51,17 +51,20 @@ class Generic:
 
     Attributes
     ----------
+    rank : how many of the loops' conditions are independent.
     home_is_singular : whether loops are singular at home: they let more move there than in general.
     """
 
     mobility: Mobility
     directions: Floats
+    rank: int
     home_is_singular: bool
 
 
 @lru_cache(maxsize=64)
 def generic_of(mechanism: Mechanism) -> Generic:
     closure, twist = first_order(mechanism, around_home(mechanism))
+    locked = sum(each.joint.is_rigid for each in mechanism.coordinates)
     values, right = right_singular(closure)
     ranks = _rank(values)
     rank = int(ranks.max())
@@ -72,16 +75,16 @@ def generic_of(mechanism: Mechanism) -> Generic:
         for each in (np.concatenate([twists, actuators], axis=1), twists, actuators)
     )
     counts = Mobility(
-        mobility=motions.shape[-1],
+        mobility=motions.shape[-1] - locked,
         platform=platform,
         internal=shown - platform,
-        idle=motions.shape[-1] - shown,
+        idle=motions.shape[-1] - locked - shown,
         actuators=len(mechanism.actuator_names),
         uncontrolled=shown - driven,
         over_constraints=closure.shape[1] - rank,
     )
     left, sizes, _ = np.linalg.svd(np.hstack(list(twists)))
-    return Generic(counts, left[:, : int(_rank(sizes))], bool(ranks[0] < rank))
+    return Generic(counts, left[:, : int(_rank(sizes))], rank, bool(ranks[0] < rank))
 
 
 def _rank(values: NDArray[Any]) -> Any:

@@ -139,7 +139,7 @@ def _motion(mechanism: Mechanism, q: Floats) -> _Motion:
     generic = generic_of(mechanism)
     closure, twist = first_order(mechanism, q)
     actuated = actuated_columns(mechanism)
-    rank, shown = closure.shape[-1] - generic.mobility.mobility, generic.mobility.platform + generic.mobility.internal
+    rank, shown = generic.rank, generic.mobility.platform + generic.mobility.internal
     values, right = right_singular(closure)
     motions = np.swapaxes(right[:, rank:], -1, -2)
     left, sizes, _ = np.linalg.svd(np.concatenate([twist @ motions, motions[:, actuated]], axis=1), full_matrices=False)
