@@ -743,3 +743,16 @@ def test_answers_of_inverse_kinematics_carry_the_same_fields() -> None:
     assert pf.closure_residual(ik) <= 1e-9 * mechanism.characteristic_length
     assert checks.gap_of_joints(mechanism, ik).max() <= 1e-8
     assert pf.solve_ik(mechanism, ik.pose, start=fk)
+
+
+def test_values_beyond_the_bound_of_a_wheel_are_not_answered_a_turn_away() -> None:
+    """A range that is wider than a turn has ends all the same, and the one nearby is nearer than a turn."""
+    wheel = pf.load("five_bar").with_limits(p1=(-0.5, 1e4))
+    found = pf.solve_fk(wheel, [[-0.7, -0.1], [0.3, 0.1], [-3.0, -0.1]])
+    assert found.status.tolist() == [pf.Status.PROJECTED, pf.Status.REACHED, pf.Status.PROJECTED]
+    np.testing.assert_allclose(found.actuators, [[-0.5, -0.1], [0.3, 0.1], [-0.5, -0.1]], rtol=0, atol=1e-6)
+    assert [[(limit.joint, limit.bound) for limit in row] for row in found.active_limits] == [
+        [("p1", "min")],
+        [],
+        [("p1", "min")],
+    ]

@@ -85,13 +85,17 @@ def _project(
     *,
     anywhere: bool,
 ) -> None:
-    """Answer rows by feasible configurations with actuators as near to their values as searches bring them."""
+    """Answer rows by feasible configurations with actuators as near to their values as searches bring them.
+
+    For these one turn is as good as another. Rows that end beyond a bound, and so a turn away, stay PENDING.
+    """
     first = own.of(places)
     ended = nearest_actuators(mechanism, values[places], first, corners=anywhere)
     near = np.flatnonzero(np.isfinite(ended.distances))
     ended, places = ended.at(near), places[near]
     asked, actuators, measures = rows.actuators[places], ended.actuators, ended.measures
     measures[:, [POSITION_ERROR, ROTATION_ERROR]] = 0.0
+    turned = np.zeros(len(places), bool)
     for driven in table.driven:
         column = driven["column"]
         now = actuators[:, column]  # a view
@@ -99,10 +103,11 @@ def _project(
             counted = now + 2.0 * np.pi * np.round((asked[:, column] - now) / (2.0 * np.pi))
             inside = (counted >= driven["home"] + driven["lo"]) & (counted <= driven["home"] + driven["hi"])
             now[:] = np.where(inside, counted, now)
+            turned |= ~inside
         off = np.abs(now - asked[:, column]) / driven["unit"]
         measures[:, ACTUATOR_ERROR] = np.maximum(measures[:, ACTUATOR_ERROR], off)
     rows.actuators[places], rows.measures[places] = actuators, measures
-    rows.status[places] = PROJECTED
+    rows.status[places] = np.where(turned, PENDING, PROJECTED)
     rows.counters[places, ITERATIONS] = ended.counters[:, ITERATIONS]
     rows.poses[places], found.q[places], found.sides[places] = ended.poses, ended.q, ended.sides
 
