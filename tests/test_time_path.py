@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
@@ -236,3 +237,21 @@ def test_the_speed_of_a_platform_is_that_at_which_an_actuator_meets_its_limit(na
         rates = np.abs(sides[0] - sides[1]) / (2.0 * step)
         assert each.speed * rates.max() == pytest.approx(2.0, rel=1e-4)
         assert machine.actuator_names[rates.argmax()] == each.limited_by or np.sum(rates > 0.9999 * rates.max()) > 1
+
+
+def test_internal_motions_take_load_off_the_actuator_that_limits_a_platform() -> None:
+    """The redundant hexapod goes as fast as a linear program over the rates of all its actuators says."""
+    machine = pf.load("nrpm")
+    limits = np.random.default_rng(0).uniform(0.5, 2.0, len(machine.actuator_names)) * 100.0
+    here = pf.solve_ik(machine, pf.pose(np.array(machine.reference_point), rotvec=(0.05, 0.1, 0.02)))
+    forward, sizes = pf.forward_jacobian(here), np.repeat([machine.characteristic_length, 1.0], 3)
+    *axes, slowest = pf.platform_speed(here, speed=dict(zip(machine.actuator_names, limits, strict=True)))
+    for each in (*axes, slowest):
+        twist = np.zeros(6)
+        twist[slice(3) if each.kind == "along" else slice(3, 6)] = each.direction
+        asked = np.column_stack([forward * limits, -twist]) / sizes[:, None]
+        bounds = [(-1.0, 1.0)] * len(limits) + [(0.0, None)]
+        best = linprog(np.append(np.zeros(len(limits)), -1.0), A_eq=asked, b_eq=np.zeros(6), bounds=bounds)
+        assert each.speed == pytest.approx(best.x[-1], rel=1e-6)
+        assert each.limited_by in machine.actuator_names
+    assert slowest.speed <= min(each.speed for each in axes if each.kind == "along")
