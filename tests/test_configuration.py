@@ -172,3 +172,16 @@ def test_what_is_no_joint_vector_is_refused(q: Any, named: str) -> None:
 def test_what_is_no_mechanism_has_no_configuration() -> None:
     with pytest.raises(InvalidArgument, match="mechanism"):
         pf.configuration("stewart", [0.0])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["stewart", "servo_hexapod", "rps", "nrpm"])
+def test_a_ball_joint_that_is_not_as_its_bodies_are_leaves_the_loops_open(name: str) -> None:
+    """At the platform too, whose legs are closed wherever it is turned to: it is measured, not set right."""
+    mechanism = machine(name)
+    last = [joint.name for joint in mechanism.joints if joint.type == "spherical"][-1]
+    columns = [k for k, each in enumerate(mechanism.coordinates) if each.joint.name == last]
+    q = pf.solve_ik(mechanism, mechanism.home_pose).q
+    q[columns] += (0.3, 0.2, -0.1)
+    found = pf.configuration(mechanism, q)
+    assert found.status is Status.FAILED and found.residual > 0.01 * mechanism.characteristic_length
+    np.testing.assert_allclose(found.q, q, rtol=0, atol=1e-9)

@@ -203,12 +203,13 @@ def close(
     centres : wished joint centres, (n, joints, 3); NaN for none.
     limits : keep all limits too, by `margin` inside.
     plunging : undamped steps, up and down: finds more of many solutions, but not the nearest.
+    max_iterations : with 0 configurations are measured as they are.
     closeness : largest gap, excess and miss that ends the search [L or rad].
     """
     n, length = len(coordinates), closure.mechanism.characteristic_length
     if max_iterations:
         coordinates = coordinates * column_moves(closure.mechanism)
-    follow = centres is None and not limits
+    follow = centres is None and not limits and max_iterations > 0
     closed = new_closed(closure, coordinates, in_lengths(poses, 1.0 / length), np.inf)
     problem = K.ClosureProblem(
         platform=np.array(platform, dtype=float),
