@@ -279,6 +279,8 @@ def test_a_locked_passive_joint_is_a_constraint_as_a_rigid_strut_is() -> None:
     here, there = (pf.solve_ik(each, each.home_pose) for each in (locked, rigid))
     np.testing.assert_allclose(pf.travel(here).distances, pf.travel(there).distances, rtol=0, atol=1e-6)
     assert pf.travel(here).distances.min() > 0.01
+    stops, without = ([[limit.joint for limit in each.stopped_by] for each in pf.travel(of)] for of in (here, there))
+    assert stops == without
     assert pf.mobility(locked) == pf.mobility(rigid)
     assert pf.singularity(answers[0]).parallel == pytest.approx(pf.singularity(others[0]).parallel)
     assert len(pf.assembly_modes(locked, here.actuators)) == len(pf.assembly_modes(rigid, here.actuators)) > 0

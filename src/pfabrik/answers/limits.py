@@ -45,10 +45,14 @@ ALIKE = 0.999
 
 
 def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[ActiveLimit, ...]]:
-    """The limits that each row of joint coordinates (n, columns), deviations from home, lies on; ranges first."""
+    """The limits that each row of joint coordinates (n, columns), deviations from home, lies on; ranges first.
+
+    A rigid joint is always where it is locked: only beyond that it counts.
+    """
     found: list[list[ActiveLimit]] = [[] for _ in coordinates]
     ranges = ranges_of(mechanism)
-    values, near = ranges.values(coordinates), TOLERANCES.active * ranges.units
+    rigid = [joint.is_rigid for joint in ranges.joints]
+    values, near = ranges.values(coordinates), np.where(rigid, -TOLERANCES.limit, TOLERANCES.active) * ranges.units
     low, high = values - ranges.low <= near, ranges.high - values <= near
     for k, (joint, place) in enumerate(zip(ranges.joints, ranges.places, strict=True)):
         for row in np.flatnonzero(low[:, k] | high[:, k]):
@@ -77,6 +81,8 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
         which = 0
         if place < 2 * n:
             own = mechanism.coordinates[place // 2]
+            if own.joint.is_rigid:
+                continue
             name, which, unit = own.joint.name, own.place, mechanism.characteristic_length / float(units[own.column])
             value, limit = float(coordinates[row, own.column]) + own.home, own.bounds[place % 2]
             bound: Literal["min", "max", "cone"] = "max" if place % 2 else "min"
