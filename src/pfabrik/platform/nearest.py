@@ -156,16 +156,24 @@ def move_arms(
 def _nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
     """Feasible configurations at targets (n, 4, 4) [length] whose arms are near to where the starts (n,) have them.
 
-    Searches start there alone: what they miss, projections from elsewhere find.
+    Searches start there alone: what they miss, projections from elsewhere find. Where one set of arms has no place the
+    next is not asked.
+
+    Parameters
+    ----------
+    own : poses (n or 1, 4, 4), sides (n, legs), and no coordinates.
     """
     best = new_found(len(targets), table)
     best.distances[:], best.sides[:] = 0.0, own.sides
+    left = np.arange(len(targets))
     for arms, legs, approach in _toward_arms(mechanism, table):
-        begin = Starts(own.poses, *(np.ascontiguousarray(array[:, legs]) for array in own[1:]))
+        poses = own.poses if len(own.poses) == 1 else own.poses[left]
+        begin = Starts(poses, np.ascontiguousarray(own.q[:, legs]), np.ascontiguousarray(own.sides[left][:, legs]))
         values = np.ascontiguousarray(arms["sense"] * begin.sides[:, arms["leg"]])
-        found = approach.find(targets, begin, values)
-        np.maximum(best.distances, found.distances, out=best.distances)
-        best.poses[:], best.sides[:, legs] = found.poses, found.sides
+        found = approach.find(targets[left], begin, values)
+        best.distances[left] = np.maximum(best.distances[left], found.distances)
+        best.poses[left], best.sides[left, legs] = found.poses, found.sides
+        left = left[np.isfinite(found.distances)]
     return best
 
 
