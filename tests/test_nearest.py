@@ -208,11 +208,11 @@ def special_targets(mechanism: Mechanism) -> np.ndarray:
     return targets[:: 4 if INTERPRETED else 1]
 
 
-@pytest.mark.parametrize("name", ["stewart", "ucu", "nrpm"])
+@pytest.mark.parametrize("name", ["ucu", "nrpm"])
 def test_where_the_reference_point_is_does_not_change_what_is_held(name: str) -> None:
     """Platforms turn about their middle on the way to a target, not about a point far away."""
     near, rng = pf.load(name), np.random.default_rng(3)
-    lever = 300.0 * near.characteristic_length * np.array([0.0, 0.0, 1.0])
+    lever = 300.0 * near.characteristic_length * np.array([0.6, 0.0, 0.8])
     far = dataclasses.replace(near, reference_point=near.reference_point + lever)
     moves = pf.pose(
         rng.normal(size=(30, 3)) * 0.3 * near.characteristic_length,

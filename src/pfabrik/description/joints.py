@@ -118,10 +118,10 @@ class Joint:
     @property
     def is_rigid(self) -> bool:
         """Whether its two bodies are as one: it is fixed, or a passive R or P whose range is a single value."""
-        if self.type == "fixed":
-            return True
-        one = self.type in ("revolute", "prismatic") and not self.actuated and self.range is not None
-        return one and self.range[0] == self.range[1]  # type: ignore[index]
+        if self.type not in ("revolute", "prismatic") or self.actuated or self.range is None:
+            return self.type == "fixed"
+        low, high = self.range
+        return low == high
 
 
 def set_fields(frozen: object, **values: object) -> None:

@@ -280,6 +280,19 @@ def judge(own: Record, row: int, found: Found) -> None:
     found.counters[row, HOLD] = own["hold"] if is_held else HOLD_NOTHING
 
 
+@routine
+def weigh(table: Table, row: int, aim: Aim, own: Starts, work: Work, weights: Floats) -> None:
+    """Fill how hard every limit holds a row back where it starts, see `approach`."""
+    search, linear = work.search, work.search.first.linear
+    begin(table, own, row, search)
+    fix(aim.pose, True, search)
+    search.gradient.unit[0] = 1.0
+    linearise(table, row, aim, search.best, search, search.first)
+    scale_objective(linear)
+    for c in range(balance(linear, aim.pose.near, work.p, work.pulls)):
+        weights[linear.which[c]] = work.p.x[c]
+
+
 @search
 def approach(
     machine: int,
@@ -326,7 +339,7 @@ def approach(
         Found(distances, ends, ends_q, ends_sides, counters, actuators, measures, status),
     )
     work = open_work(scratch)
-    search, best, held, p, pulls = work.search, work.best, work.held, work.p, work.pulls
+    search, best, held = work.search, work.best, work.held
     frame, margin, near, weighs = setting["frame"], setting["margin"], setting["near"], setting["steps"] == 0
     pose = PoseObjective(targets, asked.weights, frame, margin, near, setting["steps"])
     aim = Aim(pose, values, setting["implied"])
@@ -338,13 +351,7 @@ def approach(
             left += 1
             continue
         if weighs:
-            begin(table, own, row, search)
-            fix(pose, True, search)
-            search.gradient.unit[0] = 1.0
-            linearise(table, row, aim, search.best, search, search.first)
-            scale_objective(search.first.linear)
-            for c in range(balance(search.first.linear, near, p, pulls)):
-                weights[row, search.first.linear.which[c]] = p.x[c]
+            weigh(table, row, aim, own, work, weights[row])
             continue
         least = search_row(table, row, aim, toward, own, others, setting["hits"], setting["stays"], work)
         distances[row] = least
