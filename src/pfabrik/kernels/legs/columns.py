@@ -80,14 +80,23 @@ def lay_out(targets: Floats, begins: Floats, task: Record, first: int, n: int, p
             if S[OFF, i] > ROUNDED and S[IS_SURE, i] == 1.0:
                 straighten(i, pose, S)
     else:
-        for i in range(n):
-            begin = begins[first + i if begins.shape[0] > 1 else 0]
-            for j in range(9):
-                S[XX + j, i] = begin[j // 3, j % 3]
+        for j in range(9):
+            lay_begins(begins[:, j // 3, j % 3], 1.0, first, n, XX + j, S)
     for j in range(3):
         if task["axes"][j] == 0:
-            for i in range(n):
-                S[PX + j, i] = shrink * begins[first + i if begins.shape[0] > 1 else 0, j, 3]
+            lay_begins(begins[:, j, 3], shrink, first, n, PX + j, S)
+
+
+@routine
+def lay_begins(begins: Floats, factor: float, first: int, n: int, to: int, S: Floats) -> None:
+    """Fill a column with what one for each row, or one for all, begins with, times a factor."""
+    if begins.shape[0] == 1:
+        value = factor * begins[0]
+        for i in range(n):
+            S[to, i] = value
+    else:
+        for i in range(n):
+            S[to, i] = factor * begins[first + i]
 
 
 @routine
