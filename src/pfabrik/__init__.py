@@ -29,169 +29,111 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-# Where each public name lives. Modules are imported when a name is first used, so that `import pfabrik` is quick.
-_HOMES = {
-    "Cone": "description.mechanism",
-    "Joint": "description.mechanism",
-    "Leg": "description.legs",
-    "Mechanism": "description.mechanism",
-    "load": "files",
-    "save": "files",
-    "catalog": "catalog",
-    "pose": "poses",
-    "Options": "options",
-    "Solution": "answers.solution",
-    "Status": "answers.status",
-    "ActiveLimit": "answers.limits",
-    "SubChain": "decomposition.decompose",
-    "decompose": "decomposition.decompose",
-    "solve_ik": "ik",
-    "track": "track",
-    "Track": "answers.tracked",
-    "Travel": "travel",
-    "travel": "travel",
-    "configuration": "configuration",
-    "margins": "answers.margins",
-    "Feasibility": "feasibility",
-    "feasibility": "feasibility",
-    "AssemblyModes": "modes.assembly",
-    "assembly_modes": "modes.assembly",
-    "WorkingModes": "modes.working",
-    "working_modes": "modes.working",
-    "closure_residual": "answers.residual",
-    "Mobility": "answers.differential",
-    "Singularity": "answers.differential",
-    "mobility": "answers.differential",
-    "inverse_jacobian": "answers.differential",
-    "forward_jacobian": "answers.differential",
-    "singularity": "answers.differential",
-    "solve_fk": "fk",
-    "Solver": "solver",
-    "warm_up": "warm_up",
-    "Inscribed": "workspace.inscribed",
-    "SingularityMap": "workspace.singular",
-    "SingularityTrack": "workspace.singular",
-    "singularity_map": "workspace.singular",
-    "Workspace": "workspace.result",
-    "workspace": "workspace.ask",
-    "export_c": "export.export_c",
-    "animate": "view.animation",
-    "Viewer": "view.live.viewer",
-    "view": "view.live.viewer",
-    "plot": "view.machine",
-    "plot_track": "view.track",
-    "plot_travel": "view.travel",
-    "PlatformSpeed": "timing.platform_speed",
-    "platform_speed": "timing.platform_speed",
-    "read_path": "paths.read_path",
-    "Timed": "timing.timed",
-    "time_path": "timing.time_path",
+# The public names of each module. Modules are imported when a name is first used, so that `import pfabrik` is quick.
+_NAMES = {
+    "answers.differential": (
+        "Mobility",
+        "Singularity",
+        "forward_jacobian",
+        "inverse_jacobian",
+        "mobility",
+        "singularity",
+    ),
+    "answers.limits": ("ActiveLimit",),
+    "answers.margins": ("margins",),
+    "answers.residual": ("closure_residual",),
+    "answers.solution": ("Solution",),
+    "answers.status": ("Status",),
+    "answers.tracked": ("Track",),
+    "catalog": ("catalog",),
+    "configuration": ("configuration",),
+    "decomposition.decompose": ("SubChain", "decompose"),
+    "description.legs": ("Leg",),
+    "description.mechanism": ("Cone", "Joint", "Mechanism"),
+    "export.export_c": ("export_c",),
+    "feasibility": ("Feasibility", "feasibility"),
+    "files": ("load", "save"),
+    "fk": ("solve_fk",),
+    "ik": ("solve_ik",),
+    "modes.assembly": ("AssemblyModes", "assembly_modes"),
+    "modes.working": ("WorkingModes", "working_modes"),
+    "options": ("Options",),
+    "paths.read_path": ("read_path",),
+    "poses": ("pose",),
+    "solver": ("Solver",),
+    "timing.platform_speed": ("PlatformSpeed", "platform_speed"),
+    "timing.time_path": ("time_path",),
+    "timing.timed": ("Timed",),
+    "track": ("track",),
+    "travel": ("Travel", "travel"),
+    "view.animation": ("animate",),
+    "view.live.viewer": ("Viewer", "view"),
+    "view.machine": ("plot",),
+    "view.track": ("plot_track",),
+    "view.travel": ("plot_travel",),
+    "warm_up": ("warm_up",),
+    "workspace.ask": ("workspace",),
+    "workspace.inscribed": ("Inscribed",),
+    "workspace.result": ("Workspace",),
+    "workspace.singular": ("SingularityMap", "SingularityTrack", "singularity_map"),
 }
+_HOMES = {name: home for home, names in _NAMES.items() for name in names}
 # Modules that are themselves public.
 _MODULES = ("errors", "geometric", "interop")
 
-__all__ = [
-    "ActiveLimit",
-    "AssemblyModes",
-    "Cone",
-    "Feasibility",
-    "Inscribed",
-    "Joint",
-    "Leg",
-    "Mechanism",
-    "Mobility",
-    "Options",
-    "PlatformSpeed",
-    "Singularity",
-    "SingularityMap",
-    "SingularityTrack",
-    "Solution",
-    "Solver",
-    "Status",
-    "SubChain",
-    "Timed",
-    "Track",
-    "Travel",
-    "Viewer",
-    "WorkingModes",
-    "Workspace",
-    "__version__",
-    "animate",
-    "assembly_modes",
-    "catalog",
-    "closure_residual",
-    "configuration",
-    "decompose",
-    "errors",
-    "export_c",
-    "feasibility",
-    "forward_jacobian",
-    "geometric",
-    "interop",
-    "inverse_jacobian",
-    "load",
-    "margins",
-    "mobility",
-    "platform_speed",
-    "plot",
-    "plot_track",
-    "plot_travel",
-    "pose",
-    "read_path",
-    "save",
-    "singularity",
-    "singularity_map",
-    "solve_fk",
-    "solve_ik",
-    "time_path",
-    "track",
-    "travel",
-    "view",
-    "warm_up",
-    "working_modes",
-    "workspace",
-]
+__all__ = [*sorted([*_HOMES, *_MODULES]), "__version__"]
 
 if TYPE_CHECKING:
-    from . import errors, geometric, interop
-    from .answers.differential import Mobility, Singularity, forward_jacobian, inverse_jacobian, mobility, singularity
-    from .answers.limits import ActiveLimit
-    from .answers.margins import margins
-    from .answers.residual import closure_residual
-    from .answers.solution import Solution
-    from .answers.status import Status
-    from .answers.tracked import Track
-    from .catalog import catalog
-    from .configuration import configuration
-    from .decomposition.decompose import SubChain, decompose
-    from .description.legs import Leg
-    from .description.mechanism import Cone, Joint, Mechanism
-    from .export.export_c import export_c
-    from .feasibility import Feasibility, feasibility
-    from .files import load, save
-    from .fk import solve_fk
-    from .ik import solve_ik
-    from .modes.assembly import AssemblyModes, assembly_modes
-    from .modes.working import WorkingModes, working_modes
-    from .options import Options
-    from .paths.read_path import read_path
-    from .poses import pose
-    from .solver import Solver
-    from .timing.platform_speed import PlatformSpeed, platform_speed
-    from .timing.time_path import time_path
-    from .timing.timed import Timed
-    from .track import track
-    from .travel import Travel, travel
-    from .view.animation import animate
-    from .view.live.viewer import Viewer, view
-    from .view.machine import plot
-    from .view.track import plot_track
-    from .view.travel import plot_travel
-    from .warm_up import warm_up
-    from .workspace.ask import workspace
-    from .workspace.inscribed import Inscribed
-    from .workspace.result import Workspace
-    from .workspace.singular import SingularityMap, SingularityTrack, singularity_map
+    from . import errors as errors, geometric as geometric, interop as interop
+    from .answers.differential import (
+        Mobility as Mobility,
+        Singularity as Singularity,
+        forward_jacobian as forward_jacobian,
+        inverse_jacobian as inverse_jacobian,
+        mobility as mobility,
+        singularity as singularity,
+    )
+    from .answers.limits import ActiveLimit as ActiveLimit
+    from .answers.margins import margins as margins
+    from .answers.residual import closure_residual as closure_residual
+    from .answers.solution import Solution as Solution
+    from .answers.status import Status as Status
+    from .answers.tracked import Track as Track
+    from .catalog import catalog as catalog
+    from .configuration import configuration as configuration
+    from .decomposition.decompose import SubChain as SubChain, decompose as decompose
+    from .description.legs import Leg as Leg
+    from .description.mechanism import Cone as Cone, Joint as Joint, Mechanism as Mechanism
+    from .export.export_c import export_c as export_c
+    from .feasibility import Feasibility as Feasibility, feasibility as feasibility
+    from .files import load as load, save as save
+    from .fk import solve_fk as solve_fk
+    from .ik import solve_ik as solve_ik
+    from .modes.assembly import AssemblyModes as AssemblyModes, assembly_modes as assembly_modes
+    from .modes.working import WorkingModes as WorkingModes, working_modes as working_modes
+    from .options import Options as Options
+    from .paths.read_path import read_path as read_path
+    from .poses import pose as pose
+    from .solver import Solver as Solver
+    from .timing.platform_speed import PlatformSpeed as PlatformSpeed, platform_speed as platform_speed
+    from .timing.time_path import time_path as time_path
+    from .timing.timed import Timed as Timed
+    from .track import track as track
+    from .travel import Travel as Travel, travel as travel
+    from .view.animation import animate as animate
+    from .view.live.viewer import Viewer as Viewer, view as view
+    from .view.machine import plot as plot
+    from .view.track import plot_track as plot_track
+    from .view.travel import plot_travel as plot_travel
+    from .warm_up import warm_up as warm_up
+    from .workspace.ask import workspace as workspace
+    from .workspace.inscribed import Inscribed as Inscribed
+    from .workspace.result import Workspace as Workspace
+    from .workspace.singular import (
+        SingularityMap as SingularityMap,
+        SingularityTrack as SingularityTrack,
+        singularity_map as singularity_map,
+    )
 
 
 def __getattr__(name: str) -> Any:
