@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -15,7 +16,8 @@ from .checks import require_path
 def whole_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A path to write to, which takes the name `path` only when the block ends without an error, or an interruption.
 
-    Its ending is that of `path`, which writers tell the format by. Where it cannot be written, the error names `path`.
+    Its ending is that of `path`, which writers tell the format by. A file that it replaces leaves it its permissions.
+    Where it cannot be written, the error names `path`.
     """
     final = require_path("path", path).resolve()  # a link keeps pointing where it points
     if not final.parent.is_dir():
@@ -25,6 +27,8 @@ def whole_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     part = final.with_name(f".{final.stem}.{os.getpid()}.part{final.suffix}")
     try:
         yield part
+        if final.exists():
+            shutil.copymode(final, part)
         part.replace(final)
     except OSError as error:
         if str(error.filename) != str(part):

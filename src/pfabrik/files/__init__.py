@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import os
-import secrets
-import shutil
 import tomllib
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ..catalog import catalog, catalog_file
-from ..checks import require_path
 from ..description.form_faults import shown
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import Fault, InvalidArgument, InvalidMechanism, UnknownName
+from ..writing import whole_path
 from .reading import read_mechanism
 from .writing import dumps
 
@@ -77,20 +74,8 @@ def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
     The file is replaced as a whole or not at all. Copies and shorthands of a file it came from are not kept.
     """
     checked_mechanism(mechanism)
-    target = require_path("path", path).resolve()
-    draft = target.with_name(f".{secrets.token_hex(8)}.tmp")
-    try:
-        draft.write_bytes(dumps(mechanism).encode())
-        if target.exists():
-            shutil.copymode(target, draft)
-        os.replace(draft, target)
-    except OSError as error:
-        if error.errno is None:
-            raise
-        raise OSError(error.errno, error.strerror, os.fspath(path)) from error  # the name that the caller knows
-    finally:
-        with suppress(OSError):
-            draft.unlink()
+    with whole_path(path) as part:
+        part.write_bytes(dumps(mechanism).encode())
 
 
 def _text(path: Path) -> str:
