@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..description.graph import edges_of, spanning_tree
 from ..description.joints import Joint
 from ..description.structure import Structure
 
@@ -44,15 +44,21 @@ class CutTree:
 
 def cut_tree(mechanism: Structure) -> CutTree:
     """The tree of a mechanism's bodies; balls are cut first, and motors last."""
-    kept = _kept(mechanism)
-    branches = list(_grown(mechanism.base, [joint for joint in mechanism.joints if joint in kept]))
-    closing = [joint for joint in mechanism.joints if joint not in kept]
-    taken = {*mechanism.bodies}
-    for joint in closing:
-        if joint.type not in CUT_AS_THEY_ARE:
+    worst_first = edges_of(sorted(mechanism.joints, key=_ease_of_cutting))
+    closing = {worst_first[index].joint for index in spanning_tree(worst_first, mechanism.base).closing}
+    kept = [joint for joint in mechanism.joints if joint not in closing]
+    branches: list[Branch] = []
+    for index, forward in spanning_tree(edges_of(kept), mechanism.base).steps:
+        parent, body = kept[index].connects if forward else kept[index].connects[::-1]
+        branches.append(Branch(kept[index], parent, body, forward))
+    cuts, taken = [], {*mechanism.bodies}
+    for joint in mechanism.joints:
+        if joint in closing and joint.type in CUT_AS_THEY_ARE:
+            cuts.append(joint)
+        elif joint in closing:
             parent, body = joint.connects
             branches.append(Branch(joint, parent, unique(f"{body}:{joint.name}", taken), twin_of=body))
-    return CutTree(tuple(branches), tuple(joint for joint in closing if joint.type in CUT_AS_THEY_ARE))
+    return CutTree(tuple(branches), tuple(cuts))
 
 
 def unique(name: str, taken: set[str]) -> str:
@@ -65,37 +71,7 @@ def unique(name: str, taken: set[str]) -> str:
     return free
 
 
-def _kept(mechanism: Structure) -> set[Joint]:
-    """A spanning tree of the joints that are worst to cut."""
-    leads_to = {body: body for body in mechanism.bodies}
-
-    def root(body: str) -> str:
-        while leads_to[body] != body:
-            body = leads_to[body]
-        return body
-
-    kept = set()
-    for joint in sorted(mechanism.joints, key=_ease_of_cutting):
-        first, second = map(root, joint.connects)
-        if first != second:
-            leads_to[first] = second
-            kept.add(joint)
-    return kept
-
-
 def _ease_of_cutting(joint: Joint) -> int:
     if joint.driven:
         return 0
     return 2 if joint.type == "spherical" else 1
-
-
-def _grown(base: str, joints: Sequence[Joint]) -> list[Branch]:
-    """The joints of a tree, from the base outward."""
-    ends, grown = [base], list[Branch]()
-    for body in ends:  # grows while it is looked through
-        for joint in joints:
-            if body in joint.connects and all(branch.joint is not joint for branch in grown):
-                forward = joint.connects[0] == body
-                grown.append(Branch(joint, body, joint.connects[1 if forward else 0], forward))
-                ends.append(grown[-1].body)
-    return grown
