@@ -55,28 +55,18 @@ def report(findings: Findings) -> str:
         "Written by `pfabrik reproduce`. *Paper*: as printed in P-FABRIK; it does not print the dimensions of its "
         "machines, ours have others. *Paper's E*: `Options.paper()`, the passes of P-FABRIK alone with E = 0.01 mm. "
         "*Default*: `Options()`, which for legs that have closed forms takes these and makes no passes.",
-        f"Measured on {machine()}. {findings.extent.steps} steps a circle, {findings.extent.targets} random targets a "
-        "machine.",
         "## What must hold",
         markdown(("promise", "measured", "holds"), [(p.text, p.measured, yes(p.holds)) for p in promises(findings)]),
-        "## Accuracy inside the workspace",
-        efficacy_table(findings.efficacy),
-        "![errors](efficacy.png)",
-        "## Cost",
+        "## Next to what the paper printed",
+        summary(findings),
         "Passes are averages over the targets that are reached. A warm start is the answer to the target before; the "
         "targets are in an order in which each is the nearest one left. *Single*: one kernel call a target, in a "
         "compiled loop. *Batch*: one call of the library, per target. Times are medians, one core, in µs.",
-        iterations_table(findings.efficiency),
-        times_table(findings.efficiency),
+        "Out of reach: the distance from the target over that of the nearest feasible pose of the same orientation, "
+        "which the exact projection (`projection='nearest'`) finds, or a general optimiser, whichever comes nearer.",
+        "The CSV files have every number: jumps of the actuators, those with twice as many steps too, and all times.",
+        "![errors](efficacy.png)",
         "![cost](efficiency.png)",
-        "## Circles that leave the workspace",
-        "Targets are projected as in the paper. How far that is from the best: the distance from the target over that "
-        "of the nearest feasible pose of the same orientation, which the exact projection (`projection='nearest'`) "
-        "finds, or a general optimiser, whichever comes nearer. Ratios are the median, 95 % and the worst.",
-        robustness_table(findings.robustness),
-        "Largest change of an actuator from one step to the next; *halved* is the same with twice as many steps, where "
-        "a continuous motion has half of it and a jump all.",
-        jumps_table(findings.robustness),
         "![paths](robustness.png)",
         "## Limits and loops, everywhere",
         "The worst over all steps: `limit_excess` of the answers, `closure_residual` by the closure engine (over L), "
@@ -168,100 +158,6 @@ def feasibilities(findings: Findings) -> Iterator[tuple[str, Feasibility]]:
         yield f"{leaving.case.label}, circle that leaves, projected exactly", leaving.exact_feasibility
 
 
-def efficacy_table(found: Sequence[Efficacy]) -> str:
-    header = ("RMSE", "paper", "ours, paper's E", "ours, default")
-    rows = []
-    for each in found:
-        unit, printed = each.case.mechanism.length_unit, each.case.printed
-        ours = [each.runs[name].position_rmse for name in ("paper", "default")]
-        rows.append((f"{each.case.label}, position [{unit}]", number(printed.position_rmse), *map(number, ours)))
-        if not is_point(each.case):
-            ours = [each.runs[name].orientation_rmse for name in ("paper", "default")]
-            rows.append((f"{each.case.label}, orientation [deg]", number(printed.orientation_rmse), *map(number, ours)))
-    return markdown(header, rows)
-
-
-def iterations_table(found: Sequence[Efficiency]) -> str:
-    ways = [(name, start) for name in ("paper", "default") for start in ("cold", "warm")]
-    titles = [f"{'paper' + chr(39) + 's E' if name == 'paper' else name}, {start}" for name, start in ways]
-    rows = [
-        (each.case.label, number(each.case.printed.iterations), *[passes(each, *way) for way in ways]) for each in found
-    ]
-    return markdown(("passes (share reached)", "paper", *titles), rows)
-
-
-def passes(found: Efficiency, name: str, start: str) -> str:
-    answered = found.answers[name, start]
-    return f"{answered.iterations:.1f} ({100 * answered.reached / len(answered.solution):.4g} %)"
-
-
-TIMED = {"paper": "P-FABRIK's passes", "default": "default", "geometric": "geometric"}
-"""What is timed, as the tables call it."""
-
-
-def times_table(found: Sequence[Efficiency]) -> str:
-    ways = [("cold", "single"), ("warm", "single"), ("cold", "batch")]
-    rows = []
-    for each in found:
-        label, printed = each.case.label, each.case.printed
-        for name, paper in (("paper", printed.time), ("default", None), ("geometric", printed.geometric_time)):
-            times = [number(1e6 * each.times[name, *way]) for way in ways]
-            rows.append((f"{label}, {TIMED[name]}", number(paper and 1e3 * paper), *times))
-        for name, ratio in (("paper", printed.ratio), ("default", None)):
-            ratios = [number(each.ratio(name, *way), 2) for way in ways]
-            rows.append((f"**{label}, {TIMED[name]} ÷ geometric**", number(ratio, 2), *ratios))
-    return markdown(("time [µs]", "paper (MATLAB)", "single, cold", "single, warm", "batch, cold"), rows)
-
-
-def robustness_table(found: Sequence[Robustness]) -> str:
-    rows = []
-    for each in found:
-        unit, solution, off = each.case.mechanism.length_unit, each.solution, each.projected
-        rows.append(
-            (
-                each.case.label,
-                f"{100 * off.mean():.0f} %",
-                f"{solution.position_error.max():.3g} {unit}",
-                spread(each.ratios, 4),
-                spread(each.exact_ratios, 7),
-                f"{len(each.compared)}",
-                f"{solution.iterations[~off].mean():.1f} / {solution.iterations[off].mean():.1f}",
-                f"{1e6 * each.seconds[~off].mean():.0f} / {1e6 * each.seconds[off].mean():.0f}",
-            )
-        )
-    header = (
-        "",
-        "steps projected",
-        "farthest from target",
-        "÷ nearest feasible",
-        "exact projection ÷ optimiser",
-        "steps compared",
-        "passes, inside / outside",
-        "µs a call, inside / outside",
-    )
-    return markdown(header, rows)
-
-
-def spread(ratios: Floats, digits: int) -> str:
-    """Median, 95 % and worst."""
-    return " / ".join(f"{ratio:.{digits}f}" for ratio in np.quantile(ratios, (0.5, 0.95, 1.0)))
-
-
-def jumps_table(found: Sequence[Robustness]) -> str:
-    rows = []
-    for each in found:
-        for kind, parts in each.jumps.items():
-            unit = each.case.mechanism.length_unit if kind == "lengths" else "deg"
-            cells = [jump_cell(parts[part], kind) for part in ("inside", "outside", "edge")]
-            rows.append((f"{each.case.label}, {kind} [{unit}]", *cells, f"{jump_ratio(parts):.2f}"))
-    return markdown(("largest step (halved)", "inside", "outside", "across the edge", "÷ inside"), rows)
-
-
-def jump_cell(jump: Jump, kind: str) -> str:
-    scale = 1.0 if kind == "lengths" else np.degrees(1.0)
-    return f"{scale * jump.size:.3g} ({scale * jump.halved:.3g})"
-
-
 def feasibility_table(findings: Findings) -> str:
     rows = [
         (name, tiny(each.limit_excess), tiny(each.closure), tiny(each.independent), str(each.failed))
@@ -324,7 +220,7 @@ def cost(found: Efficiency) -> Cells:
 
 
 def out_of_reach(found: Robustness) -> Cells:
-    paper, exact = spread(found.ratios, 3), spread(found.exact_ratios, 3)
+    paper, exact = spread(found.ratios), spread(found.exact_ratios)
     return {
         "out of reach, paper's projection: distance ÷ nearest feasible, median / 95 % / worst": ("–", paper),
         "out of reach, exact projection: distance ÷ an optimiser's, median / 95 % / worst": ("–", exact),
@@ -335,6 +231,11 @@ def out_of_reach(found: Robustness) -> Cells:
             f"{max(jump_ratio(parts) for parts in found.jumps.values()):.2f}",
         ),
     }
+
+
+def spread(ratios: Floats) -> str:
+    """Median, 95 % and worst."""
+    return " / ".join(f"{ratio:.3f}" for ratio in np.quantile(ratios, (0.5, 0.95, 1.0)))
 
 
 def put_into(path: Path, text: str) -> None:
