@@ -112,7 +112,7 @@ def test_a_ball_joint_straight_from_base_to_platform_is_a_chain_without_links() 
     pivot = with_leg(Joint("pivot", "spherical", ("base", "platform"), at=(0, 0, 150)))
     chain = pf.decompose(pivot)[-1]
     assert (str(chain), serves(chain)) == ("S", "reaching")
-    assert [node.joint for node in chain.branch_forms[0].nodes] == ["pivot"]
+    assert chain.branch_forms[0].joints == (("pivot",),)
     turned = pf.solve_ik(pivot, pf.pose([0, 0, 150], rotvec=[0.1, -0.2, 0.1]))
     assert turned
     lifted = pf.solve_ik(pivot, pf.pose([0, 0, 160]))
@@ -162,7 +162,7 @@ def test_revolutes_whose_axes_cross_are_a_universal_or_a_ball_joint() -> None:
     separate = with_leg(*crossing())
     chain = pf.decompose(separate)[-1]
     assert (str(chain), serves(chain)) == ("R-R-P*-R-R-R", "reaching")
-    assert [node.at.tolist() for node in chain.branch_forms[0].nodes] == [[-50, -80, 0], [-30, -50, 150]]
+    assert chain.branch_forms[0].nodes["home"].tolist() == [[-50, -80, 0], [-30, -50, 150]]
     target = pf.pose([5, -3, 155], rotvec=[0.1, 0.05, -0.2])
     answer = pf.solve_ik(separate, target)
     turned = target[:3, :3] @ [-30, -50, 0] + target[:3, 3]
@@ -180,7 +180,7 @@ def test_joints_that_share_a_centre_each_have_their_point() -> None:
 
 def test_joints_described_off_the_crossing_of_their_axes_are_reported_at_it() -> None:
     aside = with_leg(*crossing(Ra={"at": (-70, -80, 0)}, Rb={"at": (-50, -50, -6)}))
-    assert pf.decompose(aside)[-1].branch_forms[0].nodes[0].at == pytest.approx([-50, -80, 0], abs=1e-12)
+    assert pf.decompose(aside)[-1].branch_forms[0].nodes["home"][0] == pytest.approx([-50, -80, 0], abs=1e-12)
     assert pf.solve_ik(aside, aside.home_pose)
 
 
@@ -256,11 +256,11 @@ def test_hinges_with_parallel_axes_lie_in_one_plane_whatever_their_heights() -> 
     machine = planar("RRR")
     for chain in pf.decompose(machine):
         (form,) = chain.branch_forms
-        heights = [node.at[2] for node in form.nodes]
-        assert np.ptp(heights) <= 1e-12
-        for node in form.nodes:
-            np.testing.assert_allclose(node.at + node.shift * form.normal, machine.joint(node.joint).at, atol=1e-12)
-    shifts = [node.shift for chain in pf.decompose(machine) for node in chain.branch_forms[0].nodes]
+        places, normal = form.nodes["home"], form.record["normal"]
+        assert np.ptp(places[:, 2]) <= 1e-12
+        for place, shift, (name, *_) in zip(places, form.shifts, form.joints, strict=True):
+            np.testing.assert_allclose(place + shift * normal, machine.joint(name).at, atol=1e-12)
+    shifts = [chain.branch_forms[0].shifts for chain in pf.decompose(machine)]
     assert np.ptp(shifts) > 10
 
 

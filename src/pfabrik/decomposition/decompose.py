@@ -9,9 +9,9 @@ from typing import TypeAlias
 
 from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism, checked_mechanism
-from .forms import BranchForm, NotExpressible, TrunkJoint
 from .parallelograms import Parallelogram, parallelogram_of
-from .positions import express_branch, express_trunk
+from .positions import BranchForm, express_branch, express_trunk
+from .spots import NotExpressible
 from .stages import TIP, Stage, graph_of, is_tree, leads, stages
 
 
@@ -64,7 +64,6 @@ class SubChain:
 
     parts: tuple[Part, ...]
     reason: str | None
-    trunk_joints: tuple[TrunkJoint, ...] = ()
     branch_forms: tuple[BranchForm, ...] = ()
 
     @property
@@ -174,18 +173,18 @@ def _express(mechanism: Mechanism, chain: SubChain) -> SubChain:
     try:
         if splits and not chain.trunk:
             raise NotExpressible("branches more than once")
-        trunk = express_trunk(mechanism, chain.trunk)
+        express_trunk(mechanism, chain.trunk)
         forms = tuple(express_branch(mechanism, branch, on_base=not chain.trunk) for branch in chain.branches)
     except NotExpressible as reason:
         return SubChain(chain.parts, str(reason))
-    return SubChain(chain.parts, None, trunk, forms)
+    return SubChain(chain.parts, None, forms)
 
 
 def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
     """Why positions alone cannot express a mechanism: sub-chains with their reasons, or motors in none of them."""
     chains = decompose(mechanism)
     reasons = tuple(f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None)
-    known = {joint.name for chain in chains for joint in chain.trunk_joints}
+    known = {step.joint.name for chain in chains for step in chain.trunk}
     known |= {joint for chain in chains for form in chain.branch_forms for joint in form.told}
     driven = dict.fromkeys(drive.joint.name for drive in mechanism.drives)
     missing = (f"actuated joint {name} is in no sub-chain" for name in driven if name not in known)

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Records
+from ..arrays import Floats, Ints, Records
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.reaching import plan as P
-from .decompose import SubChain, beyond_positions, decompose
-from .forms import BranchForm, TrunkJoint
-
-_CONE_KINDS = {"carrier": P.CARRIER_CONE, "link": P.LINK_CONE, "platform": P.PLATFORM_CONE}
+from .decompose import beyond_positions, decompose
+from .positions import BranchForm, express_trunk
 
 
 @dataclass(frozen=True)
@@ -56,137 +53,73 @@ def compile_plan(mechanism: Mechanism) -> CompiledPlan:
     reasons = beyond_positions(mechanism)
     if reasons:
         raise UnsupportedMechanism(mechanism.name, reasons)
-    builder = _Builder(mechanism)
-    for chain in decompose(mechanism):
-        builder.add_chain(chain)
-    return builder.build()
+    chains = decompose(mechanism)
+    has_trunk = np.array([bool(chain.trunk) for chain in chains])
+    carriers = np.cumsum(has_trunk) * has_trunk
+    forms = [form for chain in chains for form in chain.branch_forms]
+    carried_by = np.repeat(carriers, [len(chain.branch_forms) for chain in chains])
+    trunks = [chain.trunk for chain in chains if chain.trunk]
+    steps = [step for trunk in trunks for step in trunk]
+    plan = P.Plan(
+        nodes=_nodes(forms),
+        branches=_branches(forms, carried_by),
+        chains=_spans([chain.branch_forms for chain in chains], P.CHAIN),
+        cones=_cones(forms),
+        trunks=_spans(trunks, P.TRUNK_SPAN),
+        trunk_joints=express_trunk(mechanism, steps),
+        length=mechanism.characteristic_length,
+    )
+    plan.chains["trunk"] = carriers - 1
+    home_nodes = plan.nodes["home"][plan.nodes["stored"] >= 0]
+    return CompiledPlan(
+        plan,
+        tuple(_points(forms, plan.branches)),
+        tuple(step.joint.name for step in steps),
+        tuple((step.joint.name, place) for place, step in enumerate(steps) if step.joint.at is not None),
+        P.Seeds(mechanism.home_pose[None].copy(), home_nodes[None], np.zeros((1, len(steps)))),
+    )
 
 
-class _Builder:
-    """Collects records, numbering nodes, branches and trunk joints as it goes."""
-
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
-        self.nodes: list[dict[str, Any]] = []
-        self.n_stored = 0
-        self.branches: list[dict[str, Any]] = []
-        self.chains: list[dict[str, Any]] = []
-        self.cones: list[dict[str, Any]] = []
-        self.trunks: list[dict[str, Any]] = []
-        self.trunk_joints: list[dict[str, Any]] = []
-        self.points: list[JointPoint] = []
-        self.trunk_names: list[str] = []
-        self.trunk_points: list[tuple[str, int]] = []
-
-    def add_chain(self, chain: SubChain) -> None:
-        trunk = -1
-        first = len(self.branches)
-        if chain.trunk_joints:
-            trunk = len(self.trunks)
-            self._add_trunk(chain.trunk_joints)
-        for form in chain.branch_forms:
-            self._add_branch(form, carrier=trunk + 1 if trunk >= 0 else 0)
-        self.chains.append({"first": first, "last": len(self.branches), "trunk": trunk})
-
-    def _add_trunk(self, joints: Sequence[TrunkJoint]) -> None:
-        first = len(self.trunk_joints)
-        for each in joints:
-            if self.mechanism.joint(each.name).at is not None:
-                self.trunk_points.append((each.name, len(self.trunk_joints)))
-            kind, (lo, hi) = P.SLIDE if each.slides else P.TURN, each.range
-            self.trunk_joints.append({"kind": kind, "point": each.point, "axis": each.axis, "lo": lo, "hi": hi})
-            self.trunk_names.append(each.name)
-        self.trunks.append({"first": first, "last": len(self.trunk_joints)})
-
-    def _add_branch(self, form: BranchForm, carrier: int) -> None:
-        first = len(self.nodes)
-        for k, node in enumerate(form.nodes):
-            self.nodes.append(
-                {
-                    "home": node.at,
-                    "stored": self._store(form, k),
-                    "lo": node.stroke[0],
-                    "hi": node.stroke[1],
-                    "hinge": int(node.hinge),
-                    "ranged": int(np.isfinite(node.turn).any()),
-                    "angle_home": node.angle_home,
-                    "angle_lo": node.turn[0],
-                    "angle_hi": node.turn[1],
-                }
-            )
-        cone_first = len(self.cones)
-        for cone in form.cones:
-            self.cones.append(
-                {
-                    "kind": _CONE_KINDS[cone.kind],
-                    "node": first + cone.node,
-                    "axis": cone.axis,
-                    "half_angle": cone.half_angle,
-                }
-            )
-        self._add_points(form, first, carrier)
-        self.branches.append(
-            self._branch_record(form, first, carrier) | {"cone_first": cone_first, "cone_last": len(self.cones)}
-        )
-
-    def _store(self, form: BranchForm, k: int) -> int:
-        """The place of node k of a branch among the stored ones, or -1 if pose and trunks tell where it is."""
-        if k == len(form.nodes) - 1 or (k == 0 and form.rail is None):
-            return -1
-        self.n_stored += 1
-        return self.n_stored - 1
-
-    def _branch_record(self, form: BranchForm, first: int, carrier: int) -> dict[str, Any]:
-        nodes, none = form.nodes, np.zeros(3)
-        reference = _unit(nodes[1].at - nodes[0].at) if len(nodes) > 1 and form.planar else none
-        return {
-            "first": first,
-            "last": first + len(nodes) - 1,
-            "carrier": carrier,
-            "planar": form.planar,
-            "normal": form.normal,
-            "reference": reference,
-            "end": nodes[-1].at - np.array(self.mechanism.reference_point),
-            "end_plane": int(form.end_normal is not None and not form.align),
-            "end_normal": none if form.end_normal is None else form.end_normal,
-            "rail": int(form.rail is not None),
-            "rail_axis": none if form.rail is None else form.rail,
-            "rail_lo": form.rail_range[0],
-            "rail_hi": form.rail_range[1],
-        }
-
-    def _add_points(self, form: BranchForm, first: int, carrier: int) -> None:
-        for k, node in enumerate(form.nodes):
-            at_end = k == len(form.nodes) - 1 and form.end_normal is not None
-            axis = form.end_normal if at_end and form.end_normal is not None else form.normal
-            turning = -1 if at_end else carrier
-            self.points += [JointPoint(name, first + k, node.shift, axis, turning) for name in node.joints]
-
-    def build(self) -> CompiledPlan:
-        plan = P.Plan(
-            nodes=_records(self.nodes, P.NODE),
-            branches=_records(self.branches, P.BRANCH),
-            chains=_records(self.chains, P.CHAIN),
-            cones=_records(self.cones, P.CONE),
-            trunks=_records(self.trunks, P.TRUNK_SPAN),
-            trunk_joints=_records(self.trunk_joints, P.TRUNK_JOINT),
-            length=self.mechanism.characteristic_length,
-        )
-        home = P.Seeds(
-            self.mechanism.home_pose[None].copy(),
-            plan.nodes["home"][plan.nodes["stored"] >= 0][None],
-            np.zeros((1, len(self.trunk_joints))),
-        )
-        return CompiledPlan(plan, tuple(self.points), tuple(self.trunk_names), tuple(self.trunk_points), home)
+def _starts(parts: Iterable[Sized]) -> Ints:
+    """Where each of some parts begins where all are in a row, and where the last one ends."""
+    return np.cumsum([0, *map(len, parts)])
 
 
-def _unit(vector: Floats) -> Floats:
-    return np.asarray(vector / np.linalg.norm(vector))
+def _spans(parts: Sequence[Sized], dtype: np.dtype[np.void]) -> Records:
+    """Records of the first of each of some parts, and the one after its last."""
+    spans, starts = np.zeros(len(parts), dtype), _starts(parts)
+    spans["first"], spans["last"] = starts[:-1], starts[1:]
+    return spans
 
 
-def _records(rows: list[dict[str, Any]], dtype: np.dtype[np.void]) -> Records:
-    array = np.zeros(len(rows), dtype)
-    for i, row in enumerate(rows):
-        for name, value in row.items():
-            array[i][name] = value
-    return array
+def _nodes(forms: Sequence[BranchForm]) -> Records:
+    """The nodes of all branches, those that are stored counted."""
+    nodes = np.concatenate([form.nodes for form in forms])
+    stored = nodes["stored"] >= 0
+    nodes["stored"][stored] = np.arange(stored.sum())
+    return nodes
+
+
+def _cones(forms: Sequence[BranchForm]) -> Records:
+    """The cones of all branches, at nodes counted over all of them."""
+    cones = np.concatenate([form.cones for form in forms])
+    cones["node"] += np.repeat(_starts(form.nodes for form in forms)[:-1], [len(form.cones) for form in forms])
+    return cones
+
+
+def _branches(forms: Sequence[BranchForm], carried_by: Ints) -> Records:
+    """All branches, with what carries them and where their parts are."""
+    branches = np.array([form.record for form in forms], P.BRANCH)
+    nodes, cones = _starts(form.nodes for form in forms), _starts(form.cones for form in forms)
+    branches["first"], branches["last"], branches["carrier"] = nodes[:-1], nodes[1:] - 1, carried_by
+    branches["cone_first"], branches["cone_last"] = cones[:-1], cones[1:]
+    return branches
+
+
+def _points(forms: Sequence[BranchForm], branches: Records) -> Iterator[JointPoint]:
+    """How the centres of all joints follow from nodes."""
+    for form, branch in zip(forms, branches, strict=True):
+        for node, (names, shift) in enumerate(zip(form.joints, form.shifts.tolist(), strict=True), branch["first"]):
+            at_end = node == branch["last"] and branch["end_normal"].any()
+            axis, carrier = branch["end_normal" if at_end else "normal"], -1 if at_end else int(branch["carrier"])
+            yield from (JointPoint(name, node, shift, axis, carrier) for name in names)

@@ -10,23 +10,56 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Record, Records
 from ..description.graph import Step
 from ..description.mechanism import Joint, Mechanism
+from ..kernels.reaching import plan as P
 from ..tolerances import TOLERANCES
-from .forms import FREE, BranchForm, ConeForm, Interval, NodeForm, NotExpressible, TrunkJoint
-from .spots import Spot, spots_along
+from .spots import NotExpressible, Spot, spots_along
+
+Interval: TypeAlias = tuple[float, float]
+FREE: Interval = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class BranchForm:
+    """One branch as the kernels have it, at home, in base coordinates, its parts counted within the branch.
+
+    Attributes
+    ----------
+    joints : those with their centres at each node; several where they act as one.
+    shifts : how far the centre of each node's joints is along the axis of its hinge, (nodes,) [length].
+    nodes, record, cones : as of `kernels.reaching.plan`; a node that is stored has the place 0.
+    told : joints whose value follows.
+    """
+
+    joints: tuple[tuple[str, ...], ...]
+    shifts: Floats
+    nodes: Records
+    record: Record
+    cones: Records
+    told: tuple[str, ...]
 
 
 @dataclass
 class _Draft:
-    """A branch being expressed."""
+    """A branch being expressed.
+
+    Attributes
+    ----------
+    joints : those with their centres at each spot; of a tip that is cut, the end effector itself.
+    nodes, shifts : see `BranchForm`.
+    """
 
     spots: list[Spot]
+    joints: tuple[tuple[str, ...], ...]
+    nodes: Records
+    shifts: Floats
     rail: Step | None = None
     planar: int = 0
     normal: Floats = field(default_factory=lambda: np.zeros(3))
@@ -35,48 +68,55 @@ class _Draft:
     told: list[str] = field(default_factory=list)
 
 
-def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[TrunkJoint, ...]:
-    """The trunk of a branched chain: revolute and prismatic joints in any order."""
-    found = []
-    for step in steps:
+def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> Records:
+    """The trunk of a branched chain: revolute and prismatic joints in any order, as records of `TRUNK_JOINT`."""
+    found = np.zeros(len(steps), P.TRUNK_JOINT)
+    for record, step in zip(found, steps, strict=True):
         joint = step.joint
         if joint.type not in ("revolute", "prismatic"):
             raise NotExpressible(f"joint {joint.name}, below a branching body, is {joint.type}")
-        point, axis = np.array(joint.at or (0.0, 0.0, 0.0)), np.array(mechanism.home_axis(joint.name)) * step.sign
-        found.append(TrunkJoint(joint.name, point, axis, joint.type == "prismatic", _from_home(mechanism, joint)))
-    return tuple(found)
+        record["kind"] = P.SLIDE if joint.type == "prismatic" else P.TURN
+        record["point"], record["axis"] = joint.at or 0.0, np.array(mechanism.home_axis(joint.name)) * step.sign
+        record["lo"], record["hi"] = _from_home(mechanism, joint)
+    return found
 
 
 def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -> BranchForm:
     """One branch, from the base (or from the body it hangs on) to the end effector."""
-    near = TOLERANCES.alignment * mechanism.characteristic_length
-    draft = _Draft(spots_along(mechanism, steps))
-    if steps[0].joint.type == "prismatic" and len(draft.spots) > 0:
+    spots = spots_along(mechanism, steps)
+    joints = tuple(tuple(step.joint.name for step in spot.steps) or (mechanism.end_effector,) for spot in spots)
+    draft = _Draft(spots, joints, np.zeros(len(spots), P.NODE), np.zeros(len(spots)))
+    if steps[0].joint.type == "prismatic" and len(spots) > 0:
         if not on_base:
             raise NotExpressible(f"joint {steps[0].joint.name} slides on a moving body")
-        draft.rail, draft.spots[0].slider = draft.spots[0].slider, None
+        draft.rail, spots[0].slider = spots[0].slider, None
     _classify(draft)
-    nodes = _place_nodes(mechanism, draft)
-    if (draft.align or draft.ends_in_plane) and len(draft.spots) > 1:
-        draft.told.append(draft.spots[-1].steps[0].joint.name)
-    cones = tuple(
-        _cone(draft, nodes, k, step, near)
-        for k, spot in enumerate(draft.spots)
-        for step in spot.steps
-        if step.joint.cone
-    )
-    rail, rail_range = _rail(mechanism, draft)
-    return BranchForm(
-        nodes=tuple(nodes),
-        planar=draft.planar,
-        normal=draft.normal,
-        end_normal=draft.normal if draft.align else (draft.spots[-1].axis if draft.ends_in_plane else None),
-        align=draft.align,
-        rail=rail,
-        rail_range=rail_range,
-        cones=cones,
-        told=tuple(draft.told),
-    )
+    _place_nodes(mechanism, draft)
+    if (draft.align or draft.ends_in_plane) and len(spots) > 1:
+        draft.told.append(spots[-1].steps[0].joint.name)
+    near = TOLERANCES.alignment * mechanism.characteristic_length
+    cones = [_cone(draft, k, step, near) for k, spot in enumerate(spots) for step in spot.steps if step.joint.cone]
+    record = _record(mechanism, draft)
+    return BranchForm(joints, draft.shifts, draft.nodes, record, np.array(cones, P.CONE), tuple(draft.told))
+
+
+def _record(mechanism: Mechanism, draft: _Draft) -> Record:
+    """What counts for the branch as a whole."""
+    record, places = np.zeros((), P.BRANCH), draft.nodes["home"]
+    record["planar"], record["normal"] = draft.planar, draft.normal
+    if len(places) > 1 and draft.planar:
+        record["reference"] = (places[1] - places[0]) / np.linalg.norm(places[1] - places[0])
+    record["end"] = places[-1] - mechanism.reference_point
+    record["end_plane"] = draft.ends_in_plane
+    if draft.align or draft.ends_in_plane:
+        record["end_normal"] = draft.normal if draft.align else draft.spots[-1].axis
+    record["rail_lo"], record["rail_hi"] = FREE
+    if draft.rail is not None:
+        joint = draft.rail.joint
+        draft.told.append(joint.name)
+        record["rail"], record["rail_axis"] = 1, np.array(mechanism.home_axis(joint.name)) * draft.rail.sign
+        record["rail_lo"], record["rail_hi"] = _from_home(mechanism, joint)
+    return record
 
 
 def _home(mechanism: Mechanism, joint: Joint) -> float:
@@ -135,49 +175,52 @@ def _is_parallel(axis: Floats | None, normal: Floats) -> bool:
     return axis is not None and float(np.linalg.norm(np.cross(axis, normal))) <= TOLERANCES.alignment
 
 
-def _place_nodes(mechanism: Mechanism, draft: _Draft) -> list[NodeForm]:
+def _place_nodes(mechanism: Mechanism, draft: _Draft) -> None:
     """The nodes: centres of hinges moved along their axes into one plane, segments with their strokes."""
-    spots, planar = draft.spots, draft.planar
-    names = [tuple(step.joint.name for step in spot.steps) or (mechanism.end_effector,) for spot in spots]
-    nodes = [NodeForm(joints, spot.at) for joints, spot in zip(names, spots, strict=True)]
+    spots, planar, nodes = draft.spots, draft.planar, draft.nodes
+    nodes["home"] = [spot.at for spot in spots]
+    nodes["stored"][-1], nodes["angle_lo"], nodes["angle_hi"] = -1, *FREE
+    nodes["hinge"][: min(planar, len(spots) - 1)] = 1
+    if draft.rail is None:
+        nodes["stored"][0] = -1
     in_plane = spots[min(planar, len(spots) - 1)].at if not draft.align else spots[0].at
     for k in range(planar):
-        shift = float(draft.normal @ (spots[k].at - in_plane))
-        nodes[k] = replace(nodes[k], at=spots[k].at - shift * draft.normal, shift=shift, hinge=k + 1 < len(spots))
+        _shift(draft, k, draft.normal, in_plane)
     if draft.ends_in_plane:
         axis = spots[-1].axis
         assert axis is not None
-        shift = float(axis @ (spots[-1].at - nodes[-2].at))
-        nodes[-1] = replace(nodes[-1], at=spots[-1].at - shift * axis, shift=shift)
+        _shift(draft, -1, axis, nodes["home"][-2])
     for k in range(1, len(nodes)):
-        nodes[k] = replace(nodes[k], stroke=_stroke(mechanism, draft, nodes, k))
-    for k in range(planar):
-        if nodes[k].hinge:
-            nodes[k] = _range_hinge(mechanism, draft, nodes, k)
-    return nodes
+        nodes["lo"][k], nodes["hi"][k] = _stroke(mechanism, draft, k)
+    for k in np.flatnonzero(nodes["hinge"]).tolist():
+        _range_hinge(mechanism, draft, k)
 
 
-def _stroke(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: int) -> Interval:
+def _shift(draft: _Draft, k: int, axis: Floats, level: Floats) -> None:
+    """Move node k along its axis to where another place is."""
+    centre = draft.spots[k].at
+    draft.shifts[k] = shift = float(axis @ (centre - level))
+    draft.nodes["home"][k] = centre - shift * axis
+
+
+def _stroke(mechanism: Mechanism, draft: _Draft, k: int) -> Interval:
     """Lengths allowed between nodes k - 1 and k."""
-    step = nodes[k].at - nodes[k - 1].at
+    step, (before, after) = draft.nodes["home"][k] - draft.nodes["home"][k - 1], draft.joints[k - 1 : k + 1]
     length = float(np.linalg.norm(step))
     slider = draft.spots[k].slider
     if length <= TOLERANCES.alignment * mechanism.characteristic_length:
-        raise NotExpressible(f"joints {nodes[k - 1].joint} and {nodes[k].joint} coincide")
+        raise NotExpressible(f"joints {before[0]} and {after[0]} coincide")
     if slider is None:
         return length, length
     joint = slider.joint
     cosine = float(np.array(mechanism.home_axis(joint.name)) @ step) / length * slider.sign
     if abs(cosine) < math.cos(2.0 * TOLERANCES.alignment):
-        raise NotExpressible(
-            f"prismatic joint {joint.name} does not point from {nodes[k - 1].joint} to {nodes[k].joint}"
-        )
+        raise NotExpressible(f"prismatic joint {joint.name} does not point from {before[0]} to {after[0]}")
     sign = math.copysign(1.0, cosine)
     home = _home(mechanism, joint)
     limits = _limits(joint, home)
     if joint.along is not None:
-        own = {each.joint.name for spot in draft.spots[k - 1 : k + 1] for each in spot.steps} | {nodes[k].joint}
-        if not set(joint.along) <= own:
+        if not set(joint.along) <= {*before, *after}:
             raise NotExpressible(f"prismatic joint {joint.name} is measured along joints that are not its neighbours")
         sign = 1.0
     offset = home - sign * length
@@ -186,15 +229,15 @@ def _stroke(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: int) 
     return max(lo, 0.0), hi
 
 
-def _range_hinge(mechanism: Mechanism, draft: _Draft, nodes: list[NodeForm], k: int) -> NodeForm:
-    """Node k with the range of its hinge, as deviation from home about the branch's normal."""
-    step = draft.spots[k].steps[0]
+def _range_hinge(mechanism: Mechanism, draft: _Draft, k: int) -> None:
+    """The range of the hinge in node k, as deviation from home about the branch's normal."""
+    step, node, places = draft.spots[k].steps[0], draft.nodes[k], draft.nodes["home"]
     sense = _sense(step, draft.normal)
     draft.told.append(step.joint.name)
-    lo, hi = sorted(bound * sense for bound in _from_home(mechanism, step.joint))
-    before = nodes[k].at - nodes[k - 1].at if k > 0 else None
-    angle_home = _angle_about(draft.normal, before, nodes[k + 1].at - nodes[k].at) if before is not None else 0.0
-    return replace(nodes[k], turn=(lo, hi), angle_home=angle_home)
+    node["angle_lo"], node["angle_hi"] = sorted(bound * sense for bound in _from_home(mechanism, step.joint))
+    node["ranged"] = np.isfinite([node["angle_lo"], node["angle_hi"]]).any()
+    if k > 0:
+        node["angle_home"] = _angle_about(draft.normal, places[k] - places[k - 1], places[k + 1] - places[k])
 
 
 def _sense(step: Step, normal: Floats) -> float:
@@ -206,41 +249,33 @@ def _angle_about(normal: Floats, a: Floats, b: Floats) -> float:
     return math.atan2(float(normal @ np.cross(a, b)), float(a @ b))
 
 
-def _rail(mechanism: Mechanism, draft: _Draft) -> tuple[Floats | None, Interval]:
-    if draft.rail is None:
-        return None, FREE
-    joint = draft.rail.joint
-    draft.told.append(joint.name)
-    return np.array(mechanism.home_axis(joint.name)) * draft.rail.sign, _from_home(mechanism, joint)
-
-
-def _cone(draft: _Draft, nodes: list[NodeForm], k: int, step: Step, near: float) -> ConeForm:
-    """The cone of the joint at node k."""
-    cone, name = step.joint.cone, step.joint.name
+def _cone(draft: _Draft, k: int, step: Step, near: float) -> tuple[int, int, Floats, float]:
+    """The cone of the joint at node k, a record of `CONE`."""
+    cone, name, places = step.joint.cone, step.joint.name, draft.nodes["home"]
     assert cone is not None
-    axis, last = np.array(cone.axis), len(nodes) - 1
+    axis, last = np.array(cone.axis), len(places) - 1
     seen = k - 1 if cone.fixed_to != step.inward else k + 1
-    if 0 <= seen <= last and abs(nodes[seen].shift) > near:
-        raise NotExpressible(f"the cone of joint {name} is about a line to {nodes[seen].joint}, off the chain's plane")
-    outward = nodes[k + 1].at - nodes[k].at if k < last else None
+    if 0 <= seen <= last and abs(draft.shifts[seen]) > near:
+        raise NotExpressible(
+            f"the cone of joint {name} is about a line to {draft.joints[seen][0]}, off the chain's plane"
+        )
+    outward = places[k + 1] - places[k] if k < last else None
     if cone.fixed_to != step.inward:
         if k == last and k > 0:
-            return ConeForm(name, "platform", k, axis, cone.half_angle)
+            return P.PLATFORM_CONE, k, axis, cone.half_angle
         if outward is not None and k > 0 and _is_parallel(axis, outward / np.linalg.norm(outward)):
             sign = math.copysign(1.0, float(axis @ outward))
-            return ConeForm(name, "link", k, np.array([-sign, 0.0, 0.0]), cone.half_angle)
+            return P.LINK_CONE, k, np.array([-sign, 0.0, 0.0]), cone.half_angle
         raise NotExpressible(f"the cone of joint {name} turns with a link whose twist positions do not show")
     if outward is None:
         raise NotExpressible(f"the cone of joint {name} limits a line of the end effector")
     if k == 0:
-        return ConeForm(name, "carrier", k, axis, cone.half_angle)
-    link = nodes[k].at - nodes[k - 1].at
+        return P.CARRIER_CONE, k, axis, cone.half_angle
+    link = places[k] - places[k - 1]
     link = link / np.linalg.norm(link)
     if k <= draft.planar:
         across = np.cross(draft.normal, link)
-        parts = np.array([axis @ link, axis @ across, axis @ draft.normal])
-        return ConeForm(name, "link", k, parts, cone.half_angle)
+        return P.LINK_CONE, k, np.array([axis @ link, axis @ across, axis @ draft.normal]), cone.half_angle
     if _is_parallel(axis, link):
-        parts = np.array([math.copysign(1.0, float(axis @ link)), 0.0, 0.0])
-        return ConeForm(name, "link", k, parts, cone.half_angle)
+        return P.LINK_CONE, k, np.array([math.copysign(1.0, float(axis @ link)), 0.0, 0.0]), cone.half_angle
     raise NotExpressible(f"the cone of joint {name} turns with a link whose twist positions do not show")

@@ -15,9 +15,12 @@ from ..description.graph import Step
 from ..description.home_mobility import universal_axes
 from ..description.mechanism import Joint, Mechanism
 from ..tolerances import TOLERANCES
-from .forms import NotExpressible
 
 _KINDS: dict[str, Literal["R", "U", "S"]] = {"revolute": "R", "universal": "U", "spherical": "S"}
+
+
+class NotExpressible(Exception):
+    """Positions alone cannot express this chain; the text says why."""
 
 
 @dataclass
