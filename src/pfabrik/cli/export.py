@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-
-import pfabrik as pf
 
 from .mech import MECH, load
 from .whole import OUTPUT, STANDARD, refuse_existing, whole_file
@@ -16,53 +15,36 @@ from .whole import OUTPUT, STANDARD, refuse_existing, whole_file
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
 
-
-def mjcf(mechanism: Mechanism) -> str:
-    """A MuJoCo model."""
-    return pf.interop.to_mjcf(mechanism)
-
-
-def c_double(mechanism: Mechanism) -> str:
-    """One file of C in double precision."""
-    from ..export.export_c import c_source
-
-    return c_source(mechanism)
-
-
-def c_float(mechanism: Mechanism) -> str:
-    """One file of C in single precision."""
-    from ..export.export_c import c_source
-
-    return c_source(mechanism, precision="float")
-
-
-def linuxcnc(mechanism: Mechanism) -> str:
-    """What LinuxCNC needs."""
-    from ..export.linuxcnc import linuxcnc as settings
-
-    return settings(mechanism)
-
-
-def klipper(mechanism: Mechanism) -> str:
-    """What Klipper needs."""
-    from ..export.klipper import klipper as settings
-
-    return settings(mechanism)
-
-
-TARGETS: dict[str, tuple[Callable[[Mechanism], str], str]] = {
-    "mjcf": (mjcf, "A MuJoCo model, which starts closed; what weighs and drives it is made up."),
-    "c": (c_double, "One file of C99: inverse and forward kinematics with every limit."),
-    "c_float": (c_float, "The same in single precision."),
-    "linuxcnc": (linuxcnc, "HAL lines where LinuxCNC has these kinematics, else a module in C for halcompile."),
-    "klipper": (klipper, "[printer] and [stepper_*] of a delta printer."),
+TARGETS = {
+    "mjcf": "A MuJoCo model, which starts closed; what weighs and drives it is made up.",
+    "c": "One file of C99: inverse and forward kinematics with every limit.",
+    "c_float": "The same in single precision.",
+    "linuxcnc": "HAL lines where LinuxCNC has these kinematics, else a module in C for halcompile.",
+    "klipper": "[printer] and [stepper_*] of a delta printer.",
 }
-"""Name of an option -> the text that a mechanism becomes, and what the help says of it."""
+"""Name of an option -> what the help says of it."""
+
+
+def text_of(mechanism: Mechanism, name: str) -> str:
+    """The text that a mechanism becomes."""
+    from ..export.export_c import c_source
+    from ..export.klipper import klipper
+    from ..export.linuxcnc import linuxcnc
+    from ..interop import to_mjcf
+
+    makers: dict[str, Callable[[Mechanism], str]] = {
+        "mjcf": to_mjcf,
+        "c": c_source,
+        "c_float": partial(c_source, precision="float"),
+        "linuxcnc": linuxcnc,
+        "klipper": klipper,
+    }
+    return makers[name](mechanism)
 
 
 def one_option_each(command: Callable[..., Any]) -> Callable[..., Any]:
     """An option for every target, which takes the file to write."""
-    for name, (_, said) in reversed(TARGETS.items()):
+    for name, said in reversed(TARGETS.items()):
         command = click.option(option(name), metavar="FILE", help=said, **OUTPUT)(command)
     return command
 
@@ -88,7 +70,7 @@ def export(mech: str, force: bool, **files: Path | None) -> int:
         refuse_existing(path, force)
     mechanism = load(mech)
     for name, path in wanted.items():
-        text = TARGETS[name][0](mechanism)
+        text = text_of(mechanism, name)
         with whole_file(path, [Path(mech)]) as handle:
             handle.write(text)
         if path != STANDARD:

@@ -6,9 +6,12 @@ import json
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
 import pfabrik as pf
 
+from ..description.readouts import readouts
+from .answer import describe, pose_header, pose_texts, tell_modes
 from .finite import is_finite
 from .mech import MECH, load
 
@@ -47,16 +50,12 @@ def fk(mech: str, values: tuple[float, ...], list_all: bool, as_json: bool) -> i
     if list_all:
         return list_modes(mechanism, asked, as_json)
     solution = pf.solve_fk(mechanism, asked)
-    click.echo(json.dumps(solution.to_dict(), allow_nan=False) if as_json else describe_fk(solution, asked))
+    click.echo(json.dumps(solution.to_dict(), allow_nan=False) if as_json else describe(solution, asked))
     return 0 if solution else 1
 
 
 def coordinates(mechanism: Mechanism, values: tuple[float, ...]) -> Floats:
     """The values as coordinates (n_a,) [length or rad]; a usage error for too few or too many."""
-    import numpy as np
-
-    from ..description.readouts import readouts
-
     shown = readouts(mechanism)
     if len(values) != len(shown):
         expected = ", ".join(f"{readout.name} [{readout.unit}]" for readout in shown)
@@ -64,16 +63,8 @@ def coordinates(mechanism: Mechanism, values: tuple[float, ...]) -> Floats:
     return np.array([readout.coordinate(value) for readout, value in zip(shown, values, strict=True)])
 
 
-def describe_fk(solution: Solution, asked: Floats) -> str:
-    """The answer for people."""
-    from .answer import describe
-
-    return describe(solution, asked)
-
-
 def list_modes(mechanism: Mechanism, asked: Floats, as_json: bool) -> int:
     """Print all assembly modes, each with its pose; the exit code."""
-    from .answer import pose_header, pose_texts, tell_modes
 
     def cells(mode: Solution) -> list[str]:
         position, angles = pose_texts(mode)
