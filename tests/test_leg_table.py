@@ -17,7 +17,7 @@ from pfabrik.decomposition.leg_table import LegTable, leg_table, table_of_poses
 from pfabrik.description.home_mobility import end_effector_freedom
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
-from pfabrik.feasibility import _Asked
+from pfabrik.feasibility import _margins
 from pfabrik.kernels.platform.read import read
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
@@ -338,10 +338,14 @@ def test_feasibility_tells_where_three_hinges_through_a_point_cannot_point() -> 
 
 @pytest.mark.parametrize("name", ["stewart", "hexaglide", "delta", "rrr"])
 def test_blocks_measure_what_is_measured_one_by_one(name: str) -> None:
-    asked = _Asked(machine(name), None)
+    mechanism, table = machine(name), leg_table(machine(name))
+    singly = replace(table)
+    vars(singly)["is_for_blocks"] = False
     poses = targets_around_home(name, 200, 0.4, 0.8)
     poses[7] = np.nan
-    (margins, _), (each, _) = asked.of_poses(poses), asked._one_by_one(poses)
+    asked = poses, mechanism.home_pose[None].copy(), table.home_sides
+    (margins, _), (each, _) = (_margins(mechanism, legs, *asked) for legs in (table, singly))
+    assert table.is_for_blocks
     np.testing.assert_allclose(margins, each, rtol=1e-9, atol=1e-9)
     assert (each > 0.0).any() and (each < 0.0).any()
 

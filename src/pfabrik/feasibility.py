@@ -61,67 +61,45 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
     UnsupportedMechanism : some chain is no leg in closed form; the message says which, and why.
     InvalidArgument : targets of the wrong shape.
     """
-    asked = _Asked(mechanism, start)
+    table = table_of_poses(checked_mechanism(mechanism))
+    if not isinstance(table, LegTable):
+        raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"])
+    begin, sides = mechanism.home_pose[None].copy(), table.home_sides
+    if start is not None:
+        found = start_of(mechanism, start, ())
+        assert found is not None
+        begin = np.require(found.rows.poses, requirements=["C", "W"])
+        sides = sides_at(mechanism, table, found)
     poses, shape = as_targets(mechanism, targets)
-    margin, binding = asked.of_poses(poses)
+    margin, binding = _margins(mechanism, table, poses, begin, sides)
     return Feasibility(shaped(margin, shape), shaped(binding, shape), _limits(mechanism))
 
 
-class _Asked:
-    """A mechanism's legs in the working mode of a start."""
-
-    def __init__(self, mechanism: Mechanism, start: Start | None) -> None:
-        table = table_of_poses(checked_mechanism(mechanism))
-        if not isinstance(table, LegTable):
-            raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"])
-        self._table, self._machine = table, machine(table)
-        self._follows = int(table.task["unset"][0] > 0 and has_parasitic_motion(mechanism))
-        self._begin, self._sides = mechanism.home_pose[None].copy(), table.home_sides
-        if start is not None:
-            found = start_of(mechanism, start, ())
-            assert found is not None
-            self._begin = np.require(found.rows.poses, requirements=["C", "W"])
-            self._sides = sides_at(mechanism, table, found)
-
-    def of_poses(self, poses: Floats) -> tuple[Floats, Ints]:
-        """Margins (n,) of poses (n, 4, 4), and which limits they are of."""
-        if not self._table.is_for_blocks:
-            return self._one_by_one(poses)
-        margin, binding, unknown = self._in_blocks(poses)
-        if unknown:
-            some = np.flatnonzero(binding == UNKNOWN)
-            margin[some], binding[some] = self._one_by_one(poses[some])
-        return margin, binding
-
-    def _in_blocks(self, poses: Floats) -> tuple[Floats, Ints, int]:
-        """Margins and bindings of poses, and how many of them are UNKNOWN."""
+def _margins(mechanism: Mechanism, table: LegTable, poses: Floats, begin: Floats, sides: Floats) -> tuple[Floats, Ints]:
+    """Margins (n,) of poses (n, 4, 4), and which limits they are of: in blocks, and one by one what these leave."""
+    margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
+    legs, rest = machine(table), np.arange(len(poses))
+    if table.is_for_blocks:
         from .kernels.legs.maps import margins_in_blocks
 
-        margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
+        follows = int(table.task["unset"][0] > 0 and has_parasitic_motion(mechanism))
 
-        def run(block: slice) -> int:
-            return margins_in_blocks(
-                self._machine.address,
-                poses[block],
-                self._begin,
-                self._sides,
-                self._follows,
-                margin[block],
-                binding[block],
-            )
+        def run(own: slice) -> int:
+            return margins_in_blocks(legs.address, poses[own], begin, sides, follows, margin[own], binding[own])
 
-        return margin, binding, sum(in_blocks(run, len(poses), ROWS_A_RUN))
+        if not sum(in_blocks(run, len(poses), ROWS_A_RUN)):
+            return margin, binding
+        rest = np.flatnonzero(binding == UNKNOWN)
+    from .kernels.legs.feasibility import feasibility as measure
 
-    def _one_by_one(self, poses: Floats) -> tuple[Floats, Ints]:
-        from .kernels.legs.feasibility import feasibility as measure
+    left, margins, bindings = poses[rest], np.empty(len(rest)), np.empty(len(rest), np.int64)
 
-        margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
+    def run_rest(own: slice) -> None:
+        measure(legs.address, left[own], begin, sides, margins[own], bindings[own])
 
-        def run(block: slice) -> None:
-            measure(self._machine.address, poses[block], self._begin, self._sides, margin[block], binding[block])
-
-        in_blocks(run, len(poses), ROWS_A_BLOCK)
-        return margin, binding
+    in_blocks(run_rest, len(rest), ROWS_A_BLOCK)
+    margin[rest], binding[rest] = margins, bindings
+    return margin, binding
 
 
 @lru_cache(maxsize=64)
