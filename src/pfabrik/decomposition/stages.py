@@ -8,7 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
-from ..description.graph import Edge, components, edges_of, spanning_tree
+from ..description.graph import Edge, spanning_tree, welded
 from ..description.structure import Structure
 
 TIP = "(tip)"
@@ -35,7 +35,8 @@ class Stage:
 
 def graph_of(mechanism: Structure) -> Graph:
     """The graph of a mechanism; a joint that is the end effector becomes two edges, each to the tip."""
-    weld = _welded(mechanism)
+    rigid = [joint for joint in mechanism.joints if joint.is_rigid and joint.name != mechanism.end_effector]
+    weld = welded(rigid, mechanism.base)
     edges = []
     for joint in mechanism.joints:
         first, second = (weld.get(body, body) for body in joint.connects)
@@ -45,16 +46,6 @@ def graph_of(mechanism: Structure) -> Graph:
             edges.append(Edge(joint, (first, second)))
     end = TIP if mechanism.end_effector_is_joint else weld.get(mechanism.end_effector, mechanism.end_effector)
     return Graph(tuple(edges), mechanism.base, end)
-
-
-def _welded(mechanism: Structure) -> dict[str, str]:
-    """Bodies that fixed or locked joints hold together -> the one that stands for them: the base, or the first."""
-    fixed = [joint for joint in mechanism.joints if joint.is_rigid and joint.name != mechanism.end_effector]
-    weld: dict[str, str] = {}
-    for group in components(edges_of(fixed)):
-        bodies = [body for edge in group for body in edge.bodies]
-        weld.update(dict.fromkeys(bodies, mechanism.base if mechanism.base in bodies else bodies[0]))
-    return weld
 
 
 def is_tree(edges: Sequence[Edge], base: str, end: str) -> bool:

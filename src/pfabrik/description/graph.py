@@ -1,7 +1,7 @@
 """The graph of a mechanism, bodies joined by joints, and the walks through it that everything else is built on.
 
 - `spanning_tree`: which joints lead from one body to every other, and the loops that the other joints close;
-- `components`: what hangs together once the graph is cut at some bodies;
+- `components`: what hangs together once the graph is cut at some bodies; `welded`: bodies that are as one;
 - `next_joints`: where the rigid parts around a joint end.
 """
 
@@ -148,6 +148,19 @@ def components(edges: Sequence[Edge], *cut: str) -> list[list[Edge]]:
         for member in groups[target]:
             group_of.update({body: target for body in edges[member].bodies if body not in cut})
     return [[edges[member] for member in sorted(groups[number])] for number in sorted(groups)]
+
+
+def welded(joints: Sequence[Joint], *kept: str) -> dict[str, str]:
+    """Bodies that joints hold together -> the one that stands for them: the first of those that are kept, or of all.
+
+    What is kept stands for itself; bodies that stand for themselves may be missing.
+    """
+    stands_for: dict[str, str] = {}
+    for group in components(edges_of(joints)):
+        bodies = [body for edge in group for body in edge.bodies]
+        first = next((body for body in kept if body in bodies), bodies[0])
+        stands_for |= {body: first for body in bodies if body not in kept}
+    return stands_for
 
 
 @lru_cache(maxsize=256)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..checks import require_names
+from ..description.graph import welded
 from ..description.joint_types import KINDS, TASK_COORDINATES
 from ..description.joints import Cone, Joint
 from ..description.mechanism import Mechanism
@@ -203,16 +204,10 @@ def _place(robot: Robot, end_effector: str) -> tuple[str, Floats | None]:
 
 def _merged(robot: Robot, base: str, tip: str) -> tuple[list[Joint], list[Loop]]:
     """Joints and loops with the bodies that are welded to each other as one, called as asked for."""
-    group = {body: body for body in _bodies(robot)}
-    for joint in robot.joints:
-        if joint.type == "fixed":
-            old, new = group[joint.connects[1]], group[joint.connects[0]]
-            group = {body: new if of == old else of for body, of in group.items()}
-    called = {of: of for of in group.values()}
-    called |= {group[name]: name for name in (tip, base) if name in group}
+    weld = welded([joint for joint in robot.joints if joint.type == "fixed"], base, tip)
 
     def named(pair: tuple[str, str]) -> tuple[str, str]:
-        return called[group[pair[0]]], called[group[pair[1]]]
+        return weld.get(pair[0], pair[0]), weld.get(pair[1], pair[1])
 
     joints = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.joints if each.type != "fixed"]
     loops = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.loops]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..description.graph import welded
 from ..description.joint_types import JointType
 from ..description.joints import Cone, Joint
 from ..tolerances import TOLERANCES
@@ -28,8 +29,7 @@ def simplified(
     base, end_effector : names that stay.
     cones : joint -> the cone that limits it.
     """
-    kept = {base, end_effector}
-    single = _grouped(_without_welds(_hinged(joints), kept), kept, told)
+    single = _grouped(_without_welds(_hinged(joints), base, end_effector), {base, end_effector}, told)
     return [dataclasses.replace(each, cone=cones[each.name]) if each.name in cones else each for each in single]
 
 
@@ -54,22 +54,11 @@ def _hinged(joints: Sequence[Joint]) -> list[Joint]:
     return [joint for joint in left if joint is not None]
 
 
-def _without_welds(joints: Sequence[Joint], kept: set[str]) -> list[Joint]:
-    """Bodies that are fixed to each other as one."""
-    stands_for: dict[str, str] = {}
-
-    def of(body: str) -> str:
-        while body in stands_for:
-            body = stands_for[body]
-        return body
-
-    for joint in joints:
-        if joint.type == "fixed":
-            first, second = map(of, joint.connects)
-            if first != second and not {first, second} <= kept:
-                first, second = (second, first) if second in kept else (first, second)
-                stands_for[second] = first
-    moved = [dataclasses.replace(each, connects=(of(each.connects[0]), of(each.connects[1]))) for each in joints]
+def _without_welds(joints: Sequence[Joint], *kept: str) -> list[Joint]:
+    """Bodies that are fixed to each other as one, but for those that are kept."""
+    weld = welded([joint for joint in joints if joint.type == "fixed"], *kept)
+    ends = [(weld.get(a, a), weld.get(b, b)) for a, b in (joint.connects for joint in joints)]
+    moved = [dataclasses.replace(joint, connects=pair) for joint, pair in zip(joints, ends, strict=True)]
     return [joint for joint in moved if joint.connects[0] != joint.connects[1]]
 
 
