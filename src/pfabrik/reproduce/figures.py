@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..answers.status import Status
-from ..description.readouts import Readout, readout
+from ..description.readouts import readout
 from ..view.looks import ACHIEVED, ASKED, HELD, SHADE
-from ..view.track import common_keys, draw_limits, line_style, shade_steps
+from ..view.track import common_keys, draw_actuator, line_style, shade_steps
 from .efficacy import Efficacy, is_point
 from .efficiency import Efficiency
 from .robustness import Robustness
@@ -124,11 +124,10 @@ def draw_robustness(found: Sequence[Robustness], path: Path) -> None:
     grid = figure.add_gridspec(len(found), 3, width_ratios=(1, 1.25, 1))
     titled = []
     for row, each in enumerate(found):
-        kinds = joints_by_unit(each)
-        parts = grid[row, 1].subgridspec(len(kinds), 1, hspace=0.04).subplots(sharex=True, squeeze=False)[:, 0]
+        parts = grid[row, 1].subgridspec(len(each.case.shown), 1).subplots(sharex=True, squeeze=False)[:, 0]
         path_panel, cost_panel = figure.add_subplot(grid[row, 0]), figure.add_subplot(grid[row, 2])
         draw_path(path_panel, each)
-        draw_joints(parts.tolist(), each, kinds)
+        draw_joints(parts.tolist(), each)
         draw_cost(cost_panel, each)
         titled += [path_panel, parts[0], cost_panel]
     letters(titled)
@@ -152,32 +151,17 @@ def draw_path(axes: Axes, found: Robustness) -> None:
     axes.legend(handles=handles, **BELOW, ncols=2)
 
 
-def joints_by_unit(found: Robustness) -> list[list[tuple[int, Readout]]]:
-    """The joints that are shown with their places, those of one unit together."""
+def draw_joints(panels: Sequence[Axes], found: Robustness) -> None:
+    """Values of the joints that are shown, with their limits; a panel for each."""
     mechanism = found.case.mechanism
-    known = {each.name: each for each in mechanism.coordinates}
-    shown = list(enumerate(readout(known[name], mechanism.length_unit) for name in found.case.shown))
-    units = dict.fromkeys(each.unit for _, each in shown)
-    return [[(place, each) for place, each in shown if each.unit == unit] for unit in units]
-
-
-def draw_joints(panels: Sequence[Axes], found: Robustness, groups: Sequence[list[tuple[int, Readout]]]) -> None:
-    """Values of the joints that are shown, with their limits; a panel for each unit."""
-    for axes, group in zip(panels, groups, strict=True):
-        shade_steps(axes, found.projected)
-        for place, each in group:
-            values = each.display(np.asarray(found.solution.joints[each.name]))
-            axes.plot(values, linewidth=1.5, label=each.name, **line_style(place))
-        draw_limits(axes, group)
-        first = group[0][1]
-        axes.set(ylabel=f"{'angle' if first.is_angle else 'length'} [{first.unit}]", xlim=(0, len(found.targets) - 1))
-        axes.margins(y=0.08)
-        axes.grid(alpha=0.3)
+    known = {each.name: readout(each, mechanism.length_unit) for each in mechanism.coordinates}
+    for axes, name in zip(panels, found.case.shown, strict=True):
+        values = np.asarray(found.solution.joints[name])
+        draw_actuator(axes, known[name], known[name].display(values), found.solution)
     panels[0].set_title(f"{found.case.label}: joint values and limits")
     panels[-1].set_xlabel("step")
-    handles = [handle for axes in panels for handle in axes.get_legend_handles_labels()[0]]
     below = BELOW | {"bbox_to_anchor": (0.5, -0.16 * len(panels))}
-    panels[-1].legend(handles=[*handles, *common_keys()], **below, ncols=4)
+    panels[-1].legend(handles=common_keys(), **below, ncols=3)
 
 
 def draw_cost(axes: Axes, found: Robustness) -> None:

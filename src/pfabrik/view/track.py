@@ -209,12 +209,6 @@ def line_style(place: int) -> dict[str, Any]:
     return {"color": colour, "linestyle": DASHES[(place + place // len(LINE_COLOURS)) % len(DASHES)]}
 
 
-def draw_limits(axes: Axes, group: list[tuple[int, Readout]]) -> None:
-    """One line for every distinct finite limit."""
-    for bound in sorted({bound for _, readout in group for bound in readout.limits if np.isfinite(bound)}):
-        axes.axhline(bound, color="black", linewidth=1, linestyle=LIMIT_DASHES, zorder=1)
-
-
 def shade_steps(axes: Axes, marked: Mask) -> None:
     """A grey band behind every run of marked steps."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
