@@ -354,6 +354,28 @@ class TestJacobians:
             d = (c - a) / np.linalg.norm(c - a)
             assert row == pytest.approx([*d, *np.cross(c - machine.reference_point, d)], abs=1e-10)
 
+    def test_jacobian_of_carriages_is_exact_wherever_they_stand(self):
+        """A 3-PPR: each carriage goes as fast as the platform's corner goes along its rail."""
+        corners = np.array(ring(40.0, 0.0, (90, 210, 330)))
+        out = corners / 40.0
+        rails = np.cross(Z, out)
+        joints = []
+        for k, (corner, direction, rail) in enumerate(zip(corners, out, rails, strict=True)):
+            joints += [
+                Joint(f"A{k}", "prismatic", ("base", f"a{k}"), axis=rail, actuated=True),
+                Joint(f"B{k}", "prismatic", (f"a{k}", f"b{k}"), axis=direction),
+                Joint(f"C{k}", "revolute", (f"b{k}", "platform"), at=corner, axis=Z),
+            ]
+        machine = Mechanism("3-PPR", joints, "platform", (3, 4, 0))
+        rng = np.random.default_rng(0)
+        twists = np.concatenate([rng.uniform(-20, 20, (40, 2)), rng.uniform(-0.6, 0.6, (40, 1))], axis=1)
+        targets = pf.pose([(3 + x, 4 + y, 0) for x, y, _ in twists], rotvec=twists[:, 2:] * Z)
+        found = inverse_jacobian(pf.solve_ik(machine, targets))
+        arms = (corners - (3, 4, 0)) @ np.swapaxes(targets[:, :3, :3], -1, -2)
+        turning = np.einsum("nki,ki->nk", np.cross(Z, arms), rails)
+        assert found[..., :2] == pytest.approx(np.broadcast_to(rails[:, :2], (40, 3, 2)), abs=1e-9)
+        assert found[..., 5] == pytest.approx(turning, abs=1e-9 * 40)
+
     def test_free_freedoms_rest_as_far_as_they_can(self):
         machine = MACHINES["serial_spherical"]()
         q = home(machine)

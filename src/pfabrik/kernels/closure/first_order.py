@@ -229,7 +229,8 @@ def rotate_apart(table: Floats, first: int, last: int, sizes: Floats) -> None:
                     for i in range(width):
                         x, y = table[a, i], table[b, i]
                         table[a, i], table[b, i] = c * x + s * y, c * y - s * x
-                    worst = max(worst, cosine)
+                    # two that change places miss some of the other pairs of this sweep
+                    worst = max(worst, 1.0 if aa < bb else cosine)
         if worst <= NEARLY:
             break
     for a in range(n):
