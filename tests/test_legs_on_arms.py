@@ -179,3 +179,12 @@ def test_maps_lead_arms_that_turn_far_near_home() -> None:
     feasible = np.asarray(pf.feasibility(mechanism, wanted).margin) > 0.0
     assert 20 < reached.sum() < 100 and not (feasible & ~reached).any()
     assert (feasible & reached).sum() > 0.97 * reached.sum()
+
+
+def test_maps_lead_arms_of_whole_poses_part_by_part_too() -> None:
+    """Trunks that the whole pose places: all at once they end in another of their ways to stand, or in none."""
+    mechanism = machine("R + 3-RPS + RR")
+    wanted = targets(mechanism, 300, 0.3, 0.6, ANY)
+    reached = np.asarray(pf.solve_ik(mechanism, wanted, options=Options(working_mode="keep")).status) == 0
+    assert 20 < reached.sum() < 300
+    np.testing.assert_array_equal(np.asarray(pf.feasibility(mechanism, wanted).margin) > 0.0, reached)

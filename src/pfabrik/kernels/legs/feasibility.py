@@ -8,10 +8,11 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
-from ..vectors import angle_between, copy_row, vec
+from ..rotations import difference, turn_about_z, yaw_difference
+from ..vectors import angle_between, copy_row, scale, vec
 from .answer import CLOSE, KEPT, complete, deviation, end_of_rows, new_completion, put_rows
 from .endings import missed_by
-from .poses import lean_to, load, put_pose
+from .poses import lean_to, load, put_pose, turn_pose
 from .records import CARRIAGE, CRANK, CROSS, FOOT, FOOT_LINE, HEAD, HEAD_LINE, PIVOT, ROD, SLIDE, TRIPLE
 from .table import open_table
 
@@ -67,20 +68,20 @@ def feasibility(
     table = open_table(machine)
     work, legs, task, limited, cones = new_completion(table), table.legs, table.task, table.limited, table.cones
     before, toward, n_legs = np.zeros((4, 4)), np.zeros((4, 4)), legs.shape[0]
-    own = np.zeros(n_legs)
+    own, turn = np.zeros(n_legs), np.zeros(3)
     n_limits = 2 * limited.shape[0] + cones.shape[0]
     for row in range(targets.shape[0]):
         margins[row], bindings[row] = math.nan, -1
         is_pose, closed = True, False
         for parts in (1, PARTS, MORE_PARTS):
-            if parts > 1 and (task[0]["unset"] == 0 or not margins[row] < 0.0):
+            if parts > 1 and not (margins[row] < 0.0 and task[0]["unset"] + task[0]["led"] > 0):
                 break
             if parts == MORE_PARTS and closed and task[0]["led"] == 0:
                 break
-            aim(begins[0], begins[0], 1.0, task[0], before)
+            aim(begins[0], begins[0], 1.0, task[0], before, turn)
             copy_row(sides[0], own)
             for part in range(1, parts + 1):
-                aim(targets[row], begins[0], part / parts, task[0], toward)
+                aim(targets[row], begins[0], part / parts, task[0], toward, turn)
                 is_pose = load(toward, before, task[0], work.pose)
                 closed = is_pose and complete(table, own, work)
                 if not closed:
@@ -106,11 +107,8 @@ def feasibility(
 
 
 @routine
-def aim(target: Floats, begin: Floats, share: float, task: Record, toward: Floats) -> None:
-    """Fill a target that is a share of the way from another pose, (4, 4) [length] each.
-
-    Of rotations, the z axis alone goes a share of its way.
-    """
+def aim(target: Floats, begin: Floats, share: float, task: Record, toward: Floats, turn: Floats) -> None:
+    """Fill a target that is a share of the way from another pose, (4, 4) [length] each."""
     for i in range(4):
         for j in range(4):
             toward[i, j] = target[i, j]
@@ -118,11 +116,15 @@ def aim(target: Floats, begin: Floats, share: float, task: Record, toward: Float
         return
     for i in range(3):
         toward[i, 3] = begin[i, 3] + share * (target[i, 3] - begin[i, 3])
-    if task["rotations"] == 2:
-        for i in range(3):
-            for j in range(3):
-                toward[i, j] = begin[i, j]
+        for j in range(3):
+            toward[i, j] = begin[i, j]
+    if task["rotations"] == 3:
+        difference(target, begin, turn)
+        turn_pose(toward, scale(share, vec(turn)))
+    elif task["rotations"] == 2:
         lean_to(target, share, toward)
+    elif task["rotations"] == 1:
+        turn_about_z(toward, share * yaw_difference(target, begin))
 
 
 @routine
