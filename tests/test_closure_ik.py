@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import checks
 import pfabrik as pf
-from machines import closure
+from machines import closure, ring
 from machines.closure import MACHINES, X, Z, chain, joint
 from pfabrik import Mechanism, Options, Solution, Status
 
@@ -423,3 +423,22 @@ def test_the_agile_eye_has_eight_assembly_modes() -> None:
     assert len(modes) == 8
     for mode in modes:
         assert checks.gap_of_joints(mechanism, mode)[0] <= 2e-9
+
+
+def test_what_holds_an_orientation_is_sought_from_other_places_turned_so() -> None:
+    """A 3-CRS: the nearest pose that leans as asked is one to which no short way leads from home, or from a corner."""
+    mechanism = Mechanism.from_legs(
+        "C*-R-S",
+        base=ring(100.0, 0.0, closure.TURNS),
+        via=ring(80.0, 40.0, (25, 145, 265)),
+        platform=ring(40.0, 90.0, closure.TURNS),
+        A={"axis": "vertical", "range": ((-1.2, 1.2), (-40, 50))},
+        B={"axis": "radial"},
+        C={"cone": {"half_angle": 1.0}},
+        reference_point=(0, 0, 90),
+    )
+    leant = {"rotvec": (-0.15, 0.02, 0.13)}
+    near = pf.solve_ik(mechanism, pf.pose((-16, 1, 82), **leant))
+    found = pf.solve_ik(mechanism, pf.pose((-23, 8, 82), **leant))
+    assert near and found.held == "orientation"
+    assert found.position_error < np.linalg.norm(near.pose[:3, 3] - (-23, 8, 82))

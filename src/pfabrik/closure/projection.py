@@ -91,7 +91,8 @@ def project(
     targets : (n, 4, 4); what does not count in them is as it may stay.
     starts : joint coordinates (n, columns) each, feasible or nearly; of equal answers the first start's is taken.
     ways : tried in turn, until one has an answer.
-    corners : search from the corners of the workspace too. Without, the search stays about where it starts.
+    corners : search from the corners of the workspace too, there with what is held put in its place. Without, the
+        search stays about where it starts.
     """
     n, frame = len(targets), task_of(closure.mechanism).frame
     best = Projected(close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, HOLD_NOTHING))
@@ -99,15 +100,19 @@ def project(
     everywhere = [*starts, *(np.where(closure.idle, starts[0], corner) for corner in elsewhere)]
     for way in ways:
         open_to_it, hits = np.isinf(best.distances), np.zeros(n, np.int64)
-        for start in everywhere:
+        for place, start in enumerate(everywhere):
             waiting = np.flatnonzero(open_to_it & (hits < HITS))
             if len(waiting):
-                found = approached(closure, start[waiting], targets[waiting], platform=way.weights, frame=frame)
+                begin = start[waiting]
+                if place >= len(starts):
+                    begin = _placed(closure, begin, targets[waiting], way)
+                found = approached(closure, begin, targets[waiting], platform=way.weights, frame=frame)
                 hits[waiting] = _take_nearer(closure, best, waiting, found, targets, way, hits[waiting])
         lost = np.flatnonzero(np.isinf(best.distances))
         if len(lost) and LOCKED in way.weights:
-            placed = _placed(closure, starts[0][lost], targets[lost], way)
-            _take_nearer(closure, best, lost, placed, targets, way, np.zeros(len(lost), np.int64))
+            begin = _placed(closure, starts[0][lost], targets[lost], way)
+            found = approached(closure, begin, targets[lost], platform=way.weights, frame=frame)
+            _take_nearer(closure, best, lost, found, targets, way, np.zeros(len(lost), np.int64))
     lost = np.flatnonzero(np.isinf(best.distances))
     if len(lost):  # where a search starts is feasible, or nearly: better than no answer
         begin = starts[0][lost]
@@ -136,15 +141,17 @@ def _take_nearer(
     return np.where(better, 1, hits + again)
 
 
-def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Closing:
-    """Nearest configurations from where the end effector is put as it is to be held, and the loops close on it.
+def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Floats:
+    """Joint coordinates with the end effector put as it is to be held, and the loops closed on it.
 
-    Finds what is held where no short way leads to it.
+    A search from there finds what is held where no short way leads to it.
     """
+    if LOCKED not in way.weights:
+        return start
     task = task_of(closure.mechanism)
     begin = displacements(closure.mechanism, start)[closure.mechanism.end_effector_body] @ closure.mechanism.home_pose
     held = np.zeros((4, 4), bool)
     held[:3, 3], held[:3, :3] = np.array(way.weights[:3]) == LOCKED, LOCKED in way.weights[3:]
     placed = np.where(held, task.completed(targets, begin), begin)
     closed = close(closure, start, placed, platform=way.held, frame=task.frame, limits=True, margin=TOLERANCES.inside)
-    return approached(closure, closed.coordinates, targets, platform=way.weights, frame=task.frame)
+    return closed.coordinates
