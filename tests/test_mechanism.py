@@ -462,6 +462,10 @@ class TestFaults:
         stray = [Joint(name, "spherical", ("u", "v"), at=(float(i), 0, 0)) for i, name in enumerate("xy")]
         assert "'u', 'v', apart from the rest" in faults_of([*five_bar(), *stray])["joint[5].connects"]
 
+    def test_a_name_that_is_no_name_apart_from_the_rest_is_a_fault(self):
+        stray = [Joint(name, "spherical", ("u", "v"), at=(float(i), 0, 0)) for i, name in enumerate([{}, "y"])]
+        assert list(faults_of([*five_bar(), *stray])) == ["joint[5].name", "joint[5].connects"]
+
     def test_end_effector_without_a_path_to_the_base_is_a_fault(self):
         stray = [Joint(name, "spherical", ("u", "v"), at=(float(i), 0, 0)) for i, name in enumerate("xy")]
         faults = faults_of([*five_bar(), *stray], "u", reference_point=(0, 0, 0))

@@ -137,7 +137,7 @@ def _connection_faults(mechanism: Structure) -> Iterator[Fault]:
         bodies = {body for edge in part for body in edge.bodies}
         if mechanism.base in bodies:
             continue
-        if mechanism.end_effector in bodies | {edge.joint.name for edge in part}:
+        if mechanism.end_effector in bodies | {edge.joint.name for edge in part if is_name(edge.joint.name)}:
             found = f"'{mechanism.end_effector}', to which no joints lead from the base '{mechanism.base}'"
             yield Fault("end_effector", found, "an end effector connected to the base")
         else:
