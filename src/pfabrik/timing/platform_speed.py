@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import combinations
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from ..answers.differential import forward_jacobian, inverse_jacobian
 from ..answers.solution import Solution, checked_solution
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..description.task import task_of
 from ..errors import InvalidArgument
 from ..motion.displacements import rate_units
@@ -18,6 +18,9 @@ from ..motion.first_order import actuated_columns, first_order, right_singular
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .time_path import limits_of
+
+ROUNDED = 1e-12
+"""Shares of limits that differ by no more differ by rounding."""
 
 
 class PlatformSpeed(NamedTuple):
@@ -71,7 +74,7 @@ def platform_speed(
     twists = _twists(solution)[:, : len(sizes)]
     kept = twists @ (forward / sizes[:, None])
     following = np.linalg.pinv(kept, rcond=TOLERANCES.alignment)
-    shares, found = _shares(_internal_rates(solution), limits), []
+    shares, found = _Shares(_internal_rates(solution) / limits[:, None]), []
     for twist in twists:
         rates = inverse @ twist
         if not _is_made(twist, forward @ rates, sizes):
@@ -79,10 +82,10 @@ def platform_speed(
             rates = following @ wanted
             if not _is_made(wanted, kept @ rates, np.ones(len(wanted))):
                 rates = np.full(len(limits), np.nan)
-        found.append(_fastest(twist, rates, shares, mechanism.actuator_names))
-    slowest = _slowest(inverse, forward, sizes, shares)
+        found.append(_fastest(twist, rates / limits, shares, mechanism.actuator_names))
+    slowest = _slowest(_translations(inverse, forward, sizes), inverse / limits[:, None], shares)
     if slowest is not None:
-        found.append(_fastest(slowest, inverse @ slowest, shares, mechanism.actuator_names))
+        found.append(_fastest(slowest, inverse @ slowest / limits, shares, mechanism.actuator_names))
     return tuple(found)
 
 
@@ -104,61 +107,107 @@ def _internal_rates(solution: Solution) -> Floats:
     return np.asarray(rates * rate_units(mechanism)[actuated, None])
 
 
-class _Shares(NamedTuple):
-    """How much of their limits rates take, whatever internal motions go with them: the most of |rows @ rates|.
+class _Shares:
+    """How much of their limits actuators take at least, whatever internal motions go with what they do.
+
+    It is the most that they take by weights that no internal motion changes and whose sizes sum to one: a linear
+    programme, solved by the simplex method. These weights are the same whatever is asked, so that each search goes on
+    from where the last one ended; the first from an actuator without a limit, which is added to the others.
 
     Attributes
     ----------
-    rows : (rows, n_a).
-    hardest : which actuator counts most in each row, (rows,).
+    motions : orthonormal internal motions, in shares of the limits, (n_a + 1, k).
+    basis, signs : the actuators that have weights, and the signs of these, (k + 1,).
     """
 
-    rows: Floats
-    hardest: Ints
+    def __init__(self, internal: Floats) -> None:
+        present = np.pad(internal, ((0, 1), (0, 0)))
+        motions, sizes, _ = np.linalg.svd(present, full_matrices=False)
+        self.motions = rest = motions[:, sizes > TOLERANCES.rank * sizes.max(initial=0.0)]
+        self.signs, self.basis = np.ones(rest.shape[1] + 1), np.full(rest.shape[1] + 1, len(internal))
+        for k in range(rest.shape[1]):
+            lengths = np.linalg.norm(rest, axis=1)
+            self.basis[k] = np.argmax(lengths)
+            axis = rest[self.basis[k]] / lengths.max()
+            rest = rest - np.outer(rest @ axis, axis)
 
-
-def _shares(internal: Floats, limits: Floats) -> _Shares:
-    """The shares of limits (n_a,) beside internal motions (n_a, k).
-
-    Without internal motions a row is one actuator. Else it is a mean of k + 1 that none of them changes: where each of
-    these takes as much as the mean does, none can take less but for another that takes more.
-    """
-    limited = np.flatnonzero(np.isfinite(limits))
-    present = internal[limited] / limits[limited, None]
-    k = int(np.linalg.matrix_rank(present, TOLERANCES.rank * np.abs(present).max(initial=0.0))) if present.size else 0
-    which = np.array(list(combinations(range(len(limited)), k + 1)), np.intp).reshape(-1, k + 1)
-    weights = np.linalg.svd(present[which])[0][:, :, -1] if k else np.ones(which.shape)
-    weights /= np.abs(weights).sum(axis=1, keepdims=True)
-    rows = np.zeros((len(which), len(limits)))
-    np.put_along_axis(rows, limited[which], weights / limits[limited[which]], axis=1)
-    return _Shares(rows, limited[which[np.arange(len(which)), np.abs(weights).argmax(axis=1)]])
+    def weights(self, rates: Floats) -> Floats:
+        """The weights of the actuators, (n_a,), by which rates, in shares of the limits, (n_a,), take the most."""
+        asked, is_stuck = np.append(rates, 0.0), False
+        rounded = ROUNDED * np.abs(asked).max()
+        while True:
+            inverse = np.linalg.inv(np.column_stack([self.motions[self.basis], self.signs]))
+            *moves, share = inverse @ asked[self.basis]
+            left = asked - self.motions @ moves
+            over = np.abs(left) - share
+            over[self.basis] = -2.0 * share
+            # the first where nothing is gained, of what leaves too: Bland's rule, by which no basis comes back
+            enters = np.argmax(over > rounded if is_stuck else over)
+            if over[enters] <= rounded:
+                break
+            sign = np.copysign(1.0, left[enters])
+            falls = sign * self.signs * (np.append(self.motions[enters], sign) @ inverse)
+            until = np.full(len(falls), np.inf)
+            np.divide(self.signs * inverse[-1], falls, out=until, where=falls > TOLERANCES.rank)
+            leaving = np.flatnonzero(until <= until.min() + ROUNDED)
+            leaves = leaving[np.argmin(self.basis[leaving] if is_stuck else -falls[leaving])]
+            is_stuck = until.min() <= ROUNDED
+            self.basis[leaves], self.signs[leaves] = enters, sign
+        weights = np.zeros(len(asked))
+        weights[self.basis] = inverse[-1]
+        return weights[:-1]
 
 
 def _fastest(twist: Floats, rates: Floats, shares: _Shares, names: tuple[str, ...]) -> PlatformSpeed:
-    """The highest speed along or about an axis, by the rates of the actuators that it asks for; NaN for none."""
+    """The highest speed along or about an axis, by the rates it asks for, in shares of the limits; NaN for none."""
     kind = "along" if twist[:3].any() else "about"
     x, y, z = (twist[:3] if kind == "along" else twist[3:]).tolist()
     if np.isnan(rates).any():
         return PlatformSpeed(kind, (x, y, z), 0.0, "")
-    taken = np.abs(shares.rows @ rates)
-    if not taken.max(initial=0.0) > 0.0:
+    weights = shares.weights(rates)
+    taken = float(weights @ rates)
+    if not taken > ROUNDED * np.abs(rates).max():
         return PlatformSpeed(kind, (x, y, z), np.inf, "")
-    place = int(np.argmax(taken))
-    return PlatformSpeed(kind, (x, y, z), float(1.0 / taken[place]), names[int(shares.hardest[place])])
+    return PlatformSpeed(kind, (x, y, z), 1.0 / taken, names[np.argmax(np.abs(weights))])
 
 
 def _is_made(wanted: Floats, made: Floats, sizes: Floats) -> bool:
     return bool(np.linalg.norm((made - wanted) / sizes) <= TOLERANCES.alignment * np.linalg.norm(wanted / sizes))
 
 
-def _slowest(inverse: Floats, forward: Floats, sizes: Floats, shares: _Shares) -> Floats | None:
-    """The translation at which some actuator meets its limit first, among those that the machine makes."""
+def _translations(inverse: Floats, forward: Floats, sizes: Floats) -> Floats:
+    """The directions in which the machine moves without turning, orthonormal, (m, 3)."""
     keeps = (forward @ inverse - np.eye(len(sizes)))[:, :3] / sizes[:, None] * sizes[0]
     _, values, right = np.linalg.svd(keeps)
-    free = right[values <= TOLERANCES.alignment]
-    if not len(free):
-        return None
-    rows = shares.rows @ inverse[:, :3] @ free.T
-    direction = rows[np.argmax(np.linalg.norm(rows, axis=1))] @ free
-    size = np.linalg.norm(direction)
-    return None if size == 0.0 else np.concatenate([direction / size, np.zeros(len(sizes) - 3)])
+    return right[values <= TOLERANCES.alignment]
+
+
+def _slowest(free: Floats, inverse: Floats, shares: _Shares) -> Floats | None:
+    """Of the unit vectors that these (m, 3) span, the translation that takes the largest share, as a twist.
+
+    Shares are convex: in a cone of m directions a linear function with the same values at these is no less, nor is the
+    largest of their values where it is scaled to the plane through these. The cone is halved if that is more than has
+    been met.
+    """
+    m, rates, largest = len(free), inverse[:, :3] @ free.T, np.zeros(len(free))
+
+    def corner(direction: Floats) -> Floats:
+        """A unit vector, and the share that it takes."""
+        unit = direction / np.linalg.norm(direction)
+        return np.append(unit, shares.weights(rates @ unit) @ rates @ unit)
+
+    quarters = product((1.0, -1.0), repeat=m - 1) if m else ()
+    cones = [np.array([corner(axis) for axis in np.diag((1.0, *signs))]) for signs in quarters]
+    while cones:
+        cone = cones.pop()
+        units, taken = cone[:, :-1], cone[:, -1]
+        linear, across = np.linalg.solve(units, np.column_stack([taken, np.ones(m)])).T
+        bound = min(np.linalg.norm(linear), taken.max() * np.linalg.norm(across))
+        if bound <= (1.0 + ROUNDED) * np.linalg.norm(largest):
+            continue
+        largest = max(largest, shares.weights(rates @ linear) @ rates, key=np.linalg.norm)
+        ends = np.unravel_index(np.argmin(units @ units.T), (m, m))
+        middle = corner(units[list(ends)].sum(axis=0))
+        cones += [np.where(np.arange(m)[:, None] == end, middle, cone) for end in set(ends)]
+    size = np.linalg.norm(largest)
+    return None if size == 0.0 else np.append(largest @ free / size, np.zeros(inverse.shape[1] - 3))
