@@ -677,3 +677,24 @@ def test_where_no_constraint_follows_from_others_at_home_no_walk_is_made(monkeyp
     """Walks take a second or more of a machine with many legs, before its first projection."""
     monkeypatch.setattr(rotation, "around_home", None)
     assert rotation.implied_rows.__wrapped__(pf.load("stewart")) == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "turned"), [("delta", "yaw"), ("linear_delta", "yaw"), ("orthoglide", "tilt"), ("delta", "tilt")]
+)
+def test_a_platform_that_never_turns_is_not_looked_for_turned(
+    name: str, turned: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It goes where it goes if it is not asked to turn; and that is told in the pose of the platform alone."""
+    plain = pf.load(name)
+    asked = Mechanism(plain.name, plain.joints, plain.end_effector, plain.reference_point, task=("x", "y", "z", turned))
+    offsets = np.random.default_rng(0).uniform(-0.6, 0.6, (12, 3)) * plain.characteristic_length
+    angles = np.linspace(0.1, 2.0, 12)
+    axis = np.array([0.0, 0.0, 1.0] if turned == "yaw" else [0.8, 0.6, 0.0])
+    targets = pf.pose(np.array(plain.reference_point) + offsets, rotvec=angles[:, None] * axis)
+    monkeypatch.setattr(ClosureEngine, "answer", None)
+    found, expected = pf.solve_ik(asked, targets), pf.solve_ik(plain, targets)
+    assert {Status.REACHED, Status.PROJECTED} == set(expected.status)
+    assert (found.status == Status.PROJECTED).all()
+    np.testing.assert_allclose(found.rotation_error, angles, atol=1e-9)
+    np.testing.assert_allclose(found.position_error, expected.position_error, atol=1e-6 * plain.characteristic_length)

@@ -35,11 +35,13 @@ def asks_too_much(mechanism: Mechanism) -> bool:
 def has_other_assemblies(mechanism: Mechanism) -> bool:
     """Whether a target that one way of assembly misses is to be looked for in all others: they reach different ones.
 
-    Not where nothing is left out but positions that never change, as the height of a planar machine.
+    Not where nothing is left out but what never changes: positions, as the height of a planar machine, or what is left
+    of the rotation of a platform that does not turn at all.
     """
     if not (follows_task(mechanism) and asks_too_much(mechanism)):
         return False
-    return task_of(mechanism).rotations in (1, 2) or has_parasitic_motion(mechanism)
+    turns = bool((np.abs(generic_of(mechanism).directions[3:]) > TOLERANCES.alignment).any())
+    return (turns and task_of(mechanism).rotations in (1, 2)) or has_parasitic_motion(mechanism)
 
 
 def _asked(mechanism: Mechanism) -> int:
