@@ -83,8 +83,7 @@ def _say(text: str) -> None:
 
 @contextmanager
 def in_haste() -> Iterator[None]:
-    """Without what takes Numba long and gives nothing here, and with arrays on whole lines of the cache, for as long as it
-    compiles.
+    """Without what takes Numba long and gives nothing here, and arrays on whole lines of the cache, while it compiles.
 
     Collecting garbage among so many objects is a tenth of its time.
     """
