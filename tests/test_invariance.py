@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik import Joint, Mechanism, Solution, Status
+from pfabrik.platform.corners import corners_of
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 ROWS = 2 if INTERPRETED else 12
@@ -241,6 +242,15 @@ def test_other_names_order_and_viewpoints_give_the_same_answer(name: str, seed: 
         if name not in WITH_A_CHOICE:
             gap = np.abs(answer.points[names[joint]] - points)[reached]
             assert gap.max(initial=0) <= 1e-8 * original.characteristic_length
+
+
+@pytest.mark.skipif(INTERPRETED, reason="hundreds of searches")
+@pytest.mark.parametrize("name", ["hexaglide", "servo_hexapod", "reachy_mini", "nrpm"])
+def test_searches_start_from_the_same_places_however_a_machine_is_described(name: str) -> None:
+    """What is drawn is a leg's by where it is, and counts along its axis whichever way that is described."""
+    original = machine(name)
+    other, _ = relabelled(original, np.random.default_rng(0))
+    np.testing.assert_allclose(corners_of(other).poses, corners_of(original).poses, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -48,6 +48,10 @@ OF_A_MODE, SELDOM = 4, 0.2
 [L^2]: a mode may have a room of its own, small as it is."""
 
 
+PLACES = 6
+"""Decimals of the places of legs [L]: what is aligned differs by rounding."""
+
+
 @lru_cache(maxsize=64)
 def corners_of(mechanism: Mechanism) -> Starts:
     """Feasible configurations far from home and from each other; every third may be in a room beyond the base."""
@@ -100,9 +104,11 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     if not keeps_rotation(mechanism):
         poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
     q = np.zeros((n, len(table.legs)))
-    for carrier in (*carriers_of(table), *table.arms):
-        lo, hi = max(carrier["lo"], -np.pi), min(carrier["hi"], np.pi)
-        q[:, carrier["leg"]] = carrier["sense"] * rng.uniform(lo, hi, n)
+    carriers = np.concatenate([carriers_of(table), table.arms])
+    for carrier in carriers[_by_place(table, carriers["leg"])]:
+        way = _way(table, carrier["leg"])
+        ends = way * carrier["sense"] * np.clip([carrier["lo"], carrier["hi"]], -np.pi, np.pi)
+        q[:, carrier["leg"]] = way * rng.uniform(ends.min(), ends.max(), n)
     sides = np.repeat(home.sides, n, axis=0)
     pivots = _sided_pivots(table)
     sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
@@ -139,4 +145,19 @@ def _apart(starts: Starts, which: int) -> Floats:
 
 def _sided_pivots(table: LegTable) -> NDArray[np.intp]:
     """The legs that are pivots of three hinges, which have two solutions."""
-    return np.flatnonzero((table.legs["kind"] == K.PIVOT) & (table.legs["side"] != 0.0))
+    pivots = np.flatnonzero((table.legs["kind"] == K.PIVOT) & (table.legs["side"] != 0.0))
+    return pivots[_by_place(table, pivots)]
+
+
+def _by_place(table: LegTable, legs: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Legs in an order that depends on where they are at home: what is drawn is theirs however they are described."""
+    own = table.legs[legs]
+    places = np.concatenate([own[end] for end in ("head_point", "foot_point", "carrier_point")], axis=1)
+    return np.lexsort(np.round(places, PLACES).T[::-1])
+
+
+def _way(table: LegTable, leg: int) -> float:
+    """Which way the axis of what carries a leg points, 1 or -1, along the first axis of the base that is not across it:
+    it may be described either way."""
+    axis = np.round(table.legs[leg]["carrier_axis"], PLACES)
+    return float(np.sign(axis[np.flatnonzero(axis)[0]]))
