@@ -188,3 +188,24 @@ def test_maps_lead_arms_of_whole_poses_part_by_part_too() -> None:
     reached = np.asarray(pf.solve_ik(mechanism, wanted, options=Options(working_mode="keep")).status) == 0
     assert 20 < reached.sum() < 300
     np.testing.assert_array_equal(np.asarray(pf.feasibility(mechanism, wanted).margin) > 0.0, reached)
+
+
+def test_rods_of_one_arm_that_are_not_parallel_have_no_dead_point_alone() -> None:
+    """Three rods, two and one on three cranks: where one of three stands square to its crank, the others place it."""
+    joints = []
+    rods = {0.0: ((20, 25), (-20, 25), (0, -30)), 2.2: ((22, 0), (-22, 0)), -2.0: ((0, 10),)}
+    for k, (angle, beside) in enumerate(rods.items()):
+        out, across = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
+        joints.append(
+            pf.Joint(f"A{k}", "revolute", ("base", f"arm{k}"), 90 * out, across, actuated=True, range=(-1.1, 0.7))
+        )
+        for i, (y, z) in enumerate(beside):
+            elbow = (170 + 5 * i) * out + y * across + (0, 0, 30 + z)
+            head = (30 - 3 * i) * out + y * across + (0, 0, 0.8 * z - 120)
+            joints.append(pf.Joint(f"B{k}{i}", "spherical", (f"arm{k}", f"rod{k}{i}"), elbow))
+            joints.append(pf.Joint(f"C{k}{i}", "spherical", (f"rod{k}{i}", "platform"), head))
+    mechanism = pf.Mechanism("3-2-1", joints, "platform", (0, 0, -120), task=("x", "y", "z"))
+    assert isinstance(engine_of(mechanism), LegsEngine)
+    for reach in pf.travel(pf.solve_ik(mechanism, mechanism.home_pose)):
+        velocities = pf.forward_jacobian(reach.end)[:3] / mechanism.characteristic_length
+        assert reach.stopped_by or np.linalg.svd(velocities)[1].min() < 1e-4

@@ -9,9 +9,9 @@ With every joint as hinges (R), slides (P) and balls (S) in series, a chain is
   coordinates are free, below rods that reach wherever arms are, or follow from what the legs on them ask for.
 
 Endings are a hinge, two that cross, three through one point, or a ball. Where a chain branches, its first branch places
-the carrier and the others are rods on it, or all are legs on its arms. Where they meet before the platform, what is
-beyond are arms of it, see `stations`. A pinned parallelogram between two parallel
-hinges is a rod between pairs of crossed hinges, and an axis that the platform keeps.
+the carrier and the others, parallel to it, are rods on it, or all are legs on its arms. Where they meet before the
+platform, what is beyond are arms of it, see `stations`. A pinned parallelogram between two parallel hinges is a rod
+between pairs of crossed hinges, and an axis that the platform keeps.
 """
 
 from __future__ import annotations
@@ -75,7 +75,20 @@ def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
         raise NoLeg("several joints carry its branches")
     main = _rod(trunk[0], first, is_reversed=False)
     rods = [_rod(None, other, is_reversed=False) for other in others]
-    return (main, *(replace(rod, is_shared=True) for rod in rods))
+    if _are_alike((main, *rods)):
+        return (main, *(replace(rod, is_shared=True) for rod in rods))
+    arm = Arm(trunk[0], is_reversed=False)
+    return (arm, *put_on(arm, (replace(main, carrier=None), *rods)))
+
+
+def _are_alike(rods: Sequence[Rod]) -> bool:
+    """Whether rods are parallel at home and of one length, as those of a parallelogram.
+
+    As long as the platform does not turn, all have the dead points of their carrier that one of them has; else where
+    one has its own the others place the carrier, and beyond is no other working mode.
+    """
+    lines = [rod.head - rod.foot for rod in rods]
+    return bool(np.ptp(lines, axis=0).max() <= TOLERANCES.nearly_implied)
 
 
 def _on_arms(trunk: Sequence[Item], branches: Sequence[list[Item]], is_reversed: bool) -> tuple[LegForm, ...]:
