@@ -13,11 +13,15 @@ from ..checks import put_limits, require_positive
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..kernels.timing import fastest
+from ..tolerances import TOLERANCES
 from .crossings import refuse_crossings
-from .curve import Curve, curve_of
+from .curve import Curve, curve_of, largest_between
 from .timed import Timed, What
 
 MOST_SAMPLES = 10_000_000
+
+ROUNDS = 8
+"""How often the grid's cells in which an acceleration exceeds its limit are slowed down; three do, mostly."""
 
 
 def time_path(
@@ -95,13 +99,34 @@ def _fastest(curve: Curve, speeds: Floats, accelerations: Floats, most_platform:
     _, slopes, bends = curve.at(s)
     n = curve.n_actuators
     slopes_of, bends_of = np.ascontiguousarray(slopes[:, :n]), np.ascontiguousarray(bends[:, :n])
+    steepest = largest_between(slopes[:-1], slopes[1:], bends[:-1] * np.diff(s)[:, None])
     with np.errstate(divide="ignore"):
-        caps = np.min(speeds / np.abs(slopes_of), axis=1)
-        caps = np.minimum(caps, most_platform / np.linalg.norm(slopes[:, n:], axis=1)) ** 2
+        caps = np.min(speeds / steepest[:, :n], axis=1)
+        caps = np.minimum(caps, most_platform / np.linalg.norm(steepest[:, n:], axis=1)) ** 2
+    caps = np.minimum(np.append(caps, caps[-1:]), np.append(caps[:1], caps))
     caps[~np.isfinite(caps)] = np.finfo(float).max ** 0.5
     x, at_rest = np.empty(len(s)), bool(np.isfinite(accelerations).any())
-    fastest(s, slopes_of, bends_of, accelerations, caps, at_rest, x)
-    return s, x
+    for _ in range(ROUNDS):
+        fastest(s, slopes_of, bends_of, accelerations, caps, at_rest, x)
+        excess = _excess(s, x, slopes_of, bends_of, accelerations)
+        if excess.max() <= 1.0 + TOLERANCES.speed:
+            break
+        slower = np.where(excess > 1.0, excess, 0.0) ** 2
+        slower = np.maximum(np.append(slower, 0.0), np.append(0.0, slower))
+        caps = np.where(slower > 0.0, np.minimum(caps, x / np.maximum(slower, 1.0)), caps)
+    return s, x / max(1.0, excess.max())
+
+
+def _excess(s: Floats, x: Floats, slopes: Floats, bends: Floats, most: Floats) -> Floats:
+    """The largest share of any acceleration's limit between each two of n points of the grid, (n - 1,).
+
+    There s'' is even and the actuators' third derivatives are, so that accelerations are parabolas in s.
+    """
+    step = np.diff(s)[:, None]
+    push = np.diff(x)[:, None] / (2.0 * step)
+    begin, end = (slopes[part] * push + bends[part] * x[part, None] for part in (slice(-1), slice(1, None)))
+    rise = np.diff(bends, axis=0) * x[:-1, None] + 3.0 * step * bends[:-1] * push
+    return np.asarray((largest_between(begin, end, rise) / most).max(axis=1))
 
 
 def _sampled(
