@@ -115,6 +115,19 @@ def test_limits_are_kept_between_steps_that_zigzag(speed: float | None, accelera
     assert np.abs(np.diff(velocities, axis=0)).max() * 50_000 <= 1.001 * most_acceleration
 
 
+def test_a_spline_that_leaves_a_range_between_the_steps_is_refused_with_the_step() -> None:
+    joints = [
+        pf.Joint("x", "prismatic", ("base", "a"), axis=(1, 0, 0), actuated=True, range=(-1, 60)),
+        pf.Joint("y", "prismatic", ("a", "b"), axis=(0, 1, 0), actuated=True),
+    ]
+    mechanism = pf.Mechanism("table", joints, "b", (0, 0, 0), task=("x", "y"))
+    corner = np.array([[min(10 * k, 60), max(10 * k - 60, 0), 0] for k in range(12)])
+    with pytest.raises(InvalidArgument, match=r"swings \S+ mm beyond the range of 'x' between its steps") as caught:
+        pf.time_path(pf.track(mechanism, corner), speed=10.0)
+    assert caught.value.rows[0] == 6
+    assert pf.time_path(pf.track(mechanism, corner - [1, 0, 0]), speed=10.0).actuators[:, 0].max() > 59.0
+
+
 @pytest.mark.parametrize("name", MACHINES)
 def test_it_is_never_slower_than_the_best_constant_speed(name: str) -> None:
     track, given = followed(name, 3), limits(name)

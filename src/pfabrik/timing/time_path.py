@@ -11,8 +11,10 @@ from ..answers.tracked import Track
 from ..arrays import Floats
 from ..checks import put_limits, require_positive
 from ..description.mechanism import Mechanism
+from ..description.readouts import readouts
 from ..errors import InvalidArgument
 from ..kernels.timing import fastest
+from ..motion.displacements import actuator_units
 from ..tolerances import TOLERANCES
 from .crossings import refuse_crossings
 from .curve import Curve, curve_of, largest_between
@@ -48,8 +50,9 @@ def time_path(
 
     Raises
     ------
-    InvalidArgument : a track with steps that were not reached, leap, or cross a parallel singularity, by the number of
-        the step; one that does not move; no limit at all; more than ten million samples.
+    InvalidArgument : a track with steps that were not reached, leap, cross a parallel singularity, or between which the
+        spline leaves a range, by the number of the step; one that does not move; no limit at all; more than ten million
+        samples.
     """
     if not isinstance(track, Track):
         raise InvalidArgument("track", f"a {type(track).__name__}", "a Track: what pfabrik.track returns")
@@ -68,6 +71,7 @@ def time_path(
     if len(curve.s) < 2:
         raise InvalidArgument("track", "a path that does not move", "two steps or more that differ")
     refuse_crossings(track)
+    refuse_swings(track, curve)
     s, x = _fastest(curve, speeds, accelerations, most_platform)
     return _sampled(track, curve, s, x, (speeds, accelerations, most_platform), every)
 
@@ -91,6 +95,22 @@ def refuse_leaps(track: Track) -> None:
         if len(steps):
             found = f"{len(steps)} step{'s' * (len(steps) > 1)} {what}"
             raise InvalidArgument("track", found, "a path that is reached throughout", rows=steps[:5].tolist())
+
+
+def refuse_swings(track: Track, curve: Curve) -> None:
+    """Where steps bend, the spline between them swings out: no farther than ranges allow."""
+    s, mechanism = curve.grid(), track.mechanism
+    low, high = np.array([drive.limits for drive in mechanism.drives]).T
+    values = curve.at(s)[0][:, : curve.n_actuators]
+    beyond, units = np.maximum(low - values, values - high), actuator_units(mechanism)
+    over = beyond > TOLERANCES.active * units
+    if over.any():
+        place = int(np.argmax((beyond / units).max(axis=0)))
+        shown = readouts(mechanism)[place]
+        far = float(shown.display(beyond[:, place].max(keepdims=True))[0])
+        found = f"a path that swings {far:.3g} {shown.unit} beyond the range of '{shown.name}' between its steps"
+        steps = np.unique(curve.step_of(s[over[:, place]]))[:5].tolist()
+        raise InvalidArgument("track", found, "shorter steps, or some room before that limit", rows=steps)
 
 
 def _fastest(curve: Curve, speeds: Floats, accelerations: Floats, most_platform: float) -> tuple[Floats, Floats]:
