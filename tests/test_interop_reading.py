@@ -661,10 +661,13 @@ def test_the_command_says_what_is_wrong_in_one_line(tmp_path: Path) -> None:
         (("check", str(tmp_path / "model.xml")), "pfabrik import"),
         (("check", str(tmp_path / "robot.urdf")), "pfabrik import"),
         (("export", "stewart"), "--mjcf FILE"),
+        (("export", "stewart", "--mjcf", "-", "--c", "-"), "--mjcf and --c name one place"),
+        (("export", "stewart", "--mjcf", str(tmp_path / "new.xml"), "--klipper", "-"), "cannot be exported"),
     ):
         code, out, err = run(*words)
         assert (code, out) == (2, "")
         assert said in err and "Traceback" not in err
+    assert not (tmp_path / "new.xml").exists()
 
 
 def test_a_missing_library_is_told_with_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,11 +66,15 @@ def export(mech: str, force: bool, **files: Path | None) -> int:
     wanted = {name: path for name, path in files.items() if path is not None}
     if not wanted:
         raise click.UsageError(f"say what to write: {', '.join(f'{option(name)} FILE' for name in TARGETS)}")
+    same = [option(name) for name, path in wanted.items() if list(wanted.values()).count(path) > 1]
+    if same:
+        raise click.UsageError(f"{' and '.join(same)} name one place: give each its own")
     for path in wanted.values():
         refuse_existing(path, force)
     mechanism = load(mech)
+    texts = {name: text_of(mechanism, name) for name in wanted}  # all of them, before any is written
     for name, path in wanted.items():
-        text = text_of(mechanism, name)
+        text = texts[name]
         with whole_file(path, [Path(mech)]) as handle:
             handle.write(text)
         if path != STANDARD:
