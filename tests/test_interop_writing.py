@@ -13,6 +13,7 @@ import pytest
 
 import pfabrik as pf
 from in_mujoco import Model
+from machines import closure
 from pfabrik.errors import InvalidArgument, UnknownName
 from pfabrik.interop import from_mjcf, to_mjcf, verify
 from pfabrik.interop.referee import reached_at_random
@@ -147,6 +148,14 @@ def test_what_is_written_is_read_back_as_an_equal_machine(name: str) -> None:
     found = pf.solve_fk(back, solution.actuators, start=pf.solve_ik(back, solution.pose))
     assert found
     assert np.abs(found.pose - solution.pose).max() <= 1e-9 * max(length, 1.0)
+
+
+def test_a_cone_fixed_to_what_is_welded_is_read_back_on_the_body_that_stands_for_it() -> None:
+    mechanism = closure.welded_tricept()
+    back = from_mjcf(to_mjcf(mechanism), length_unit=mechanism.length_unit).mechanism
+    fixed_to = {joint.name: joint.cone.fixed_to for joint in mechanism.joints if joint.cone}
+    assert set(fixed_to.values()) == {"plinth"}
+    assert {joint.name: joint.cone.fixed_to for joint in back.joints if joint.cone} == dict.fromkeys(fixed_to, "base")
 
 
 def test_the_ankle_of_two_motors_comes_back_and_answers_as_mujoco_does() -> None:
