@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 
 DPI = 130
-OUTSIDE = "#f3f3f3"
 EDGE = "black"
 LIGHT, MIDDLE, DARK = "#d9d9d9", "#d55e00", "#00204d"
 BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "frameon": False, "fontsize": 9}
@@ -137,16 +136,14 @@ def draw_robustness(found: Sequence[Robustness], path: Path) -> None:
 
 def draw_path(axes: Axes, found: Robustness) -> None:
     """What was asked for, what was taken, and the edge of the workspace."""
-    unit, space = found.case.mechanism.length_unit, found.workspace
+    unit, edges = found.case.mechanism.length_unit, found.workspace.vertices[found.workspace.faces]
     asked, taken, off = found.targets[:, 1:3, 3], found.solution.pose[:, 1:3, 3], found.projected
-    inside = space.reached.astype(float)
-    axes.contourf(space.y, space.z, inside, levels=[-0.5, 0.5], colors=[OUTSIDE])
-    axes.contour(space.y, space.z, inside, levels=[0.5], colors=[EDGE], linewidths=1)
+    axes.plot(*edges.T, color=EDGE, linewidth=1)
     axes.plot(*asked.T, color=ASKED, linestyle="--", linewidth=1.6, label="asked for")
     axes.plot(*taken.T, color=ACHIEVED, linewidth=1.8, label="achieved")
     axes.plot(*taken[off].T, "o", color=HELD, markersize=2.5, label="projected step")
     axes.set(xlabel=f"y [{unit}]", ylabel=f"z [{unit}]", title=f"{found.case.label}: path")
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", adjustable="datalim")
     handles = [*axes.get_legend_handles_labels()[0], Line2D([], [], color=EDGE, linewidth=1, label="workspace's edge")]
     axes.legend(handles=handles, **BELOW, ncols=2)
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from .. import geometric
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import short_names
@@ -16,13 +15,12 @@ from ..description.mechanism import Mechanism
 from ..ik import solve_ik
 from ..tolerances import TOLERANCES
 from ..track import track
+from ..workspace.ask import workspace
+from ..workspace.result import Workspace
 from .checking import Feasibility, feasibility
 from .closest import Comparison, compare
-from .study import CENTROID, NEAREST, Case, Circle, Extent, Tick
+from .study import CENTROID, NEAREST, Case, Extent, Tick
 from .timing import clock, one_core
-
-MARGIN = 0.6
-"""How far the drawn part of the workspace goes beyond the circle, in radii."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +38,6 @@ class Jump:
     size: float
     step: int
     halved: float
-
-
-@dataclass(frozen=True)
-class Workspace:
-    """Which positions of a plane x = constant can be reached at home orientation: (n, n), rows along z."""
-
-    y: Floats
-    z: Floats
-    reached: Mask
 
 
 @dataclass(frozen=True)
@@ -106,7 +95,7 @@ def run(case: Case, extent: Extent, tick: Tick) -> Robustness:
         exact_feasibility=feasibility(exact),
         jumps=jumps(solution, finer),
         compared=compared,
-        workspace=workspace(mechanism, case.leaving, extent.grid),
+        workspace=workspace(mechanism, over=("y", "z"), fixed={"x": case.leaving.center[0]}),
         seconds=step_times(mechanism, targets, solution, extent.repeats),
     )
 
@@ -135,21 +124,6 @@ def _changes(solution: Track, chosen: Mask, part: str) -> Floats:
     parts = {"inside": ~off[1:] & ~off[:-1], "outside": off[1:] & off[:-1], "edge": off[1:] != off[:-1]}
     changes = np.abs(np.diff(solution.actuators[:, chosen], axis=0)).max(axis=1)
     return np.asarray(np.where(parts[part], changes, 0.0))
-
-
-def workspace(mechanism: Mechanism, circle: Circle, grid: int) -> Workspace:
-    """What the closed form or the library reaches on a grid around the circle, in its plane.
-
-    The closed form of a redundant machine is a rule that can miss; an answer that is reached is feasible either way.
-    """
-    x, *center = circle.center
-    half = circle.radius * (1.0 + MARGIN)
-    y, z = (np.linspace(middle - half, middle + half, grid) for middle in center)
-    points = np.stack([np.full((grid, grid), x), *np.meshgrid(y, z)], axis=-1).reshape(-1, 3)
-    reached = np.array(geometric.solve_ik(mechanism, points).reached)
-    missed = np.flatnonzero(~reached)
-    reached[missed] = solve_ik(mechanism, points[missed], options=CENTROID).status == Status.REACHED
-    return Workspace(y, z, reached.reshape(grid, grid))
 
 
 def step_times(mechanism: Mechanism, targets: Floats, solution: Track, repeats: int) -> Floats:

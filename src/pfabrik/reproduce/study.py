@@ -101,12 +101,10 @@ class Extent:
     """How often a time is taken; the median counts."""
     searches: int
     """Projected steps of each machine whose nearest feasible pose is searched; evenly spread."""
-    grid: int
-    """Points on an edge of the grid on which the workspace is drawn."""
 
 
-FULL = Extent(steps=361, targets=1000, repeats=31, searches=1000, grid=241)
-QUICK = Extent(steps=73, targets=100, repeats=5, searches=8, grid=61)
+FULL = Extent(steps=361, targets=1000, repeats=31, searches=1000)
+QUICK = Extent(steps=73, targets=100, repeats=5, searches=8)
 
 
 @lru_cache(maxsize=1)
