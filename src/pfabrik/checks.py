@@ -48,6 +48,14 @@ def require_path(name: str, value: Any) -> Path:
     return Path(path)
 
 
+def require_ending(path: Any, known: Sequence[str]) -> str:
+    """How a file's name ends, in small letters; InvalidArgument where nothing is written that way."""
+    suffix = require_path("path", path).suffix.lower()
+    if suffix not in known:
+        raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(known[:-1])} or {known[-1]}")
+    return suffix
+
+
 def require_names(name: str, value: Any) -> tuple[str, ...]:
     """Names, as a tuple; InvalidArgument for a single text and for what is no list of texts."""
     names = tuple(value) if isinstance(value, Iterable) and not _is_single(value) else None

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import click
 
+from ..checks import require_ending
 from ..extras import require
 from .whole import refuse_input
 
@@ -33,9 +34,7 @@ def picture(path: Path, inputs: Iterable[Path] = (), quiet: bool = False) -> Ite
         click.echo(f"wrote {path}", err=True)
 
 
-def ending_checked(path: Path, endings: tuple[str, ...], inputs: Iterable[Path] = ()) -> None:
+def ending_checked(path: Path, endings: Sequence[str], inputs: Iterable[Path]) -> None:
     """Stop where a name ends in another way, or is that of a file that was read."""
-    from ..view.saving import checked_ending
-
-    checked_ending(path, endings)
+    require_ending(path, endings)
     refuse_input(path, inputs)

@@ -15,9 +15,10 @@ import pfabrik as pf
 from ..answers.table import aligned
 from ..extras import require
 from ..view.saving import PICTURES
+from ..workspace.saving import ENDINGS
 from .finite import FINITE, is_finite
 from .mech import MECH, load
-from .picture import picture
+from .picture import ending_checked, picture
 from .target import Triple
 
 if TYPE_CHECKING:
@@ -78,7 +79,9 @@ def workspace(
     if tilt is not None and not 0.0 <= tilt <= 180.0:
         raise click.UsageError(f"--tilt {tilt:g}: expected an angle from 0 to 180 degrees")
     for path in outputs:
-        check_ending(path, mech)
+        ending_checked(path, (*ENDINGS, *PICTURES), (Path(mech),))
+        if path.suffix.lower() in PICTURES:
+            require("pictures", "matplotlib", "plot")
     mechanism = load(mech)
     turned = None if rpy is None else pf.pose([0, 0, 0], rpy=rpy, degrees=True)[:3, :3]
     held = {name: value for name, (value,) in pairs("--fix", fixed, 1).items()}
@@ -98,19 +101,6 @@ def workspace(
         write(found, path)
     click.echo(json.dumps(plain_object(found, shape), allow_nan=False) if as_json else describe(found, shape))
     return 0 if len(found.faces) else 1
-
-
-def check_ending(path: Path, mech: str) -> None:
-    """Refuse a name that nothing is written to, or the file that was read, before the work begins."""
-    from ..workspace.saving import ENDINGS
-
-    known = (*ENDINGS, *PICTURES)
-    if path.suffix.lower() not in known:
-        raise click.UsageError(f"-o {path}: expected a name that ends in {', '.join(known)}")
-    if path.exists() and Path(mech).exists() and path.samefile(mech):
-        raise click.UsageError(f"-o {path}: found a file that was read; expected another file")
-    if path.suffix.lower() in PICTURES:
-        require("pictures", "matplotlib", "plot")
 
 
 def pairs(option: str, words: Sequence[str], n: int) -> dict[str, list[float]]:

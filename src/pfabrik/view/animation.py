@@ -13,7 +13,7 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
-from ..checks import require_positive
+from ..checks import require_ending, require_positive
 from ..drawing import SMALL
 from ..errors import MissingLibrary
 from ..extras import require
@@ -23,7 +23,7 @@ from .canvas import canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD
 from .machine import draw_key, draw_machine
 from .plane import plane_of
-from .saving import FILMS, checked_ending
+from .saving import FILMS
 from .skeleton import Skeleton, skeleton_of
 from .track import checked_track, ways_of
 
@@ -60,7 +60,7 @@ def animate(
     MissingLibrary : matplotlib, or for ".mp4" `ffmpeg`, is not there.
     """
     known = checked_track(track)
-    suffix = checked_ending(path, FILMS)
+    suffix = require_ending(path, FILMS)
     steps = _steps(track, known, seconds)
     require("pictures", "matplotlib", "plot")
     writer = _writer(suffix)

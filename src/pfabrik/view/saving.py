@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from ..checks import require_path
-from ..errors import InvalidArgument
+from ..checks import require_ending
 from ..writing import whole_path
 
 if TYPE_CHECKING:
@@ -37,15 +36,7 @@ def save_picture(figure: Figure, path: str | os.PathLike[str], *, tight: bool = 
     """
     from matplotlib import rc_context
 
-    suffix = checked_ending(path, PICTURES)
+    suffix = require_ending(path, PICTURES)
     box: dict[str, Any] = {"bbox_inches": "tight", "pad_inches": ROOM} if tight else {}
     with whole_path(path) as part, rc_context(SETTINGS):
         figure.savefig(part, metadata=WITHOUT_DATES[suffix], **box)
-
-
-def checked_ending(path: str | os.PathLike[str], known: tuple[str, ...]) -> str:
-    """How a file's name ends, in small letters; InvalidArgument where nothing is written that way."""
-    suffix = require_path("path", path).suffix.lower()
-    if suffix not in known:
-        raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(known[:-1])} or {known[-1]}")
-    return suffix

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Ints
-from ..checks import require_path
+from ..checks import require_ending
 from ..errors import InvalidArgument
 from ..writing import whole_path
 
@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 
 def save(found: Region, path: str | PathLike[str]) -> None:
     """Write a workspace in the format that the ending says; the file is there whole, or not at all."""
-    write = _FORMATS.get(require_path("path", path).suffix.lower())
-    if write is None:
-        raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(ENDINGS)}")
-    content = write(found)
+    content = _FORMATS[require_ending(path, ENDINGS)](found)
     with whole_path(path) as part:
         part.write_bytes(content)
 

@@ -12,13 +12,13 @@ from typing import Any
 
 from ...answers.solution import Solution, checked_solution
 from ...arrays import Floats
+from ...checks import require_ending
 from ...description.mechanism import Mechanism
 from ...errors import InvalidArgument, PfabrikError
 from ...extras import require
 from ...files import load
 from ...warm_up import warm_up
 from ...writing import whole_path
-from ..saving import checked_ending
 from .newest import Newest
 from .panel import Actions
 from .player import Player
@@ -113,7 +113,7 @@ class Viewer:
 
         A Track is in it as a film. The file appears when it is complete, or not at all.
         """
-        checked_ending(path, (".html", ".htm"))
+        require_ending(path, (".html", ".htm"))
         page = self._page()
         with whole_path(path) as part:
             part.write_text(page, encoding="utf-8")
