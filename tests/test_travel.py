@@ -197,6 +197,15 @@ def test_a_hinge_turns_about_its_own_axis_as_far_as_its_range_and_about_no_other
     assert np.isinf(pf.travel(free, about=Z, pivot=(10, 0, 0)).distances).all()  # a full turn, and round again
 
 
+def test_a_turntable_stops_at_the_end_of_its_turns() -> None:
+    """It counts less than three turns: from its end on, what it would reach is a turn back."""
+    joint = Joint("T", "revolute", ("base", "table"), at=(0, 0, 0), axis=Z, actuated=True, range=(-9, 9))
+    turntable = Mechanism("turntable", [joint], "table", (50, 0, 0), task=("yaw",))
+    there, back = pf.travel(pf.configuration(turntable, [8.5]))
+    assert there.distance == pytest.approx(0.5, abs=2e-9) and np.isinf(back.distance)
+    assert [(limit.joint, limit.bound) for limit in there.stopped_by] == [("T", "max")]
+
+
 def pivot_angles(pose: np.ndarray) -> tuple[float, float]:
     """Angles of an ankle's pivot, about y and then about x, whose z axis points as a pose's does."""
     x, y, z = pose[:3, 2]

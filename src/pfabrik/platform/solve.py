@@ -170,6 +170,8 @@ class LegsEngine:
         rows, present = (new_rows(mechanism, len(targets)) for _ in range(2))
         coordinates = start.coordinates.copy()
         _, sides = self._reach(targets, start, first, True, rows)
+        turned = np.abs(rows.actuators - start.rows.actuators)[:, self._turning["column"]] > np.pi
+        rows.status[turned.any(axis=1)] = PENDING  # what is reached a turn away, from the other end of a range
         own = np.flatnonzero(rows.status == REACHED)
         coordinates[own] = settled(mechanism, table, rows.poses[own], rows.actuators[own], sides[own], coordinates[own])
         if len(own) < len(targets):
