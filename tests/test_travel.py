@@ -197,12 +197,20 @@ def test_a_hinge_turns_about_its_own_axis_as_far_as_its_range_and_about_no_other
     assert np.isinf(pf.travel(free, about=Z, pivot=(10, 0, 0)).distances).all()  # a full turn, and round again
 
 
-def test_a_turntable_stops_at_the_end_of_its_turns() -> None:
-    """It counts less than three turns: from its end on, what it would reach is a turn back."""
-    joint = Joint("T", "revolute", ("base", "table"), at=(0, 0, 0), axis=Z, actuated=True, range=(-9, 9))
-    turntable = Mechanism("turntable", [joint], "table", (50, 0, 0), task=("yaw",))
-    there, back = pf.travel(pf.configuration(turntable, [8.5]))
-    assert there.distance == pytest.approx(0.5, abs=2e-9) and np.isinf(back.distance)
+@pytest.mark.parametrize("end", [np.pi, 9.0])
+@pytest.mark.parametrize("actuated", [True, False])
+def test_a_turntable_stops_at_the_end_of_its_turns(end: float, actuated: bool) -> None:
+    """From its end on, what it would reach is a turn back, whether it has several turns or a single one."""
+    joints = [
+        Joint("T", "revolute", ("base", "table"), at=(0, 0, 0), axis=Z, actuated=actuated, range=(-end, end)),
+        Joint("A", "revolute", ("base", "crank"), at=(50, 0, 0), axis=Z, actuated=not actuated),
+        Joint("B", "revolute", ("crank", "rod"), at=(50, 20, 0), axis=Z),
+        Joint("C", "revolute", ("rod", "table"), at=(0, 20, 0), axis=Z),
+    ]
+    turntable = Mechanism("turntable", joints, "table", (0, 0, 0), task=("yaw",))
+    q = np.array([0.3, 0.3, -0.3, 0.3]) * (end - 0.2) / 0.3
+    there = pf.travel(pf.configuration(turntable, q), about=Z)[0]
+    assert there.distance == pytest.approx(0.2, abs=2e-9)
     assert [(limit.joint, limit.bound) for limit in there.stopped_by] == [("T", "max")]
 
 

@@ -33,8 +33,8 @@ def settled(
     ----------
     poses, actuators : (n, 4, 4) [length], (n, n_a).
     sides : which of its two solutions each leg takes, (n or 1, legs).
-    begin : where to start, (n or 1, columns): what a configuration leaves open (a rod's spin) is nearest to there.
-        None for home.
+    begin : where to start, (n or 1, columns): what a configuration leaves open (a rod's spin, whole turns of hinges) is
+        nearest to there. None for home.
     carriers : coordinates of the legs' carriers (n, legs) [L or rad] where they were found otherwise than by closed
         forms, which tell half their digits near dead points; NaN, or None, where not.
     """
@@ -47,6 +47,9 @@ def settled(
     read_into(table, poses, sides, found, carriers)
     closure.put_actuators(found, actuators)
     found = _closed(mechanism, poses, actuators, found)
+    if begin is not None:
+        angles = np.setdiff1d(table.known["column"][table.known["turns"] == 1], closure.actuated)
+        found[:, angles] += 2.0 * np.pi * np.round((begin - found)[:, angles] / (2.0 * np.pi))
     within_turns(mechanism, found)
     return found
 

@@ -170,10 +170,13 @@ class LegsEngine:
         rows, present = (new_rows(mechanism, len(targets)) for _ in range(2))
         coordinates = start.coordinates.copy()
         _, sides = self._reach(targets, start, first, True, rows)
-        turned = np.abs(rows.actuators - start.rows.actuators)[:, self._turning["column"]] > np.pi
-        rows.status[turned.any(axis=1)] = PENDING  # what is reached a turn away, from the other end of a range
         own = np.flatnonzero(rows.status == REACHED)
-        coordinates[own] = settled(mechanism, table, rows.poses[own], rows.actuators[own], sides[own], coordinates[own])
+        ends = settled(mechanism, table, rows.poses[own], rows.actuators[own], sides[own], coordinates[own])
+        angles = table.limited["column"][table.limited["turns"] == 1]
+        turned = (np.abs(ends - coordinates[own])[:, angles] > np.pi).any(axis=1)
+        rows.status[own[turned]] = PENDING  # reached a turn away, from the other end of a range
+        own, ends = own[~turned], ends[~turned]
+        coordinates[own] = ends
         if len(own) < len(targets):
             self._reach(start.rows.poses, start, first, True, present)
             decided = (present.status == REACHED) & ~np.bool_(table.leaves_open)
