@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..description.graph import cone_line, opposite
+from ..description.graph import PASSED_THROUGH, cone_line, edges_of, opposite, spanning_tree
 from ..description.home_mobility import universal_axes
 from ..description.mechanism import Joint, Mechanism
 from ..description.paths import Path, independent_paths
@@ -154,23 +154,15 @@ def _slides(
     mechanism: Mechanism, joint: Joint, end: Joint, line: Floats, places: Mapping[str, slice]
 ) -> list[tuple[int, Floats]]:
     """The slides between a joint and the next that turn its line, and how the line moves with each."""
-    body, found = opposite(joint), []
-    seen = {joint.name}
-    while body not in end.connects:
-        passed = next(
-            each
-            for each in mechanism.joints
-            if each.name not in seen and each.type in ("prismatic", "fixed") and body in each.connects
-        )
-        seen.add(passed.name)
-        forward = passed.connects[0] == body
-        body = passed.connects[1 if forward else 0]
-        if passed.type == "prismatic":
-            axis = np.array(mechanism.home_axis(passed.name)) * (1.0 if forward else -1.0)
-            if passed.along is None or np.linalg.norm(np.cross(axis, line)) > TOLERANCES.position * np.linalg.norm(
-                line
-            ):
-                found.append((places[passed.name].start, axis))
+    passed = [each for each in mechanism.joints if each.type in PASSED_THROUGH]
+    tree, found = spanning_tree(edges_of(passed), opposite(joint)), []
+    for index, forward in tree.way(next(body for body in end.connects if body in tree.paths)):
+        slide = passed[index]
+        if slide.type == "prismatic":
+            axis = np.array(mechanism.home_axis(slide.name)) * (1.0 if forward else -1.0)
+            off = np.linalg.norm(np.cross(axis, line))
+            if slide.along is None or off > TOLERANCES.position * np.linalg.norm(line):
+                found.append((places[slide.name].start, axis))
     return found
 
 

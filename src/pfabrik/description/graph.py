@@ -130,7 +130,7 @@ def spanning_tree(edges: Sequence[Edge], root: str) -> Tree:
             if new not in taken:
                 taken.add(new)
                 heappush(waiting, new)
-    return Tree(tuple(steps), tuple(loops), paths, np.array(list(loops.values())).reshape(-1, len(edges)))
+    return Tree(tuple(steps), tuple(loops), paths, np.reshape(list(loops.values()), (len(loops), len(edges))))
 
 
 def components(edges: Sequence[Edge], *cut: str) -> list[list[Edge]]:
