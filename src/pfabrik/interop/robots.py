@@ -76,7 +76,7 @@ def mechanism_of(
     end_effector = _end_effector(robot, end_effector, base, told)
     tip, point = _place(robot, end_effector)
     as_told = (base, end_effector) == (robot.base, robot.end_effector)
-    joints, loops = _merged(robot, base, tip)
+    joints, loops, cones = _merged(robot, base, tip)
     if point is not None:
         joints, loops = _not_called(tip, joints, loops, told)
     opened = OpenMechanism(
@@ -88,7 +88,7 @@ def mechanism_of(
         base,
         length_unit,
         require_names("task", task) if task is not None else robot.task if as_told else None,
-        robot.cones,
+        cones,
     )
     found = assemble(prune(opened, told), told)
     mechanism = _as_driven(found.mechanism, robot, metres)
@@ -181,7 +181,7 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str, told: list[
         return end_effector
     if robot.end_effector is not None:
         return robot.end_effector
-    merged, loops = _merged(robot, base, base)
+    merged, loops, _ = _merged(robot, base, base)
     pairs = [each.connects for each in merged] + [each.connects for each in loops]
     touching = Counter(body for pair in pairs for body in pair if body != base)
     counts = touching.most_common()
@@ -202,8 +202,8 @@ def _place(robot: Robot, end_effector: str) -> tuple[str, Floats | None]:
     return end_effector, None
 
 
-def _merged(robot: Robot, base: str, tip: str) -> tuple[list[Joint], list[Loop]]:
-    """Joints and loops with the bodies that are welded to each other as one, called as asked for."""
+def _merged(robot: Robot, base: str, tip: str) -> tuple[list[Joint], list[Loop], dict[str, Cone]]:
+    """Joints, loops and cones with the bodies that are welded to each other as one, called as asked for."""
     weld = welded([joint for joint in robot.joints if joint.type == "fixed"], base, tip)
 
     def named(pair: tuple[str, str]) -> tuple[str, str]:
@@ -211,7 +211,11 @@ def _merged(robot: Robot, base: str, tip: str) -> tuple[list[Joint], list[Loop]]
 
     joints = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.joints if each.type != "fixed"]
     loops = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.loops]
-    return joints, [loop for loop in loops if loop.connects[0] != loop.connects[1]]
+    cones = {
+        name: dataclasses.replace(cone, fixed_to=weld.get(cone.fixed_to, cone.fixed_to))
+        for name, cone in robot.cones.items()
+    }
+    return joints, [loop for loop in loops if loop.connects[0] != loop.connects[1]], cones
 
 
 def _not_called(tip: str, joints: list[Joint], loops: list[Loop], told: list[Note]) -> tuple[list[Joint], list[Loop]]:
