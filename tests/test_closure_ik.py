@@ -425,6 +425,7 @@ def test_the_agile_eye_has_eight_assembly_modes() -> None:
         assert checks.gap_of_joints(mechanism, mode)[0] <= 2e-9
 
 
+@compiled
 def test_what_holds_an_orientation_is_sought_from_other_places_turned_so() -> None:
     """A 3-CRS: the nearest pose that leans as asked is one to which no short way leads from home, or from a corner."""
     mechanism = Mechanism.from_legs(
