@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
-
 import click
 
+from .. import __version__
 from .group import CommandGroup
 
 __all__ = ["main"]
-
-
-def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
-    """Say which version this is, and leave."""
-    if not wanted:
-        return
-    try:
-        click.echo(f"pfabrik {version('pfabrik')}")
-    except PackageNotFoundError:
-        click.echo("pfabrik (running from its source folder, not installed)")
-    context.exit()
 
 
 @click.command(
@@ -34,9 +22,7 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-@click.option(
-    "--version", is_flag=True, is_eager=True, expose_value=False, callback=print_version, help="Show the version."
-)
+@click.version_option(__version__, message="pfabrik %(version)s", help="Show the version.")
 @click.pass_context
 def main(context: click.Context) -> int:
     """Kinematics of parallel mechanisms, with every limit kept.
