@@ -17,6 +17,7 @@ from checks import excess_of_joints, excess_of_points, gap_of_joints, gap_of_poi
 from machines import closure, positions
 from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
+from pfabrik.closure.close import close, closure_of
 from pfabrik.closure.projection import ways_of
 from pfabrik.closure.solve import ClosureEngine
 from pfabrik.decomposition.leg_table import leg_table
@@ -640,6 +641,27 @@ def test_a_pose_that_is_answered_is_reached_when_it_is_asked_for(name: str, coun
     off = again.position_error / mechanism.characteristic_length + again.rotation_error
     most = 0.15 if count > 100 else 0.2  # of few rows more by chance
     assert np.mean(off > 1e-6) <= (most if has_arms else 0.0)
+    assert (pf.solve_ik(mechanism, answers.pose, start=answers).status == Status.REACHED).all()
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_a_target_that_a_search_starts_on_is_reached() -> None:
+    """A 3-URU that turns about the middle of its base: all legs are at dead points there, in whatever way they stand."""
+    joints = []
+    for k, angle in enumerate(np.radians([0, 120, 240])):
+        out, across = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
+        hip, knee, ankle = 120 * out, 160 * out + (0, 0, 70), 40 * out + (0, 0, 130)
+        joints += [
+            Joint(f"A{k}", "universal", ("base", f"u{k}"), hip, axes=(out, across)),
+            Joint(f"B{k}", "revolute", (f"u{k}", f"l{k}"), knee, across, actuated=True, range=(-1.0, 0.8)),
+            Joint(f"C{k}", "universal", (f"l{k}", "platform"), ankle, axes=(across, out)),
+        ]
+    mechanism = Mechanism("3-URU", joints, "platform", (0, 0, 130), task=("x", "y", "z"))
+    middle = [0.327, -0.306, -0.9, 1.508, 0.206, -0.031, -0.029, -0.802, 0.22, 0.031, -0.206, -0.306, -0.9, 1.508, -0.327]
+    closed = close(closure_of(mechanism), np.array([middle]), mechanism.home_pose[None].copy())
+    start = pf.configuration(mechanism, closed.coordinates[0])
+    assert start.status is Status.REACHED and np.linalg.norm(start.pose[:3, 3]) < 1e-9
+    assert pf.solve_ik(mechanism, start.pose, start=start).status is Status.REACHED
 
 
 def test_searches_mind_where_three_hinges_point_the_platform() -> None:

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..closure.close import Closing, in_lengths
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
 from ..closure.parasitic import has_other_assemblies
@@ -16,6 +16,7 @@ from ..closure.projection import Way
 from ..closure.solve import ClosureEngine
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
+from ..description.task import task_of
 from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
 from ..kernels.rows import OPEN, PENDING, REACHED, Rows
@@ -23,6 +24,7 @@ from ..kernels.threads import in_blocks
 from ..motion.displacements import centres_at
 from ..options import Options
 from ..poses import are_poses
+from ..tolerances import TOLERANCES
 from .answers import LegAnswers, begins_of, coordinates_of, sides_at
 from .approach import starts_at
 from .coordinates import settled
@@ -86,7 +88,10 @@ class LegsEngine:
             poses = self._one.home if start is None else start.rows.poses
             question = Question(self.mechanism, self._table, options, keep_mode, nearby)
             unreached = Unreached(targets, poses, sides, carriers, rows)
-            unreached.answer(rows.status != REACHED, partial(answer_unreached, question))
+            away = rows.status != REACHED
+            if start is not None and self._table.has_sides:
+                away &= ~self._starts_there(targets, start.rows.poses)
+            unreached.answer(away, partial(answer_unreached, question))
             if start is not None:
                 self._count_turns(start.rows.actuators, rows)
         rest = (rows.status == PENDING if carriers is not None else rows.status != REACHED).nonzero()[0]
@@ -241,6 +246,17 @@ class LegsEngine:
         if start is None:
             return self._one_forward.home
         return Handle(starts_at(self.mechanism, self._table, start.rows.poses, sides))
+
+    def _starts_there(self, targets: Floats, poses: Floats) -> Mask:
+        """Whether rows start on their targets (n, 4, 4), from as many poses or one: joint coordinates reach these where
+        legs, at dead points, do not tell."""
+        task, poses = task_of(self.mechanism), np.broadcast_to(poses, targets.shape)
+        off = np.where(task.axes, (targets - poses)[:, :3, 3], 0.0)
+        there = np.asarray(np.abs(off).max(axis=1) <= TOLERANCES.position * self.mechanism.characteristic_length)
+        if np.count_nonzero(there):
+            _, turned = task.errors(poses[there], targets[there])
+            there[there] = turned <= TOLERANCES.rotation
+        return there
 
     def _sides_of(self, start: Configurations | None) -> Floats:
         """Which of its two solutions each leg takes at a start, (n or 1, legs)."""
