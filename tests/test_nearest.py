@@ -646,7 +646,7 @@ def test_a_pose_that_is_answered_is_reached_when_it_is_asked_for(name: str, coun
 
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 def test_a_target_that_a_search_starts_on_is_reached() -> None:
-    """A 3-URU that turns about the middle of its base: all legs are at dead points there, in whatever way they stand."""
+    """A 3-URU that turns about the middle of its base: all legs are at dead points there, however they stand."""
     joints = []
     for k, angle in enumerate(np.radians([0, 120, 240])):
         out, across = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
@@ -657,8 +657,9 @@ def test_a_target_that_a_search_starts_on_is_reached() -> None:
             Joint(f"C{k}", "universal", (f"l{k}", "platform"), ankle, axes=(across, out)),
         ]
     mechanism = Mechanism("3-URU", joints, "platform", (0, 0, 130), task=("x", "y", "z"))
-    middle = [0.327, -0.306, -0.9, 1.508, 0.206, -0.031, -0.029, -0.802, 0.22, 0.031, -0.206, -0.306, -0.9, 1.508, -0.327]
-    closed = close(closure_of(mechanism), np.array([middle]), mechanism.home_pose[None].copy())
+    one, lowest, other = [0.327, -0.306, -0.9, 1.508, 0.206], [-0.031, -0.029, -0.802, 0.22, 0.031], [-0.206, -0.306]
+    middle = np.array([[*one, *lowest, *other, -0.9, 1.508, -0.327]])
+    closed = close(closure_of(mechanism), middle, mechanism.home_pose[None].copy())
     start = pf.configuration(mechanism, closed.coordinates[0])
     assert start.status is Status.REACHED and np.linalg.norm(start.pose[:3, 3]) < 1e-9
     assert pf.solve_ik(mechanism, start.pose, start=start).status is Status.REACHED
