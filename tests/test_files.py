@@ -22,6 +22,7 @@ from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, U
 from pfabrik.files import LARGEST_FILE, MOST_DOTS, dumps, load, loads, save
 from pfabrik.files.reading import MOST_JOINTS
 from pfabrik.files.units import exact_degrees
+from pfabrik.writing import whole_path
 
 HEAD = 'schema = 1\nname = "m"\nend_effector = "platform"\nreference_point = [0, 0, 3]\n'
 TRIPOD = (
@@ -469,3 +470,15 @@ class TestWriting:
         with pytest.raises(OSError, match="disk full"):
             save(loads(TRIPOD), path)
         assert path.read_text() == "old" and os.listdir(tmp_path) == ["m.toml"]
+
+
+def test_two_writers_of_one_file_do_not_write_into_each_other(tmp_path: Path) -> None:
+    """Threads of one process too: the file is what one of them wrote, whole."""
+    path = tmp_path / "both.txt"
+    with whole_path(path) as late:
+        late.write_text("late")
+        with whole_path(path) as early:
+            early.write_text("early")
+        assert path.read_text() == "early"
+    assert path.read_text() == "late"
+    assert list(tmp_path.iterdir()) == [path]

@@ -29,13 +29,8 @@ def simplified(
     base, end_effector : names that stay.
     cones : joint -> the cone that limits it.
     """
-    hinged = _hinged(joints)
-    weld = welded([joint for joint in hinged if joint.type == "fixed"], base, end_effector)
-    limits = {
-        name: dataclasses.replace(cone, fixed_to=weld.get(cone.fixed_to, cone.fixed_to)) for name, cone in cones.items()
-    }
-    single = _grouped(_without_welds(hinged, weld), {base, end_effector}, told)
-    return [dataclasses.replace(each, cone=limits[each.name]) if each.name in limits else each for each in single]
+    single = _grouped(_without_welds(_hinged(joints), base, end_effector), {base, end_effector}, told)
+    return [dataclasses.replace(each, cone=cones[each.name]) if each.name in cones else each for each in single]
 
 
 def _hinged(joints: Sequence[Joint]) -> list[Joint]:
@@ -59,8 +54,9 @@ def _hinged(joints: Sequence[Joint]) -> list[Joint]:
     return [joint for joint in left if joint is not None]
 
 
-def _without_welds(joints: Sequence[Joint], weld: Mapping[str, str]) -> list[Joint]:
-    """Bodies that are fixed to each other as the one that stands for them."""
+def _without_welds(joints: Sequence[Joint], *kept: str) -> list[Joint]:
+    """Bodies that are fixed to each other as one, but for those that are kept."""
+    weld = welded([joint for joint in joints if joint.type == "fixed"], *kept)
     ends = [(weld.get(a, a), weld.get(b, b)) for a, b in (joint.connects for joint in joints)]
     moved = [dataclasses.replace(joint, connects=pair) for joint, pair in zip(joints, ends, strict=True)]
     return [joint for joint in moved if joint.connects[0] != joint.connects[1]]
