@@ -344,6 +344,32 @@ def test_ik_tells_reached_from_projected_by_its_exit_code(run: Callable[..., Res
     assert run("ik", "stewart", *BEYOND_REACH).exit_code == 1
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "ik stewart --position 10 0 190",
+        "ik stewart --position 0 0 300",
+        "ik delta --position 10 0 -90",
+        "plot stewart --position 10 0 190",
+        "plot five_bar --position 0 20 170",
+        "plot nrpm --position 10 0 200",
+        "plot delta --position 10 0 -90",
+        "fk five_bar -20 20",
+    ],
+)
+def test_what_is_printed_asks_for_no_joints_that_it_does_not_show(
+    run: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, line: str
+) -> None:
+    """After installing, their kernels would be compiled for it: longer than all else takes."""
+
+    def unasked(*_: object) -> None:
+        raise AssertionError("joint coordinates are worked out")
+
+    monkeypatch.setattr("pfabrik.platform.coordinates.read_into", unasked)
+    monkeypatch.setattr("pfabrik.platform.coordinates._closed", unasked)
+    assert run(*line.split()).exit_code in (0, 1)
+
+
 def test_a_projection_names_its_distance_and_the_limits_that_hold_it(run: Callable[..., Result]) -> None:
     first_line = run("ik", "stewart", *BEYOND_REACH).stdout.splitlines()[0]
     solution = pf.solve_ik(pf.load("stewart"), pf.pose([0, 0, 300]))

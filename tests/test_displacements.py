@@ -15,6 +15,7 @@ from pfabrik import Joint, Mechanism
 from pfabrik.description.home_mobility import universal_axes
 from pfabrik.motion.displacements import (
     centres,
+    centres_at,
     columns,
     displacements,
     end_effector_pose,
@@ -24,6 +25,7 @@ from pfabrik.motion.displacements import (
     screws,
     stepped,
 )
+from pfabrik.motion.walks import around_home
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
@@ -242,3 +244,44 @@ def test_coordinates_are_named_in_the_order_of_their_columns() -> None:
     for name, place in columns(machine).items():
         owned = machine.coordinate_names[place]
         assert len(owned) == place.stop - place.start and all(each.partition("[")[0] == name for each in owned)
+
+
+@pytest.mark.parametrize("name", pf.catalog())
+def test_poses_and_actuators_tell_the_same_centres_as_all_joints(name: str) -> None:
+    machine = pf.load(name)
+    q = around_home(machine)
+    actuators = np.stack([q[:, drive.column] + drive.home for drive in machine.drives], axis=1)
+    found, expected = centres_at(machine, end_effector_pose(machine, q), actuators), centres(machine, q)
+    if name in ("g1_ankle", "orthoglide", "ucu"):  # a joint in the middle of a passive leg
+        assert found is None
+        return
+    assert found is not None and list(found) == list(expected)
+    off = max(float(np.abs(found[joint] - expected[joint]).max()) for joint in expected)
+    assert off <= 1e-8 * machine.characteristic_length  # to which the loops are closed
+
+
+def test_centres_are_told_through_driven_and_locked_joints_described_from_either_body() -> None:
+    joints = [
+        Joint("R", "revolute", ("base", "b1"), at=(1, 2, 3), axis=(1, 1, 0), actuated=True, home=0.4),
+        Joint("P", "prismatic", ("b2", "b1"), axis=(0, 1, 2), actuated=True),
+        Joint("F", "fixed", ("b3", "b2"), at=(0, 5, 2)),
+        Joint("U", "universal", ("b4", "b3"), at=(4, 2, -1), axes=((1, 0, 0), (1, 2, 0))),
+        Joint("S", "spherical", ("b4", "b5"), at=(2, 2, 7)),
+    ]
+    machine = Mechanism("arm", joints, "b5", (2, 3, 8))
+    q = anywhere(machine)
+    actuators = q[:, [drive.column for drive in machine.drives]] + [0.4, 0.0]
+    found = centres_at(machine, end_effector_pose(machine, q), actuators)
+    assert found is not None
+    for joint, expected in centres(machine, q).items():
+        np.testing.assert_allclose(found[joint], expected, atol=1e-12)
+
+
+def test_the_centre_of_a_sliding_joint_is_told_by_its_first_body_alone() -> None:
+    joints = [
+        Joint("C", "cylindrical", ("b1", "base"), at=(1, 2, 3), axis=(1, 1, 0), actuated=True),
+        Joint("S", "spherical", ("b1", "b2"), at=(2, 2, 7)),
+    ]
+    machine = Mechanism("slide", joints, "b2", (2, 3, 8))
+    q = anywhere(machine)
+    assert centres_at(machine, end_effector_pose(machine, q), q[:, [drive.column for drive in machine.drives]]) is None

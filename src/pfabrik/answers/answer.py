@@ -27,7 +27,7 @@ from ..kernels.rows import (
     Rows,
 )
 from ..motion.displacements import columns, home_coordinates
-from .limits import ActiveLimit, active_limits, binding_limits, holding_limits
+from .limits import ActiveLimit, active_limits, binding_limits, holding_limits, is_held_by_others
 from .status import Status
 
 Held: TypeAlias = Literal["orientation", "position"] | None
@@ -150,13 +150,14 @@ class Answer:
     @cached_property
     def _limits(self) -> list[tuple[ActiveLimit, ...]]:
         """The same as a list of rows, also of a single answer."""
-        rows = self._rows
-        held: list[tuple[ActiveLimit, ...]] = [()] * len(rows.status)
-        away = np.flatnonzero((rows.status != Status.REACHED) & (rows.status != Status.INVALID))
-        named = active_limits(self.mechanism, self._coordinates[away])
-        for row, found in zip(away, named, strict=True):
-            held[row] = found
-        projected = np.flatnonzero(rows.status == Status.PROJECTED)
+        status = self._rows.status
+        held: list[tuple[ActiveLimit, ...]] = [()] * len(status)
+        is_asked = (status == Status.PROJECTED) & (self._wanted is not None)
+        others = np.flatnonzero((status != Status.REACHED) & (status != Status.INVALID) & ~is_asked)
+        if len(others):
+            for row, found in zip(others, active_limits(self.mechanism, self._coordinates[others]), strict=True):
+                held[row] = found
+        projected = np.flatnonzero(is_asked)
         if self._wanted is not None and len(projected):
             for row, found in zip(projected, self._holding(self._wanted, projected), strict=True):
                 held[row] = found
@@ -183,6 +184,18 @@ class Answer:
             rows = projected[holds == way.hold]
             if len(rows):
                 weights = engine.weighed_limits(self._found.at(rows), wanted.targets[rows], way)
-                limits = holding_limits(self.mechanism, self._coordinates[rows], weights)
+                limits = holding_limits(self.mechanism, self._told_of(rows, weights), weights)
                 found.update(zip(rows.tolist(), limits, strict=True))
         return [found[row] for row in projected.tolist()]
+
+    def _told_of(self, rows: NDArray[np.intp], weights: Floats) -> Floats:
+        """Joint coordinates of some rows, (n, columns), as far as the limits that hold these back need them.
+
+        Where only those of actuators hold, the others are not worked out: they are NaN.
+        """
+        if is_held_by_others(self.mechanism, weights):
+            return self._coordinates[rows]
+        told = np.full((len(rows), len(home_coordinates(self.mechanism))), np.nan)
+        for place, drive in enumerate(self.mechanism.drives):
+            told[:, drive.column] = self._rows.actuators[rows, place] - drive.home
+        return told

@@ -76,7 +76,7 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
     """
     found: list[list[ActiveLimit]] = [[] for _ in coordinates]
     n, units = coordinates.shape[1], rate_units(mechanism)
-    angles = list(coned(mechanism, coordinates))
+    angles = coned(mechanism, coordinates) if (multipliers[:, 2 * n :] > TOLERANCES.holding).any() else []
     for row, place in ((row, place) for row, own in enumerate(multipliers) for place in _hardest_first(own)):
         which = 0
         if place < 2 * n:
@@ -91,6 +91,15 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
             name, value, bound, unit = joint.name, float(values[row]), "cone", mechanism.characteristic_length
         found[row].append(ActiveLimit(name, bound, value, limit, float(multipliers[row, place]) * unit, which))
     return [tuple(each) for each in found]
+
+
+def is_held_by_others(mechanism: Mechanism, multipliers: Floats) -> bool:
+    """Whether a limit other than an actuator's holds some row back; multipliers as of `holding_limits`."""
+    resting = [drive.column for drive in mechanism.drives]
+    resting += [each.column for each in mechanism.coordinates if each.joint.is_rigid]  # which are left out anyway
+    others = np.ones(multipliers.shape[1], bool)
+    others[[2 * column + side for column in resting for side in (0, 1)]] = False
+    return bool((multipliers[:, others] > TOLERANCES.holding).any())
 
 
 def _hardest_first(multipliers: Floats) -> list[int]:

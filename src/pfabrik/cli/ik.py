@@ -66,7 +66,9 @@ def ik(
             answer["margins"] = [dict(zip(names, limit, strict=True)) for limit in nearest_first(solution)]
         click.echo(json.dumps(answer, allow_nan=False))
     else:
-        click.echo("\n\n".join([describe(solution), *[margins_table(solution)] * with_margins]))
+        click.echo(describe(solution))
+        if with_margins:
+            click.echo(f"\n{margins_table(solution)}")
     return 0 if solution else 1
 
 

@@ -118,23 +118,67 @@ def centres(mechanism: Structure, q: Floats) -> dict[str, Floats]:
     return {joint.name: present[:, j] for j, joint in enumerate(mechanism.joints) if joint.at is not None}
 
 
-def centres_at(mechanism: Structure, poses: Floats) -> dict[str, Floats] | None:
-    """The same where poses of the end effector (n, 4, 4) tell it alone; None where some joint is on neither of the base
-    and the end effector's body."""
-    found: dict[str, Floats] = {}
-    if mechanism.end_effector_is_joint:
+def centres_at(mechanism: Structure, poses: Floats, actuators: Floats) -> dict[str, Floats] | None:
+    """Joint name -> position of its centre, (n, 3) [length], from poses of the end effector (n, 4, 4) and actuator values
+    (n, n_a) alone; None where some joint is on no body that these place.
+
+    Bodies are placed outward from the base, then from the end effector, through joints that are driven or locked.
+    """
+    outward = _outward(mechanism)
+    if outward is None:
         return None
-    displaced = poses @ np.linalg.inv(mechanism.home_pose)
+    steps, on = outward
+    known = {mechanism.base: np.repeat(np.eye(4)[None], len(poses), axis=0)}
+    if not mechanism.end_effector_is_joint:
+        known[mechanism.end_effector_body] = poses @ np.linalg.inv(mechanism.home_pose)
+    q = np.zeros((len(poses), len(column_joints(mechanism))))
+    for place, drive in enumerate(mechanism.drives):
+        q[:, drive.column] = actuators[:, place] - drive.home
+    for joint, forward in steps:
+        first, second = joint.connects
+        motion = joint_displacements(mechanism, joint.name, q[:, columns(mechanism)[joint.name]])
+        if forward:
+            known[second] = known[first] @ motion
+        else:
+            known[first] = known[second] @ _inverse(motion)
+    return {
+        joint.name: poses[:, :3, 3] if body is None else _moved(known[body], np.array(joint.at, dtype=float))
+        for joint, body in on
+    }
+
+
+@lru_cache(maxsize=64)
+def _outward(
+    mechanism: Structure,
+) -> tuple[tuple[tuple[Joint, bool], ...], tuple[tuple[Joint, str | None], ...]] | None:
+    """The joints that place bodies one after the other for `centres_at`, and whether it is their second body that they
+    place; and every joint with a centre and the body that tells it, None for the end effector itself. None where some
+    centre is not told."""
+    driven = {drive.column for drive in mechanism.drives}
+    driven |= {each.column for each in mechanism.coordinates if each.joint.is_rigid}
+    span = columns(mechanism)
+    leading = [
+        each for each in mechanism.joints if driven.issuperset(range(span[each.name].start, span[each.name].stop))
+    ]
+    placed, steps = [mechanism.base], []
+    if not mechanism.end_effector_is_joint:
+        placed.append(mechanism.end_effector_body)
+    for body in placed:  # which grows
+        for joint in leading:
+            for here, there, forward in ((*joint.connects, True), (*reversed(joint.connects), False)):
+                if here == body and there not in placed:
+                    placed.append(there)
+                    steps.append((joint, forward))
+    on: list[tuple[Joint, str | None]] = []
     for joint in mechanism.joints:
         if joint.at is None:
             continue
-        if mechanism.base in joint.connects:
-            found[joint.name] = np.repeat(np.array(joint.at, dtype=float)[None], len(poses), axis=0)
-        elif mechanism.end_effector_body in joint.connects:
-            found[joint.name] = _moved(displaced, np.array(joint.at, dtype=float))
-        else:
+        slides = joint.type in ("prismatic", "cylindrical")  # their centre is a point of their first body
+        bodies = [body for body in placed if body in (joint.connects[:1] if slides else joint.connects)]
+        if not bodies and joint.name != mechanism.end_effector:
             return None
-    return found
+        on.append((joint, bodies[0] if bodies else None))
+    return tuple(steps), tuple(on)
 
 
 def placed(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:

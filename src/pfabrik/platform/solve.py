@@ -199,7 +199,7 @@ class LegsEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         if not isinstance(found, LegAnswers):
             return self._inner.points(found)
-        placed = centres_at(self.mechanism, found.rows.poses)
+        placed = centres_at(self.mechanism, found.rows.poses, found.rows.actuators)
         return placed if placed is not None else self._inner.points(found)
 
     def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
