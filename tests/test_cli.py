@@ -1155,7 +1155,7 @@ def test_demo_says_how_to_get_what_it_needs(run: Callable[..., Result], monkeypa
     monkeypatch.setattr("pfabrik.extras.find_spec", lambda _: None)
     result = run("demo")
     assert result.exit_code == 2
-    assert "pip install 'pfabrik[plot]'" in result.stderr
+    assert "pip install '.[plot]'" in result.stderr
 
 
 def test_demo_refuses_a_file_where_its_folder_should_be(run: Callable[..., Result], tmp_path: Path) -> None:

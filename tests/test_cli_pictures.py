@@ -81,4 +81,4 @@ def test_a_missing_library_is_named_before_the_work(monkeypatch: pytest.MonkeyPa
     for words in (("plot", "five_bar"), ("track", "five_bar", "path.csv", "--animate", "a.gif")):
         result = run(*words)
         assert result.exit_code == 2
-        assert "install it with: pip install 'pfabrik[plot]'" in result.stderr
+        assert "install it with: pip install '.[plot]'" in result.stderr

@@ -139,6 +139,35 @@ def without_noise(text: str) -> list[str]:
     return [line.rstrip() for line in text.splitlines() if not line.startswith(NOISE)]
 
 
+def test_the_readme_leads_to_every_page() -> None:
+    readme = ROOT / "README.md"
+    linked = {(ROOT / link).resolve() for link in LINK.findall(readme.read_text(encoding="utf-8"))}
+    assert [page.name for page in ROOT.glob("docs/*.md") if page.resolve() not in linked] == []
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("folder")
+def test_the_first_program_of_the_readme_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:
+    (code, *_), (shown,) = blocks(ROOT / "README.md", "python"), blocks(ROOT / "README.md", "text")
+    exec(compile(code, "<readme>", "exec"), {"__name__": "__main__"})
+    assert capsys.readouterr().out == shown
+
+
+def test_the_package_is_installed_from_its_folder_for_it_is_on_no_index() -> None:
+    pages = [page for page in PAGES if "pip install" in page.read_text(encoding="utf-8")]
+    assert pages
+    for page in pages:
+        assert not re.search(r"pip install ['\"]?pfabrik", page.read_text(encoding="utf-8")), page
+
+
+def test_the_citation_is_of_this_version_and_of_the_paper_that_the_pages_name() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {pf.__version__}\n" in citation
+    (number,) = set(re.findall(r"\d{4}\.\d{5}", citation))
+    for page in (ROOT / "README.md", ROOT / "docs" / "references.md"):
+        assert set(re.findall(r"\d{4}\.\d{5}", page.read_text(encoding="utf-8"))) == {number}
+
+
 LINES = [line for block in blocks(ROOT / "README.md", "") for line in block.splitlines() if line.startswith("pfabrik ")]
 ELSEWHERE = ("pfabrik demo --quick", "pfabrik reproduce --quick")
 """Commands that take long, and that tests of their own run just so."""

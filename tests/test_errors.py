@@ -20,7 +20,7 @@ PUBLIC = [
     errors.ContinuumOfWorkingModes("m", 1, ["j4", "j6"]),
     errors.InvalidArgument("target", "a text", "numbers", rows=[3, 5]),
     errors.UnknownName("joint", "p", ["p1", "p5"]),
-    errors.MissingLibrary("pictures", "matplotlib", "pip install 'pfabrik[plot]'"),
+    errors.MissingLibrary("pictures", "matplotlib", "pip install '.[plot]'"),
     errors.MobilityWarning("the loops all but lock"),
 ]
 

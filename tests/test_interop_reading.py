@@ -676,4 +676,4 @@ def test_a_missing_library_is_told_with_the_command_that_installs_it(monkeypatch
     monkeypatch.setattr(extras, "find_spec", lambda name: None)
     for words in (("verify", "stewart"),):
         code, _, err = run(*words)
-        assert code == 2 and "pip install 'pfabrik[mujoco]'" in err
+        assert code == 2 and "pip install '.[mujoco]'" in err

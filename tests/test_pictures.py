@@ -210,7 +210,7 @@ def test_what_cannot_be_drawn_is_refused() -> None:
 
 def test_a_missing_library_is_named_with_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pfabrik.extras.find_spec", lambda _: None)
-    with pytest.raises(MissingLibrary, match=r"pictures need matplotlib; .* pip install 'pfabrik\[plot\]'"):
+    with pytest.raises(MissingLibrary, match=r"pictures need matplotlib; .* pip install '\.\[plot\]'"):
         pf.plot(tripod_rps())
 
 

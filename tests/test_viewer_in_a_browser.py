@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 
 pytest.importorskip("viser", reason="needs the extra view")
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install 'pfabrik[dev]'")
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install '.[dev]'")
 
 CHROMIUM = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""

@@ -1,4 +1,7 @@
-"""What is optional: asked for when it is used, and named with the command that installs it where it is missing."""
+"""What is optional: asked for when it is used, and named with the command that installs it where it is missing.
+
+The package is on no index: it is installed from its folder.
+"""
 
 from __future__ import annotations
 
@@ -21,4 +24,4 @@ def require(what: str, library: str, extra: str) -> None:
     MissingLibrary
     """
     if find_spec(library) is None:
-        raise MissingLibrary(what, library, f"pip install 'pfabrik[{extra}]'")
+        raise MissingLibrary(what, library, f"pip install '.[{extra}]' in the folder of pfabrik's sources")

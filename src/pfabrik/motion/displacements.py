@@ -119,10 +119,14 @@ def centres(mechanism: Structure, q: Floats) -> dict[str, Floats]:
 
 
 def centres_at(mechanism: Structure, poses: Floats, actuators: Floats) -> dict[str, Floats] | None:
-    """Joint name -> position of its centre, (n, 3) [length], from poses of the end effector (n, 4, 4) and actuator values
-    (n, n_a) alone; None where some joint is on no body that these place.
+    """Joint name -> position of its centre, (n, 3) [length], from poses and actuators alone; None if they do not tell.
 
     Bodies are placed outward from the base, then from the end effector, through joints that are driven or locked.
+    Where a joint is on no such body, they do not tell.
+
+    Parameters
+    ----------
+    poses, actuators : of the end effector, (n, 4, 4) [length], and values (n, n_a) [length or rad].
     """
     outward = _outward(mechanism)
     if outward is None:
