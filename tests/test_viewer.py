@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import socket
+import sys
 import threading
 import time
+import types
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+import rich
 from click.testing import CliRunner
+from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
@@ -48,6 +52,26 @@ def shown() -> Iterator[Callable[..., pf.Viewer]]:
     yield view
     for viewer in opened:
         viewer.close()
+
+
+def test_a_cell_of_a_notebook_shows_no_banner(
+    shown: Callable[..., pf.Viewer], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a notebook the console of rich hands what is printed to IPython's `display`, past standard output."""
+    displayed: list[object] = []
+    ipython = types.ModuleType("IPython")
+    display = types.ModuleType("IPython.display")
+    display.display = displayed.append  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    console = Console(force_jupyter=True)
+    monkeypatch.setattr(rich, "_console", console)
+    viewer = shown(tripod_rps())
+    viewer.close()
+    assert displayed == []
+    assert capsys.readouterr().out == ""
+    console.print("what others print is shown")
+    assert len(displayed) == 1
 
 
 # Only the newest.

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import io
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
+import rich
 
 from ...arrays import Floats
 from ...description.mechanism import Mechanism
@@ -21,9 +23,19 @@ DISTANCE = 2.1
 SEEN_FROM = np.array([0.5, -0.8, 0.35]) / np.linalg.norm([0.5, -0.8, 0.35])
 
 
-def quietly() -> contextlib.AbstractContextManager[object]:
-    """What the server says of itself is not what a command prints."""
-    return contextlib.redirect_stdout(io.StringIO())
+@contextlib.contextmanager
+def quietly() -> Iterator[None]:
+    """Keep what the server says of itself off standard output, and out of the cells of a notebook.
+
+    It prints by rich, whose console writes into a notebook's cell by itself, not on standard output.
+    """
+    console = rich.get_console()
+    was_quiet, console.quiet = console.quiet, True
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        console.quiet = was_quiet
 
 
 def serve(host: str, port: int) -> viser.ViserServer:
