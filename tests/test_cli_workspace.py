@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,8 @@ def test_it_prints_the_size_and_what_forms_the_border_and_writes_every_format(
     found = pf.workspace(pf.load("stewart"), resolution=8.0)
     (joint, bound), _ = next(iter(found.shares.items()))
     assert "mm³" in result.stdout.splitlines()[0]
-    assert f"{joint} {bound}" in result.stdout
+    assert re.search(rf"^\d+\.\d% +{joint} {bound} +prismatic, actuated$", result.stdout, re.MULTILINE)
+    assert re.search(r"^\d+\.\d% +A\w+ cone +universal$", result.stdout, re.MULTILINE)
     told = [line for line in result.stderr.splitlines() if "compiling" not in line]
     assert told == [f"wrote {name}" for name in names]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)

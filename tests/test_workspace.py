@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import sys
 import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -391,6 +392,37 @@ def test_a_picture_shows_every_limit_of_the_border(name: str) -> None:
         with pytest.raises(InvalidArgument, match="two-dimensional axes for a workspace of three"):
             found.plot(pyplot.figure().add_subplot())
     pyplot.close("all")
+
+
+def test_stops_of_motors_and_of_elbows_differ_in_colour_and_are_named_where_they_are() -> None:
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    found = pf.workspace(pf.load("five_bar"))
+    assert set(found.shares) == {(joint, bound) for joint in ("p1", "p2", "p4", "p5") for bound in ("min", "max")}
+    groups = groups_of(found)
+    assert len({group.colour for group in groups}) == len(found.shares)
+    assert {group.label for group in groups} == {
+        *(f"{joint} {bound}, actuated" for joint in ("p1", "p5") for bound in ("min", "max")),
+        *(f"{joint} {bound}" for joint in ("p2", "p4") for bound in ("min", "max")),
+    }
+    axes = found.plot()
+    assert sorted(text.get_text() for text in axes.texts) == sorted(" ".join(limit) for limit in found.shares)
+    for text in axes.texts:
+        nearest = np.argmin(np.linalg.norm(found.vertices - text.xy, axis=1))
+        assert " ".join(found.limits[found.vertex_limit[nearest]]) == text.get_text()
+    pyplot.close("all")
+
+
+def test_motors_and_elbows_share_no_colour_where_there_are_too_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        sys.modules["pfabrik.workspace.border"], "COLOURS", ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
+    )
+    found = pf.workspace(pf.load("five_bar"), resolution=8.0)
+    assert {group.label for group in groups_of(found)} == {
+        "p1, 5 min, actuated",
+        "p1, 5 max, actuated",
+        "p2, 4 min",
+        "p2, 4 max",
+    }
 
 
 @pytest.mark.parametrize(

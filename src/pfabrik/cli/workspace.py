@@ -173,8 +173,9 @@ def describe(found: Workspace, shape: Inscribed | None) -> str:
         for name, low, high, factor, unit in zip(found.names, *found.bounds.tolist(), shown, units, strict=True)
     ]
     shares = list(found.shares.items())
-    limits = [(f"{100.0 * share:.1f}%", " ".join(limit).strip()) for limit, share in shares[:MOST_LIMITS]]
-    blocks = [in_words(found), aligned(["", "min", "max", "unit"], rows), aligned(["border", "formed by"], limits)]
+    limits = [(f"{100.0 * share:.1f}%", " ".join(limit).strip(), kind_of(found, limit[0])) for limit, share in shares]
+    formed = aligned(["border", "formed by", "joint"], limits[:MOST_LIMITS])
+    blocks = [in_words(found), aligned(["", "min", "max", "unit"], rows), formed]
     if len(shares) > MOST_LIMITS:
         blocks[-1] += f"\nand {len(shares) - MOST_LIMITS} more"
     if len(found.components) > 1:
@@ -186,6 +187,12 @@ def describe(found: Workspace, shape: Inscribed | None) -> str:
         middle = ", ".join(f"{c * f:.4g}" for c, f in zip(shape.centre.tolist(), shown, strict=True))
         blocks.append(f"largest {shape.kind}: {lengths} about {middle} [{', '.join(dict.fromkeys(units))}]")
     return "\n\n".join(blocks)
+
+
+def kind_of(found: Workspace, name: str) -> str:
+    """What a limit's joint is: "revolute, actuated"; empty where it is none's."""
+    kinds = {joint.name: joint.type + ", actuated" * bool(joint.actuated) for joint in found.mechanism.joints}
+    return kinds.get(name, "")
 
 
 def described_part(found: Workspace, part: Workspace) -> str:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from .region import Region
 
-COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#f0e442")
-"""Colours that colour-blind people can tell apart, after Okabe and Ito; of the limits that form most of the border."""
+COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#f0e442", "#332288", "#882255")
+"""Of the limits that form most of the border. Colour-blind people can tell them apart (Okabe and Ito; two by Tol)."""
 
 REST = "#b0b0b0"
 """Of all other limits together."""
@@ -30,19 +30,27 @@ class Group(NamedTuple):
 
 
 def groups_of(found: Region) -> list[Group]:
-    """Limits that share a colour: each its own where there are colours enough; else those of joints that are copies."""
-    together = {limit: [limit] for limit in found.shares}
-    if len(together) > len(COLOURS):
-        together = {}
-        for joint, bound in found.shares:
-            together.setdefault((joint.rstrip("0123456789"), bound), []).append((joint, bound))
+    """Limits that share a colour: each its own where there are colours enough; else those of joints that are copies.
+
+    Stops of motors and of passive joints are never one group, whatever their names: they are changed in other ways.
+    """
+    together: dict[tuple[str, str, bool], list[tuple[str, str]]] = {}
+    for joint, bound in found.shares:
+        stem = joint if len(found.shares) <= len(COLOURS) else joint.rstrip("0123456789")
+        together.setdefault((stem, bound, is_actuated(found, joint)), []).append((joint, bound))
     order = sorted(together.items(), key=lambda item: -sum(found.shares[limit] for limit in item[1]))
     groups: list[Group] = []
-    for colour, ((name, bound), limits) in zip(COLOURS, order, strict=False):
-        copies = sorted(joint[len(name) :] for joint, _ in limits)
-        groups.append(_group(found, f"{name}{', '.join(copies)} {bound}".strip(), colour, limits))
+    for colour, ((stem, bound, actuated), limits) in zip(COLOURS, order, strict=False):
+        copies = sorted(joint[len(stem) :] for joint, _ in limits)
+        label = f"{stem}{', '.join(copies)} {bound}".strip() + ", actuated" * actuated
+        groups.append(_group(found, label, colour, limits))
     rest = [limit for _, limits in order[len(COLOURS) :] for limit in limits]
     return [*groups, _group(found, f"{len(rest)} other limits", REST, rest)] if rest else groups
+
+
+def is_actuated(found: Region, joint: str) -> bool:
+    """Whether a limit is a motor's; False where what forms the border is no joint: a coordinate's end, or reach."""
+    return any(each.name == joint and bool(each.actuated) for each in found.mechanism.joints)
 
 
 def _group(found: Region, label: str, colour: str, limits: list[tuple[str, str]]) -> Group:

@@ -28,6 +28,12 @@ DARKEST = 0.55
 WITHIN = "#eef3f7"
 """What is within reach, in a plane."""
 
+SHORTEST_NAMED = 0.08
+"""Share of the picture's diagonal that a stretch of a border is long before its limit is written beside it."""
+
+OFF, SIDEWAYS = 5.0, 0.2
+"""How far from the border its name is [points], and from which share of a direction on it stands to that side."""
+
 Strings: TypeAlias = NDArray[np.str_]
 
 
@@ -70,6 +76,8 @@ def _draw_plane(axes: Any, found: Region, groups: list[Group]) -> None:
     points = shown(found, found.vertices)
     segments = points[found.faces]
     loops = _loops(found.faces)
+    for loop in loops:
+        _name_stretches(axes, found, points, loop)
     if loops:
         ends = [np.vstack([points[loop], points[loop[:1]]]) for loop in loops]
         codes = [[Path.MOVETO, *[Path.LINETO] * (len(end) - 2), Path.CLOSEPOLY] for end in ends]
@@ -84,9 +92,35 @@ def _draw_plane(axes: Any, found: Region, groups: list[Group]) -> None:
     )
     axes.set(**dict(zip(("xlabel", "ylabel"), labels(found), strict=True)))
     axes.autoscale_view()
-    axes.margins(0.06)
+    axes.margins(0.1)  # for the names beside the border
     if len(set(found.units)) == 1:
         axes.set_aspect("equal")
+
+
+def _name_stretches(axes: Any, found: Region, points: Floats, loop: list[int]) -> None:
+    """Write the limit that forms each stretch of a border beside its middle, outside; short stretches have no room."""
+    limit_of = dict(zip(map(tuple, found.faces.tolist()), found.face_limit.tolist(), strict=True))
+    limits = np.array([limit_of[pair] for pair in zip(loop, [*loop[1:], loop[0]], strict=True)])
+    changes = np.flatnonzero(limits != np.roll(limits, 1))
+    first = int(changes[0]) if len(changes) else 0
+    corners, limits = points[np.roll(loop, -first)], np.roll(limits, -first)
+    steps = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(steps, axis=1)
+    for stretch in np.split(np.arange(len(loop)), np.flatnonzero(np.diff(limits)) + 1):
+        along = np.cumsum(lengths[stretch])
+        if along[-1] < SHORTEST_NAMED * np.linalg.norm(np.ptp(points, axis=0)):
+            continue
+        middle = stretch[int(np.searchsorted(along, 0.5 * along[-1]))]
+        outward = np.array([steps[middle, 1], -steps[middle, 0]]) / max(lengths[middle], 1e-300)
+        axes.annotate(
+            " ".join(found.limits[limits[middle]]).strip(),
+            corners[middle] + 0.5 * steps[middle],
+            xytext=OFF * outward,
+            textcoords="offset points",
+            ha="left" if outward[0] > SIDEWAYS else "right" if outward[0] < -SIDEWAYS else "center",
+            va="bottom" if outward[1] > SIDEWAYS else "top" if outward[1] < -SIDEWAYS else "center",
+            fontsize=SMALL,
+        )
 
 
 def _draw_solid(axes: Any, found: Region, groups: list[Group]) -> None:
