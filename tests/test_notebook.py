@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import xml.etree.ElementTree as ET
@@ -14,6 +15,7 @@ import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
 from pfabrik.description.sketch import HEIGHT, WIDTH, sketch
 
+MARKED = pf.Options(on_invalid="mark")
 SVG = "{http://www.w3.org/2000/svg}"
 NUMBER = re.compile(r"-?\d+\.?\d*(?:e[-+]?\d+)?|nan|inf", re.IGNORECASE)
 
@@ -143,3 +145,89 @@ def test_a_row_that_was_no_pose_is_shown_without_a_drawing() -> None:
     text = marked._repr_html_()
     assert "invalid" in list(ET.fromstring(text).itertext())
     assert not list(ET.fromstring(text).iter(f"{SVG}svg"))
+
+
+def test_a_workspace_shows_its_size_ends_limits_and_its_outline_in_the_plane() -> None:
+    found = pf.workspace(pf.load("five_bar"), resolution=8.0)
+    text = found._repr_html_()
+    words = list(ET.fromstring(text).itertext())
+    assert any(word.endswith("mm²") for word in words)
+    low, high = found.bounds[:, 0]
+    assert f"y from {low:.6g} to {high:.6g} mm" in words
+    first, *rows = cells(text)
+    assert first == ["border", "formed by", "joint"]
+    assert {(limit, kind) for _, limit, kind in rows} == {
+        (f"{joint} {bound}", "revolute, actuated" if joint in ("p1", "p5") else "revolute")
+        for joint in ("p1", "p2", "p4", "p5")
+        for bound in ("min", "max")
+    }
+    assert sum(float(share.rstrip("%")) for share, *_ in rows) == pytest.approx(100.0, abs=0.5)
+    paths = list(drawing(text).iter(f"{SVG}path"))
+    assert {path.findtext(f"{SVG}title") for path in paths} == {limit for _, limit, _ in rows}
+    assert len({path.get("stroke") for path in paths}) == len(paths)
+    ends = np.array([float(number) for path in paths for number in NUMBER.findall(path.get("d") or "")]).reshape(-1, 2)
+    assert (ends >= 0.0).all() and (ends <= (WIDTH, HEIGHT)).all()
+    y_by_z = np.ptp(found.vertices, axis=0)
+    assert np.ptp(ends, axis=0) == pytest.approx(y_by_z * (np.ptp(ends[:, 0]) / y_by_z[0]), abs=0.2)  # at one scale
+    top = found.vertices[np.argmax(found.vertices[:, 1])]
+    assert ends[np.argmin(ends[:, 1]), 0] == pytest.approx(WIDTH / 2 + top[0] * np.ptp(ends[:, 0]) / y_by_z[0], abs=0.5)
+
+
+def test_a_workspace_of_three_coordinates_and_an_empty_one_show_no_outline() -> None:
+    machine = pf.load("stewart")
+    for found, word in (
+        (pf.workspace(machine, resolution=20.0), "mm³"),
+        (pf.workspace(machine, fixed={"z": 5000.0}), "nothing within reach"),
+    ):
+        text = found._repr_html_()
+        assert any(word in each for each in ET.fromstring(text).itertext())
+        assert not list(ET.fromstring(text).iter(f"{SVG}svg"))
+
+
+def test_names_in_a_workspace_are_escaped() -> None:
+    machine = pf.load("five_bar")
+    joints = [dataclasses.replace(joint, name=joint.name.replace("p1", "<b>&1")) for joint in machine.joints]
+    renamed = pf.Mechanism("<script>&", joints, machine.end_effector, task=machine.task)
+    text = pf.workspace(renamed, resolution=8.0)._repr_html_()
+    assert "<script>" not in text and "<b>&1" not in text
+    assert "<b>&1 max" in [row[1] for row in cells(text)]
+    assert "<b>&1 max" in [path.findtext(f"{SVG}title") for path in drawing(text).iter(f"{SVG}path")]
+
+
+def test_mobility_shows_every_count() -> None:
+    machine = pf.load("nrpm")
+    found = pf.mobility(machine)
+    shown = {name.replace("-", "_"): int(count) for name, count, _ in cells(found._repr_html_())[1:]}
+    assert shown == {**dataclasses.asdict(found), "redundancy": len(machine.actuator_names) - 6}
+
+
+def test_singularity_shows_every_measure_and_what_is_singular() -> None:
+    machine = pf.load("five_bar").without_limits()
+    reached = pf.solve_ik(machine, (0, 0, 175))
+    assert [row[2] for row in cells(pf.singularity(reached)._repr_html_())] == ["singular", *["no"] * 4]
+    stretched = pf.configuration(machine, pf.solve_ik(machine, (0, 0, 1e4)).q)
+    rows = {kind: word for kind, _, word in cells(pf.singularity(stretched)._repr_html_())[1:]}
+    assert rows["serial"] == "yes"
+    batch = pf.singularity(pf.solve_ik(machine, [(0, 0, 175), (0, 10, 180), (0, np.nan, 0)], options=MARKED))
+    text = batch._repr_html_()
+    assert "batch of shape (3,)" in list(ET.fromstring(text).itertext())
+    assert {kind: float(least) for kind, least, _ in cells(text)[1:]} == pytest.approx(
+        {kind: np.nanmin(getattr(batch, kind)) for kind in ("serial", "parallel", "constraint", "passive")}, rel=5e-3
+    )
+
+
+def test_margins_show_the_nearest_limit_first_and_of_a_batch_the_least() -> None:
+    machine = pf.load("stewart")
+    one = pf.margins(pf.solve_ik(machine, (10, 0, 190)))
+    header, *rows = cells(one._repr_html_())
+    assert header == ["joint", "bound", "margin"]
+    assert {(joint, bound) for joint, bound, _ in rows} == set(one)
+    values = [float(value) for *_, value in rows]
+    assert values == sorted(values)
+    batch = pf.margins(pf.solve_ik(machine, [(10, 0, 190), (0, 0, 250), (np.nan, 0, 0)], options=MARKED))
+    header, *rows = cells(batch._repr_html_())
+    assert header == ["joint", "bound", "least margin"]
+    for joint, bound, value in rows:
+        assert float(value) == pytest.approx(np.nanmin(batch[joint, bound]), rel=1e-3, abs=1e-4)
+    none = pf.margins(pf.solve_ik(machine, [(np.nan, 0, 0)], options=MARKED))
+    assert {value for *_, value in cells(none._repr_html_())[1:]} == {"-"}

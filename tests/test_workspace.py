@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
-import sys
 import itertools
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor

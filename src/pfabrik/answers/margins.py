@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ..arrays import Floats, shaped
+from ..description.notebook import card
 from ..frozen import FrozenMapping
 from ..motion.limits import coned, ranges_of
 from ..tolerances import TOLERANCES
 from .solution import Solution, checked_solution
 
 
-def margins(solution: Solution) -> Mapping[tuple[str, str], float | Floats]:
+class Margins(FrozenMapping[tuple[str, str], float | Floats]):
+    """(joint, bound) -> margin, for every limit; `margins` makes them."""
+
+    def _repr_html_(self) -> str:
+        """Every limit, the nearest first, for notebooks; of a batch, the least margin of each."""
+        least = {limit: _least(np.ravel(margin)) for limit, margin in self.items()}
+        order = sorted(least, key=lambda limit: (np.isnan(least[limit]), least[limit]))
+        rows = [(*limit, "-" if np.isnan(least[limit]) else f"{least[limit]:.4g}") for limit in order]
+        is_one = all(np.ndim(margin) == 0 for margin in self.values())
+        return card("Margins", (), ("joint", "bound", "margin" if is_one else "least margin"), rows, "")
+
+
+def _least(margins: Floats) -> float:
+    known = margins[~np.isnan(margins)]
+    return float(known.min()) if len(known) else float("nan")
+
+
+def margins(solution: Solution) -> Margins:
     """(joint, bound) -> how far every limit is from being met, (...,), for every limit of its mechanism.
 
     Bounds are "min", "max" and "cone", as in `ActiveLimit`. A margin is a share of the room there is: of half the
@@ -39,7 +55,7 @@ def margins(solution: Solution) -> Mapping[tuple[str, str], float | Floats]:
             found[joint.name, bound] = each[place] if before is None else np.minimum(each[place], before)
     for joint, angles, half_angle in coned(mechanism, q):
         found[joint.name, "cone"] = (half_angle - angles) / half_angle
-    return FrozenMapping({key: shaped(margin, solution.shape) for key, margin in found.items()})
+    return Margins({key: shaped(margin, solution.shape) for key, margin in found.items()})
 
 
 def nearest_first(solution: Solution) -> list[tuple[str, str, float]]:

@@ -162,7 +162,7 @@ def plain_object(found: Workspace, shape: Inscribed | None) -> dict[str, object]
 
 def describe(found: Workspace, shape: Inscribed | None) -> str:
     """Size, ends, what forms the border, and parts."""
-    from ..workspace.words import in_words
+    from ..workspace.words import in_words, kind_of
 
     if not len(found.faces):
         return "nothing within reach"
@@ -187,12 +187,6 @@ def describe(found: Workspace, shape: Inscribed | None) -> str:
         middle = ", ".join(f"{c * f:.4g}" for c, f in zip(shape.centre.tolist(), shown, strict=True))
         blocks.append(f"largest {shape.kind}: {lengths} about {middle} [{', '.join(dict.fromkeys(units))}]")
     return "\n\n".join(blocks)
-
-
-def kind_of(found: Workspace, name: str) -> str:
-    """What a limit's joint is: "revolute, actuated"; empty where it is none's."""
-    kinds = {joint.name: joint.type + ", actuated" * bool(joint.actuated) for joint in found.mechanism.joints}
-    return kinds.get(name, "")
 
 
 def described_part(found: Workspace, part: Workspace) -> str:

@@ -164,12 +164,13 @@ def _outward(
     leading = [
         each for each in mechanism.joints if driven.issuperset(range(span[each.name].start, span[each.name].stop))
     ]
-    placed, steps = [mechanism.base], []
+    placed, steps = [mechanism.base], list[tuple[Joint, bool]]()
     if not mechanism.end_effector_is_joint:
         placed.append(mechanism.end_effector_body)
     for body in placed:  # which grows
         for joint in leading:
-            for here, there, forward in ((*joint.connects, True), (*reversed(joint.connects), False)):
+            first, second = joint.connects
+            for here, there, forward in ((first, second, True), (second, first, False)):
                 if here == body and there not in placed:
                     placed.append(there)
                     steps.append((joint, forward))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
+from ..description.notebook import card
 from ..tolerances import TOLERANCES
 from .first_order import actuated_columns, first_order, right_singular
 from .walks import around_home
@@ -43,6 +44,23 @@ class Mobility:
     def redundancy(self) -> int:
         """Actuators beyond the freedoms of the end effector; negative where there are too few."""
         return self.actuators - self.platform
+
+    def _repr_html_(self) -> str:
+        """Every count with what it counts, for notebooks."""
+        rows = [(name.replace("_", "-"), str(getattr(self, name)), words) for name, words in _IN_WORDS.items()]
+        return card("Mobility", (), ("", "count", "of"), rows, "")
+
+
+_IN_WORDS = {
+    "mobility": "independent motions of the whole mechanism",
+    "platform": "freedoms of the end effector",
+    "internal": "motions of actuators while the end effector rests",
+    "idle": "motions of neither the end effector nor an actuator",
+    "actuators": "actuated coordinates",
+    "redundancy": "actuators beyond the freedoms of the end effector",
+    "uncontrolled": "freedoms left with all actuators locked",
+    "over_constraints": "loop conditions that follow from the others",
+}
 
 
 @dataclass(frozen=True)

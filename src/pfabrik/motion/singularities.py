@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
+from ..description.notebook import card
 from ..description.task import task_of
 from ..tolerances import TOLERANCES
 from .displacements import displacements
@@ -59,6 +60,20 @@ class Singularity:
     lost: Floats
     gained: Floats
     kinds: tuple[str, ...] | list[tuple[str, ...]]
+
+    def _repr_html_(self) -> str:
+        """Every measure and whether it is singular, for notebooks; of a batch, the least, and how many rows are."""
+        is_one = np.ndim(self.serial) == 0
+        rows = []
+        for kind in KINDS:
+            measure = np.ravel(getattr(self, kind))
+            known = measure[~np.isnan(measure)]
+            least = f"{known.min():.3g}" if len(known) else "-"
+            count = int(np.count_nonzero(known < TOLERANCES.singular))
+            rows.append((kind, least, ("yes" if count else "no") if is_one else str(count)))
+        header = ("kind", "measure", "singular") if is_one else ("kind", "least measure", "singular rows")
+        lines = [] if is_one else [f"batch of shape {np.shape(self.serial)}"]
+        return card("Singularity", lines, header, rows, "")
 
 
 def measures(mechanism: Mechanism, q: Floats) -> Singularity:

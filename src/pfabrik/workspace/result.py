@@ -124,6 +124,12 @@ class Workspace(Region):
             "components": [{"size": each.size, "at_start": each is self.at_start} for each in self.components],
         }
 
+    def _repr_html_(self) -> str:
+        """Size, ends, what forms the border and, over two coordinates, its outline, for notebooks."""
+        from .notebook import workspace_html
+
+        return workspace_html(self)
+
     def __repr__(self) -> str:
         over = ", ".join(self.names)
         return f"<Workspace of '{self.mechanism.name}' over {over}: {in_words(self)}>"

@@ -16,6 +16,12 @@ def in_words(found: Region) -> str:
     )
 
 
+def kind_of(found: Region, name: str) -> str:
+    """What a limit's joint is: "revolute, actuated"; empty where it is none's."""
+    kinds = {joint.name: joint.type + ", actuated" * bool(joint.actuated) for joint in found.mechanism.joints}
+    return kinds.get(name, "")
+
+
 def rounded(value: float, uncertainty: float) -> str:
     """A number to the first digit of its uncertainty."""
     if not uncertainty > 0.0:
