@@ -15,7 +15,6 @@ from pfabrik import Joint, Mechanism
 from pfabrik.description.home_mobility import universal_axes
 from pfabrik.motion.displacements import (
     centres,
-    centres_at,
     columns,
     displacements,
     end_effector_pose,
@@ -25,6 +24,7 @@ from pfabrik.motion.displacements import (
     screws,
     stepped,
 )
+from pfabrik.motion.outward import centres_at
 from pfabrik.motion.walks import around_home
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -278,10 +278,17 @@ def test_centres_are_told_through_driven_and_locked_joints_described_from_either
 
 
 def test_the_centre_of_a_sliding_joint_is_told_by_its_first_body_alone() -> None:
-    joints = [
-        Joint("C", "cylindrical", ("b1", "base"), at=(1, 2, 3), axis=(1, 1, 0), actuated=True),
-        Joint("S", "spherical", ("b1", "b2"), at=(2, 2, 7)),
-    ]
-    machine = Mechanism("slide", joints, "b2", (2, 3, 8))
-    q = anywhere(machine)
-    assert centres_at(machine, end_effector_pose(machine, q), q[:, [drive.column for drive in machine.drives]]) is None
+    def machine(actuated: bool | tuple[bool, bool]) -> Mechanism:
+        joints = [
+            Joint("C", "cylindrical", ("b1", "base"), at=(1, 2, 3), axis=(1, 1, 0), actuated=actuated),
+            Joint("S", "spherical", ("b1", "b2"), at=(2, 2, 7)),
+        ]
+        return Mechanism("slide", joints, "b2", (2, 3, 8))
+
+    whole, half = machine(True), machine((True, False))
+    q = anywhere(whole)
+    poses = end_effector_pose(whole, q)
+    assert centres_at(half, poses, q[:, :1]) is None
+    found = centres_at(whole, poses, q[:, :2])
+    assert found is not None
+    np.testing.assert_allclose(found["C"], centres(whole, q)["C"], atol=1e-12)

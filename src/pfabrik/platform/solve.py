@@ -21,7 +21,7 @@ from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
 from ..kernels.rows import OPEN, PENDING, REACHED, Rows
 from ..kernels.threads import in_blocks
-from ..motion.displacements import centres_at
+from ..motion.outward import centres_at
 from ..options import Options
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
