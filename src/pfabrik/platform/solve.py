@@ -76,9 +76,9 @@ class LegsEngine:
         rows = self._one.new_rows() if is_one else new_rows(self.mechanism, len(targets))
         ends = first.copy() if self._table.leads_arms else first
         if is_one and self._reach_one(targets, start, ends, keep_mode, rows):
-            begins = begins_of(self.mechanism, self._table, start, first)
-            told = rows.poses, rows.actuators, ends
-            return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins()), ends)
+            mechanism, table = self.mechanism, self._table
+            begins, told = begins_of(mechanism, table, start, first), (rows.poses, rows.actuators, ends)
+            return LegAnswers(rows, lambda own: settled(mechanism, table, *told, begins(slice(None)))[own], ends)
         left, sides = self._reach(targets, start, first, keep_mode, rows, tried=is_one)
         carriers, others = None, None
         if left and self._searches:
@@ -264,9 +264,11 @@ class LegsEngine:
 
     def _answer_one(self, rows: Rows, ends: Ends, start: Configurations | None, first: Floats) -> LegAnswers:
         """One row that assembles as an answer, from a start on sides `first`."""
-        begins = begins_of(self.mechanism, self._table, start, first)
-        told, q = (rows.poses, rows.actuators, ends.sides), ends.q
-        return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins(), q), ends.sides, q)
+        mechanism, table, q = self.mechanism, self._table, ends.q
+        begins, told = begins_of(mechanism, table, start, first), (rows.poses, rows.actuators, ends.sides)
+        return LegAnswers(
+            rows, lambda own: settled(mechanism, table, *told, begins(slice(None)), q)[own], ends.sides, q
+        )
 
     def _reach_one(
         self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows
