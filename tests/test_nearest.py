@@ -722,3 +722,129 @@ def test_a_platform_that_never_turns_is_not_looked_for_turned(
     assert (found.status == Status.PROJECTED).all()
     np.testing.assert_allclose(found.rotation_error, angles, atol=1e-9)
     np.testing.assert_allclose(found.position_error, expected.position_error, atol=1e-6 * plain.characteristic_length)
+
+
+# --- asked again ------------------------------------------------------------------------------------------------------
+
+AGAIN = {f"catalogue {name}": partial(pf.load, name) for name in pf.catalog()} | {
+    f"{kind} {name}": make
+    for kind, made in (("positions", positions.MACHINES), ("closure", closure.MACHINES), ("arms", closure.ON_ARMS))
+    for name, make in made.items()
+}
+"""Every machine of the catalogue and of the tests."""
+NEARER = 1e-9
+"""By how much an answer that is asked again may come nearer [L]."""
+
+
+def unlimited_five_bar(base: float, inner: float, outer: float) -> Mechanism:
+    """A 5-bar without limits: feet at +- base / 2, links of these lengths, elbows out."""
+    tip, joints = np.array([0.03 * base, 0.75 * (inner + outer)]), []
+    for side, name in ((-1.0, "1"), (1.0, "2")):
+        foot = np.array([side * base / 2, 0.0])
+        away = np.linalg.norm(tip - foot)
+        turn = np.arctan2(*(tip - foot)[::-1]) - side * np.arccos((inner**2 + away**2 - outer**2) / (2 * inner * away))
+        elbow = foot + inner * np.array([np.cos(turn), np.sin(turn)])
+        joints += [
+            Joint(f"A{name}", "revolute", ("base", f"a{name}"), at=(*foot, 0), axis=(0, 0, 1), actuated=True),
+            Joint(f"B{name}", "revolute", (f"a{name}", f"c{name}"), at=(*elbow, 0), axis=(0, 0, 1)),
+        ]
+    joints.append(Joint("tip", "revolute", ("c1", "c2"), at=(*tip, 0), axis=(0, 0, 1)))
+    return Mechanism("unlimited 5-bar", joints, "tip")
+
+
+def nearest_of_rings(targets: np.ndarray, feet: np.ndarray, radii: tuple[float, float]) -> np.ndarray:
+    """How far targets (n, 2) are from what is within both of two rings: feet on four circles, and their crossings."""
+    candidates = [targets]
+    for foot in feet:
+        out = (targets - foot) / np.linalg.norm(targets - foot, axis=1)[:, None]
+        candidates += [foot + radius * out for radius in radii]
+    span = np.linalg.norm(feet[1] - feet[0])
+    along = (feet[1] - feet[0]) / span
+    for first in radii:
+        for second in radii:
+            x = (span**2 + first**2 - second**2) / (2 * span)
+            if abs(x) <= first:
+                for y in (1.0, -1.0):
+                    corner = feet[0] + x * along + y * np.sqrt(first**2 - x**2) * np.array([-along[1], along[0]])
+                    candidates.append(np.broadcast_to(corner, targets.shape))
+    every = np.stack(candidates)
+    from_feet = np.linalg.norm(every[:, :, None] - feet, axis=-1)
+    inside = ((from_feet <= radii[1] + 1e-9) & (from_feet >= radii[0] - 1e-9)).all(axis=-1)
+    return np.where(inside, np.linalg.norm(every - targets, axis=-1), np.inf).min(axis=0)
+
+
+@pytest.mark.parametrize(("base", "inner", "outer"), [(0.6472, 1.14, 0.9), (0.3, 0.46, 0.46), (118.0, 90.0, 90.0)])
+def test_just_outside_two_rings_answers_are_their_nearest_points(base: float, inner: float, outer: float) -> None:
+    """Links stretch out at the border, where elbows tell of the tip with half their digits: no search stops there."""
+    machine = unlimited_five_bar(base, inner, outer)
+    feet, radii = np.array([[-base / 2, 0.0], [base / 2, 0.0]]), (abs(inner - outer), inner + outer)
+    rng, length = np.random.default_rng(0), machine.characteristic_length
+    n = 20 if INTERPRETED else 1500
+    foot = feet[rng.integers(0, 2, n)]
+    angle, radius = rng.uniform(-np.pi, np.pi, n), radii[1] + length * 10.0 ** rng.uniform(-6, -2, n)
+    targets = foot + radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    distances = nearest_of_rings(targets, feet, radii)
+    answers = pf.solve_ik(machine, np.c_[targets, np.zeros(n)])
+    assert (answers.status == Status.PROJECTED).all()
+    assert np.abs(answers.position_error - distances).max() <= NEARER * length
+    assert answers.certified.mean() > 0.98
+
+
+def asked_of(mechanism: Mechanism, n: int, seed: int = 0) -> tuple[np.ndarray, Solution]:
+    """Targets in and out of the workspace, and just outside: beyond answers to those far out; and the answers."""
+    rng, length = np.random.default_rng(seed), mechanism.characteristic_length
+    far = np.repeat(mechanism.home_pose[None], n, axis=0)
+    away = rng.normal(size=(n, 3))
+    away *= rng.uniform(0.1, 2.0, (n, 1)) * length / np.linalg.norm(away, axis=1)[:, None]
+    far[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-0.4, 0.4, (n, 3))).as_matrix() @ far[:, :3, :3]
+    far[:, :3, 3] += away
+    border = pf.solve_ik(mechanism, far).pose
+    outward = far[:, :3, 3] - border[:, :3, 3]
+    size = np.linalg.norm(outward, axis=1)[:, None]
+    border[:, :3, 3] += np.where(size > 1e-6 * length, outward / np.maximum(size, 1e-300), 0.0) * (
+        length * 10.0 ** rng.uniform(-5, -2, (n, 1))
+    )
+    targets = np.concatenate([far, border])
+    return targets, pf.solve_ik(mechanism, targets)
+
+
+def pose_differences(mechanism: Mechanism, some: Solution, others: Solution) -> np.ndarray:
+    """By how much poses differ, (n,) [L or rad]."""
+    apart = np.abs(some.pose - others.pose)
+    apart[:, :3, 3] /= mechanism.characteristic_length
+    return np.asarray(apart.max(axis=(1, 2)))
+
+
+def check_asked_again(mechanism: Mechanism, n: int, seed: int = 0) -> None:
+    targets, answers = asked_of(mechanism, n, seed)
+    away = np.flatnonzero(answers.status == Status.PROJECTED)
+    if not len(away):
+        return
+    answers, targets = answers[away], targets[away]
+    again = pf.solve_ik(mechanism, targets, start=answers)
+    assert (again.status == Status.PROJECTED).all()
+    more = [own is None and other is not None for own, other in zip(answers.held, again.held, strict=True)]
+    length, same = mechanism.characteristic_length, again.held == answers.held
+    assert (same | more).all()
+    nearer = (distances(mechanism, answers) - distances(mechanism, again)) / length
+    assert nearer[same].max(initial=0.0) <= NEARER
+    assert nearer[same].min(initial=0.0) >= -NEARER
+    assert pose_differences(mechanism, answers, again)[same].max(initial=0.0) <= NEARER
+    there = pf.solve_ik(mechanism, answers.pose, start=answers)
+    assert (there.status == Status.REACHED).all()
+    assert pose_differences(mechanism, answers, there).max() <= NEARER
+    assert np.abs(there.actuators - answers.actuators).max() <= 10.0 * NEARER * max(length, 1.0)
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.parametrize("name", AGAIN)
+def test_answers_asked_again_from_themselves_stay(name: str) -> None:
+    """No answer is nearer when it is asked again, none is farther, and its pose is reached from it as it is."""
+    check_asked_again(AGAIN[name](), 2 if INTERPRETED else 12)
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", AGAIN)
+def test_many_answers_asked_again_from_themselves_stay(name: str) -> None:
+    check_asked_again(AGAIN[name](), 200, seed=1)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .answers.answer import Wanted
 from .answers.solution import Solution
 from .answers.starts import Start, start_of
+from .closure.configurations import Configurations
 from .description.mechanism import Mechanism
 from .engine import inverse_engine_of
 from .errors import InvalidArgument
-from .kernels.rows import REACHED
+from .kernels.rows import HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
+from .tolerances import TOLERANCES
 
 
 def solve_ik(
@@ -48,8 +52,35 @@ def solve_ik(
     refuse_invalid(targets, shape, found.rows.status, options)
     status = found.rows.status
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
-    wanted = Wanted(targets.copy(), options.hold, options.rotation_length) if is_missed else None
+    if not is_missed:
+        return Solution(mechanism, found, shape)
+    wanted = Wanted(targets.copy(), options.hold, options.rotation_length)
+    if begin is not None and isinstance(start, Solution) and start._wanted is not None:
+        found = _unless_nearer(mechanism, found, wanted, begin, start._wanted)
     return Solution(mechanism, found, shape, wanted)
+
+
+def _unless_nearer(
+    mechanism: Mechanism, found: Configurations, wanted: Wanted, start: Configurations, before: Wanted
+) -> Configurations:
+    """What was found, with the start where that is the answer to the same target, and not farther: asked again, an
+    answer stays as it is unless something nearer is found."""
+    if (wanted.hold, wanted.rotation_length) != (before.hold, before.rotation_length):
+        return found
+    lever = wanted.rotation_length or mechanism.rotation_length
+    others, rows = start.rows, found.rows
+    distances, farthest = (
+        np.hypot(each.measures[:, POSITION_ERROR], lever * each.measures[:, ROTATION_ERROR]) for each in (others, rows)
+    )
+    same = (wanted.targets == before.targets).all(axis=(1, 2)) & (others.status == PROJECTED)
+    same &= rows.status != REACHED
+    no_nearer = distances <= farthest + TOLERANCES.position * mechanism.characteristic_length
+    stays = same & np.where(others.holds == rows.holds, no_nearer, rows.holds == HOLD_NOTHING)
+    places = np.flatnonzero(stays)
+    if not len(places):
+        return found
+    own = np.zeros(len(places), np.intp) if len(start) == 1 else places
+    return found.with_others(places, start.at(own))
 
 
 def keeps_mode(options: Options, start: object) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,12 @@ from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDING, RESIDUAL, Rows
 from .close import Closing, Closure, closure_of
+
+Places: TypeAlias = NDArray[np.intp] | slice
+"""Which rows of a batch."""
+
+ROWS_A_CALL = 32
+"""What it takes to find the coordinates of a part of a batch, besides those of its rows [rows]."""
 
 STEPS_A_REPORT = 16
 """Steps along a path between two reports of progress."""
@@ -78,10 +84,12 @@ class Configurations:
     were_given : whether the coordinates were what was searched for; else they follow from the rows when asked for.
     """
 
-    def __init__(self, rows: Rows, coordinates: Floats | Callable[[], Floats]) -> None:
+    def __init__(self, rows: Rows, coordinates: Floats | Callable[[Places], Floats]) -> None:
+        """Coordinates that follow from the rows are those that a call gives for some places."""
         self.rows = rows
         self.were_given = not callable(coordinates)
         self._coordinates = coordinates
+        self._taken = 0
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As configurations whose coordinates were given: how they would be found is not pickled."""
@@ -92,14 +100,28 @@ class Configurations:
 
     @cached_property
     def coordinates(self) -> Floats:
-        return self._coordinates() if callable(self._coordinates) else self._coordinates
+        return self._coordinates(slice(None)) if callable(self._coordinates) else self._coordinates
+
+    def coordinates_at(self, places: NDArray[np.intp]) -> Floats:
+        """The coordinates at some places: of these alone, until parts have taken as long as the whole would."""
+        if not callable(self._coordinates) or "coordinates" in vars(self):
+            return self.coordinates[places]
+        self._taken += len(places) + ROWS_A_CALL
+        return self._coordinates(places) if self._taken < len(self) else self.coordinates[places]
 
     def at(self, places: NDArray[np.intp]) -> Configurations:
         """The configurations at some places, copied."""
         rows = Rows._make(np.ascontiguousarray(array[places]) for array in self.rows)
         if self.were_given:
             return Configurations(rows, self.coordinates[places])
-        return Configurations(rows, lambda: self.coordinates[places])
+        return Configurations(rows, lambda own: self.coordinates_at(places[own]))
+
+    def with_others(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
+        """These configurations with as many others at some places."""
+        rows, coordinates = rows_at(self.rows, np.arange(len(self))), self.coordinates.copy()
+        put_rows(rows, places, others.rows)
+        coordinates[places] = others.coordinates
+        return Configurations(rows, coordinates)
 
     def replace(self, places: NDArray[np.intp], others: Configurations, rows: Mask) -> None:
         """Put some rows of other configurations in some places, in place."""

@@ -65,6 +65,9 @@ WORTH, MUCH = 0.01, 0.1
 """Damping, in units of curvature: at least, after a step that did not lead down; and more than a good step takes back
 at once."""
 
+SOLVABLE = 1e-8
+"""Damping, in units of curvature, for a programme that is not solved: rounding then weighs less than what it asks."""
+
 STEEPEST = 1e8
 """Damping, in units of curvature, that ends a search: no step however short leads down."""
 
@@ -184,21 +187,33 @@ def is_closed(linear: Linearisation, tolerance: float) -> bool:
 
 
 @routine
+def solve_within(linear: Linearisation, closed: bool, p: QP) -> bool:
+    """Solve the programme whose H is factorised: what limits are exceeded by is closed or, where it cannot be, taken as
+    if it were just met; as is what is open by rounding where all is `closed`."""
+    motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
+    for c in range(k):
+        p.h[c] = min(linear.h[c], 0.0) if closed else linear.h[c] + linear.drift[c]
+    if solve_qp(p, motions, k):
+        return True
+    for c in range(k):
+        p.h[c] = min(linear.h[c], 0.0)
+    return solve_qp(p, motions, k)
+
+
+@routine
 def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: float, p: QP) -> tuple[float, float]:
     """The step that the damped programme asks for, into `p.x`: what it takes from the objective, and the damping.
 
     Where curvature is not positive, that across active limits counts more: there is no room to move there. Where that
-    is not enough, damping grows. A programme without a solution takes what is exceeded as if it were just met; so does
-    one where all is closed, for what is open by rounding is nothing to close.
+    is not enough, damping grows. So it does where rounding keeps a programme from its solution: at a corner, where some
+    motions have hardly any curvature.
     """
     motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
-    closed = is_closed(linear, CLOSED)
+    closed, stiff, is_solved = is_closed(linear, CLOSED), 0.0, False
     for c in range(k):
-        p.h[c] = min(linear.h[c], 0.0) if closed else linear.h[c] + linear.drift[c]
         for a in range(motions):
             p.G[c, a] = linear.G[c, a]
-    stiff = 0.0
-    for attempt in range(60):
+    for _attempt in range(60):
         for a in range(motions):
             p.g[a] = linear.g[a]
             for b in range(a + 1):
@@ -209,16 +224,16 @@ def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: fl
                     for b in range(a + 1):
                         p.H[a, b] += stiff * p.G[c, a] * p.G[c, b]
         if factorise(p.H, motions, 1e-300, p.factor):
-            break
-        if attempt == 0:
+            is_solved = solve_within(linear, closed, p)
+            if is_solved:
+                break
+            damping = max(10.0 * damping, SOLVABLE * largest)
+        elif stiff == 0.0:
             stiff = 10.0 * largest
         else:
             damping = max(2.0 * damping, 1e-3 * largest)
-    if not solve_qp(p, motions, k):
-        for c in range(k):
-            p.h[c] = min(linear.h[c], 0.0)
-        if not solve_qp(p, motions, k):
-            return -math.inf, damping
+    if not is_solved:
+        return -math.inf, damping
     promise = 0.0 if closed else -linear.totals[0]["closing"]
     for a in range(motions):
         promise -= linear.g[a] * p.x[a]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.close import closure_of
-from ..closure.configurations import Configurations
+from ..closure.configurations import Configurations, Places, put_rows, rows_at
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.legs import records as K
@@ -30,7 +30,11 @@ class LegAnswers(Configurations):
     """
 
     def __init__(
-        self, rows: Rows, coordinates: Floats | Callable[[], Floats], sides: Floats, carriers: Floats | None = None
+        self,
+        rows: Rows,
+        coordinates: Floats | Callable[[Places], Floats],
+        sides: Floats,
+        carriers: Floats | None = None,
     ) -> None:
         super().__init__(rows, coordinates)
         self._sides, self.carriers = sides, carriers
@@ -47,7 +51,27 @@ class LegAnswers(Configurations):
         """The configurations at some places, copied."""
         rows = super().at(places).rows
         carriers = None if self.carriers is None else self.carriers[places]
-        return LegAnswers(rows, lambda: self.coordinates[places], self.sides[places], carriers)
+        return LegAnswers(rows, lambda own: self.coordinates_at(places[own]), self.sides[places], carriers)
+
+    def with_others(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
+        """These configurations with as many others at some places; coordinates stay to be found where they are."""
+        if not isinstance(others, LegAnswers):
+            return super().with_others(places, others)
+        rows, sides = rows_at(self.rows, np.arange(len(self))), self.sides.copy()
+        put_rows(rows, places, others.rows)
+        sides[places] = others.sides
+        carriers = np.full(sides.shape, np.nan) if self.carriers is None else self.carriers.copy()
+        carriers[places] = np.nan if others.carriers is None else others.carriers
+        which = np.full(len(self), -1)
+        which[places] = np.arange(len(places))
+
+        def coordinates(own: Places) -> Floats:
+            at = np.arange(len(which))[own]
+            found, is_other = self.coordinates_at(at), which[at] >= 0
+            found[is_other] = others.coordinates_at(which[at[is_other]])
+            return found
+
+        return LegAnswers(rows, coordinates, sides, carriers)
 
 
 def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Floats:
@@ -87,18 +111,19 @@ def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Fl
 
 def begins_of(
     mechanism: Mechanism, table: LegTable, start: Configurations | None, sides: Floats
-) -> Callable[[], Floats | None]:
-    """Gives the joint coordinates of a start, None for home.
+) -> Callable[[Places], Floats | None]:
+    """Gives the joint coordinates of starts at some places, or of the one for all; None for home.
 
     Of a start that knows its coordinates no other way, the pose and the actuators are kept, not how it was found:
     answers that start from each other would all stay in memory.
     """
     if start is None:
-        return lambda: None
+        return lambda places: None
     if start.were_given:
         given = start.coordinates
-        return lambda: given
-    return partial(settled, mechanism, table, start.rows.poses, start.rows.actuators, sides, None)
+        return lambda places: given if len(given) == 1 else given[places]
+    told = start.rows.poses, start.rows.actuators, sides
+    return lambda places: settled(mechanism, table, *(each if len(each) == 1 else each[places] for each in told), None)
 
 
 def coordinates_of(
@@ -107,26 +132,29 @@ def coordinates_of(
     rows: Rows,
     sides: Floats,
     carriers: Floats | None,
-    begins: Callable[[], Floats | None],
+    begins: Callable[[Places], Floats | None],
     rest: NDArray[np.intp],
     others: Configurations | None,
+    places: Places,
 ) -> Floats:
-    """Joint coordinates (n, columns) of answers, those of the other engine (`rest`) as it has them."""
-    own = np.setdiff1d(np.arange(len(rows.status)), rest)
-    begin = begins()
-    if begin is not None and len(begin) > 1:
-        begin = begin[own]
+    """Joint coordinates (n, columns) of the answers at some places, those of the other engine (`rest`) as it has
+    them."""
+    at = np.arange(len(rows.status))[places]
+    elsewhere = np.full(len(rows.status), -1)
+    elsewhere[rest] = np.arange(len(rest))
+    is_own = elsewhere[at] < 0
+    own = at[is_own]
     found = settled(
         mechanism,
         table,
         rows.poses[own],
         rows.actuators[own],
         sides if len(sides) == 1 else sides[own],
-        begin,
+        begins(own),
         None if carriers is None else carriers[own],
     )
     if others is None:
         return found
-    every = np.empty((len(rows.status), found.shape[1]))
-    every[own], every[rest] = found, others.coordinates
+    every = np.empty((len(at), found.shape[1]))
+    every[is_own], every[~is_own] = found, others.coordinates[elsewhere[at[~is_own]]]
     return every

@@ -19,7 +19,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
-from ..kernels.rows import OPEN, PENDING, REACHED, Rows
+from ..kernels.rows import OPEN, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
 from ..motion.outward import centres_at
 from ..options import Options
@@ -76,9 +76,9 @@ class LegsEngine:
         rows = self._one.new_rows() if is_one else new_rows(self.mechanism, len(targets))
         ends = first.copy() if self._table.leads_arms else first
         if is_one and self._reach_one(targets, start, ends, keep_mode, rows):
-            begins = begins_of(self.mechanism, self._table, start, first)
-            told = rows.poses, rows.actuators, ends
-            return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins()), ends)
+            mechanism, table = self.mechanism, self._table
+            begins, told = begins_of(mechanism, table, start, first), (rows.poses, rows.actuators, ends)
+            return LegAnswers(rows, lambda own: settled(mechanism, table, *told, begins(slice(None)))[own], ends)
         left, sides = self._reach(targets, start, first, keep_mode, rows, tried=is_one)
         carriers, others = None, None
         if left and self._searches:
@@ -94,14 +94,35 @@ class LegsEngine:
             unreached.answer(away, partial(answer_unreached, question))
             if start is not None:
                 self._count_turns(start.rows.actuators, rows)
-        rest = (rows.status == PENDING if carriers is not None else rows.status != REACHED).nonzero()[0]
-        if len(rest) == len(targets):
-            return self._inner.answer(targets, start, options, keep_mode=keep_mode)
+        waits = (rows.status == PENDING) | (rows.status == UNSURE) if carriers is not None else rows.status != REACHED
+        rest = waits.nonzero()[0]
         if len(rest):
-            begin = start if start is None or len(start) == 1 else start.at(rest)
+            begin = start if start is None or len(start) == 1 or len(rest) == len(start) else start.at(rest)
             others = self._inner.answer(targets[rest], begin, options, keep_mode=keep_mode)
+            stays = self._stay(rows_at(rows, rest), others.rows, options)
+            rows.status[rest[stays]] = PROJECTED
+            rest, others = rest[~stays], others if not stays.any() else others.at(np.flatnonzero(~stays))
+            if len(rest) == len(targets):
+                return others
             put_rows(rows, rest, others.rows)
+            sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides
+            sides[rest] = sides_at(self.mechanism, self._table, others)
+            if carriers is not None:
+                carriers[rest] = np.nan
         return self._answers(rows, sides, carriers, start, first, rest, others)
+
+    def _stay(self, rows: Rows, others: Rows, options: Options) -> Mask:
+        """Which projections that are UNSURE stay: others of their targets are not reached, and no nearer."""
+        lever = options.rotation_length or self.mechanism.rotation_length
+        away, off = (
+            np.hypot(each.measures[:, POSITION_ERROR], lever * each.measures[:, ROTATION_ERROR])
+            for each in (rows, others)
+        )
+        nearer = (others.status == PROJECTED) & (
+            off < away - TOLERANCES.position * self.mechanism.characteristic_length
+        )
+        better = (others.status == REACHED) | (nearer & (others.holds >= rows.holds))
+        return np.asarray((rows.status == UNSURE) & ~better)
 
     def prepared(
         self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool
@@ -264,9 +285,11 @@ class LegsEngine:
 
     def _answer_one(self, rows: Rows, ends: Ends, start: Configurations | None, first: Floats) -> LegAnswers:
         """One row that assembles as an answer, from a start on sides `first`."""
-        begins = begins_of(self.mechanism, self._table, start, first)
-        told, q = (rows.poses, rows.actuators, ends.sides), ends.q
-        return LegAnswers(rows, lambda: settled(self.mechanism, self._table, *told, begins(), q), ends.sides, q)
+        mechanism, table, q = self.mechanism, self._table, ends.q
+        begins, told = begins_of(mechanism, table, start, first), (rows.poses, rows.actuators, ends.sides)
+        return LegAnswers(
+            rows, lambda own: settled(mechanism, table, *told, begins(slice(None)), q)[own], ends.sides, q
+        )
 
     def _reach_one(
         self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows

@@ -16,7 +16,7 @@ from ..closure.parasitic import strays
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Found, Starts
-from ..kernels.rows import PENDING, POSITION_ERROR, REACHED, ROTATION_ERROR, Rows
+from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options
 from .approach import starts_at
@@ -89,7 +89,7 @@ def _answer_otherwise() -> Callable[..., int]:
 
 
 def answer_unreached(question: Question, some: Unreached) -> None:
-    """Answer targets in other working modes, or by the nearest feasible poses; some may stay PENDING."""
+    """Answer targets in other working modes, or by the nearest feasible poses; some may stay PENDING or UNSURE."""
     table = question.table
     if question.keep_mode or not table.has_sides:
         _answer_completed(question, some)
@@ -159,7 +159,8 @@ def _reach_from(corners: Starts, question: Question, some: Unreached) -> Mask:
 
 def _project(question: Question, some: Unreached) -> None:
     """Answer rows by the nearest feasible poses, and exactly from there where these are as good as reached, or the task
-    leaves some of the pose open."""
+    leaves some of the pose open. Those as good as reached that are not, and not certain to be the nearest, are UNSURE.
+    """
     mechanism, table, options, keep_mode, nearby = question
     targets, begins, sides, carriers, rows = some
     n, own = len(targets), starts_at(mechanism, table, begins, sides[: len(begins)])
@@ -170,9 +171,9 @@ def _project(question: Question, some: Unreached) -> None:
         return
     placed = slice(None) if left == 0 else found.distances < np.inf
     sides[placed], carriers[placed] = found.sides[placed], found.q[placed]
-    is_near = found.distances <= NEARLY
+    is_near = (found.distances <= NEARLY) & ~(rows.certain & (rows.status == PROJECTED))
     if np.count_nonzero(is_near):
-        rows.status[is_near], carriers[is_near] = PENDING, np.nan
+        rows.status[is_near] = UNSURE
     asked = (machine_nearby if nearby else machine)(table)
     some.answer(found.distances < np.inf if table.is_partial else is_near, partial(_reach_again, asked))
 

@@ -36,7 +36,7 @@ from .equations import Now, close_rods
 from .lagrangian import lagrangian_hessian
 from .linearise import linearise
 from .records import Aim
-from .search import NEAR, NEARBY, STEPS_AWAY, Search, copy_now, move
+from .search import NEAR, NEARBY, STEPS_AWAY, Search, copy_now, count_platform, move
 
 HOPELESS = 8.0
 """A search that is farther than the nearest yet by so many times what its last step promised is given up, unless the
@@ -58,6 +58,10 @@ thousandth."""
 
 BY = 0.01
 """A search that comes so near to the nearest configuration met yet [rad or L] would end there."""
+
+MISSES = 4
+"""Steps that left loops open and did not lead down after which equations are solved for the platform too: next to a
+dead point a carrier tells where the platform is so steeply that the model is good for far less than is left to go."""
 
 
 @routine
@@ -166,6 +170,7 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
             copy_now(search.closed, search.best)
             linearise(table, row, aim, search.best, search, view)
         distance = go_down(table, row, aim, least, met, closing, search)
+        count_platform(2, search)
         if distance >= 0.0:
             return distance
     return math.inf
@@ -182,6 +187,7 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
     view, other, hessian, control = search.first, search.second, search.hessian, search.control[0]
     unit = search.gradient.unit
     begin_descent(view.linear, hessian, control)
+    missed = 0
     while control["done"] == 0:
         if not has_same_curvature(view, other, control):
             control["largest"] = lagrangian_hessian(table, row, aim, search, view)
@@ -200,6 +206,10 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
                     closes = restore_feasibility(table, row, aim, search.trial, tolerance, search, other, CORRECTIONS)
                     closes = closes or other.linear.totals[0]["gap"] <= max(CLOSED, openness(view.linear))
                 led_down = judge_step(view.linear, other.linear, closes, share, control)
+                if not led_down and not is_closed(other.linear, CLOSED):
+                    missed += 1
+                    if missed == MISSES:
+                        count_platform(1, search)
                 if led_down:
                     copy_now(search.trial, search.best)
                     view, other = other, view

@@ -106,6 +106,15 @@ def fix(aim: PoseObjective, in_place: bool, search: Search) -> None:
 
 
 @routine
+def count_platform(users: int, search: Search) -> None:
+    """Have equations solved for the platform as readily as for what carries their rods (1), or where those do not tell
+    (2): what moves of it then counts as what legs have in common."""
+    used = search.elimination.used
+    for j in range(6):
+        used[j] = users if used[j] > 0 else 0
+
+
+@routine
 def move(table: Table, step: Floats, share: float, now: Now) -> None:
     """Take a share of a step."""
     pose, q, columns = now.pose, now.q, table.columns
