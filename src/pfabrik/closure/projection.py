@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, Mask
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
@@ -28,6 +28,11 @@ HITS = 7
 """How many searches must end at the nearest configuration found before no other is looked for."""
 
 
+DRAGGED = 1.0
+"""How much farther than where it starts an answer may be that holds part of its target, for each unit by which that
+part differs at the start [L per rad, or rad per L]: a turn about the middle of a machine moves no joint by more."""
+
+
 class Way(NamedTuple):
     """A way to project: weights of the platform's position [L] and rotation [rad], and what of them is held."""
 
@@ -44,6 +49,19 @@ class Way(NamedTuple):
         position, rotation = task_of(closure.mechanism).errors(poses, targets)
         turning = np.sqrt(max((weight for weight in self.weights[3:] if weight != LOCKED), default=0.0))
         return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, turning * rotation))
+
+    def is_too_far(self, closure: Closure, distances: Floats, starts: Floats, targets: Floats) -> Mask:
+        """Whether answers that hold part of their targets are farther than the poses (n, 4, 4) where searches start, and
+        by more than it could cost to hold that part, (n,).
+
+        With d the distance of an answer and d0 that of its start in what is not held, and e0 how far the start is from
+        having what is: d > d0 + e0.
+        """
+        position, rotation = task_of(closure.mechanism).errors(starts, targets)
+        position = position / closure.mechanism.characteristic_length
+        lacking = rotation if self.hold == HOLD_ORIENTATION else position
+        allowed = self.distances(closure, starts, targets) + DRAGGED * lacking
+        return np.asarray((distances < np.inf) & (distances > (1.0 + SAME) * allowed))
 
 
 class Projected(NamedTuple):
