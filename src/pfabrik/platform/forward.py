@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.configurations import Configurations, new_rows
-from ..decomposition.leg_table import LegTable
+from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
@@ -36,7 +37,8 @@ def assembled(
 ) -> tuple[Rows, Floats, Floats]:
     """Configurations that have actuated values (n, n_a), within all limits; rows without one are PENDING.
 
-    Without a start, the row's own configuration is looked for from elsewhere too.
+    What does not assemble from where it starts is assembled from elsewhere: from a start only where that beats a
+    projection, and where legs do not assemble in its mode beyond a limit.
 
     Parameters
     ----------
@@ -47,21 +49,56 @@ def assembled(
     -------
     The rows, the coordinates of the legs' carriers (n, legs) [L or rad], and the sides of the answers (n, legs).
     """
+    is_cold = start is None
     own = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
     rows, (wanted, *ends) = tried or _assembled_from(mechanism, table, values, own)
-    found, rest = Starts(rows.poses, *ends), np.flatnonzero(rows.status == PENDING)
-    if start is None and len(rest):
-        filled = rows.status, wanted, *found, rows.measures
-        parts = [array[rest] for array in (rows.actuators, *filled)]
-        _assemble(mechanism, table, own, corners_of(mechanism), parts)
-        for array, part in zip(filled, parts[1:], strict=True):
-            array[rest] = part
-        rest = np.flatnonzero(rows.status == PENDING)
-    if len(rest):
-        _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
-        near = rest[rows.measures[rest, ACTUATOR_ERROR] <= tolerance]
-        rows.status[near[rows.status[near] == PROJECTED]] = REACHED
+    found, strayed = Starts(rows.poses, *ends), rows.status == PENDING
+    missed = partial(_assemble_missed, mechanism, table, values, own, rows, wanted, found)
+    if is_cold:
+        missed(corners_of, np.flatnonzero(rows.status != REACHED))
+    rest = np.flatnonzero(rows.status != REACHED)
+    if not len(rest):
+        return rows, found.q, found.sides
+    rows.status[rest] = PENDING
+    _project(mechanism, table, wanted, own, rest, rows, found, anywhere=is_cold)
+    near = rest[rows.measures[rest, ACTUATOR_ERROR] <= tolerance]
+    rows.status[near[rows.status[near] == PROJECTED]] = REACHED
+    if not is_cold:
+        missed(_starts_elsewhere, np.flatnonzero(strayed & (rows.status != REACHED)))
     return rows, found.q, found.sides
+
+
+@lru_cache(maxsize=64)
+def _starts_elsewhere(mechanism: Mechanism) -> Starts:
+    """Home, then the corners."""
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
+    home = home_start(mechanism, table)
+    return Starts(*(np.concatenate(both) for both in zip(home, corners_of(mechanism), strict=True)))
+
+
+def _assemble_missed(
+    mechanism: Mechanism,
+    table: LegTable,
+    values: Floats,
+    own: Starts,
+    rows: Rows,
+    wanted: Floats,
+    found: Starts,
+    elsewhere: Callable[[Mechanism], Starts],
+    places: NDArray[np.intp],
+) -> None:
+    """Assemble rows that are missed from elsewhere, nearest to their starts; those reached replace what they were."""
+    if not len(places):
+        return
+    filled, asked = [rows.status, wanted, *found, rows.measures], values[places]
+    parts = [array[places] for array in filled]
+    _assemble(mechanism, table, own.of(places), elsewhere(mechanism), [asked, *parts])
+    reached = parts[0] == REACHED
+    for array, part in zip(filled, parts, strict=True):
+        array[places[reached]] = part[reached]
+    rows.actuators[places[reached]] = asked[reached]
+    rows.measures[places[reached], ACTUATOR_ERROR] = 0.0
 
 
 def _assembled_from(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts) -> tuple[Rows, Ends]:

@@ -75,7 +75,9 @@ def is_completed(mechanism: Mechanism) -> bool:
 
 def _reach_otherwise(way: Approach, targets: Floats, own: Starts, found: Found) -> None:
     """Answer the rows that another way to project reaches: near singularities each misses others."""
-    asked = ((found.status == PROJECTED) & (found.distances < np.inf) & (found.counters[:, HOLD] < CERTAIN)).nonzero()[0]
+    asked = ((found.status == PROJECTED) & (found.distances < np.inf) & (found.counters[:, HOLD] < CERTAIN)).nonzero()[
+        0
+    ]
     if not len(asked):
         return
     some = found.at(asked)
@@ -85,9 +87,7 @@ def _reach_otherwise(way: Approach, targets: Floats, own: Starts, found: Found) 
     found.put(asked[reached], some.at(reached))
 
 
-def _let_go(
-    mechanism: Mechanism, options: Options, free: Approach, targets: Floats, own: Starts, found: Found
-) -> None:
+def _let_go(mechanism: Mechanism, options: Options, free: Approach, targets: Floats, own: Starts, found: Found) -> None:
     """Hold nothing where what was held leads farther from targets than the start is, and nothing held does not: see
     `Way.is_too_far`."""
     held, nothing = ways_of(mechanism, options.hold, options.rotation_length)
@@ -104,9 +104,7 @@ def _let_go(
 
 
 @lru_cache(maxsize=256)
-def _ways(
-    mechanism: Mechanism, options: Options, hold: str | None, corners: bool, stays: bool
-) -> tuple[Approach, ...]:
+def _ways(mechanism: Mechanism, options: Options, hold: str | None, corners: bool, stays: bool) -> tuple[Approach, ...]:
     """The ways to project, in the order in which they are tried."""
     table, length = leg_table(mechanism), mechanism.characteristic_length
     assert isinstance(table, LegTable)
