@@ -13,7 +13,7 @@ from ..description.mechanism import Mechanism
 from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
-from .close import Closing, Closure, close, closure_of, platform_poses
+from .close import CLOSED, Closing, Closure, close, closure_of, platform_poses
 from .configurations import Configurations
 from .descend import nearest_actuators
 from .starts import same_random_starts
@@ -40,12 +40,14 @@ SIGHT = 3.0
 def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
     """Close the loops at actuated values (n, n_a), or at feasible ones as near as a search brings them.
 
-    Newton's method with the actuators locked; where it strays, the actuators led to their values in steps; then, unless
-    `seeded`, random starts; then the nearest feasible values.
+    Newton's method with the actuators locked; where it strays, the actuators led to their values in steps; then random
+    starts; then the nearest feasible values.
 
     Parameters
     ----------
     coordinates : joint coordinates to start from, (n, columns), deviations from home.
+    seeded : they are to stay in their mode where they assemble in it, within limits or not. Other starts, home the
+        first, only replace a projection.
 
     Returns
     -------
@@ -60,9 +62,28 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seede
             if len(rest):
                 best.improve(rest, attempt(closure, coordinates[rest], poses[rest], values[rest]))
     rest = np.flatnonzero(~best.feasible)
-    if len(rest):
-        _project(closure, best, rest, (coordinates[rest], poses[rest]), values[rest], seeded)
+    if not len(rest):
+        return best
+    strayed = best.gap[rest] > CLOSED
+    _project(closure, best, rest, (coordinates[rest], poses[rest]), values[rest], seeded)
+    if seeded:
+        off = np.abs(actuator_errors(closure, best.coordinates[rest], values[rest])).max(axis=1, initial=0.0)
+        missed = rest[strayed & ((off > NEAR) | ~best.feasible[rest])]
+        if len(missed):
+            _assemble_elsewhere(closure, best, missed, poses[missed], values[missed])
     return best
+
+
+def _assemble_elsewhere(closure: Closure, best: Closing, rows: NDArray[np.intp], poses: Floats, values: Floats) -> None:
+    """Assemble rows from home, or else from random starts, nearest to their own poses (n, 4, 4); where that fails they
+    stay as they are."""
+    home = np.zeros_like(best.coordinates[rows]), np.repeat(closure.mechanism.home_pose[None], len(rows), axis=0)
+    tried = _locked(closure, *home, values)
+    missed = np.flatnonzero(~tried.feasible)
+    if len(missed):
+        tried.improve(missed, _scattered(closure, home[0][missed], poses[missed], values[missed]))
+    reached = np.flatnonzero(tried.feasible)
+    best.take(rows[reached], tried, reached)
 
 
 def _over_determined(mechanism: Mechanism) -> bool:

@@ -51,8 +51,8 @@ class Way(NamedTuple):
         return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, turning * rotation))
 
     def is_too_far(self, closure: Closure, distances: Floats, starts: Floats, targets: Floats) -> Mask:
-        """Whether answers that hold part of their targets are farther than the poses (n, 4, 4) where searches start, and
-        by more than it could cost to hold that part, (n,).
+        """Whether answers that hold part of their targets are farther than the poses (n, 4, 4) where searches start,
+        and by more than holding it may cost, (n,).
 
         With d the distance of an answer and d0 that of its start in what is not held, and e0 how far the start is from
         having what is: d > d0 + e0.
