@@ -153,7 +153,7 @@ def _hits(table: LegTable) -> int:
     if task["rows"] > 0 or len(table.arms):
         return HITS
     carriers = table.legs["carrier"][carriers_of(table)["leg"]]
-    return HITS_OF_STRUTS if not len(carriers) else HITS_OF_RAILS if (carriers == K.RAIL).any() else HITS
+    return HITS_OF_STRUTS if not len(carriers) else HITS_OF_RAILS if (carriers == K.CARRIAGE).any() else HITS
 
 
 def carriers_of(table: LegTable) -> Records:
