@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,8 @@ from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .close import CLOSED, Closing, Closure, close, closure_of, platform_poses
 from .configurations import Configurations
-from .descend import nearest_actuators
+from .descend import MOST_STEPS, nearest_actuators
+from .effort import descents_within
 from .starts import same_random_starts
 
 STRIDES = 8
@@ -145,17 +146,18 @@ def _project(
     ended = best.coordinates[rest], best.poses[rest]
     found = close(closure, *start, max_iterations=0)
     distance = np.full(len(rest), np.inf)
+    n, steps = descents_within(closure, 2 if seeded else 2 + PROJECTIONS, MOST_STEPS)
     others = () if seeded else _newton_ends(closure, values)
-    for coordinates, poses in chain([ended, start], others):
+    for coordinates, poses in islice(chain([ended, start], others), n):
         waiting = np.flatnonzero(distance > NEAR)
         if not len(waiting):
             break
-        tried = nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting])
+        tried = nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting], steps)
         _take_nearer(closure, found, distance, waiting, tried, values)
     waiting = np.flatnonzero(np.isinf(distance))
     if len(waiting):
         asked = _within_sight(closure, start[0][waiting], values[waiting])
-        tried = nearest_actuators(closure, start[0][waiting], start[1][waiting], asked)
+        tried = nearest_actuators(closure, start[0][waiting], start[1][waiting], asked, steps)
         _take_nearer(closure, found, distance, waiting, tried, values)
     feasible = np.flatnonzero(found.feasible)
     best.take(rest[feasible], found, feasible)
