@@ -88,7 +88,9 @@ def _assemble_elsewhere(closure: Closure, best: Closing, rows: NDArray[np.intp],
 
 
 def _over_determined(mechanism: Mechanism) -> bool:
-    """Whether there are more actuators than motions: then most values contradict each other."""
+    """Whether there are more actuators than motions: then most values contradict each other. Never without loops."""
+    if len(closure_of(mechanism).loops.paths) <= 2:
+        return False
     counted = generic_of(mechanism).mobility
     return counted.actuators > counted.mobility - counted.idle
 
@@ -146,7 +148,8 @@ def _project(
     ended = best.coordinates[rest], best.poses[rest]
     found = close(closure, *start, max_iterations=0)
     distance = np.full(len(rest), np.inf)
-    n, steps = descents_within(closure, 2 if seeded else 2 + PROJECTIONS, MOST_STEPS)
+    ranged = np.isfinite(closure.loops.lo[closure.actuated]) | np.isfinite(closure.loops.hi[closure.actuated])
+    n, steps = descents_within(closure, 2 if seeded else 2 + PROJECTIONS, MOST_STEPS, np.count_nonzero(ranged))
     others = () if seeded else _newton_ends(closure, values)
     for coordinates, poses in islice(chain([ended, start], others), n):
         waiting = np.flatnonzero(distance > NEAR)

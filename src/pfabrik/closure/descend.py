@@ -14,6 +14,7 @@ from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, Closing, Closure, close, closing_of, closure_of, new_closed
+from .effort import steps_within
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -58,12 +59,16 @@ def nearest_actuators(
     Parameters
     ----------
     coordinates, poses : where to start, (n, columns) and (n, 4, 4); need not be closed, nor within limits.
-    steps : each search may take; with none it ends where loops close within limits.
+    steps : each search may take; with none it ends where loops close within limits, from values put within ranges.
     """
     anchors, weights = coordinates.copy(), np.zeros(len(closure.scale))
     closure.put_actuators(anchors, values)
     weights[closure.actuated] = 1.0
-    begin = close(closure, anchors, poses, limits=True, margin=TOLERANCES.inside)
+    if steps == 0:
+        lo, hi = closure.loops.lo + TOLERANCES.inside, closure.loops.hi - TOLERANCES.inside
+        anchors = np.where(lo <= hi, np.clip(anchors * closure.scale, lo, hi) / closure.scale, anchors)
+    most = steps_within(closure, 100)
+    begin = close(closure, anchors, poses, limits=True, margin=TOLERANCES.inside, max_iterations=most)
     if steps == 0:
         return begin
     free = _objective(closure, begin.poses, EVERYTHING_FREE, BASE_AXES, steps)

@@ -21,6 +21,9 @@ DESCENDING = 4e9
 """Likewise for the steps of all descents of one answer: one takes the cube of the number of all coordinates, several
 times."""
 
+TAKEN_UP = 4
+"""What taking up a limit costs, in squares of the number of coordinates."""
+
 ENOUGH = 20
 """Steps that a closing may always take: those that arrive need ten to fifteen, however long the chain."""
 
@@ -44,9 +47,15 @@ def stride_within(closure: Closure, most: int, strides: int) -> int:
     return steps if steps >= FEWEST else 0
 
 
-def descents_within(closure: Closure, starts: int, most: int) -> tuple[int, int]:
-    """How many descents of so many begin, and how many steps each may take; no steps where too few are left."""
-    steps = int(DESCENDING / max(1, np.count_nonzero(~closure.idle)) ** 3)
+def descents_within(closure: Closure, starts: int, most: int, met: int = 0) -> tuple[int, int]:
+    """How many descents of so many begin, and how many steps each may take; no steps where too few are left.
+
+    Parameters
+    ----------
+    met : how many limits a step may meet: it takes them up one by one.
+    """
+    moving = max(1, np.count_nonzero(~closure.idle))
+    steps = int(DESCENDING / (moving**2 * (moving + TAKEN_UP * met)))
     n = min(starts, max(1, steps // A_DESCENT))
     steps = min(most, steps // n)
     return n, steps if steps >= FEWEST else 0

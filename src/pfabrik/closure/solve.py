@@ -303,7 +303,7 @@ def _led(closure: Closure, targets: Floats, start: Floats, begin: Floats, held: 
     """The platform led from where it is to its target; where what is not held leaps on the way, nothing is found."""
     task, present, steps = task_of(closure.mechanism), begin, stride_within(closure, 100, STRIDES)
     if steps == 0:
-        return _close_below(closure, start, targets, held, limits=limits)
+        return _close_below(closure, start, targets, held, 0 if limits else 100, limits=limits)
     leapt = np.zeros(len(targets), bool)
     for stride in range(1, STRIDES + 1):
         way = between(begin, targets, stride / STRIDES)
