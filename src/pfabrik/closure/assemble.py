@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import chain, islice
 
 import numpy as np
@@ -31,6 +32,10 @@ SAME = 1e-3
 NEAR = 1e-6
 """Actuators this near to the asked values need no search from elsewhere for nearer ones [L or rad]."""
 
+NOISE = 1e-4
+"""How far readings of more actuators than freedoms are off for noise alone [L or rad]: those that fit as well from a
+start contradict each other, and fit exactly nowhere else."""
+
 PROJECTIONS = 12
 """Random starts of the search for feasible values near those that no configuration has."""
 
@@ -57,7 +62,7 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seede
     closure, poses = closure_of(mechanism), platform_poses(mechanism, coordinates)
     best = _locked(closure, coordinates, poses, values)
     if not best.feasible.all():
-        attempts = [] if _over_determined(mechanism) else [_led]
+        attempts = [] if is_over_determined(mechanism) else [_led]
         for attempt in attempts if seeded else [*attempts, _scattered]:
             rest = np.flatnonzero(~best.feasible)
             if len(rest):
@@ -69,7 +74,8 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seede
     _project(closure, best, rest, (coordinates[rest], poses[rest]), values[rest], seeded)
     if seeded:
         off = np.abs(actuator_errors(closure, best.coordinates[rest], values[rest])).max(axis=1, initial=0.0)
-        missed = rest[strayed & ((off > NEAR) | ~best.feasible[rest])]
+        near = NOISE if is_over_determined(mechanism) else NEAR
+        missed = rest[strayed & ((off > near) | ~best.feasible[rest])]
         if len(missed):
             _assemble_elsewhere(closure, best, missed, poses[missed], values[missed])
     return best
@@ -87,7 +93,8 @@ def _assemble_elsewhere(closure: Closure, best: Closing, rows: NDArray[np.intp],
     best.take(rows[reached], tried, reached)
 
 
-def _over_determined(mechanism: Mechanism) -> bool:
+@lru_cache(maxsize=64)
+def is_over_determined(mechanism: Mechanism) -> bool:
     """Whether there are more actuators than motions: then most values contradict each other. Never without loops."""
     if len(closure_of(mechanism).loops.paths) <= 2:
         return False

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..closure.assemble import NOISE, is_over_determined
 from ..closure.configurations import Configurations, new_rows
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
@@ -53,9 +54,9 @@ def assembled(
     own = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
     rows, (wanted, *ends) = tried or _assembled_from(mechanism, table, values, own)
     found, strayed = Starts(rows.poses, *ends), rows.status == PENDING
-    missed = partial(_assemble_missed, mechanism, table, values, own, rows, wanted, found)
+    missed = partial(_assemble_missed, mechanism, table, values, rows, wanted, found)
     if is_cold:
-        missed(corners_of, np.flatnonzero(rows.status != REACHED))
+        missed(own, corners_of, np.flatnonzero(rows.status != REACHED))
     rest = np.flatnonzero(rows.status != REACHED)
     if not len(rest):
         return rows, found.q, found.sides
@@ -63,8 +64,16 @@ def assembled(
     _project(mechanism, table, wanted, own, rest, rows, found, anywhere=is_cold)
     near = rest[rows.measures[rest, ACTUATOR_ERROR] <= tolerance]
     rows.status[near[rows.status[near] == PROJECTED]] = REACHED
-    if not is_cold:
-        missed(_starts_elsewhere, np.flatnonzero(strayed & (rows.status != REACHED)))
+    strayed &= rows.status != REACHED
+    if is_cold or not np.count_nonzero(strayed):
+        return rows, found.q, found.sides
+    if is_over_determined(mechanism):
+        strayed &= (rows.status == PENDING) | (rows.measures[:, ACTUATOR_ERROR] > NOISE)
+    missed(own, _starts_elsewhere, np.flatnonzero(strayed))
+    missed(home_start(mechanism, table), corners_of, np.flatnonzero(strayed & (rows.status != REACHED)))
+    places = np.flatnonzero(strayed & (rows.status != REACHED))
+    if len(places):
+        _project_elsewhere(mechanism, table, wanted, own, places, rows, values, found, tolerance)
     return rows, found.q, found.sides
 
 
@@ -81,14 +90,17 @@ def _assemble_missed(
     mechanism: Mechanism,
     table: LegTable,
     values: Floats,
-    own: Starts,
     rows: Rows,
     wanted: Floats,
     found: Starts,
+    own: Starts,
     elsewhere: Callable[[Mechanism], Starts],
     places: NDArray[np.intp],
 ) -> None:
-    """Assemble rows that are missed from elsewhere, nearest to their starts; those reached replace what they were."""
+    """Assemble rows that are missed from elsewhere, nearest to where they start; those reached replace what they were.
+
+    From where they start actuators are led to their values: from home too, which is a start of its own for that.
+    """
     if not len(places):
         return
     filled, asked = [rows.status, wanted, *found, rows.measures], values[places]
@@ -99,6 +111,28 @@ def _assemble_missed(
         array[places[reached]] = part[reached]
     rows.actuators[places[reached]] = asked[reached]
     rows.measures[places[reached], ACTUATOR_ERROR] = 0.0
+
+
+def _project_elsewhere(
+    mechanism: Mechanism,
+    table: LegTable,
+    wanted: Floats,
+    own: Starts,
+    places: NDArray[np.intp],
+    rows: Rows,
+    values: Floats,
+    found: Starts,
+    tolerance: float,
+) -> None:
+    """Project rows from anywhere; those that have their values so replace what they were."""
+    some = Rows(*(array[places] for array in rows))
+    ends = Starts(some.poses, found.q[places], found.sides[places])
+    some.actuators[:] = values[places]
+    _project(mechanism, table, wanted[places], own.of(places), np.arange(len(places)), some, ends, anywhere=True)
+    reached = (some.status == PROJECTED) & (some.measures[:, ACTUATOR_ERROR] <= tolerance)
+    some.status[reached] = REACHED
+    for array, part in zip((*rows, found.q, found.sides), (*some, ends.q, ends.sides), strict=True):
+        array[places[reached]] = part[reached]
 
 
 def _assembled_from(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts) -> tuple[Rows, Ends]:
