@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
+from functools import lru_cache
+from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,10 @@ from ..description.mechanism import Mechanism
 from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
-from .close import Closing, Closure, close, closure_of, platform_poses
+from .close import CLOSED, Closing, Closure, close, closure_of, platform_poses
 from .configurations import Configurations
-from .descend import nearest_actuators
+from .descend import MOST_STEPS, nearest_actuators
+from .effort import descents_within
 from .starts import same_random_starts
 
 STRIDES = 8
@@ -30,6 +32,10 @@ SAME = 1e-3
 NEAR = 1e-6
 """Actuators this near to the asked values need no search from elsewhere for nearer ones [L or rad]."""
 
+NOISE = 1e-4
+"""How far readings of more actuators than freedoms are off for noise alone [L or rad]: those that fit as well from a
+start contradict each other, and fit exactly nowhere else."""
+
 PROJECTIONS = 12
 """Random starts of the search for feasible values near those that no configuration has."""
 
@@ -40,12 +46,14 @@ SIGHT = 3.0
 def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
     """Close the loops at actuated values (n, n_a), or at feasible ones as near as a search brings them.
 
-    Newton's method with the actuators locked; where it strays, the actuators led to their values in steps; then, unless
-    `seeded`, random starts; then the nearest feasible values.
+    Newton's method with the actuators locked; where it strays, the actuators led to their values in steps; then random
+    starts; then the nearest feasible values.
 
     Parameters
     ----------
     coordinates : joint coordinates to start from, (n, columns), deviations from home.
+    seeded : they are to stay in their mode where they assemble in it, within limits or not. Other starts, home the
+        first, only replace a projection.
 
     Returns
     -------
@@ -54,19 +62,42 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seede
     closure, poses = closure_of(mechanism), platform_poses(mechanism, coordinates)
     best = _locked(closure, coordinates, poses, values)
     if not best.feasible.all():
-        attempts = [] if _over_determined(mechanism) else [_led]
+        attempts = [] if is_over_determined(mechanism) else [_led]
         for attempt in attempts if seeded else [*attempts, _scattered]:
             rest = np.flatnonzero(~best.feasible)
             if len(rest):
                 best.improve(rest, attempt(closure, coordinates[rest], poses[rest], values[rest]))
     rest = np.flatnonzero(~best.feasible)
-    if len(rest):
-        _project(closure, best, rest, (coordinates[rest], poses[rest]), values[rest], seeded)
+    if not len(rest):
+        return best
+    strayed = best.gap[rest] > CLOSED
+    _project(closure, best, rest, (coordinates[rest], poses[rest]), values[rest], seeded)
+    if seeded:
+        off = np.abs(actuator_errors(closure, best.coordinates[rest], values[rest])).max(axis=1, initial=0.0)
+        near = NOISE if is_over_determined(mechanism) else NEAR
+        missed = rest[strayed & ((off > near) | ~best.feasible[rest])]
+        if len(missed):
+            _assemble_elsewhere(closure, best, missed, poses[missed], values[missed])
     return best
 
 
-def _over_determined(mechanism: Mechanism) -> bool:
-    """Whether there are more actuators than motions: then most values contradict each other."""
+def _assemble_elsewhere(closure: Closure, best: Closing, rows: NDArray[np.intp], poses: Floats, values: Floats) -> None:
+    """Assemble rows from home, or else from random starts, nearest to their own poses (n, 4, 4); where that fails they
+    stay as they are."""
+    home = np.zeros_like(best.coordinates[rows]), np.repeat(closure.mechanism.home_pose[None], len(rows), axis=0)
+    tried = _locked(closure, *home, values)
+    missed = np.flatnonzero(~tried.feasible)
+    if len(missed):
+        tried.improve(missed, _scattered(closure, home[0][missed], poses[missed], values[missed]))
+    reached = np.flatnonzero(tried.feasible)
+    best.take(rows[reached], tried, reached)
+
+
+@lru_cache(maxsize=64)
+def is_over_determined(mechanism: Mechanism) -> bool:
+    """Whether there are more actuators than motions: then most values contradict each other. Never without loops."""
+    if len(closure_of(mechanism).loops.paths) <= 2:
+        return False
     counted = generic_of(mechanism).mobility
     return counted.actuators > counted.mobility - counted.idle
 
@@ -124,17 +155,19 @@ def _project(
     ended = best.coordinates[rest], best.poses[rest]
     found = close(closure, *start, max_iterations=0)
     distance = np.full(len(rest), np.inf)
+    ranged = np.isfinite(closure.loops.lo[closure.actuated]) | np.isfinite(closure.loops.hi[closure.actuated])
+    n, steps = descents_within(closure, 2 if seeded else 2 + PROJECTIONS, MOST_STEPS, np.count_nonzero(ranged))
     others = () if seeded else _newton_ends(closure, values)
-    for coordinates, poses in chain([ended, start], others):
+    for coordinates, poses in islice(chain([ended, start], others), n):
         waiting = np.flatnonzero(distance > NEAR)
         if not len(waiting):
             break
-        tried = nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting])
+        tried = nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting], steps)
         _take_nearer(closure, found, distance, waiting, tried, values)
     waiting = np.flatnonzero(np.isinf(distance))
     if len(waiting):
         asked = _within_sight(closure, start[0][waiting], values[waiting])
-        tried = nearest_actuators(closure, start[0][waiting], start[1][waiting], asked)
+        tried = nearest_actuators(closure, start[0][waiting], start[1][waiting], asked, steps)
         _take_nearer(closure, found, distance, waiting, tried, values)
     feasible = np.flatnonzero(found.feasible)
     best.take(rest[feasible], found, feasible)

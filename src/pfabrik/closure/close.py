@@ -64,6 +64,12 @@ class Closure:
         idle[self.loops.row_columns] = False
         return idle
 
+    @cached_property
+    def cubes(self) -> float:
+        """Sum of the cubes of how many coordinates each group has, at least 1: what a step of closing takes."""
+        on_paths = self.loops.group_of[~self.idle]
+        return float(max(1.0, (np.bincount(on_paths).astype(float) ** 3).sum()))
+
     def actuators(self, coordinates: Floats) -> Floats:
         """The actuated values (n, n_a) in coordinates (n, columns) [length or rad]."""
         return np.asarray(coordinates[:, self.actuated] + self.home)

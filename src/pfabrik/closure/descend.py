@@ -14,6 +14,7 @@ from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, Closing, Closure, close, closing_of, closure_of, new_closed
+from .effort import steps_within
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -25,7 +26,13 @@ MOST_STEPS = 200
 
 
 def approached(
-    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
+    closure: Closure,
+    coordinates: Floats,
+    targets: Floats,
+    *,
+    platform: Sequence[float],
+    frame: int = BASE_AXES,
+    steps: int = MOST_STEPS,
 ) -> Closing:
     """Feasible configurations nearest to targets, (n, 4, 4): local minima of the distance, from given coordinates.
 
@@ -35,26 +42,36 @@ def approached(
     platform : what counts of the distance from the targets: weights of the squares of position [L] and rotation [rad];
         LOCKED for what is to be as the target has it.
     frame : of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY.
+    steps : each search may take.
 
     Returns
     -------
     Closing : judge by `feasible`. Gaps and excesses are those of the whole, the same for every group.
     """
-    return _ended(closure, coordinates, _objective(closure, targets, platform, frame, MOST_STEPS))
+    return _ended(closure, coordinates, _objective(closure, targets, platform, frame, steps))
 
 
-def nearest_actuators(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
+def nearest_actuators(
+    closure: Closure, coordinates: Floats, poses: Floats, values: Floats, steps: int = MOST_STEPS
+) -> Closing:
     """Feasible configurations whose actuators differ least from the values (n, n_a), by least squares; a local search.
 
     Parameters
     ----------
     coordinates, poses : where to start, (n, columns) and (n, 4, 4); need not be closed, nor within limits.
+    steps : each search may take; with none it ends where loops close within limits, from values put within ranges.
     """
     anchors, weights = coordinates.copy(), np.zeros(len(closure.scale))
     closure.put_actuators(anchors, values)
     weights[closure.actuated] = 1.0
-    begin = close(closure, anchors, poses, limits=True, margin=TOLERANCES.inside)
-    free = _objective(closure, begin.poses, EVERYTHING_FREE, BASE_AXES, MOST_STEPS)
+    if steps == 0:
+        lo, hi = closure.loops.lo + TOLERANCES.inside, closure.loops.hi - TOLERANCES.inside
+        anchors = np.where(lo <= hi, np.clip(anchors * closure.scale, lo, hi) / closure.scale, anchors)
+    most = steps_within(closure, 100)
+    begin = close(closure, anchors, poses, limits=True, margin=TOLERANCES.inside, max_iterations=most)
+    if steps == 0:
+        return begin
+    free = _objective(closure, begin.poses, EVERYTHING_FREE, BASE_AXES, steps)
     return _ended(closure, begin.coordinates, free._replace(weights=weights, anchors=anchors * closure.scale))
 
 

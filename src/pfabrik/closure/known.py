@@ -13,7 +13,8 @@ from ..kernels.closure.loops import BASE_AXES
 from ..poses import pose
 from ..tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, close, closure_of
-from .descend import approached
+from .descend import MOST_STEPS, approached
+from .effort import descents_within, starts_within
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .starts import random_starts
 
@@ -21,8 +22,9 @@ FAR_CORNER, TURNED_CORNER = 0.5, 0.5
 """Where corners are looked for: so far from home [L], and turned so far [rad]."""
 
 
-CORNERS, CHANCES = 8, 128
-"""How many corners searches start from, and how many random configurations are closed to find some."""
+CORNERS, CHANCES, A_CHANCE = 8, 128, 20
+"""How many corners searches start from, and how many random configurations are closed to find some, in about how many
+steps each."""
 
 
 @lru_cache(maxsize=64)
@@ -41,7 +43,9 @@ def corners_of(mechanism: Mechanism) -> tuple[Floats, ...]:
     ]
     turning = 0.0 if mechanism.end_effector_is_joint else 1.0
     home = np.zeros((len(directions), len(closure.scale)))
-    ends = approached(closure, home, np.array(poses), platform=(1.0, 1.0, 1.0, turning, turning, turning))
+    _, steps = descents_within(closure, CORNERS, MOST_STEPS)
+    platform = (1.0, 1.0, 1.0, turning, turning, turning)
+    ends = approached(closure, home, np.array(poses), platform=platform, steps=max(steps, 1))
     coordinates, places = chanced_upon(mechanism)
     kept = ends.feasible
     coordinates = np.concatenate([home[:1], ends.coordinates[kept], coordinates])
@@ -60,12 +64,22 @@ def chanced_upon(mechanism: Mechanism) -> tuple[Floats, Floats]:
     They are in the assembly of home as far as a task tells it.
     """
     closure, task = closure_of(mechanism, whole=False), task_of(mechanism)
-    coordinates, poses = random_starts(closure, CHANCES, np.random.default_rng(0))
+    chances = starts_within(closure, CHANCES, A_CHANCE)
+    coordinates, poses = random_starts(closure, chances, np.random.default_rng(0))
     rest = task.left_out
     keeps_rest = follows_task(mechanism) and not has_parasitic_motion(mechanism)
     if keeps_rest:
-        poses = task.completed(poses, np.repeat(mechanism.home_pose[None], CHANCES, axis=0))
+        poses = task.completed(poses, np.repeat(mechanism.home_pose[None], chances, axis=0))
     platform, frame = (rest.held, rest.frame) if keeps_rest else (EVERYTHING_FREE, BASE_AXES)
-    found = close(closure, coordinates, poses, platform=platform, frame=frame, limits=True, margin=TOLERANCES.inside)
+    found = close(
+        closure,
+        coordinates,
+        poses,
+        platform=platform,
+        frame=frame,
+        limits=True,
+        margin=TOLERANCES.inside,
+        max_iterations=100 if chances == CHANCES else A_CHANCE,
+    )
     feasible = found.feasible
     return found.coordinates[feasible], found.poses[feasible]

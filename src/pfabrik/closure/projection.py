@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, Mask
 from ..description.mechanism import Mechanism
 from ..description.task import Weights, task_of
 from ..kernels.closure.loops import LOCKED
@@ -17,8 +17,9 @@ from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of, platform_poses
-from .descend import approached, weighed_limits
-from .known import corners_of
+from .descend import MOST_STEPS, approached, weighed_limits
+from .effort import descents_within
+from .known import CORNERS, corners_of
 from .parasitic import strays
 
 SAME = 1e-7
@@ -26,6 +27,14 @@ SAME = 1e-7
 
 HITS = 7
 """How many searches must end at the nearest configuration found before no other is looked for."""
+
+
+RESTING = 20
+"""Steps in which a start of a long chain is brought within its limits."""
+
+DRAGGED = 1.0
+"""How much farther than where it starts an answer may be that holds part of its target, for each unit by which that
+part differs at the start [L per rad, or rad per L]: a turn about the middle of a machine moves no joint by more."""
 
 
 class Way(NamedTuple):
@@ -44,6 +53,19 @@ class Way(NamedTuple):
         position, rotation = task_of(closure.mechanism).errors(poses, targets)
         turning = np.sqrt(max((weight for weight in self.weights[3:] if weight != LOCKED), default=0.0))
         return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, turning * rotation))
+
+    def is_too_far(self, closure: Closure, distances: Floats, starts: Floats, targets: Floats) -> Mask:
+        """Whether answers that hold part of their targets are farther than the poses (n, 4, 4) where searches start,
+        and by more than holding it may cost, (n,).
+
+        With d the distance of an answer and d0 that of its start in what is not held, and e0 how far the start is from
+        having what is: d > d0 + e0.
+        """
+        position, rotation = task_of(closure.mechanism).errors(starts, targets)
+        position = position / closure.mechanism.characteristic_length
+        lacking = rotation if self.hold == HOLD_ORIENTATION else position
+        allowed = self.distances(closure, starts, targets) + DRAGGED * lacking
+        return np.asarray((distances < np.inf) & (distances > (1.0 + SAME) * allowed))
 
 
 class Projected(NamedTuple):
@@ -96,9 +118,13 @@ def project(
     """
     n, frame = len(targets), task_of(closure.mechanism).frame
     best = Projected(close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, HOLD_NOTHING))
-    elsewhere = corners_of(closure.mechanism) if corners else ()
+    count, steps = descents_within(closure, len(starts) + (CORNERS if corners else 0), MOST_STEPS)
+    is_long = count < len(starts) or steps == 0
+    elsewhere = corners_of(closure.mechanism) if corners and count == len(starts) + CORNERS else ()
+    if is_long:
+        starts = [_nearest_at_rest(closure, targets, starts, ways[-1])]
     everywhere = [*starts, *(np.where(closure.idle, starts[0], corner) for corner in elsewhere)]
-    for way in ways:
+    for way in ways if steps else ():
         open_to_it, hits = np.isinf(best.distances), np.zeros(n, np.int64)
         for place, start in enumerate(everywhere):
             waiting = np.flatnonzero(open_to_it & (hits < HITS))
@@ -106,19 +132,52 @@ def project(
                 begin = start[waiting]
                 if place >= len(starts):
                     begin = _placed(closure, begin, targets[waiting], way)
-                found = approached(closure, begin, targets[waiting], platform=way.weights, frame=frame)
+                found = approached(closure, begin, targets[waiting], platform=way.weights, frame=frame, steps=steps)
                 hits[waiting] = _take_nearer(closure, best, waiting, found, targets, way, hits[waiting])
         lost = np.flatnonzero(np.isinf(best.distances))
-        if len(lost) and LOCKED in way.weights:
+        if len(lost) and LOCKED in way.weights and not is_long:
             begin = _placed(closure, starts[0][lost], targets[lost], way)
-            found = approached(closure, begin, targets[lost], platform=way.weights, frame=frame)
+            found = approached(closure, begin, targets[lost], platform=way.weights, frame=frame, steps=steps)
             _take_nearer(closure, best, lost, found, targets, way, np.zeros(len(lost), np.int64))
     lost = np.flatnonzero(np.isinf(best.distances))
     if len(lost):  # where a search starts is feasible, or nearly: better than no answer
-        begin = starts[0][lost]
-        stayed = close(closure, begin, platform_poses(closure.mechanism, begin), max_iterations=0)
-        _take_nearer(closure, best, lost, stayed, targets, ways[-1], np.zeros(len(lost), np.int64))
+        _take_nearer(
+            closure, best, lost, _at_rest(closure, starts[0][lost]), targets, ways[-1], np.zeros(len(lost), np.int64)
+        )
+    if len(ways) > 1:
+        _let_go(closure, best, targets, starts, ways)
     return best
+
+
+def _at_rest(closure: Closure, coordinates: Floats) -> Closing:
+    """Joint coordinates as they are."""
+    return close(closure, coordinates, platform_poses(closure.mechanism, coordinates), max_iterations=0)
+
+
+def _nearest_at_rest(closure: Closure, targets: Floats, starts: Sequence[Floats], way: Way) -> Floats:
+    """The starts that are nearest to targets once they are closed within limits, row by row; the first where none is.
+
+    There is no time to search from each of them.
+    """
+    best = Projected(_at_rest(closure, starts[0]), np.full(len(targets), np.inf), np.full(len(targets), HOLD_NOTHING))
+    every = np.arange(len(targets))
+    for start in starts:
+        poses = platform_poses(closure.mechanism, start)
+        closed = close(closure, start, poses, limits=True, margin=TOLERANCES.inside, max_iterations=RESTING)
+        _take_nearer(closure, best, every, closed, targets, way, np.zeros(len(every), np.int64))
+    return best.closing.coordinates
+
+
+def _let_go(closure: Closure, best: Projected, targets: Floats, starts: Sequence[Floats], ways: Sequence[Way]) -> None:
+    """Hold nothing where what was held leads farther from targets than the start is, and nothing held does not."""
+    begun = platform_poses(closure.mechanism, starts[0])
+    far = np.flatnonzero((best.holds == ways[0].hold) & ways[0].is_too_far(closure, best.distances, begun, targets))
+    if not len(far):
+        return
+    other = project(closure, targets[far], [start[far] for start in starts], ways[-1:], corners=False)
+    nearer = other.distances <= (1.0 + SAME) * ways[-1].distances(closure, begun[far], targets[far])
+    best.closing.take(far[nearer], other.closing, nearer)
+    best.distances[far[nearer]], best.holds[far[nearer]] = other.distances[nearer], other.holds[nearer]
 
 
 def _take_nearer(

@@ -30,6 +30,7 @@ from .configurations import (
     write_closing,
 )
 from .descend import within_sight
+from .effort import starts_within, steps_within, stride_within
 from .known import chanced_upon
 from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
 from .projection import Way, held_back, kept, project, ways_of
@@ -225,7 +226,8 @@ def _start_nearby(closure: Closure, found: Closing, targets: Floats, held: Weigh
     coordinates, poses = chanced_upon(closure.mechanism)
     task, rest = task_of(closure.mechanism), np.flatnonzero(~found.feasible)
     away = np.array([_distances(closure, poses, np.repeat(targets[[row]], len(poses), axis=0)) for row in rest])
-    for places in np.argsort(away, axis=1)[:, :NEARBY].T if len(rest) else ():
+    nearby = starts_within(closure, NEARBY, STEPS)
+    for places in np.argsort(away, axis=1)[:, :nearby].T if len(rest) else ():
         waiting = ~found.feasible[rest]
         if not waiting.any():
             break
@@ -244,7 +246,7 @@ def _search(
     """
     rng = np.random.default_rng(0)
     hits = np.zeros(found.gaps.shape, np.int64)
-    for _ in range(STARTS):
+    for _ in range(starts_within(closure, STARTS, STEPS)):
         rest = rows[~found.feasible[rows] & (hits[rows].max(axis=1) < HITS)]
         if not len(rest):
             break
@@ -293,18 +295,20 @@ def _close_below(
         frame=BASE_AXES if held == HELD else task_of(closure.mechanism).frame,
         limits=limits,
         margin=TOLERANCES.inside,
-        max_iterations=max_iterations,
+        max_iterations=steps_within(closure, max_iterations),
     )
 
 
 def _led(closure: Closure, targets: Floats, start: Floats, begin: Floats, held: Weights, *, limits: bool) -> Closing:
     """The platform led from where it is to its target; where what is not held leaps on the way, nothing is found."""
-    task, present = task_of(closure.mechanism), begin
+    task, present, steps = task_of(closure.mechanism), begin, stride_within(closure, 100, STRIDES)
+    if steps == 0:
+        return _close_below(closure, start, targets, held, 0 if limits else 100, limits=limits)
     leapt = np.zeros(len(targets), bool)
     for stride in range(1, STRIDES + 1):
         way = between(begin, targets, stride / STRIDES)
         way = way if held == HELD else task.completed(way, present)
-        found = _close_below(closure, start, way, held, limits=limits)
+        found = _close_below(closure, start, way, held, steps, limits=limits)
         leapt |= differences(closure, found.poses, way) > STRANGE + differences(closure, way, present)
         start, present = found.coordinates, found.poses
     found.gaps[leapt] = np.inf

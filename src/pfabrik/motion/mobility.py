@@ -16,6 +16,10 @@ from ..tolerances import TOLERANCES
 from .first_order import actuated_columns, first_order, right_singular
 from .walks import around_home
 
+COUNTING, FEWEST = 4e9, 2
+"""Cubes of the number of joint coordinates that motions are counted at in sum, so that it takes seconds of the longest
+chains; and at how many configurations at least: home may be special."""
+
 
 @dataclass(frozen=True)
 class Mobility:
@@ -81,7 +85,8 @@ class Generic:
 
 @lru_cache(maxsize=64)
 def generic_of(mechanism: Mechanism) -> Generic:
-    closure, twist = first_order(mechanism, around_home(mechanism))
+    around = around_home(mechanism)
+    closure, twist = first_order(mechanism, around[: max(FEWEST, int(COUNTING / max(1, around.shape[1]) ** 3))])
     locked = sum(each.joint.is_rigid for each in mechanism.coordinates)
     values, right = right_singular(closure)
     ranks = _rank(values)
@@ -101,7 +106,7 @@ def generic_of(mechanism: Mechanism) -> Generic:
         uncontrolled=shown - driven,
         over_constraints=closure.shape[1] - rank,
     )
-    left, sizes, _ = np.linalg.svd(np.hstack(list(twists)))
+    left, sizes, _ = np.linalg.svd(np.hstack(list(twists)), full_matrices=False)
     return Generic(counts, left[:, : int(_rank(sizes))], rank, bool(ranks[0] < rank))
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..closure.assemble import NOISE, is_over_determined
 from ..closure.configurations import Configurations, new_rows
-from ..decomposition.leg_table import LegTable
+from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
@@ -36,7 +38,8 @@ def assembled(
 ) -> tuple[Rows, Floats, Floats]:
     """Configurations that have actuated values (n, n_a), within all limits; rows without one are PENDING.
 
-    Without a start, the row's own configuration is looked for from elsewhere too.
+    What does not assemble from where it starts is assembled from elsewhere: from a start only where that beats a
+    projection, and where legs do not assemble in its mode beyond a limit.
 
     Parameters
     ----------
@@ -47,21 +50,89 @@ def assembled(
     -------
     The rows, the coordinates of the legs' carriers (n, legs) [L or rad], and the sides of the answers (n, legs).
     """
+    is_cold = start is None
     own = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
     rows, (wanted, *ends) = tried or _assembled_from(mechanism, table, values, own)
-    found, rest = Starts(rows.poses, *ends), np.flatnonzero(rows.status == PENDING)
-    if start is None and len(rest):
-        filled = rows.status, wanted, *found, rows.measures
-        parts = [array[rest] for array in (rows.actuators, *filled)]
-        _assemble(mechanism, table, own, corners_of(mechanism), parts)
-        for array, part in zip(filled, parts[1:], strict=True):
-            array[rest] = part
-        rest = np.flatnonzero(rows.status == PENDING)
-    if len(rest):
-        _project(mechanism, table, wanted, own, rest, rows, found, anywhere=start is None)
-        near = rest[rows.measures[rest, ACTUATOR_ERROR] <= tolerance]
-        rows.status[near[rows.status[near] == PROJECTED]] = REACHED
+    found, strayed = Starts(rows.poses, *ends), rows.status == PENDING
+    missed = partial(_assemble_missed, mechanism, table, values, rows, wanted, found)
+    if is_cold:
+        missed(own, corners_of, np.flatnonzero(rows.status != REACHED))
+    rest = np.flatnonzero(rows.status != REACHED)
+    if not len(rest):
+        return rows, found.q, found.sides
+    rows.status[rest] = PENDING
+    _project(mechanism, table, wanted, own, rest, rows, found, anywhere=is_cold)
+    near = rest[rows.measures[rest, ACTUATOR_ERROR] <= tolerance]
+    rows.status[near[rows.status[near] == PROJECTED]] = REACHED
+    strayed &= rows.status != REACHED
+    if is_cold or not np.count_nonzero(strayed):
+        return rows, found.q, found.sides
+    if is_over_determined(mechanism):
+        strayed &= (rows.status == PENDING) | (rows.measures[:, ACTUATOR_ERROR] > NOISE)
+    missed(own, _starts_elsewhere, np.flatnonzero(strayed))
+    missed(home_start(mechanism, table), corners_of, np.flatnonzero(strayed & (rows.status != REACHED)))
+    places = np.flatnonzero(strayed & (rows.status != REACHED))
+    if len(places):
+        _project_elsewhere(mechanism, table, wanted, own, places, rows, values, found, tolerance)
     return rows, found.q, found.sides
+
+
+@lru_cache(maxsize=64)
+def _starts_elsewhere(mechanism: Mechanism) -> Starts:
+    """Home, then the corners."""
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
+    home = home_start(mechanism, table)
+    return Starts(*(np.concatenate(both) for both in zip(home, corners_of(mechanism), strict=True)))
+
+
+def _assemble_missed(
+    mechanism: Mechanism,
+    table: LegTable,
+    values: Floats,
+    rows: Rows,
+    wanted: Floats,
+    found: Starts,
+    own: Starts,
+    elsewhere: Callable[[Mechanism], Starts],
+    places: NDArray[np.intp],
+) -> None:
+    """Assemble rows that are missed from elsewhere, nearest to where they start; those reached replace what they were.
+
+    From where they start actuators are led to their values: from home too, which is a start of its own for that.
+    """
+    if not len(places):
+        return
+    filled, asked = [rows.status, wanted, *found, rows.measures], values[places]
+    parts = [array[places] for array in filled]
+    _assemble(mechanism, table, own.of(places), elsewhere(mechanism), [asked, *parts])
+    reached = parts[0] == REACHED
+    for array, part in zip(filled, parts, strict=True):
+        array[places[reached]] = part[reached]
+    rows.actuators[places[reached]] = asked[reached]
+    rows.measures[places[reached], ACTUATOR_ERROR] = 0.0
+
+
+def _project_elsewhere(
+    mechanism: Mechanism,
+    table: LegTable,
+    wanted: Floats,
+    own: Starts,
+    places: NDArray[np.intp],
+    rows: Rows,
+    values: Floats,
+    found: Starts,
+    tolerance: float,
+) -> None:
+    """Project rows from anywhere; those that have their values so replace what they were."""
+    some = Rows(*(array[places] for array in rows))
+    ends = Starts(some.poses, found.q[places], found.sides[places])
+    some.actuators[:] = values[places]
+    _project(mechanism, table, wanted[places], own.of(places), np.arange(len(places)), some, ends, anywhere=True)
+    reached = (some.status == PROJECTED) & (some.measures[:, ACTUATOR_ERROR] <= tolerance)
+    some.status[reached] = REACHED
+    for array, part in zip((*rows, found.q, found.sides), (*some, ends.q, ends.sides), strict=True):
+        array[places[reached]] = part[reached]
 
 
 def _assembled_from(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts) -> tuple[Rows, Ends]:

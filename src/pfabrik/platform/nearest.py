@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Records
-from ..closure.close import in_lengths
-from ..closure.projection import Way, ways_of
+from ..closure.close import closure_of, in_lengths
+from ..closure.projection import SAME, Way, ways_of
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
@@ -18,7 +18,7 @@ from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Found, Starts
-from ..kernels.rows import HOLD_ORIENTATION, HOLD_POSITION
+from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION, PROJECTED, REACHED
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .approach import Approach, new_found, no_starts, starts_at
@@ -46,10 +46,9 @@ def project(
     -------
     How many rows have none.
     """
-    tolerances = options.tolerance, options.rotation_tolerance
-    first, *others = _ways(mechanism, options.hold, options.rotation_length, *tolerances, corners, stays)
-    left = first.fill(targets, own, found)
-    for way in others:
+    asked = _ways(mechanism, options, options.hold, corners, stays)
+    left = asked[0].fill(targets, own, found)
+    for way in asked[1:]:
         if not left:
             break
         if left == len(targets):
@@ -59,27 +58,61 @@ def project(
         some = found.at(lost)
         left = way.fill(targets[lost], own.of(lost), some)
         found.put(lost, some)
+    if len(asked) > 1:
+        _let_go(mechanism, options, asked[-1], targets, own, found)
+    if is_completed(mechanism) and len(ways_of(mechanism, "orientation", options.rotation_length)) > 1:
+        other = asked[1:] or _ways(mechanism, options, "orientation", corners, stays)
+        _reach_otherwise(other[0], targets, own, found)
     return left
 
 
+def is_completed(mechanism: Mechanism) -> bool:
+    """Whether legs reach only what they complete step by step: then what they miss may be reached."""
+    table = leg_table(mechanism)
+    assert isinstance(table, LegTable)
+    return table.is_completed
+
+
+def _reach_otherwise(way: Approach, targets: Floats, own: Starts, found: Found) -> None:
+    """Answer the rows that another way to project reaches: near singularities each misses others."""
+    asked = ((found.status == PROJECTED) & (found.distances < np.inf) & (found.counters[:, HOLD] < CERTAIN)).nonzero()[
+        0
+    ]
+    if not len(asked):
+        return
+    some = found.at(asked)
+    way.fill(targets[asked], own.of(asked), some)
+    reached = (some.status == REACHED) & (some.distances < np.inf)
+    some.counters[:, HOLD] = HOLD_NOTHING
+    found.put(asked[reached], some.at(reached))
+
+
+def _let_go(mechanism: Mechanism, options: Options, free: Approach, targets: Floats, own: Starts, found: Found) -> None:
+    """Hold nothing where what was held leads farther from targets than the start is, and nothing held does not: see
+    `Way.is_too_far`."""
+    held, nothing = ways_of(mechanism, options.hold, options.rotation_length)
+    closure, length = closure_of(mechanism), mechanism.characteristic_length
+    starts = np.broadcast_to(in_lengths(own.poses, length), targets.shape)
+    holds = (found.counters[:, HOLD] % CERTAIN == held.hold) & (found.distances < np.inf)
+    far = (holds & held.is_too_far(closure, found.distances, starts, targets)).nonzero()[0]
+    if not len(far):
+        return
+    some = found.at(far)
+    free.fill(targets[far], own.of(far), some)
+    nearer = some.distances <= (1.0 + SAME) * nothing.distances(closure, starts[far], targets[far])
+    found.put(far[nearer], some.at(nearer))
+
+
 @lru_cache(maxsize=256)
-def _ways(
-    mechanism: Mechanism,
-    hold: str | None,
-    rotation_length: float | None,
-    tolerance: float | None,
-    rotation_tolerance: float,
-    corners: bool,
-    stays: bool,
-) -> tuple[Approach, ...]:
+def _ways(mechanism: Mechanism, options: Options, hold: str | None, corners: bool, stays: bool) -> tuple[Approach, ...]:
     """The ways to project, in the order in which they are tried."""
     table, length = leg_table(mechanism), mechanism.characteristic_length
     assert isinstance(table, LegTable)
     others = corners_of(mechanism) if corners else no_starts(table)
-    settings = {"steps": MOST_STEPS, "stays": int(stays), "rotation": rotation_tolerance}
-    settings["position"] = tolerance or TOLERANCES.position * length
+    settings = {"steps": MOST_STEPS, "stays": int(stays), "rotation": options.rotation_tolerance}
+    settings["position"] = options.tolerance or TOLERANCES.position * length
     ways = []
-    for way in ways_of(mechanism, hold, rotation_length):
+    for way in ways_of(mechanism, hold, options.rotation_length):
         held = {
             "hold": way.hold,
             "held_position": TOLERANCES.held * length if way.hold == HOLD_POSITION else np.inf,

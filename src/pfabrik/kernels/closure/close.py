@@ -53,6 +53,10 @@ LEAST_DAMPING, MOST_DAMPING = 1e-14, 1e6
 """Damping of the normal equations, whose entries are of order one: the least keeps idle motions (a rod's own spin)
 still without slowing convergence, the most ends a search that finds no way down."""
 
+FEW = 100
+"""Coordinates of one group up to which the least damping is above the rounding of its factor, which grows with the
+cube of their number: six equations leave all but six of its pivots to damping."""
+
 
 class Work(NamedTuple):
     """Scratch memory of one thread."""
@@ -79,14 +83,50 @@ def note(eq: Equations, row: int, closed: Closed) -> None:
         closed.misses[row, group] = eq.misses[group]
 
 
+LONG, BESIDE = 48, 8
+"""Coordinates of one group from which on it is factorised by rows, which are long enough then to be worth it; and how
+many of them beside each other."""
+
+
+@routine
+def factorise_long(A: Floats, size: int, damping: float, L: Floats) -> None:
+    """The Cholesky factor L L^T = A + damping, one over its diagonal there, by the rows of L^T.
+
+    Entry by entry the same sums as `eliminate` takes, in an order in which they are contiguous.
+    """
+    for first in range(0, size, BESIDE):
+        last = min(first + BESIDE, size)
+        for i in range(first, last):
+            for k in range(i, size):
+                L[i, k] = A[k, i]
+        for j in range(first):
+            for i in range(first, last):
+                share = L[j, i]
+                for k in range(i, size):
+                    L[i, k] -= share * L[j, k]
+        for i in range(first, last):
+            for j in range(first, i):
+                share = L[j, i]
+                for k in range(i, size):
+                    L[i, k] -= share * L[j, k]
+            L[i, i] = 1.0 / math.sqrt(max(L[i, i] + damping, damping))
+            for k in range(i + 1, size):
+                L[i, k] *= L[i, i]
+    for i in range(size):
+        for j in range(i):
+            L[i, j] = L[j, i]
+
+
 @inlined
 def eliminate(A: Floats, C: Floats, b: Floats, size: int, damping: float, L: Floats, Y: Floats) -> None:
     """Y = (A + damping)^-1 [C, -b], by Cholesky."""
+    if size > LONG:
+        factorise_long(A, size, damping, L)
     for i in range(size):
         for k in range(6):
             Y[i, k] = C[i, k]
         Y[i, 6] = -b[i]
-        for j in range(i + 1):
+        for j in range(i + 1 if size <= LONG else 0):
             value = A[i, j]
             for k in range(j):
                 value -= L[i, k] * L[j, k]
@@ -201,10 +241,20 @@ def is_close(problem: ClosureProblem, eq: Equations) -> bool:
     return largest <= problem.closeness
 
 
+@inlined
+def least_damping(layout: Layout) -> float:
+    """The least damping of groups as large as these."""
+    largest = FEW
+    for group in range(len(layout.sizes)):
+        largest = max(largest, layout.sizes[group])
+    return LEAST_DAMPING * (largest / FEW) ** 3
+
+
 @routine
 def close_row(loops: Loops, layout: Layout, problem: ClosureProblem, row: int, work: Work, closed: Closed) -> int:
     """Close the loops of a row, from `work.trial`, into `work.best`; how many steps it took."""
     best, trial, eq = work.best, work.trial, work.eq
+    least = least_damping(layout)
     plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
     copy_state(trial, best)
     cost, factor, step = math.inf, 1.0, math.inf
@@ -239,7 +289,7 @@ def close_row(loops: Loops, layout: Layout, problem: ClosureProblem, row: int, w
                 copy_state(best, trial)
         elif turn == RETURN:
             turn = TRY
-        damping = LEAST_DAMPING if plunging else max(LEAST_DAMPING, DAMPING * factor * min(cost, 1.0))
+        damping = least if plunging else max(least, DAMPING * factor * min(cost, 1.0))
         if turn == TRY and (iterations == problem.max_iterations or not damping < MOST_DAMPING):
             turn = MEASURE
         if turn == TRY:

@@ -20,7 +20,7 @@ from ..legs.records import CARRIER, PIVOT, Table
 from ..legs.table import SAMPLE, open_table
 from ..linear import solve_spd, solve_square
 from ..references import opener
-from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
+from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..sqp import longest
 from ..vectors import add, copy_row, copy_table, cross, put, sub, vec, wrap
 from .equations import Now, View, count_unknowns, new_now, new_view, place, put_slopes
@@ -289,9 +289,9 @@ def put_deviations(table: Table, values: Floats, wanted: Floats) -> None:
 @routine
 def assemble_row(
     table: Table, given: Floats, own: Starts, row: int, others: Starts, wanted: Floats, work: Newton
-) -> bool:
-    """Assemble one row, into `work.now`, within all limits, and read the legs there; see `assemble`."""
-    first, values = row if own.poses.shape[0] > 1 else 0, wanted[row]
+) -> int:
+    """Assemble one row, into `work.now`, within all limits, and read the legs there; its status, see `assemble`."""
+    first, values, status = row if own.poses.shape[0] > 1 else 0, wanted[row], PENDING
     put_deviations(table, given[row], values)
     for attempt in range(2):
         load_start(table, own, first, work)
@@ -299,7 +299,8 @@ def assemble_row(
         worst = newton(table, STEPS, work) if attempt == 0 else lead(table, values, work)
         if worst <= NEARLY_ASSEMBLED:
             if is_feasible(table, values, work):
-                return True
+                return REACHED
+            status = EXCEEDED
             break
     nearest = math.inf
     for start in range(others.poses.shape[0]):
@@ -313,7 +314,8 @@ def assemble_row(
     if nearest < math.inf:
         copy_now(work.first, work.now)
         place(table, work.now, work.look)
-    return nearest < math.inf
+        return REACHED
+    return status
 
 
 @routine
@@ -352,6 +354,8 @@ def assemble(
 ) -> int:
     """Assemble legs at given actuators, within all limits; rows for which none is found are PENDING.
 
+    Or EXCEEDED, where they assemble from the row's start, beyond a limit.
+
     Newton's method from each row's start; where it strays, the actuators are led to their values in strides.
 
     Parameters
@@ -367,14 +371,14 @@ def assemble(
 
     Returns
     -------
-    How many are PENDING.
+    How many are not REACHED.
     """
     table, first, rest, left = open_table(machine), open_starts(own), open_starts(others), 0
     work = open_newton(scratch)
     for row in range(values.shape[0]):
-        status[row] = PENDING
-        if assemble_row(table, values, first, row, rest, wanted, work):
-            status[row] = REACHED
+        status[row] = assemble_row(table, values, first, row, rest, wanted, work)
+        if status[row] == REACHED:
             write_assembled(table, row, work, Starts(poses, q, sides), measures)
-        left += status[row]
-    return left // PENDING
+        else:
+            left += 1
+    return left

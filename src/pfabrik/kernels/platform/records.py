@@ -83,7 +83,7 @@ class Found(NamedTuple):
         """Those of some rows."""
         return Found._make(array[places] for array in self)
 
-    def put(self, places: Mask, others: Found) -> None:
+    def put(self, places: NDArray[np.intp] | Mask, others: Found) -> None:
         """Write others at some places."""
         for array, own in zip(self, others, strict=True):
             array[places] = own
