@@ -50,8 +50,5 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
         click.echo(f"{viewer.mechanism.name} at {viewer.url} (Ctrl-C ends it)")
         if not no_browser:
             webbrowser.open(viewer.url)
-        try:
-            viewer.wait()
-        except KeyboardInterrupt:
-            click.echo()
+        viewer.wait()
     return 0
