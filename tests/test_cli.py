@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import dataclasses
 import itertools
@@ -26,9 +27,11 @@ import pfabrik as pf
 from machines import closure
 from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import template, templates
-from pfabrik.cli import main
+from pfabrik.cli import main, outputs
 from pfabrik.cli.answer import describe_modes
 from pfabrik.cli.group import exit_code
+from pfabrik.cli.outputs import ignores_case
+from pfabrik.cli.stops import AGAIN
 from pfabrik.cli.whole import new_folder
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy
@@ -948,6 +951,68 @@ def test_an_output_that_is_a_link_or_a_device_stays_one(run: Callable[..., Resul
     assert not Path(os.devnull).is_file()
 
 
+def test_a_link_that_is_written_through_is_told_and_one_in_circles_refused(
+    run: Callable[..., Result], tmp_path: Path
+) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n0,10,200\n")
+    (tmp_path / "link.csv").symlink_to("answers.csv")
+    (tmp_path / "loop.csv").symlink_to("loop.csv")
+    said = run("track", "five_bar", "path.csv", "-o", "link.csv").stderr
+    assert f"pfabrik: note: link.csv is a link; {tmp_path / 'answers.csv'} is written\n" in said
+    assert "is a link" not in run("track", "five_bar", "path.csv", "-o", "answers.csv").stderr
+    refused = run("track", "five_bar", "path.csv", "-o", "loop.csv")
+    assert (refused.exit_code, (tmp_path / "loop.csv").is_symlink()) == (2, True)
+    assert "loop.csv: Too many levels of symbolic links" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "track five_bar path.csv -o a.png --plot a.png",
+        "track five_bar path.csv -o a.png --plot ./a.png",
+        "track five_bar path.csv -o {folder}/a.png --plot a.png",
+        "track five_bar path.csv -o same/a.png --plot a.png",
+        "track five_bar path.csv -o a.png --plot link.png",
+        "track five_bar path.csv -o there.png --plot hard.png",
+        "track five_bar path.csv --plot a.png --animate link.gif",
+        "workspace five_bar -o a.csv -o ./a.csv",
+    ],
+)
+def test_two_outputs_to_one_place_are_refused(run: Callable[..., Result], tmp_path: Path, line: str) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n0,10,200\n")
+    (tmp_path / "there.png").write_text("precious")
+    os.link(tmp_path / "there.png", tmp_path / "hard.png")
+    (tmp_path / "same").symlink_to(".")
+    for link in ("link.png", "link.gif"):
+        (tmp_path / link).symlink_to("a.png")
+    before = sorted(os.listdir(tmp_path))
+    result = run(*line.format(folder=tmp_path).split())
+    assert result.exit_code == 2
+    assert "found one place for two outputs" in result.stderr
+    assert sorted(os.listdir(tmp_path)) == before
+    assert (tmp_path / "there.png").read_text() == "precious"
+
+
+def test_names_that_differ_by_case_are_one_place_where_the_file_system_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blind = (tmp_path / "A.Png").exists() if (tmp_path / "a.png").write_text("") == 0 else False
+    assert ignores_case(tmp_path) == blind
+    for answer in (False, True):
+        monkeypatch.setattr(outputs, "ignores_case", lambda _, answer=answer: answer)
+        assert outputs.is_one_place(tmp_path / "out.csv", tmp_path / "OUT.csv") == answer
+        assert not outputs.is_one_place(tmp_path / "out.csv", tmp_path / "other.csv")
+
+
+def test_standard_output_that_is_a_file_is_not_written_twice(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n0,10,200\n")
+    with (tmp_path / "a.csv").open("w") as handle:
+        line = ("track", "five_bar", "path.csv", "-o", "a.csv", "--json")
+        with in_process(*line, stdout=handle, cwd=tmp_path) as process:
+            assert "found one place for two outputs" in process.communicate(timeout=60)[1]
+    assert process.returncode == 2
+
+
 # Wrong input
 
 
@@ -1072,22 +1137,18 @@ def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
     def interruptible() -> None:  # a shell starts what runs in its background with interrupts ignored
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-    line = ("demo", "--steps", 200_000, "--out", tmp_path / "out")
+    line = ("demo", "--steps", 200_000, "-o", tmp_path / "out")
     with in_process(*line, stdout=subprocess.PIPE, preexec_fn=interruptible) as process:
         deadline = time.monotonic() + 5
         while not os.listdir(tmp_path) and time.monotonic() < deadline:
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
         try:
-            said = process.communicate(timeout=30)[1]
-        except subprocess.TimeoutExpired:  # a signal that arrives in a callback of the compiler's C++ code is lost
-            process.send_signal(signal.SIGINT)
             said = process.communicate(timeout=90)[1]
         finally:
             process.kill()  # where it has ended, nothing happens
     assert "Traceback" not in said
-    # a shell calls both 130; Python sends itself the signal again if it arrived in code that it was just generating
-    assert process.returncode in (130, -signal.SIGINT), said
+    assert process.returncode == 130, said
     assert os.listdir(tmp_path) == []
 
 
@@ -1110,13 +1171,85 @@ def test_an_interruption_while_a_folder_is_removed_is_told_as_one(
     assert os.listdir(tmp_path) == []
 
 
+def test_an_interruption_that_is_swallowed_comes_again(capsys: pytest.CaptureFixture[str]) -> None:
+    def work() -> None:
+        with contextlib.suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5)
+        time.sleep(5)
+        pytest.fail("nobody was interrupted")
+
+    assert exit_code(work) == 130
+    assert capsys.readouterr().err == "pfabrik: interrupted\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_cleans_up_is_not_disturbed_by_further_signals(number: int) -> None:
+    cleaned = []
+
+    def work() -> None:
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(5)
+        finally:
+            os.kill(os.getpid(), number)
+            time.sleep(3 * AGAIN)
+            cleaned.append(True)
+
+    before = signal.getsignal(number)
+    assert exit_code(work) == 128 + number
+    assert cleaned
+    assert signal.getsignal(number) == before
+
+
+def test_a_signal_in_code_that_was_just_generated_has_its_own_exit_code(tmp_path: Path) -> None:
+    (tmp_path / "ends.py").write_text(
+        "import os, signal, sys, time\nfrom pfabrik.cli.group import exit_code\n"
+        "sys.exit(exit_code(lambda: exec('os.kill(os.getpid(), signal.SIGTERM); time.sleep(5)')))\n"
+    )
+    ran = subprocess.run([sys.executable, tmp_path / "ends.py"], capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (143, "pfabrik: terminated\n")
+
+
+def test_a_track_that_is_told_to_end_leaves_no_parts_of_files(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n" + "0,10,200\n5,10,201\n" * 200_000)
+    with in_process("track", "five_bar", "path.csv", "-o", "answers.csv", cwd=tmp_path) as process:
+        deadline = time.monotonic() + 60
+        while not list(tmp_path.glob(".*.part*")) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.terminate()
+        said = process.communicate(timeout=60)[1]
+    assert (process.returncode, said.splitlines()[-1]) == (143, "pfabrik: terminated")
+    assert os.listdir(tmp_path) == ["path.csv"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [0.5, 1.5, 2.5, 4.0])
+def test_a_view_is_interrupted_at_any_moment(after: float) -> None:
+    pytest.importorskip("viser")
+
+    def interruptible() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    line = ("view", "stewart", "--no-browser", "--port", 9100 + int(10 * after))
+    with in_process(*line, stdout=subprocess.PIPE, preexec_fn=interruptible) as process:
+        time.sleep(after)
+        process.send_signal(signal.SIGINT)
+        try:
+            said = process.communicate(timeout=30)[1]
+        finally:
+            process.kill()  # where it has ended, nothing happens
+    assert process.returncode == 130, said
+    assert said.strip() == "pfabrik: interrupted"
+
+
 # The demo
 
 
 @pytest.mark.slow
 def test_demo_writes_a_picture_and_a_table_for_each_machine(run: Callable[..., Result], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    result = run("demo", "--quick", "--out", "pictures")
+    result = run("demo", "--quick", "-o", "pictures")
     assert result.exit_code == 0
     assert {path.suffix for path in (tmp_path / "pictures").iterdir()} == {".png", ".csv"}
     for path in (tmp_path / "pictures").glob("*.csv"):

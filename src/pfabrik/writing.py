@@ -20,7 +20,9 @@ def whole_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     Its ending is that of `path`, which writers tell the format by. A file that it replaces leaves it its permissions.
     Where it cannot be written, the error names `path`.
     """
-    final = require_path("path", path).resolve()  # a link keeps pointing where it points
+    final = Path(os.path.realpath(require_path("path", path)))  # a link keeps pointing where it points
+    if final.is_symlink():  # in circles
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     if not final.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     if final.is_dir():

@@ -11,7 +11,8 @@ from click.shell_completion import CompletionItem
 from ..answers.table import aligned
 from ..catalog import catalog, catalog_file, template, templates, title
 from .mech import MECH
-from .whole import OUTPUT, STANDARD, refuse_existing, whole_file
+from .outputs import OUTPUT, STANDARD, check_outputs, refuse_existing
+from .whole import whole_file
 
 
 def kinds_completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -42,6 +43,7 @@ def new(kind: str | None, machine: str | None, output: Path, force: bool, list_a
         raise click.UsageError(f"give either --from NAME or one KIND of {', '.join(templates())}")
     text = text_of(kind) if machine is None else catalog_file(machine).read_text(encoding="utf-8")
     refuse_existing(output, force)
+    check_outputs([("-o", output)])
     with whole_file(output) as handle:
         handle.write(text)
     if output != STANDARD:

@@ -22,8 +22,8 @@ GRACE = 5.0
 class Stops:
     """While it is entered, a signal to end is a KeyboardInterrupt in the main thread, until the block has ended.
 
-    Whoever swallows the exception gets it again; who cleans up because of it is not disturbed. Signals that are ignored,
-    as in the background of a shell or under `nohup`, stay ignored.
+    Whoever swallows the exception gets it again; who cleans up because of it is not disturbed. Signals that are
+    ignored, as in the background of a shell or under `nohup`, stay ignored.
 
     Attributes
     ----------

@@ -15,8 +15,9 @@ from ..answers.table import aligned
 from ..telling import telling
 from .finite import FINITE
 from .mech import MECH, load
+from .outputs import OUTPUT, STANDARD, check_outputs
 from .speeds import speed_limits, speed_option
-from .whole import OUTPUT, STANDARD, whole_file
+from .whole import whole_file
 
 if TYPE_CHECKING:
     from ..timing.timed import Timed
@@ -55,11 +56,13 @@ def time(
     """
     if as_json and output == STANDARD:
         raise click.UsageError("-o - and --json both print on stdout: give one of them")
+    inputs = (path, Path(mech))
+    check_outputs([("-o", output), ("--json", STANDARD if as_json else None)], inputs)
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
     pushes = speed_limits(mechanism, accelerations, "--acceleration")
     targets = pf.read_path(path, mechanism).targets
-    with nullcontext() if output is None else whole_file(output, inputs=(path, Path(mech))) as handle:
+    with nullcontext() if output is None else whole_file(output, inputs) as handle:
         with telling(f"tracking {len(targets)} targets") as on_progress:
             followed = pf.track(mechanism, targets, on_progress=on_progress)
         timed = pf.time_path(

@@ -10,9 +10,10 @@ import click
 
 import pfabrik as pf
 
+from ..checks import require_ending
 from ..telling import telling
 from .mech import MECH, STANDARD_INPUT, load
-from .picture import ending_checked
+from .outputs import check_outputs
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
@@ -35,7 +36,8 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
     --html writes what is shown as one file, which opens in any browser without this program.
     """
     if html is not None:
-        ending_checked(html, (".html", ".htm"), inputs=(Path(mech), *([path] if path else [])))
+        check_outputs([("--html", html)], [Path(mech), *([path] if path else [])])
+        require_ending(html, (".html", ".htm"))
     shown: str | Mechanism | Track = mech if mech != STANDARD_INPUT and path is None else load(mech)
     if path is not None:
         mechanism = load(mech)
