@@ -745,6 +745,23 @@ def quick_path(folder: Path) -> Path:
     return path
 
 
+def test_text_that_a_spreadsheet_would_run_goes_out_as_text(run: Callable[..., Result], tmp_path: Path) -> None:
+    joints = [dataclasses.replace(joint, name=f"={joint.name}") for joint in pf.load("five_bar").joints]
+    along = [dataclasses.replace(joint, along=None) for joint in joints]
+    pf.save(dataclasses.replace(pf.load("five_bar"), joints=along, end_effector="=p3"), tmp_path / "arm.toml")
+    (tmp_path / "path.csv").write_text("x,y,z,@note\n0,10,200,=1+1\n0,10,900,-5\n")
+    assert run("track", "arm.toml", "path.csv", "-o", "answers.csv").exit_code == 1
+    with (tmp_path / "answers.csv").open(newline="", encoding="utf-8") as handle:
+        cells = {cell for row in csv.reader(handle) for cell in row if cell[:1] in ("=", "@", "+", "-")}
+    assert all(math.isfinite(float(cell)) for cell in cells)
+    rows = rows_of(tmp_path / "answers.csv")
+    assert [row["'@note"] for row in rows] == ["'=1+1", "-5"]
+    assert {row["margin_of"][:2] for row in rows} == {"'="}
+    again = pf.read_path(tmp_path / "answers.csv", pf.load("five_bar"))
+    assert list(again.others["@note"]) == ["=1+1", "-5"]
+    assert {name[:1] for name in again.others["margin_of"]} == {"="}
+
+
 def test_track_names_the_actuators_that_are_too_fast(run: Callable[..., Result], tmp_path: Path) -> None:
     path = quick_path(tmp_path)
     foot, head = np.array([100, 20]), np.array([40, 40])
@@ -873,7 +890,7 @@ def test_a_path_file_that_is_no_text_is_refused(run: Callable[..., Result], tmp_
     (tmp_path / "path.csv").write_bytes(bytes(range(256)))
     result = run("track", "five_bar", "path.csv", "-o", "answers.csv")
     assert result.exit_code == 2
-    assert "a file that is no text" in result.stderr
+    assert "no text of a path" in result.stderr
 
 
 def test_many_faults_are_told_in_one_line(run: Callable[..., Result], tmp_path: Path) -> None:

@@ -327,8 +327,9 @@ def test_a_program_in_cpp_calls_the_file_compiled_as_c(tmp_path: Path) -> None:
     (tmp_path / "arm.c").write_text(c_source(machine("linear_delta"), name="arm"))
     (tmp_path / "main.cpp").write_text(
         '#define ARM_DECLARATIONS_ONLY\n#include "arm.c"\n#include <cstdio>\n'
-        "int main() { arm_pose pose; double found[ARM_ACTUATORS]; arm_home(&pose); pose.p[2] += 1.0; arm_pose out = pose;"
-        ' if (arm_ik(&pose, &out, found)) return 1; std::printf("%.12g %.12g %.12g", found[0], found[1], found[2]); }'
+        "int main() { arm_pose pose; double found[ARM_ACTUATORS]; arm_home(&pose); pose.p[2] += 1.0;"
+        " arm_pose out = pose; if (arm_ik(&pose, &out, found)) return 1;"
+        ' std::printf("%.12g %.12g %.12g", found[0], found[1], found[2]); }'
     )
     for command in (
         [COMPILERS[0], "-std=c99", "-c", "arm.c"],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
 from ..description.readouts import readouts
 from ..extras import require
@@ -83,7 +83,7 @@ class Timed:
         shown = readouts(self.mechanism)
         units = np.array([float(each.display(np.ones(1))[0]) for each in shown])
         names = [f"{each.name}{'_deg' if each.is_angle else ''}" for each in shown]
-        writer = csv.writer(handle, lineterminator="\n")
+        writer = CsvWriter(handle)
         header = ["t", "step", "x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg"]
         header += [f"{kind}_{name}" for kind in ("actuator", "rate", "acceleration") for name in names]
         writer.writerow([*header, "platform_speed", "held_back_by"])
