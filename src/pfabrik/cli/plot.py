@@ -18,7 +18,7 @@ from .target import Triple, target_of, targeted
 @click.argument("mech", type=MECH)
 @targeted
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="PNG, SVG or PDF.  [default: NAME.png]")
-@click.option("--names", is_flag=True, help="Write the actuators' names beside them.")
+@click.option("--names", is_flag=True, help="Write the names of joints beside them.")
 def plot(
     mech: str, position: Triple | None, rpy: Triple | None, joint: str | None, output: Path | None, names: bool
 ) -> int:
@@ -33,6 +33,6 @@ def plot(
     home = position is None and rpy is None and joint is None
     shown = mechanism if home else pf.solve_ik(mechanism, target_of(mechanism, position, rpy, joint))
     with picture(path, quiet=True):
-        pf.plot(shown, names=mechanism.actuator_names if names else ())
+        pf.plot(shown, names=names)
     click.echo(f"wrote {path}")
     return 0 if home or shown else 1

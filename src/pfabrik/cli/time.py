@@ -12,6 +12,7 @@ import click
 import pfabrik as pf
 
 from ..answers.table import aligned
+from ..errors import counted
 from ..telling import telling
 from .finite import FINITE
 from .mech import MECH, load
@@ -63,7 +64,7 @@ def time(
     pushes = speed_limits(mechanism, accelerations, "--acceleration")
     targets = pf.read_path(path, mechanism).targets
     with nullcontext() if output is None else whole_file(output, inputs) as handle:
-        with telling(f"tracking {len(targets)} targets") as on_progress:
+        with telling(f"tracking {counted(len(targets), 'target')}") as on_progress:
             followed = pf.track(mechanism, targets, on_progress=on_progress)
         timed = pf.time_path(
             followed,
@@ -90,5 +91,5 @@ def as_object(timed: Timed) -> dict[str, object]:
 def describe(timed: Timed) -> str:
     """The same for people."""
     rows = [(name, what, f"{100.0 * share:.1f} %") for (name, what), share in timed.held_back.items()]
-    told = f"{timed.duration:.6g} s, {len(timed.times)} samples"
+    told = f"{timed.duration:.6g} s, {counted(len(timed.times), 'sample')}"
     return "\n\n".join([told, aligned(["held back by", "its", "of the time"], rows)]) if rows else told

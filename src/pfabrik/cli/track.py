@@ -14,6 +14,7 @@ import click
 import pfabrik as pf
 
 from ..checks import require_ending
+from ..errors import counted
 from ..extras import require
 from ..telling import telling
 from .finite import FINITE
@@ -170,7 +171,7 @@ def answered(
     from .track_rows import Rows
 
     rows: Rows | None = None
-    with telling(f"tracking {total or ''} targets") as tell:
+    with telling(f"tracking {counted(total, 'target') if total else 'targets'}") as tell:
         on_progress = None if tell is None else lambda done: tell(done, total or 0)
         parts = follow_parts(mechanism, blocks, options=options, speed_limits=limits or None, on_progress=on_progress)
         for path, followed, first in parts:

@@ -10,6 +10,7 @@ import click
 
 import pfabrik as pf
 
+from ..errors import counted
 from .mech import MECH, load
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def describe(mechanism: Mechanism, found: Verification) -> str:
         return f"{mechanism.name}: no pose was reached"
     return "\n".join(
         [
-            f"{mechanism.name}: {'agrees' if found else 'does not agree'} with MuJoCo on {found.poses} poses",
+            f"{mechanism.name}: {'agrees' if found else 'does not agree'} with MuJoCo on {counted(found.poses, 'pose')}",
             f"largest loop gap             {found.loop_gap:.1e} {unit}",
             f"largest position difference  {found.position_difference:.1e} {unit}",
             f"largest rotation difference  {found.rotation_difference:.1e} rad",

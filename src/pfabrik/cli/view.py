@@ -11,6 +11,7 @@ import click
 import pfabrik as pf
 
 from ..checks import require_ending
+from ..errors import counted
 from ..telling import telling
 from .mech import MECH, STANDARD_INPUT, load
 from .outputs import check_outputs
@@ -42,7 +43,7 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
     if path is not None:
         mechanism = load(mech)
         targets = pf.read_path(path, mechanism).targets
-        with telling(f"tracking {len(targets)} targets") as on_progress:
+        with telling(f"tracking {counted(len(targets), 'target')}") as on_progress:
             shown = pf.track(mechanism, targets, on_progress=on_progress)
     with pf.view(shown, port=port, host=host) as viewer:
         if html is not None:

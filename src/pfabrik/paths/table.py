@@ -14,7 +14,7 @@ from ..arrays import Floats
 from ..cells import is_finite, unmarked
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..errors import near_miss
+from ..errors import counted, near_miss
 from ..motion.mobility import generic_of
 from ..poses import pose
 from ..tolerances import TOLERANCES
@@ -84,7 +84,7 @@ class Table:
         lines = [number for number, _ in rows]
         for number, cells in rows:
             if len(cells) != len(self._header):
-                raise WrongPath(f"line {number}: found {len(cells)} cells; expected {len(self._header)}")
+                raise WrongPath(f"line {number}: found {counted(len(cells), 'cell')}; expected {len(self._header)}")
         told = dict(zip(self._header, zip(*(cells for _, cells in rows), strict=True), strict=True))
         others: dict[str, Sequence[str]] = {}
         for name, cells in told.items():

@@ -12,6 +12,7 @@ from ..arrays import Floats, Ints
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
 from ..description.readouts import readouts
+from ..errors import counted
 from ..extras import require
 from ..rotations import to_rpy
 from ..writing import whole_path
@@ -68,7 +69,7 @@ class Timed:
 
     def __repr__(self) -> str:
         name = self.mechanism.name
-        return f"<Timed path of '{name}': {self.duration:.6g} s, {len(self.times)} samples>"
+        return f"<Timed path of '{name}': {self.duration:.6g} s, {counted(len(self.times), 'sample')}>"
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write times, poses, actuators, their rates and accelerations; angles in degrees.
