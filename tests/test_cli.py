@@ -1051,7 +1051,7 @@ def test_standard_output_that_is_a_file_is_not_written_twice(tmp_path: Path) -> 
         (["ik", "stewart", *WITHIN_REACH, "--all", "--margins"], "--margins is of one answer"),
         (["ik", "ankle_ups", "--joint", "pivot"], "found 'pivot'; expected NAME=VALUE"),
         (["ik", "ankle_ups", "--joint", "pivot=5,nan"], "expected NAME=VALUE[,VALUE...] with finite numbers"),
-        (["ik", "ankle_ups", "--joint", "pivot=5"], "found 1 values; expected 2"),
+        (["ik", "ankle_ups", "--joint", "pivot=5"], "found 1 value; expected 2"),
         (["ik", "ankle_ups", "--joint", "pivt=5,10"], "did you mean 'pivot'"),
         (["ik", "ankle_ups", "--joint", "BL=100"], "expected those of 'pivot'"),
         (["ik", "ankle_ups", "--joint", "pivot=5,10", "--rpy", "0", "0", "0"], "--joint says it all"),

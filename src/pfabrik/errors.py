@@ -171,7 +171,7 @@ class InvalidArgument(PfabrikError, ValueError):
         self.found = found
         self.expected = expected
         self.rows = tuple(rows)
-        where = f" (first bad rows: {', '.join(map(str, self.rows))})" if self.rows else ""
+        where = f" (first bad row{'s' * (len(self.rows) > 1)}: {', '.join(map(str, self.rows))})" if self.rows else ""
         super().__init__(f"{argument}: found {found}; expected {expected}{where}")
 
 

@@ -104,7 +104,8 @@ def modes_as_object(found: Modes) -> dict[str, object]:
 
 def describe_modes(found: Modes, kind: str, header: Sequence[str], cells: Callable[[Solution], list[str]]) -> str:
     """How many modes, a table of them, and how sure it is that there are no others."""
-    searched = f"{counted(found.starts, 'start')}; another one would find a new mode with a probability of about {found.unseen:.2%}"
+    chance = f"another one would find a new mode with a probability of about {found.unseen:.2%}"
+    searched = f"{counted(found.starts, 'start')}; {chance}"
     if not found:
         return f"no {kind} mode found\n\n{searched}"
     kept = sum(map(bool, found)) or "none"

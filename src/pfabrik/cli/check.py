@@ -106,8 +106,8 @@ def task_notes(mechanism: Mechanism, there: int) -> Iterator[str]:
     twists = directions[counts]
     if asked > there < np.linalg.matrix_rank(twists, TOLERANCES.alignment):  # not always the same, as in a plane
         yield (
-            f"the task {' '.join(mechanism.task)} asks for {counted(asked, 'freedom')}, and the end effector has {there}, from "
-            "which the others follow: hardly any target can be reached; `task` says which count"
+            f"the task {' '.join(mechanism.task)} asks for {counted(asked, 'freedom')}, and the end effector has "
+            f"{there}, from which the others follow: hardly any target can be reached; `task` says which count"
         )
 
 

@@ -169,11 +169,8 @@ class Mechanism(Structure):
     def _doubts_of_freedom(self) -> Iterator[str]:
         left = end_effector_freedom(self, frozenset(drive.column for drive in self.drives))
         if left > 0:
-            drives, leave = (
-                counted(len(self.actuator_names), "actuator"),
-                "leaves" if len(self.actuator_names) == 1 else "leave",
-            )
-            yield f"{drives} {leave} the end effector {counted(left, 'freedom')} at home"
+            drives, leaves = len(self.actuator_names), "leave" if len(self.actuator_names) > 1 else "leaves"
+            yield f"{counted(drives, 'actuator')} {leaves} the end effector {counted(left, 'freedom')} at home"
         missed_by = inexactness(self)
         if missed_by > 0.0:
             yield (

@@ -127,7 +127,8 @@ def _of_task(mechanism: Mechanism) -> Iterator[Note]:
     if mechanism.task == mechanism.whole_task and freedoms < whole:
         coordinates = ", ".join(TASK_COORDINATES)
         yield Note(
-            f"the end effector has {counted(freedoms, 'freedom')} of {whole}: `task` says which of {coordinates} targets set"
+            f"the end effector has {counted(freedoms, 'freedom')} of {whole}: "
+            f"`task` says which of {coordinates} targets set"
         )
 
 
