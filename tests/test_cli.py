@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -33,6 +34,7 @@ from pfabrik.cli.group import exit_code
 from pfabrik.cli.outputs import ignores_case
 from pfabrik.cli.stops import AGAIN
 from pfabrik.cli.whole import new_folder
+from pfabrik.description.rods import uneven_rods
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy
 
@@ -306,6 +308,71 @@ def test_check_notes_what_may_not_be_meant(
     assert note in result.stderr
 
 
+def with_joints_moved(name: str, offset: float, *joints: str) -> pf.Mechanism:
+    """A delta with the feet of some rods moved along them, so that they are longer [length]."""
+    mechanism = pf.load(name)
+    moved = []
+    for joint in mechanism.joints:
+        if joint.name in joints:
+            foot, head = np.array(joint.at), np.array(mechanism.joint(f"C{joint.name[1:]}").at)
+            along = (foot - head) / np.linalg.norm(foot - head)
+            joint = dataclasses.replace(joint, at=tuple((foot + offset * along).tolist()))
+        moved.append(joint)
+    return dataclasses.replace(mechanism, joints=moved)
+
+
+@pytest.mark.parametrize(
+    ("name", "joints", "note"),
+    [
+        ("delta", ["BL2"], "rods 'rodL2' (255 mm) and 'rodR2' (232 mm) are side by side between 'arm2' and 'platform'"),
+        ("linear_delta", ["BR1"], "'rodL1' (273 mm) and 'rodR1' (296 mm) are side by side between 'carriage1'"),
+        (
+            "linear_delta",
+            ["BL3", "BR3"],
+            "'rodL3' (296 mm) and 'rodR3' (296 mm): the 4 others alike are 273 mm",
+        ),
+        ("servo_hexapod", ["BL1"], "rod 'rodL1' (LONGER cm): the 5 others alike are LENGTH cm long"),
+    ],
+)
+def test_check_names_rods_that_are_not_as_long_as_their_neighbours_or_copies(
+    run: Callable[..., Result], tmp_path: Path, name: str, joints: list[str], note: str
+) -> None:
+    mechanism = with_joints_moved(name, 23.0, *joints)
+    pf.save(mechanism, tmp_path / "my.toml")
+    for what, leg in (("LENGTH", "L2"), ("LONGER", "L1")):
+        ends = [mechanism.joint(f"{letter}{leg}").at for letter in "BC"]
+        note = note.replace(what, f"{math.dist(*ends):.9g}")
+    result = run("check", "my.toml")
+    assert result.exit_code == 0
+    assert note in result.stderr
+    assert result.stderr.count("note:") == 1
+    assert note in json.loads(run("check", "my.toml", "--json").stdout)["notes"][0]
+    if len(joints) == 1 and name.endswith("delta"):
+        refused = run("export", "my.toml", "klipper")
+        told = note.removeprefix("rods ").partition(" are side")[0]
+        assert refused.exit_code == 2 and told in refused.stderr
+
+
+def test_rods_between_crosses_of_hinges_are_rods(tmp_path: Path) -> None:
+    arm = [pf.Joint("P", "prismatic", ("base", "carriage"), axis=(0, 0, 1), actuated=True)]
+    for side, height in (("L", 0.0), ("R", -7.0)):
+        y = 20.0 if side == "L" else -20.0
+        foot, head = (0, y, 100 + height), (0, y, 0)
+        arm += [
+            pf.Joint(f"A{side}", "revolute", ("carriage", f"cross{side}"), at=foot, axis=(1, 0, 0)),
+            pf.Joint(f"B{side}", "revolute", (f"cross{side}", f"rod{side}"), at=foot, axis=(0, 1, 0)),
+            pf.Joint(f"C{side}", "spherical", (f"rod{side}", "platform"), at=head),
+        ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mechanism = pf.Mechanism("pair", arm, "platform", (0, 0, 0))
+    (pair,) = uneven_rods(mechanism)
+    assert [(rod.name, rod.between, rod.length) for rod in pair] == [
+        ("rodL", ("carriage", "platform"), 100.0),
+        ("rodR", ("carriage", "platform"), 93.0),
+    ]
+
+
 def test_check_does_not_mind_a_hinge_that_tilts_about_one_axis(run: Callable[..., Result], tmp_path: Path) -> None:
     (tmp_path / "flap.toml").write_text(FLAP, encoding="utf-8")
     assert run("check", "flap.toml").stderr == ""
@@ -414,6 +481,12 @@ def test_travel_tells_what_the_library_does_in_degrees_and_the_unit_of_length(ru
         unit, size = ("mm", 1.0) if reach.kind == "along" else ("deg", math.degrees(1.0))
         assert (float(row[4]), row[5]) == (pytest.approx(size * reach.distance, rel=1e-5), unit)
         assert all(limit.joint in row[6] and limit.bound in row[6] for limit in reach.stopped_by)
+
+
+def test_travel_says_why_where_no_limit_stops_it(run: Callable[..., Result], tmp_path: Path) -> None:
+    pf.save(pf.load("five_bar").without_limits(), tmp_path / "free.toml")
+    assert run("travel", "free.toml", "--along", 0, 0, 1).stdout.splitlines()[1].endswith("mm    links stretched")
+    assert run("travel", "five_bar", "--along", 1, 0, 0).stdout.splitlines()[1].endswith("0  mm    no freedom that way")
 
 
 def test_travel_starts_where_it_is_told_and_goes_where_it_is_told(run: Callable[..., Result]) -> None:
@@ -672,6 +745,13 @@ def test_kinds_are_listed_for_programs_too(run: Callable[..., Result]) -> None:
     assert run("new", "delta", "--json").exit_code == 2
 
 
+def test_new_alone_lists_the_kinds(run: Callable[..., Result], tmp_path: Path) -> None:
+    result = run("new")
+    assert (result.exit_code, result.stdout) == (0, run("new", "--list").stdout)
+    assert "pfabrik new KIND -o FILE" in result.stderr
+    assert os.listdir(tmp_path) == []
+
+
 def test_an_option_without_its_values_is_told_as_its_commands(run: Callable[..., Result]) -> None:
     assert run("travel", "stewart", "--along", "1").stderr.endswith("travel --help')\n")
 
@@ -692,7 +772,7 @@ def test_a_file_that_exists_is_kept_unless_forced(run: Callable[..., Result], tm
     [
         (["6-UPX"], "no template named '6-UPX'; did you mean '6-UPS'? (known: 3-PRS, "),
         (["dleta", "-o", "my.toml"], "did you mean 'delta'?"),
-        ([], "one KIND of 3-PRS, "),
+        (["-o", "my.toml"], "one KIND of 3-PRS, "),
         (["delta", "-o", "no/such/my.toml"], "no/such/my.toml: No such file or directory"),
     ],
 )
@@ -866,7 +946,7 @@ def test_wrong_speeds_are_told_in_a_line(
         ("\n\n", "empty"),
         ("x,y,z\n", "no targets"),
         ("x,y\n1,2\n", "no column z"),
-        ("x;y;z\n1;2;3\n", "with commas between"),
+        ("x y z\n1 2 3\n", "with commas between"),
         ("x,y,z,x\n1,2,3,4\n", "'x' appears twice"),
         ("x,y,z\n1,2,3\n1,b,3\n", "line 3: column 'y': found 'b'"),
         ("x,y,z\n1,2,nan\n", "line 2: column 'z': found 'nan'"),
