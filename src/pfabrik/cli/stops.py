@@ -80,7 +80,7 @@ class Stops:
     def _insist(self) -> None:
         while not self._over.wait(AGAIN):
             self._is_again = True
-            _thread.interrupt_main(self.number or signal.SIGINT)
+            _thread.interrupt_main(signal.Signals(self.number or signal.SIGINT))
 
     def _drop(self, unraisable: Any) -> None:
         """An interruption that a callback could not raise is no message: it is raised again."""

@@ -43,44 +43,69 @@ class Rod(NamedTuple):
 
 def rods_of(mechanism: Structure) -> list[Rod]:
     """All rods, in the order of their bodies; a cross between hinges that meet in a point is part of a joint."""
-    fixed = [joint for joint in mechanism.joints if joint.type == "fixed"]
-    whole = welded(fixed, mechanism.base, mechanism.end_effector)
-    held: dict[str, list[Joint]] = defaultdict(list)
-    for joint in mechanism.joints:
-        ends = {whole.get(body, body) for body in joint.connects}
-        for body in ends if len(ends) == 2 else ():
-            held[body].append(joint)
-    small = TOLERANCES.alignment * mechanism.characteristic_length
-    pairs = {
-        body: (joints[0], joints[1], np.subtract(joints[1].at, joints[0].at))
-        for body, joints in held.items()
-        if len(joints) == 2 and body not in (mechanism.base, mechanism.end_effector) and all(map(_may_end, joints))
-    }
-    crosses = {body for body, (*_, span) in pairs.items() if np.linalg.norm(span) <= small}
-
-    def beyond(joint: Joint, body: str) -> str:
-        for _ in mechanism.joints:
-            first, second = (whole.get(each, each) for each in joint.connects)
-            body = second if body == first else first
-            if body not in crosses:
-                break
-            joint = next(each for each in pairs[body][:2] if each is not joint)
-        return body
-
-    found = []
-    for body, (one, other, span) in pairs.items():
-        if body in crosses:
+    graph, found = _Graph(mechanism), []
+    for name, (one, other) in graph.held.items():
+        if name in graph.crosses:
             continue
-        ends = sorted([(beyond(one, body), one, -span), (beyond(other, body), other, span)], key=lambda end: end[0])
-        (first, its, _), (last, joint, way) = ends
+        ends = sorted([(graph.beyond(one, name), one), (graph.beyond(other, name), other)], key=lambda end: end[0])
+        (first, foot), (last, head) = ends
         if first != last:
-            kinds = sorted((each.type, name == mechanism.end_effector) for each, name in ((its, first), (joint, last)))
-            found.append(Rod(body, (first, last), (kinds[0], kinds[1]), way))
+            tip = mechanism.end_effector
+            kinds = sorted([(foot.type, first == tip), (head.type, last == tip)])
+            found.append(Rod(name, (first, last), (kinds[0], kinds[1]), _place(head) - _place(foot)))
     return found
+
+
+class _Graph:
+    """Bodies between two passive joints.
+
+    Attributes
+    ----------
+    held : body -> its two joints.
+    crosses : those of them whose joints are in one place.
+    """
+
+    def __init__(self, mechanism: Structure) -> None:
+        fixed = [joint for joint in mechanism.joints if joint.type == "fixed"]
+        self._whole = welded(fixed, mechanism.base, mechanism.end_effector)
+        joints: dict[str, list[Joint]] = defaultdict(list)
+        for joint in mechanism.joints:
+            first, last = self._bodies(joint)
+            for body in (first, last) if first != last else ():
+                joints[body].append(joint)
+        small = TOLERANCES.alignment * mechanism.characteristic_length
+        ends = (mechanism.base, mechanism.end_effector)
+        self.held = {
+            body: (each[0], each[1])
+            for body, each in joints.items()
+            if len(each) == 2 and body not in ends and all(map(_may_end, each))
+        }
+        self.crosses = {
+            body for body, (one, other) in self.held.items() if np.linalg.norm(_place(one) - _place(other)) <= small
+        }
+
+    def _bodies(self, joint: Joint) -> tuple[str, str]:
+        first, last = joint.connects
+        return self._whole.get(first, first), self._whole.get(last, last)
+
+    def beyond(self, joint: Joint, body: str) -> str:
+        """The body on the other side of a joint, and of the crosses that are part of it."""
+        for _ in range(1 + len(self.crosses)):
+            first, last = self._bodies(joint)
+            body = last if body == first else first
+            if body not in self.crosses:
+                break
+            one, other = self.held[body]
+            joint = other if joint is one else one
+        return body
 
 
 def _may_end(joint: Joint) -> bool:
     return joint.type in ENDS and not joint.actuated and joint.at is not None
+
+
+def _place(joint: Joint) -> Floats:
+    return np.array(joint.at, dtype=float)
 
 
 def uneven_rods(mechanism: Structure) -> list[tuple[Rod, ...]]:
@@ -105,7 +130,7 @@ def odd_rods(mechanism: Structure) -> list[tuple[tuple[Rod, ...], tuple[Rod, ...
     alike: dict[object, list[tuple[Rod, ...]]] = defaultdict(list)
     for rods in _by_bodies(rods_of(mechanism)):
         if np.ptp([rod.length for rod in rods]) <= small:
-            alike[len(rods), rods[0].kind].append(rods)
+            alike[len(rods), rods[0].kind].append(tuple(rods))
     found = []
     for legs in alike.values():
         lengths = np.array([rods[0].length for rods in legs])
@@ -132,4 +157,4 @@ def _by_bodies(rods: Sequence[Rod]) -> list[list[Rod]]:
 
 def _are_side_by_side(one: Rod, other: Rod) -> bool:
     cosine = float(one.span @ other.span) / (one.length * other.length)
-    return cosine >= np.cos(SIDE_BY_SIDE)
+    return bool(cosine >= np.cos(SIDE_BY_SIDE))

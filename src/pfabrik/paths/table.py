@@ -87,12 +87,14 @@ class Table:
                 raise WrongPath(f"line {number}: found {counted(len(cells), 'cell')}; expected {len(self._header)}")
         told = dict(zip(self._header, zip(*(cells for _, cells in rows), strict=True), strict=True))
         others: dict[str, Sequence[str]] = {}
-        for name, cells in told.items():
-            if name in NUMERIC:
-                cells = self._with_points(name, cells, lines)
-                columns[name] = _numbers(name, cells, lines)
+        for name, texts in told.items():
+            if name not in NUMERIC:
+                others[name] = [unmarked(cell) for cell in texts]
+                continue
+            numbers = self._with_points(name, texts, lines)
+            columns[name] = _numbers(name, numbers, lines)
             if name not in OF_POSES:
-                others[name] = cells if name in NUMERIC else [unmarked(cell) for cell in cells]
+                others[name] = numbers
         return _path(columns, others, lines, self._mechanism)
 
     def _with_points(self, name: str, cells: Sequence[str], lines: Sequence[int]) -> Sequence[str]:

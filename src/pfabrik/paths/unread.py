@@ -14,43 +14,19 @@ IN_NUMBERS = "words with numbers, such as X12.5"
 
 OF_PROGRAMS: tuple[tuple[re.Pattern[str], str, str], ...] = (
     (
-        re.compile(r"O\s*[<\[#\d]\S*\s*(SUB|ENDSUB|CALL|RETURN)\b|O\s*<"),
+        re.compile(r"O ?[<\[#\d]\S{0,40} ?(SUB|ENDSUB|CALL|RETURN)\b|O ?<"),
         "a subroutine, or a call of one",
         IN_ONE_PROGRAM,
     ),
-    (re.compile(r"O\s*[<\[#\d]\S*\s*[A-Z]{2,}"), "a condition or a loop", IN_ONE_PROGRAM),
-    (re.compile(r"M\s*0*(97|98|198)(?![\d.])|CALL\b|G\s*0*(65|66)(?![\d.])"), "a call of a subroutine", IN_ONE_PROGRAM),
-    (re.compile(r"M\s*0*99(?![\d.])"), "the end of a subroutine, or a jump", IN_ONE_PROGRAM),
-    (re.compile(r"M\s*0*47(?![\d.])"), "a jump back to the beginning", IN_ONE_PROGRAM),
+    (re.compile(r"O ?[<\[#\d]\S{0,40} ?[A-Z]{2,}"), "a condition or a loop", IN_ONE_PROGRAM),
+    (re.compile(r"M ?0*(97|98|198)(?![\d.])|CALL\b|G ?0*(65|66)(?![\d.])"), "a call of a subroutine", IN_ONE_PROGRAM),
+    (re.compile(r"M ?0*99(?![\d.])"), "the end of a subroutine, or a jump", IN_ONE_PROGRAM),
+    (re.compile(r"M ?0*47(?![\d.])"), "a jump back to the beginning", IN_ONE_PROGRAM),
     (re.compile(r"\b(IF|THEN|ELSE|WHILE|GOTO|END\d*|DO\d+)\b"), "a condition, a loop or a jump", IN_ONE_PROGRAM),
-    (re.compile(r"[A-Z]?\s*#\S*"), "a variable", IN_NUMBERS),
-    (re.compile(r"[A-Z]?\s*\[\S*"), "an expression", IN_NUMBERS),
+    (re.compile(r"[A-Z]? ?#\S*"), "a variable", IN_NUMBERS),
+    (re.compile(r"[A-Z]? ?\[\S*"), "an expression", IN_NUMBERS),
 )
 """How a line looks that steers a program, what that is, and what is expected in its place."""
-
-OFFSETS = "positions as the machine has them, without offsets but the first (G54)"
-IN_ONE_PROGRAM = "all moves one after the other in one program"
-PLAIN_MOVES = "G0 to G3, G17 to G21, G90 or G91"
-IN_NUMBERS = "words with numbers, such as X12.5"
-
-OF_PROGRAMS: tuple[tuple[re.Pattern[str], str, str], ...] = (
-    (
-        re.compile(r"O\s*[<\[#\d]\S*\s*(SUB|ENDSUB|CALL|RETURN)\b|O\s*<"),
-        "a subroutine, or a call of one",
-        IN_ONE_PROGRAM,
-    ),
-    (re.compile(r"O\s*[<\[#\d]\S*\s*[A-Z]{2,}"), "a condition or a loop", IN_ONE_PROGRAM),
-    (re.compile(r"M\s*0*(97|98|198)(?![\d.])|CALL\b|G\s*0*(65|66)(?![\d.])"), "a call of a subroutine", IN_ONE_PROGRAM),
-    (re.compile(r"M\s*0*99(?![\d.])"), "the end of a subroutine, or a jump", IN_ONE_PROGRAM),
-    (re.compile(r"M\s*0*47(?![\d.])"), "a jump back to the beginning", IN_ONE_PROGRAM),
-    (re.compile(r"\b(IF|THEN|ELSE|WHILE|GOTO|END\d*|DO\d+)\b"), "a condition, a loop or a jump", IN_ONE_PROGRAM),
-    (re.compile(r"[A-Z]?\s*#\S*"), "a variable", IN_NUMBERS),
-    (re.compile(r"[A-Z]?\s*\[\S*"), "an expression", IN_NUMBERS),
-)
-"""How a line looks that steers a program, what that is, and what is expected in its place."""
-
-PROGRAM_NUMBER = re.compile(r"O\s*\d+")
-"""How a program of many controllers begins; a second one is that of another program."""
 
 OFFSETS = "offsets or tool data that are set"
 CODES: dict[str, tuple[str, str]] = {
@@ -84,8 +60,9 @@ CODES: dict[str, tuple[str, str]] = {
 
 def refuse_steering(plain: str, number: int) -> None:
     """WrongPath for a line that steers a program: subroutines, conditions, variables."""
+    spaced = " ".join(plain.split())
     for pattern, what, expected in OF_PROGRAMS:
-        found = pattern.search(plain)
+        found = pattern.search(spaced)
         if found:
             raise WrongPath(f"line {number}: found {found[0].strip()[:20]}, {what}; expected {expected}")
 
