@@ -25,7 +25,7 @@ def is_finite(text: str) -> bool:
 
 def marked(text: str) -> str:
     """Text for a cell: with a mark in front where a spreadsheet would take it for a formula; numbers stay."""
-    return f"{MARK}{text}" if _is_formula(text) else text
+    return text if text[:1].isalnum() or not _is_formula(text) else f"{MARK}{text}"
 
 
 def unmarked(cell: str) -> str:

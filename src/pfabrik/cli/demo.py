@@ -16,7 +16,7 @@ from ..answers.table import aligned
 from ..arrays import Floats
 from ..extras import require
 from ..telling import telling
-from .outputs import real
+from .outputs import check_outputs, real
 from .picture import picture
 from .whole import new_folder, whole_folder
 
@@ -54,6 +54,7 @@ def demo(output: Path, steps: int, quick: bool) -> int:
     from ..reproduce.study import cases
 
     require("pictures", "matplotlib", "plot")
+    check_outputs([("-o", output)])
     with new_folder(real(output)):  # what cannot be written is found before the work begins
         runs = []
     count = QUICK_STEPS if quick else steps

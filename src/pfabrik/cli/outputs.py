@@ -40,8 +40,13 @@ def check_outputs(outputs: Sequence[tuple[str, Path | None]], inputs: Iterable[P
             both = " and ".join(dict.fromkeys(f"{name} {place}" for name, place in ((option, path), (other, its))))
             raise click.UsageError(f"{both}: found one place for two outputs; expected a place for each")
     for _, path in given:
-        if path.is_symlink() and not real(path).is_symlink() and (path.is_file() or not path.exists()):
+        if path.is_symlink() and not real(path).is_symlink() and not _is_device(path):
             click.echo(f"pfabrik: note: {path} is a link; {real(path)} is written", err=True)
+
+
+def _is_device(path: Path) -> bool:
+    """Whether it is there, and neither a file nor a folder: a pipe, say."""
+    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def refuse_existing(path: Path, force: bool) -> None:

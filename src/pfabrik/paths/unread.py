@@ -28,6 +28,9 @@ OF_PROGRAMS: tuple[tuple[re.Pattern[str], str, str], ...] = (
 )
 """How a line looks that steers a program, what that is, and what is expected in its place."""
 
+MAY_STEER = re.compile(r"[O#\[M]|[A-Z]{2}|G ?0*6[56]")
+"""What each of these lines has; most lines have none of it."""
+
 OFFSETS = "offsets or tool data that are set"
 CODES: dict[str, tuple[str, str]] = {
     **dict.fromkeys(("G5", "G5.1", "G5.2", "G6.2"), ("a spline", PLAIN_MOVES)),
@@ -61,6 +64,8 @@ CODES: dict[str, tuple[str, str]] = {
 def refuse_steering(plain: str, number: int) -> None:
     """WrongPath for a line that steers a program: subroutines, conditions, variables."""
     spaced = " ".join(plain.split())
+    if MAY_STEER.search(spaced) is None:
+        return
     for pattern, what, expected in OF_PROGRAMS:
         found = pattern.search(spaced)
         if found:
