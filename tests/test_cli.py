@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import dataclasses
 import itertools
@@ -14,6 +15,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -26,10 +28,13 @@ import pfabrik as pf
 from machines import closure
 from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import template, templates
-from pfabrik.cli import main
+from pfabrik.cli import main, outputs
 from pfabrik.cli.answer import describe_modes
 from pfabrik.cli.group import exit_code
+from pfabrik.cli.outputs import ignores_case
+from pfabrik.cli.stops import AGAIN
 from pfabrik.cli.whole import new_folder
+from pfabrik.description.rods import uneven_rods
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy
 
@@ -303,6 +308,71 @@ def test_check_notes_what_may_not_be_meant(
     assert note in result.stderr
 
 
+def with_joints_moved(name: str, offset: float, *joints: str) -> pf.Mechanism:
+    """A delta with the feet of some rods moved along them, so that they are longer [length]."""
+    mechanism = pf.load(name)
+    moved = []
+    for joint in mechanism.joints:
+        if joint.name in joints:
+            foot, head = np.array(joint.at), np.array(mechanism.joint(f"C{joint.name[1:]}").at)
+            along = (foot - head) / np.linalg.norm(foot - head)
+            joint = dataclasses.replace(joint, at=tuple((foot + offset * along).tolist()))
+        moved.append(joint)
+    return dataclasses.replace(mechanism, joints=moved)
+
+
+@pytest.mark.parametrize(
+    ("name", "joints", "note"),
+    [
+        ("delta", ["BL2"], "rods 'rodL2' (255 mm) and 'rodR2' (232 mm) are side by side between 'arm2' and 'platform'"),
+        ("linear_delta", ["BR1"], "'rodL1' (273 mm) and 'rodR1' (296 mm) are side by side between 'carriage1'"),
+        (
+            "linear_delta",
+            ["BL3", "BR3"],
+            "'rodL3' (296 mm) and 'rodR3' (296 mm): the 4 others alike are 273 mm",
+        ),
+        ("servo_hexapod", ["BL1"], "rod 'rodL1' (LONGER cm): the 5 others alike are LENGTH cm long"),
+    ],
+)
+def test_check_names_rods_that_are_not_as_long_as_their_neighbours_or_copies(
+    run: Callable[..., Result], tmp_path: Path, name: str, joints: list[str], note: str
+) -> None:
+    mechanism = with_joints_moved(name, 23.0, *joints)
+    pf.save(mechanism, tmp_path / "my.toml")
+    for what, leg in (("LENGTH", "L2"), ("LONGER", "L1")):
+        ends = [mechanism.joint(f"{letter}{leg}").at for letter in "BC"]
+        note = note.replace(what, f"{math.dist(*ends):.9g}")
+    result = run("check", "my.toml")
+    assert result.exit_code == 0
+    assert note in result.stderr
+    assert result.stderr.count("note:") == 1
+    assert note in json.loads(run("check", "my.toml", "--json").stdout)["notes"][0]
+    if len(joints) == 1 and name.endswith("delta"):
+        refused = run("export", "my.toml", "klipper")
+        told = note.removeprefix("rods ").partition(" are side")[0]
+        assert refused.exit_code == 2 and told in refused.stderr
+
+
+def test_rods_between_crosses_of_hinges_are_rods(tmp_path: Path) -> None:
+    arm = [pf.Joint("P", "prismatic", ("base", "carriage"), axis=(0, 0, 1), actuated=True)]
+    for side, height in (("L", 0.0), ("R", -7.0)):
+        y = 20.0 if side == "L" else -20.0
+        foot, head = (0, y, 100 + height), (0, y, 0)
+        arm += [
+            pf.Joint(f"A{side}", "revolute", ("carriage", f"cross{side}"), at=foot, axis=(1, 0, 0)),
+            pf.Joint(f"B{side}", "revolute", (f"cross{side}", f"rod{side}"), at=foot, axis=(0, 1, 0)),
+            pf.Joint(f"C{side}", "spherical", (f"rod{side}", "platform"), at=head),
+        ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mechanism = pf.Mechanism("pair", arm, "platform", (0, 0, 0))
+    (pair,) = uneven_rods(mechanism)
+    assert [(rod.name, rod.between, rod.length) for rod in pair] == [
+        ("rodL", ("carriage", "platform"), 100.0),
+        ("rodR", ("carriage", "platform"), 93.0),
+    ]
+
+
 def test_check_does_not_mind_a_hinge_that_tilts_about_one_axis(run: Callable[..., Result], tmp_path: Path) -> None:
     (tmp_path / "flap.toml").write_text(FLAP, encoding="utf-8")
     assert run("check", "flap.toml").stderr == ""
@@ -437,6 +507,12 @@ def test_travel_tells_what_the_library_does_in_degrees_and_the_unit_of_length(ru
         unit, size = ("mm", 1.0) if reach.kind == "along" else ("deg", math.degrees(1.0))
         assert (float(row[4]), row[5]) == (pytest.approx(size * reach.distance, rel=1e-5), unit)
         assert all(limit.joint in row[6] and limit.bound in row[6] for limit in reach.stopped_by)
+
+
+def test_travel_says_why_where_no_limit_stops_it(run: Callable[..., Result], tmp_path: Path) -> None:
+    pf.save(pf.load("five_bar").without_limits(), tmp_path / "free.toml")
+    assert run("travel", "free.toml", "--along", 0, 0, 1).stdout.splitlines()[1].endswith("mm    links stretched")
+    assert run("travel", "five_bar", "--along", 1, 0, 0).stdout.splitlines()[1].endswith("0  mm    no freedom that way")
 
 
 def test_travel_starts_where_it_is_told_and_goes_where_it_is_told(run: Callable[..., Result]) -> None:
@@ -695,6 +771,13 @@ def test_kinds_are_listed_for_programs_too(run: Callable[..., Result]) -> None:
     assert run("new", "delta", "--json").exit_code == 2
 
 
+def test_new_alone_lists_the_kinds(run: Callable[..., Result], tmp_path: Path) -> None:
+    result = run("new")
+    assert (result.exit_code, result.stdout) == (0, run("new", "--list").stdout)
+    assert "pfabrik new KIND -o FILE" in result.stderr
+    assert os.listdir(tmp_path) == []
+
+
 def test_an_option_without_its_values_is_told_as_its_commands(run: Callable[..., Result]) -> None:
     assert run("travel", "stewart", "--along", "1").stderr.endswith("travel --help')\n")
 
@@ -715,7 +798,7 @@ def test_a_file_that_exists_is_kept_unless_forced(run: Callable[..., Result], tm
     [
         (["6-UPX"], "no template named '6-UPX'; did you mean '6-UPS'? (known: 3-PRS, "),
         (["dleta", "-o", "my.toml"], "did you mean 'delta'?"),
-        ([], "one KIND of 3-PRS, "),
+        (["-o", "my.toml"], "one KIND of 3-PRS, "),
         (["delta", "-o", "no/such/my.toml"], "no/such/my.toml: No such file or directory"),
     ],
 )
@@ -766,6 +849,23 @@ def quick_path(folder: Path) -> Path:
     path = folder / "path.csv"
     path.write_text("x,y,z\n0,0,195\n0,0,205\n0,0,205\n")
     return path
+
+
+def test_text_that_a_spreadsheet_would_run_goes_out_as_text(run: Callable[..., Result], tmp_path: Path) -> None:
+    joints = [dataclasses.replace(joint, name=f"={joint.name}") for joint in pf.load("five_bar").joints]
+    along = [dataclasses.replace(joint, along=None) for joint in joints]
+    pf.save(dataclasses.replace(pf.load("five_bar"), joints=along, end_effector="=p3"), tmp_path / "arm.toml")
+    (tmp_path / "path.csv").write_text("x,y,z,@note\n0,10,200,=1+1\n0,10,900,-5\n")
+    assert run("track", "arm.toml", "path.csv", "-o", "answers.csv").exit_code == 1
+    with (tmp_path / "answers.csv").open(newline="", encoding="utf-8") as handle:
+        cells = {cell for row in csv.reader(handle) for cell in row if cell[:1] in ("=", "@", "+", "-")}
+    assert all(math.isfinite(float(cell)) for cell in cells)
+    rows = rows_of(tmp_path / "answers.csv")
+    assert [row["'@note"] for row in rows] == ["'=1+1", "-5"]
+    assert {row["margin_of"][:2] for row in rows} == {"'="}
+    again = pf.read_path(tmp_path / "answers.csv", pf.load("five_bar"))
+    assert list(again.others["@note"]) == ["=1+1", "-5"]
+    assert {name[:1] for name in again.others["margin_of"]} == {"="}
 
 
 def test_track_names_the_actuators_that_are_too_fast(run: Callable[..., Result], tmp_path: Path) -> None:
@@ -872,7 +972,7 @@ def test_wrong_speeds_are_told_in_a_line(
         ("\n\n", "empty"),
         ("x,y,z\n", "no targets"),
         ("x,y\n1,2\n", "no column z"),
-        ("x;y;z\n1;2;3\n", "with commas between"),
+        ("x y z\n1 2 3\n", "with commas between"),
         ("x,y,z,x\n1,2,3,4\n", "'x' appears twice"),
         ("x,y,z\n1,2,3\n1,b,3\n", "line 3: column 'y': found 'b'"),
         ("x,y,z\n1,2,nan\n", "line 2: column 'z': found 'nan'"),
@@ -896,7 +996,7 @@ def test_a_path_file_that_is_no_text_is_refused(run: Callable[..., Result], tmp_
     (tmp_path / "path.csv").write_bytes(bytes(range(256)))
     result = run("track", "five_bar", "path.csv", "-o", "answers.csv")
     assert result.exit_code == 2
-    assert "a file that is no text" in result.stderr
+    assert "no text of a path" in result.stderr
 
 
 def test_many_faults_are_told_in_one_line(run: Callable[..., Result], tmp_path: Path) -> None:
@@ -974,6 +1074,68 @@ def test_an_output_that_is_a_link_or_a_device_stays_one(run: Callable[..., Resul
     assert not Path(os.devnull).is_file()
 
 
+def test_a_link_that_is_written_through_is_told_and_one_in_circles_refused(
+    run: Callable[..., Result], tmp_path: Path
+) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n0,10,200\n")
+    (tmp_path / "link.csv").symlink_to("answers.csv")
+    (tmp_path / "loop.csv").symlink_to("loop.csv")
+    said = run("track", "five_bar", "path.csv", "-o", "link.csv").stderr
+    assert f"pfabrik: note: link.csv is a link; {tmp_path / 'answers.csv'} is written\n" in said
+    assert "is a link" not in run("track", "five_bar", "path.csv", "-o", "answers.csv").stderr
+    refused = run("track", "five_bar", "path.csv", "-o", "loop.csv")
+    assert (refused.exit_code, (tmp_path / "loop.csv").is_symlink()) == (2, True)
+    assert "loop.csv: Too many levels of symbolic links" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "track five_bar path.csv -o a.png --plot a.png",
+        "track five_bar path.csv -o a.png --plot ./a.png",
+        "track five_bar path.csv -o {folder}/a.png --plot a.png",
+        "track five_bar path.csv -o same/a.png --plot a.png",
+        "track five_bar path.csv -o a.png --plot link.png",
+        "track five_bar path.csv -o there.png --plot hard.png",
+        "track five_bar path.csv --plot a.png --animate link.gif",
+        "workspace five_bar -o a.csv -o ./a.csv",
+    ],
+)
+def test_two_outputs_to_one_place_are_refused(run: Callable[..., Result], tmp_path: Path, line: str) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n0,10,200\n")
+    (tmp_path / "there.png").write_text("precious")
+    os.link(tmp_path / "there.png", tmp_path / "hard.png")
+    (tmp_path / "same").symlink_to(".")
+    for link in ("link.png", "link.gif"):
+        (tmp_path / link).symlink_to("a.png")
+    before = sorted(os.listdir(tmp_path))
+    result = run(*line.format(folder=tmp_path).split())
+    assert result.exit_code == 2
+    assert "found one place for two outputs" in result.stderr
+    assert sorted(os.listdir(tmp_path)) == before
+    assert (tmp_path / "there.png").read_text() == "precious"
+
+
+def test_names_that_differ_by_case_are_one_place_where_the_file_system_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blind = (tmp_path / "A.Png").exists() if (tmp_path / "a.png").write_text("") == 0 else False
+    assert ignores_case(tmp_path) == blind
+    for answer in (False, True):
+        monkeypatch.setattr(outputs, "ignores_case", lambda _, answer=answer: answer)
+        assert outputs.is_one_place(tmp_path / "out.csv", tmp_path / "OUT.csv") == answer
+        assert not outputs.is_one_place(tmp_path / "out.csv", tmp_path / "other.csv")
+
+
+def test_standard_output_that_is_a_file_is_not_written_twice(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n0,10,200\n")
+    with (tmp_path / "a.csv").open("w") as handle:
+        line = ("track", "five_bar", "path.csv", "-o", "a.csv", "--json")
+        with in_process(*line, stdout=handle, cwd=tmp_path) as process:
+            assert "found one place for two outputs" in process.communicate(timeout=60)[1]
+    assert process.returncode == 2
+
+
 # Wrong input
 
 
@@ -995,7 +1157,7 @@ def test_an_output_that_is_a_link_or_a_device_stays_one(run: Callable[..., Resul
         (["ik", "stewart", *WITHIN_REACH, "--all", "--margins"], "--margins is of one answer"),
         (["ik", "ankle_ups", "--joint", "pivot"], "found 'pivot'; expected NAME=VALUE"),
         (["ik", "ankle_ups", "--joint", "pivot=5,nan"], "expected NAME=VALUE[,VALUE...] with finite numbers"),
-        (["ik", "ankle_ups", "--joint", "pivot=5"], "found 1 values; expected 2"),
+        (["ik", "ankle_ups", "--joint", "pivot=5"], "found 1 value; expected 2"),
         (["ik", "ankle_ups", "--joint", "pivt=5,10"], "did you mean 'pivot'"),
         (["ik", "ankle_ups", "--joint", "BL=100"], "expected those of 'pivot'"),
         (["ik", "ankle_ups", "--joint", "pivot=5,10", "--rpy", "0", "0", "0"], "--joint says it all"),
@@ -1098,22 +1260,18 @@ def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
     def interruptible() -> None:  # a shell starts what runs in its background with interrupts ignored
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-    line = ("demo", "--steps", 200_000, "--out", tmp_path / "out")
+    line = ("demo", "--steps", 200_000, "-o", tmp_path / "out")
     with in_process(*line, stdout=subprocess.PIPE, preexec_fn=interruptible) as process:
         deadline = time.monotonic() + 5
         while not os.listdir(tmp_path) and time.monotonic() < deadline:
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
         try:
-            said = process.communicate(timeout=30)[1]
-        except subprocess.TimeoutExpired:  # a signal that arrives in a callback of the compiler's C++ code is lost
-            process.send_signal(signal.SIGINT)
             said = process.communicate(timeout=90)[1]
         finally:
             process.kill()  # where it has ended, nothing happens
     assert "Traceback" not in said
-    # a shell calls both 130; Python sends itself the signal again if it arrived in code that it was just generating
-    assert process.returncode in (130, -signal.SIGINT), said
+    assert process.returncode == 130, said
     assert os.listdir(tmp_path) == []
 
 
@@ -1136,13 +1294,85 @@ def test_an_interruption_while_a_folder_is_removed_is_told_as_one(
     assert os.listdir(tmp_path) == []
 
 
+def test_an_interruption_that_is_swallowed_comes_again(capsys: pytest.CaptureFixture[str]) -> None:
+    def work() -> None:
+        with contextlib.suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5)
+        time.sleep(5)
+        pytest.fail("nobody was interrupted")
+
+    assert exit_code(work) == 130
+    assert capsys.readouterr().err == "pfabrik: interrupted\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_cleans_up_is_not_disturbed_by_further_signals(number: int) -> None:
+    cleaned = []
+
+    def work() -> None:
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(5)
+        finally:
+            os.kill(os.getpid(), number)
+            time.sleep(3 * AGAIN)
+            cleaned.append(True)
+
+    before = signal.getsignal(number)
+    assert exit_code(work) == 128 + number
+    assert cleaned
+    assert signal.getsignal(number) == before
+
+
+def test_a_signal_in_code_that_was_just_generated_has_its_own_exit_code(tmp_path: Path) -> None:
+    (tmp_path / "ends.py").write_text(
+        "import os, signal, sys, time\nfrom pfabrik.cli.group import exit_code\n"
+        "sys.exit(exit_code(lambda: exec('os.kill(os.getpid(), signal.SIGTERM); time.sleep(5)')))\n"
+    )
+    ran = subprocess.run([sys.executable, tmp_path / "ends.py"], capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (143, "pfabrik: terminated\n")
+
+
+def test_a_track_that_is_told_to_end_leaves_no_parts_of_files(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("x,y,z\n" + "0,10,200\n5,10,201\n" * 200_000)
+    with in_process("track", "five_bar", "path.csv", "-o", "answers.csv", cwd=tmp_path) as process:
+        deadline = time.monotonic() + 60
+        while not list(tmp_path.glob(".*.part*")) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.terminate()
+        said = process.communicate(timeout=60)[1]
+    assert (process.returncode, said.splitlines()[-1]) == (143, "pfabrik: terminated")
+    assert os.listdir(tmp_path) == ["path.csv"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [1.5, 2.5, 4.0])
+def test_a_view_is_interrupted_at_any_moment(after: float) -> None:
+    pytest.importorskip("viser")
+
+    def interruptible() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    line = ("view", "stewart", "--no-browser", "--port", 9100 + int(10 * after))
+    with in_process(*line, stdout=subprocess.PIPE, preexec_fn=interruptible) as process:
+        time.sleep(after)
+        process.send_signal(signal.SIGINT)
+        try:
+            said = process.communicate(timeout=30)[1]
+        finally:
+            process.kill()  # where it has ended, nothing happens
+    assert process.returncode == 130, said
+    assert said.strip() == "pfabrik: interrupted"
+
+
 # The demo
 
 
 @pytest.mark.slow
 def test_demo_writes_a_picture_and_a_table_for_each_machine(run: Callable[..., Result], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    result = run("demo", "--quick", "--out", "pictures")
+    result = run("demo", "--quick", "-o", "pictures")
     assert result.exit_code == 0
     assert {path.suffix for path in (tmp_path / "pictures").iterdir()} == {".png", ".csv"}
     for path in (tmp_path / "pictures").glob("*.csv"):

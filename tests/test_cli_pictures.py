@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from pathlib import Path
 
@@ -44,6 +45,15 @@ def test_track_draws_and_films_without_a_file_of_answers() -> None:
     assert sorted(os.listdir()) == ["a.gif", "a.png", "path.csv"]
     assert "wrote a.png" in result.stderr
     assert "2 reached, 1 projected" in result.stdout
+
+
+def test_plot_writes_the_names_of_all_joints(monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[set[str]] = []
+    drawing = importlib.import_module("pfabrik.view.machine")
+    monkeypatch.setattr(drawing, "write_names", lambda _canvas, _skeleton, named: written.append(named))
+    assert run("plot", "five_bar", "--names", "-o", "a.svg").exit_code == 0
+    assert run("plot", "five_bar", "-o", "b.svg").exit_code == 0
+    assert written == [{joint.name for joint in pf.load("five_bar").joints}, set()]
 
 
 def test_travel_prints_its_table_and_draws_it() -> None:

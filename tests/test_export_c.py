@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from functools import lru_cache
@@ -10,9 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import pfabrik as pf
 from machines import closure, published
+from pfabrik.cli import main
 from pfabrik.decomposition.leg_table import leg_table
 from pfabrik.description.joint_types import KINDS
 from pfabrik.description.task import task_of
@@ -301,11 +304,58 @@ def test_a_file_checks_itself_with_poses_that_have_one_answer_alone(tmp_path: Pa
 @needs_compiler
 def test_a_self_test_fails_where_the_machine_is_another(tmp_path: Path) -> None:
     text = c_source(machine("stewart"))
-    place = text.index(".foot = {") + len(".foot = {")
+    place = text.index("/* foot */ {") + len("/* foot */ {")
     wrong = text[:place] + "1.0 + " + text[place:]
     run = subprocess.run([str(compiled(tmp_path, wrong, COMPILERS[0], driver=None))], capture_output=True, text=True)
     assert run.returncode == 1
     assert "actuator 0" in run.stdout
+
+
+@pytest.mark.skipif(not shutil.which("g++"), reason="no C++ compiler here")
+@pytest.mark.parametrize("standard", ["c++11", "c++20"])
+@pytest.mark.parametrize(
+    ("name", "precision"), [("linear_delta", "float"), ("canfield", "double"), (AMBIGUOUS, "double")]
+)
+def test_the_file_is_cpp_too(name: str, precision: str, standard: str, tmp_path: Path) -> None:
+    text = c_source(machine(name), precision=precision)
+    program = compiled(tmp_path, text, "g++", f"-std={standard}", "-xc++", driver=None)
+    assert subprocess.run([str(program)], capture_output=True, text=True).stdout == "50 poses, 0 wrong\n"
+
+
+@pytest.mark.skipif(not COMPILERS or not shutil.which("g++"), reason="no compilers of C and C++ here")
+def test_a_program_in_cpp_calls_the_file_compiled_as_c(tmp_path: Path) -> None:
+    (tmp_path / "arm.c").write_text(c_source(machine("linear_delta"), name="arm"))
+    (tmp_path / "main.cpp").write_text(
+        '#define ARM_DECLARATIONS_ONLY\n#include "arm.c"\n#include <cstdio>\n'
+        "int main() { arm_pose pose; double found[ARM_ACTUATORS]; arm_home(&pose); pose.p[2] += 1.0;"
+        " arm_pose out = pose; if (arm_ik(&pose, &out, found)) return 1;"
+        ' std::printf("%.12g %.12g %.12g", found[0], found[1], found[2]); }'
+    )
+    for command in (
+        [COMPILERS[0], "-std=c99", "-c", "arm.c"],
+        ["g++", "-std=c++17", "-Wall", "-Werror", "main.cpp", "arm.o", "-o", "main", "-lm"],
+    ):
+        subprocess.run(command, cwd=tmp_path, check=True)
+    told = subprocess.run([str(tmp_path / "main")], capture_output=True, text=True, check=True).stdout
+    lifted = pf.solve_ik(machine("linear_delta"), machine("linear_delta").home_pose[:3, 3] + [0, 0, 1])
+    np.testing.assert_allclose([float(word) for word in told.split()], lifted.actuators, rtol=1e-9)
+
+
+@needs_compiler
+@pytest.mark.parametrize("options", [[], ["--name", "delta"]])
+def test_the_command_that_the_file_and_the_page_tell_runs_the_self_test(options: list[str], tmp_path: Path) -> None:
+    file, page = tmp_path / "delta.c", Path(__file__).parents[1] / "docs" / "your-controller.md"
+    result = CliRunner().invoke(main, ["export", "linear_delta", "c", "-o", str(file), *options])
+    assert result.exit_code == 0
+    said = re.search(r"^ +(cc .*-D.*SELF_TEST) FILE (.*)$", file.read_text(), re.MULTILINE)
+    assert said is not None
+    told = re.search(r"^ +(cc .*-D.*SELF_TEST) delta.c (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert told is not None
+    assert told.groups() == said.groups() or not options
+    command = f"{said[1].replace('cc', COMPILERS[0], 1)} delta.c {said[2]}"
+    ran = subprocess.run(["sh", "-c", command], cwd=tmp_path, capture_output=True, text=True)
+    assert (ran.stdout, ran.stderr) == ("50 poses, 0 wrong\n", "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["check", "delta.c"]
 
 
 @needs_compiler

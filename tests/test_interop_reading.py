@@ -632,7 +632,7 @@ def test_a_model_goes_through_the_command_to_answers_and_back(tmp_path: Path) ->
     assert run("fk", str(file), "5", "-3")[0] == 0
     code, out, _ = run("verify", str(file), "--with", "mujoco", "--poses", "3")
     assert code == 0 and "agrees with MuJoCo on 3 poses" in out
-    assert run("export", str(file), "--mjcf", str(again))[0] == 0
+    assert run("export", str(file), "mjcf", "-o", str(again))[0] == 0
     assert verify(from_mjcf(again).mechanism, poses=2)
     code, out, _ = run("verify", str(file), "--poses", "2", "--json")
     assert json.loads(out)["agree"] is True
@@ -660,9 +660,11 @@ def test_the_command_says_what_is_wrong_in_one_line(tmp_path: Path) -> None:
         (("import", str(tmp_path / "robot.urdf"), "--configuration", "up"), "--configuration"),
         (("check", str(tmp_path / "model.xml")), "pfabrik import"),
         (("check", str(tmp_path / "robot.urdf")), "pfabrik import"),
-        (("export", "stewart"), "--mjcf FILE"),
-        (("export", "stewart", "--mjcf", "-", "--c", "-"), "--mjcf and --c name one place"),
-        (("export", "stewart", "--mjcf", str(tmp_path / "new.xml"), "--klipper", "-"), "cannot be exported"),
+        (("export", "stewart"), "FORMAT"),
+        (("export", "stewart", "mjfc"), "mjcf"),
+        (("export", "stewart", "mjcf", "--name", "arm"), "--name is of c and c-float"),
+        (("export", "stewart", "c", "--name", "A b"), "found 'A b'"),
+        (("export", "stewart", "klipper", "-o", str(tmp_path / "new.xml")), "cannot be exported"),
     ):
         code, out, err = run(*words)
         assert (code, out) == (2, "")

@@ -231,12 +231,12 @@ class TestFreedom:
             Joint("f", "fixed", ("arm", "flange"), at=(1, 0, 0)),
             Joint("r", "revolute", ("flange", "tool"), at=(2, 0, 0), axis=Z, actuated=True),
         ]
-        with pytest.warns(MobilityWarning, match="1 actuators leave the end effector 2 freedoms"):
+        with pytest.warns(MobilityWarning, match="1 actuator leaves the end effector 2 freedoms"):
             machine = Mechanism("c", joints, "tool", (3, 0, 0))
         assert mobility(machine).mobility == 3
 
     def test_fewer_actuators_than_freedoms_warn_with_the_numbers(self):
-        with pytest.warns(MobilityWarning, match="1 actuators leave the end effector 1 freedom at home"):
+        with pytest.warns(MobilityWarning, match="1 actuator leaves the end effector 1 freedom at home"):
             Mechanism("loose", changed(five_bar(), "b", actuated=False), "tip")
 
     @pytest.mark.parametrize("tilt", [1e-11, 1e-8, 1e-6, 1e-4])

@@ -184,6 +184,13 @@ def test_limits_that_hold_an_answer_back_are_named_in_their_own_colour() -> None
     assert set(names) - set(held) == {"p1"}
 
 
+@pytest.mark.parametrize("name", ["five_bar", "canfield"])
+def test_all_joints_are_named_where_that_is_asked_for(name: str) -> None:
+    axes = pf.plot(pf.load(name), names=True)
+    assert sorted(text.get_text() for text in axes.texts) == sorted(joint.name for joint in pf.load(name).joints)
+    assert not pf.plot(pf.load(name), names=False).texts
+
+
 @pytest.mark.parametrize("name", ["stewart", "five_bar", "nrpm", "hexaglide", "serial_arm", "delta"])
 def test_no_label_hides_another_or_leaves_the_figure(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     machine = pf.load(name)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from pfabrik.cells import marked
 from pfabrik.errors import InvalidArgument
 from pfabrik.paths import path as path_module
 
@@ -86,7 +87,8 @@ def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
         ("X10", "line 1: a position without"),
         ("G1 X1\nG2 X5 Y5 I100 J0", "line 2: an arc from radius"),
         ("G2 X100 R1", "line 1: found R1"),
-        ("G1 X#5", "line 1: found '"),
+        ("G1 X#5", "line 1: found X#5, a variable"),
+        ("G1 X[3+1]", "line 1: found X[3+1], an expression"),
         ("G1 X=4", "line 1: found '"),
         ("hello world", "found 'HELLO'"),
         ("", "no moves"),
@@ -98,8 +100,31 @@ def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
         ("G1 X1 U5", "line 1: found U5"),
         ("G1 X1 Y2 X3", "line 1: found X twice"),
         ("G1 X1\nG4 X2", "line 2: found G4"),
-        ("G1 X1\nM98 P100", "line 2: found M98"),
-        ("G1 X1\nM206 X5", "line 2: found M206"),
+        ("G1 X1\nM98 P100", "line 2: found M98, a call of a subroutine"),
+        ('G1 X1\nN20 M98 P"probe.g"', "line 2: found M98, a call of a subroutine"),
+        ("G1 X1\nM99", "line 2: found M99, the end of a subroutine"),
+        ("G1 X1\nM198 P3", "line 2: found M198, a call of a subroutine"),
+        ("G1 X1\nG65 P9000 A1", "line 2: found G65, a call of a subroutine"),
+        ("O100 sub\nG1 X1\no100 endsub", "line 1: found O100 SUB, a subroutine"),
+        ("G1 X1\no<corner> call [1]", "line 2: found O<"),
+        ("G1 X1\nO 7 while [#1 LT 3]", "line 2: found O 7 WHILE, a condition or a loop"),
+        ("O1\nG1 X1\nO2\nG1 X2", "line 3: found O2, another program"),
+        ("IF [#1 EQ 2] GOTO 10", "line 1: found IF, a condition"),
+        ("G1 X1\nG55\nG1 X2", "line 2: found G55, a work offset that the program does not say"),
+        ("G1 X1\nG59.3", "line 2: found G59.3, a work offset"),
+        ("G54.1 P2\nG1 X1", "line 1: found G54.1, a work offset"),
+        ("G1 X1\nG92 X0", "line 2: found G92, an offset of all positions"),
+        ("G1 X1\nG92", "line 2: found G92, an offset of all positions"),
+        ("G1 X1\nG92.1", "line 2: found G92.1, an offset of all positions"),
+        ("G10 L2 P1 X5\nG1 X1", "line 1: found G10, offsets or tool data"),
+        ("G10 P1 Z5\nG1 X1", "line 1: found G10, offsets or tool data"),
+        ("G1 X1\nG52 X1", "line 2: found G52, a local work offset"),
+        ("G1 X1\nG53 G0 X0", "line 2: found G53, a move past the work offset"),
+        ("G1 X1\nG43 H1", "line 2: found G43, an offset by the tool's length"),
+        ("G1 X1\nG28", "line 2: found G28, a move to a place that the program does not say"),
+        ("G93 G1 X1 F1", "line 1: found G93, feeds as shares of a move"),
+        ("G1 X1\nM206 X5", "line 2: found M206, an offset of all positions"),
+        ("G90\nM70\nG91\nM72\nG1 X1", "line 4: found M72, a return to modes"),
     ],
 )
 def test_gcode_that_cannot_be_followed_is_one_sentence(text: str, said: str, tmp_path: Path) -> None:
@@ -108,6 +133,76 @@ def test_gcode_that_cannot_be_followed_is_one_sentence(text: str, said: str, tmp
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 300
+
+
+def test_words_that_set_no_place_are_passed_over(tmp_path: Path) -> None:
+    begun = "%\nO1234 (PART)\nG54 G21\nG92 E0\nG10\nG1 X1 F60\n"
+    text = begun + "M73 P10 R5\nG11\nG92 E1\nM117 M98 in words\nG1 X2\nM30\nO2\n"
+    np.testing.assert_allclose(positions(read(tmp_path, text, longest=5.0))[1:, 0], [1, 2])
+
+
+@pytest.mark.parametrize("tolerance", [5e-324, 1e-300, 1e-17, 1e-12])
+def test_a_tolerance_that_no_number_of_steps_keeps_is_refused(tolerance: float, tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument, match=r"line 2: .*(too many steps|more than 1000000 targets)"):
+        read(tmp_path, "G0 X0 Y0\nG2 X0 Y0 I20 J0 F600\n", tolerance=tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-7, 1e-3, 1.0, 1e300])
+def test_chords_are_as_far_off_their_arc_as_the_tolerance_says(tolerance: float, tmp_path: Path) -> None:
+    found = positions(read(tmp_path, "G0 X0 Y0\nG2 X0 Y0 I20 J0 F600\n", tolerance=tolerance, longest=1e9))[1:]
+    middles = (found[1:, :2] + found[:-1, :2]) / 2.0
+    off = 20.0 - np.hypot(middles[:, 0] - 20.0, middles[:, 1])
+    assert off.max() <= min(1.001 * tolerance, 20.0)
+    assert off.max() > 0.5 * tolerance or len(found) == 5
+
+
+AS_IN_ENGLISH = "note,t,x,y,z\na,0,1.5,2,180\nGröße,0.5,-2.25,3e-1,181\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        (AS_IN_ENGLISH, "utf-8"),
+        (AS_IN_ENGLISH, "utf-8-sig"),
+        (AS_IN_ENGLISH, "utf-16"),
+        (AS_IN_ENGLISH, "latin-1"),
+        (AS_IN_ENGLISH.replace(",", ";"), "latin-1"),
+        (AS_IN_ENGLISH.replace(",", ";").replace(".", ","), "latin-1"),
+        (AS_IN_ENGLISH.replace(",", "\t").replace(".", ","), "utf-16"),
+        ("sep=;\r\n" + AS_IN_ENGLISH.replace(",", ";").replace(".", ","), "utf-8-sig"),
+        ("\ufeff" + AS_IN_ENGLISH.replace("\n", "\r"), "utf-16-be"),
+    ],
+)
+@pytest.mark.parametrize("name", ["path.csv", "path"])
+def test_tables_as_spreadsheets_of_any_country_write_them(
+    text: str, encoding: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / name).write_bytes(text.encode(encoding))
+    with (tmp_path / name).open(encoding="utf-8") as standard:
+        monkeypatch.setattr("sys.stdin", standard)
+        for found in (pf.read_path(tmp_path / name, pf.load("stewart")), pf.read_path("-", pf.load("stewart"))):
+            assert positions(found).tolist() == [[1.5, 2, 180], [-2.25, 0.3, 181]]
+            assert found.times is not None and found.times.tolist() == [0.0, 0.5]
+            assert list(found.others["note"]) == ["a", "Größe"]
+            assert list(found.others["t"]) == ["0", "0.5"]
+        assert not standard.closed
+
+
+def test_a_comment_in_latin_1_is_no_fault_of_a_program(tmp_path: Path) -> None:
+    (tmp_path / "a.nc").write_bytes("(Stück für Stück)\nG1 X1 F60\n".encode("latin-1"))
+    assert len(pf.read_path(tmp_path / "a.nc", pf.load("stewart")).targets) >= 2
+
+
+FORMULAS = ["=1+1", "+note", "-x", "@me", "'=1", "''-a"]
+HARMLESS = ["'quoted'", "-5", "+3.5", "-1,5", "'-5", "-", "=", "a=b", ""]
+
+
+def test_text_that_looks_like_a_formula_is_marked_and_read_as_it_was(tmp_path: Path) -> None:
+    assert [marked(cell) for cell in HARMLESS] == HARMLESS
+    assert [marked(cell) for cell in FORMULAS] == [f"'{cell}" for cell in FORMULAS]
+    cells = FORMULAS + HARMLESS
+    rows = "".join(f'"{marked(cell)}",1,2,180\n' for cell in cells)
+    assert list(read(tmp_path, "'=note,x,y,z\n" + rows, "path.csv").others["=note"]) == cells
 
 
 def test_columns_in_any_order_and_either_unit(tmp_path: Path) -> None:
@@ -200,6 +295,10 @@ def test_steps_are_divided_or_made_at_a_rate(tmp_path: Path) -> None:
         ("x,y,z\n", "no targets"),
         ("x,y,z,t\n1,2,180,1\n1,2,180,1\n", "times that grow"),
         ("x,y,z,feed\n1,2,180,0\n", "a feed above zero"),
+        ("x;y;z\n1,5;2;180\n1.5;2;180\n", "line 3: column 'x': found '1.5'; expected decimals with ','"),
+        ("x;y;z\n1.234,5;2;180\n", "line 2: column 'x': found '1.234,5'"),
+        ('x,y,z\n"1,5",2,180\n', "line 2: column 'x': found '1,5'"),
+        ("x,y,z\n1,5,2,180\n", "line 2: found 4 cells; expected 3"),
     ],
 )
 def test_tables_that_are_no_path_are_one_sentence(text: str, said: str, tmp_path: Path) -> None:

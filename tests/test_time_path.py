@@ -196,7 +196,7 @@ def test_paths_that_no_machine_follows_are_refused_with_the_step() -> None:
     mechanism = pf.load("five_bar")
     home = mechanism.home_pose[:3, 3]
     far = pf.track(mechanism, [home, home + [0, 1e4, 0], home])
-    with pytest.raises(InvalidArgument, match=r"not reached.*first bad rows: 1"):
+    with pytest.raises(InvalidArgument, match=r"not reached.*first bad row: 1"):
         pf.time_path(far, speed=1.0)
     with pytest.raises(InvalidArgument, match="does not move"):
         pf.time_path(pf.track(mechanism, [home, home]), speed=1.0)

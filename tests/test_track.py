@@ -375,7 +375,7 @@ def test_a_row_that_is_no_pose_where_links_are_stretched_out_is_passed_over(on_i
     whole = pf.track(machine, path)
     path[8] = np.nan
     if on_invalid == "raise":
-        with pytest.raises(InvalidArgument, match="first bad rows: 8"):
+        with pytest.raises(InvalidArgument, match="first bad row: 8"):
             pf.track(machine, path)
         return
     followed = pf.track(machine, path, options=Options(on_invalid="mark"))

@@ -22,6 +22,11 @@ __all__ = [
 ]
 
 
+def counted(number: int, noun: str) -> str:
+    """So many of what a noun in the singular says: "1 row", "2 rows"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def near_miss(name: str, known: Iterable[str], likeness: float = 0.6) -> str:
     """``"; did you mean 'platform'?"`` when a known name is close to `name`, else an empty string.
 
@@ -166,7 +171,7 @@ class InvalidArgument(PfabrikError, ValueError):
         self.found = found
         self.expected = expected
         self.rows = tuple(rows)
-        where = f" (first bad rows: {', '.join(map(str, self.rows))})" if self.rows else ""
+        where = f" (first bad row{'s' * (len(self.rows) > 1)}: {', '.join(map(str, self.rows))})" if self.rows else ""
         super().__init__(f"{argument}: found {found}; expected {expected}{where}")
 
 

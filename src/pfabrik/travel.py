@@ -15,11 +15,12 @@ from .answers.status import Status
 from .answers.table import aligned, plain
 from .answers.words import short_names
 from .arrays import Floats, Mask
+from .closure.first_order import are_stretched
 from .description.mechanism import Mechanism
 from .description.notebook import card
 from .description.task import task_of
 from .engine import engine_of
-from .errors import InvalidArgument
+from .errors import InvalidArgument, counted
 from .kernels.rows import REACHED
 from .poses import as_floats
 from .rotations import from_rotvec
@@ -60,6 +61,17 @@ class Reach:
     stopped_by: tuple[ActiveLimit, ...]
     end: Solution | None
 
+    @property
+    def why(self) -> str:
+        """What stops it, in a few words; empty where nothing does."""
+        if self.stopped_by or self.end is None:
+            return short_names(self.stopped_by)
+        unit = 1.0 if self.kind == "about" else self.end.mechanism.characteristic_length
+        is_stretched = self.distance > 2.0 * TOLERANCES.position * unit
+        if not is_stretched:
+            is_stretched = bool(are_stretched(self.end.mechanism, self.end._coordinates).any())
+        return "links stretched" if is_stretched else "no freedom that way"
+
 
 @dataclass(frozen=True, repr=False)
 class Travel(Sequence[Reach]):
@@ -87,7 +99,7 @@ class Travel(Sequence[Reach]):
         return iter(self.reaches)
 
     def __repr__(self) -> str:
-        return f"<Travel of '{self.origin.mechanism.name}': {len(self)} directions>"
+        return f"<Travel of '{self.origin.mechanism.name}': {counted(len(self), 'direction')}>"
 
     def __str__(self) -> str:
         """A table of them, angles in degrees."""
@@ -98,7 +110,7 @@ class Travel(Sequence[Reach]):
         return card(self.origin.mechanism.name, ["how far the end effector can go"], _HEADER, self._rows(), "")
 
     def _rows(self) -> list[tuple[str, ...]]:
-        return [(*_direction(each), *self._distance(each), short_names(each.stopped_by)) for each in self]
+        return [(*_direction(each), *self._distance(each), each.why) for each in self]
 
     def _distance(self, reach: Reach) -> tuple[str, str]:
         """How far it is, and the unit: degrees about an axis."""

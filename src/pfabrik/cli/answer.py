@@ -14,7 +14,7 @@ from ..answers.words import as_sentence, by_bound, exceeded, loop_gap
 from ..arrays import Floats
 from ..description.notebook import bound_text
 from ..description.readouts import readouts
-from ..errors import ContinuumOfSolutions
+from ..errors import ContinuumOfSolutions, counted
 from ..rotations import to_rpy
 from ..tolerances import TOLERANCES
 from .group import complain
@@ -104,13 +104,12 @@ def modes_as_object(found: Modes) -> dict[str, object]:
 
 def describe_modes(found: Modes, kind: str, header: Sequence[str], cells: Callable[[Solution], list[str]]) -> str:
     """How many modes, a table of them, and how sure it is that there are no others."""
-    searched = (
-        f"{found.starts} starts; another one would find a new mode with a probability of about {found.unseen:.2%}"
-    )
+    chance = f"another one would find a new mode with a probability of about {found.unseen:.2%}"
+    searched = f"{counted(found.starts, 'start')}; {chance}"
     if not found:
         return f"no {kind} mode found\n\n{searched}"
     kept = sum(map(bool, found)) or "none"
-    count = f"{found.total} {kind} mode{'s' * (found.total > 1)}, "
+    count = f"{counted(found.total, f'{kind} mode')}, "
     count += f"of the {len(found)} nearest to home " if found.total > len(found) else ""
     rows = [
         [str(number), *cells(mode), str(hits), by_bound(exceeded(mode)) or "nothing"]

@@ -15,8 +15,9 @@ import pfabrik as pf
 
 from ..description.graph_faults import leaves
 from ..description.joint_types import TASK_TURNS
+from ..description.rods import odd_rods, uneven_rods, with_lengths
 from ..description.task import task_of
-from ..errors import InvalidMechanism
+from ..errors import InvalidMechanism, counted
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .info import NOT_COUNTED, counted_mobility
@@ -58,8 +59,8 @@ def check(mech: str, as_json: bool) -> int:
     for note in noted:
         click.echo(f"pfabrik: note: {note}", err=True)
     click.echo(
-        f"ok: {mechanism.name}: {len(mechanism.joints)} joints, {len(mechanism.actuator_names)} actuated, "
-        f"{len(chains)} sub-chains, task {' '.join(mechanism.task)}"
+        f"ok: {mechanism.name}: {counted(len(mechanism.joints), 'joint')}, {len(mechanism.actuator_names)} actuated, "
+        f"{counted(len(chains), 'sub-chain')}, task {' '.join(mechanism.task)}"
     )
     return 0
 
@@ -73,11 +74,27 @@ def notes(mechanism: Mechanism) -> Iterator[str]:
         yield from task_notes(mechanism, counted.platform)
     for _, joint, body in leaves(mechanism):
         yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
+    yield from rod_notes(mechanism)
     widths = [width for joint in mechanism.joints for width in angular_widths(joint)]
     if widths and mechanism.angle_unit == "rad" and max(widths) > 4 * FULL_TURN:
         yield f"a range of {max(widths):.4g} rad is {max(widths) / FULL_TURN:.3g} turns; were degrees meant?"
     if widths and mechanism.angle_unit == "deg" and max(widths) < math.radians(FULL_TURN):
         yield f"no range of an angle is wider than {math.degrees(max(widths)):.3g} degrees; were radians meant?"
+
+
+def rod_notes(mechanism: Mechanism) -> Iterator[str]:
+    """Rods that are not as long as those beside them, or as those of other legs."""
+    unit = mechanism.length_unit
+    for rods in uneven_rods(mechanism):
+        first, last = rods[0].between
+        yield (
+            f"rods {with_lengths(rods, unit)} are side by side between '{first}' and '{last}', and differ in length: "
+            "what they hold tilts as it moves"
+        )
+    for odd, others in odd_rods(mechanism):
+        what = "rod" if len(odd) == 1 else "rods"
+        length = f"{others[0].length:.9g} {unit}"
+        yield f"{what} {with_lengths(odd, unit)}: the {len(others)} others alike are {length} long"
 
 
 def task_notes(mechanism: Mechanism, there: int) -> Iterator[str]:
@@ -89,8 +106,8 @@ def task_notes(mechanism: Mechanism, there: int) -> Iterator[str]:
     twists = directions[counts]
     if asked > there < np.linalg.matrix_rank(twists, TOLERANCES.alignment):  # not always the same, as in a plane
         yield (
-            f"the task {' '.join(mechanism.task)} asks for {asked} freedoms, and the end effector has {there}, from "
-            "which the others follow: hardly any target can be reached; `task` says which count"
+            f"the task {' '.join(mechanism.task)} asks for {counted(asked, 'freedom')}, and the end effector has "
+            f"{there}, from which the others follow: hardly any target can be reached; `task` says which count"
         )
 
 

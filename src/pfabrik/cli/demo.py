@@ -16,6 +16,7 @@ from ..answers.table import aligned
 from ..arrays import Floats
 from ..extras import require
 from ..telling import telling
+from .outputs import check_outputs, real
 from .picture import picture
 from .whole import new_folder, whole_folder
 
@@ -37,10 +38,12 @@ class Run:
 
 
 @click.command()
-@click.option("--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True, help="Folder to write.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), default=Path("out"), show_default=True, help="Folder to write."
+)
 @click.option("--steps", type=click.IntRange(min=3), default=360, show_default=True, help="Targets on each circle.")
 @click.option("--quick", is_flag=True, help=f"{QUICK_STEPS} targets on each circle.")
-def demo(out: Path, steps: int, quick: bool) -> int:
+def demo(output: Path, steps: int, quick: bool) -> int:
     """Follow circles that leave the workspace.
 
     Three mechanisms track the circles of the P-FABRIK paper; pictures and CSV files go to a folder.
@@ -51,19 +54,20 @@ def demo(out: Path, steps: int, quick: bool) -> int:
     from ..reproduce.study import cases
 
     require("pictures", "matplotlib", "plot")
-    with new_folder(out.resolve()):  # what cannot be written is found before the work begins
+    check_outputs([("-o", output)])
+    with new_folder(real(output)):  # what cannot be written is found before the work begins
         runs = []
     count = QUICK_STEPS if quick else steps
     for case in sorted(cases(), key=lambda case: case.mechanism.end_effector_is_joint):  # soonest compiled first
         runs.append(follow(case, count))
-        with whole_folder(out) as folder:
+        with whole_folder(output) as folder:
             draw(runs[-1], folder)
-        click.echo(f"wrote {out / case.key}.png", err=True)
-    with whole_folder(out) as folder:
+        click.echo(f"wrote {output / case.key}.png", err=True)
+    with whole_folder(output) as folder:
         for run in runs:
             write(run, folder)
     click.echo(table(runs))
-    click.echo(f"\nwrote {', '.join(f'{run.key}.png, {run.key}.csv' for run in runs)} to {out}/")
+    click.echo(f"\nwrote {', '.join(f'{run.key}.png, {run.key}.csv' for run in runs)} to {output}/")
     return 0 if all(holds(run.solution) for run in runs) else 1
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ..paths.numbers import is_finite
+from ..cells import is_finite
 
 __all__ = ["FINITE", "is_finite"]
 

@@ -11,6 +11,7 @@ import numpy as np
 import pfabrik as pf
 
 from ..description.readouts import readouts
+from ..errors import counted
 from .answer import describe, pose_header, pose_texts, tell_modes
 from .finite import is_finite
 from .mech import MECH, load
@@ -59,7 +60,7 @@ def coordinates(mechanism: Mechanism, values: tuple[float, ...]) -> Floats:
     shown = readouts(mechanism)
     if len(values) != len(shown):
         expected = ", ".join(f"{readout.name} [{readout.unit}]" for readout in shown)
-        raise click.UsageError(f"VALUE...: found {len(values)} values; expected {len(shown)}: {expected}")
+        raise click.UsageError(f"VALUE...: found {counted(len(values), 'value')}; expected {len(shown)}: {expected}")
     return np.array([readout.coordinate(value) for readout, value in zip(shown, values, strict=True)])
 
 

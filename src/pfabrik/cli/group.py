@@ -15,9 +15,9 @@ from typing import Any, NoReturn
 import click
 
 from ..errors import PfabrikError, near_miss
+from .stops import Stops
 
 WRONG_INPUT = 2
-INTERRUPTED = 130
 PIPE_CLOSED = 141
 
 
@@ -91,8 +91,18 @@ def take_closed_places() -> None:
 
 def exit_code(run: Callable[[], Any]) -> int:
     """Run, and say how it went: the returned integer, or the code of the failure, which is told on stderr."""
+    with Stops() as stops:
+        code = code_of(run, stops)
+        if stops.number is not None:  # also where whoever was interrupted made nothing of it
+            complain(stops.word)
+            return stops.code
+    return code
+
+
+def code_of(run: Callable[[], Any], stops: Stops) -> int:
+    """Run; what failed is told on stderr, but for a signal that ended it."""
     try:
-        with plain_warnings(), interruptions_first():
+        with plain_warnings(), interruptions_first(stops):
             result = run()
         return result if isinstance(result, int) else 0
     except click.UsageError as error:
@@ -104,9 +114,10 @@ def exit_code(run: Callable[[], Any]) -> int:
         complain(str(error))
     except SystemExit:  # click leaves this way when the reader of a pipe has gone
         return PIPE_CLOSED
-    except (KeyboardInterrupt, click.Abort):
-        complain("interrupted")
-        return INTERRUPTED
+    except KeyboardInterrupt:
+        if stops.number is None:
+            complain(stops.word)
+        return stops.code
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         complain(f"{where}{error.strerror or error}")
@@ -132,11 +143,13 @@ def plain_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def interruptions_first() -> Iterator[None]:
+def interruptions_first(stops: Stops) -> Iterator[None]:
     """Have an interruption told, not what failed on its way out: a clean-up that it met may close a file twice."""
     try:
         yield
     except Exception as error:
+        if stops.number is not None:
+            raise KeyboardInterrupt from error
         cause: BaseException | None = error
         while cause is not None and not isinstance(cause, KeyboardInterrupt):
             cause = cause.__context__

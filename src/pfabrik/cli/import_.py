@@ -11,7 +11,8 @@ import click
 import pfabrik as pf
 
 from .group import complain
-from .whole import OUTPUT, STANDARD, refuse_existing, whole_file
+from .outputs import OUTPUT, STANDARD, check_outputs, refuse_existing
+from .whole import whole_file
 
 if TYPE_CHECKING:
     from ..interop import Imported
@@ -46,6 +47,7 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) 
     All that is left out or changed is told on stderr, by name.
     """
     refuse_existing(output, force)
+    check_outputs([("-o", output)], [file])
     found = imported(file, **asked)
     from ..files import dumps
 

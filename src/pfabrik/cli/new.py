@@ -11,7 +11,8 @@ from click.shell_completion import CompletionItem
 from ..answers.table import aligned
 from ..catalog import catalog, catalog_file, template, templates, title
 from .mech import MECH
-from .whole import OUTPUT, STANDARD, refuse_existing, whole_file
+from .outputs import OUTPUT, STANDARD, check_outputs, refuse_existing
+from .whole import whole_file
 
 
 def kinds_completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -29,19 +30,23 @@ def kinds_completed(ctx: click.Context, param: click.Parameter, incomplete: str)
 def new(kind: str | None, machine: str | None, output: Path, force: bool, list_all: bool, as_json: bool) -> int:
     """Write a starting file for a machine of your own.
 
-    KIND is a name from `pfabrik new --list`. The file describes a machine of this kind that works as it is; its
-    comments say what to measure and where to put it. With --from it is a machine of `pfabrik catalog`, as it is there.
+    KIND is one of those that `pfabrik new` alone lists. The file describes a machine of this kind that works as it is;
+    its comments say what to measure and where to put it. With --from it is a machine of `pfabrik catalog`, as it is
+    there.
     """
     if as_json and not list_all:
         raise click.UsageError("--json goes with --list: a file is TOML")
-    if list_all:
+    if list_all or not (kind or machine or output != STANDARD or force):
         kinds = {name: title(name) for name in templates()}
         click.echo(json.dumps(kinds) if as_json else aligned(("kind", "machine"), kinds.items()))
+        if not list_all:
+            click.echo("next: pfabrik new KIND -o FILE", err=True)
         return 0
     if (kind is None) == (machine is None):
         raise click.UsageError(f"give either --from NAME or one KIND of {', '.join(templates())}")
     text = text_of(kind) if machine is None else catalog_file(machine).read_text(encoding="utf-8")
     refuse_existing(output, force)
+    check_outputs([("-o", output)])
     with whole_file(output) as handle:
         handle.write(text)
     if output != STANDARD:

@@ -10,6 +10,7 @@ import click
 
 import pfabrik as pf
 
+from ..errors import counted
 from .finite import FINITE, is_finite
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def joint_target(mechanism: Mechanism, words: str) -> dict[str, float | list[flo
         raise click.UsageError(f"--joint: found '{words}'; expected NAME=VALUE[,VALUE...] with finite numbers")
     kinds = KINDS[mechanism.joint(name).type].coordinates
     if len(values) != len(kinds):
-        raise click.UsageError(f"--joint {words}: found {len(values)} values; expected {len(kinds)}")
+        raise click.UsageError(f"--joint {words}: found {counted(len(values), 'value')}; expected {len(kinds)}")
     in_order = zip(map(float, values), kinds, strict=True)
     read = [math.radians(value) if kind == "angle" else value for value, kind in in_order]
     return {name: read if len(read) > 1 else read[0]}

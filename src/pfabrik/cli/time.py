@@ -12,11 +12,13 @@ import click
 import pfabrik as pf
 
 from ..answers.table import aligned
+from ..errors import counted
 from ..telling import telling
 from .finite import FINITE
 from .mech import MECH, load
+from .outputs import OUTPUT, STANDARD, check_outputs
 from .speeds import speed_limits, speed_option
-from .whole import OUTPUT, STANDARD, whole_file
+from .whole import whole_file
 
 if TYPE_CHECKING:
     from ..timing.timed import Timed
@@ -55,12 +57,14 @@ def time(
     """
     if as_json and output == STANDARD:
         raise click.UsageError("-o - and --json both print on stdout: give one of them")
+    inputs = (path, Path(mech))
+    check_outputs([("-o", output), ("--json", STANDARD if as_json else None)], inputs)
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
     pushes = speed_limits(mechanism, accelerations, "--acceleration")
     targets = pf.read_path(path, mechanism).targets
-    with nullcontext() if output is None else whole_file(output, inputs=(path, Path(mech))) as handle:
-        with telling(f"tracking {len(targets)} targets") as on_progress:
+    with nullcontext() if output is None else whole_file(output, inputs) as handle:
+        with telling(f"tracking {counted(len(targets), 'target')}") as on_progress:
             followed = pf.track(mechanism, targets, on_progress=on_progress)
         timed = pf.time_path(
             followed,
@@ -87,5 +91,5 @@ def as_object(timed: Timed) -> dict[str, object]:
 def describe(timed: Timed) -> str:
     """The same for people."""
     rows = [(name, what, f"{100.0 * share:.1f} %") for (name, what), share in timed.held_back.items()]
-    told = f"{timed.duration:.6g} s, {len(timed.times)} samples"
+    told = f"{timed.duration:.6g} s, {counted(len(timed.times), 'sample')}"
     return "\n\n".join([told, aligned(["held back by", "its", "of the time"], rows)]) if rows else told

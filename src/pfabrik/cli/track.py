@@ -13,15 +13,18 @@ import click
 
 import pfabrik as pf
 
+from ..checks import require_ending
+from ..errors import counted
 from ..extras import require
 from ..telling import telling
 from .finite import FINITE
 from .mech import MECH, load
-from .picture import ending_checked, picture
+from .outputs import OUTPUT, STANDARD, check_outputs
+from .picture import picture
 from .projecting import options_projecting, projecting
 from .speeds import own_limits, speed_limits, speed_option
 from .track_checks import checked
-from .whole import OUTPUT, STANDARD, whole_file
+from .whole import whole_file
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
@@ -86,7 +89,10 @@ def track(
     if mech == str(path) == str(STANDARD):
         raise click.UsageError("MECH and PATH are both standard input: give a file for one of them")
     inputs = (path, Path(mech))
-    refuse_early(picture_path, film_path, inputs)
+    printed = STANDARD if as_json else None
+    outputs = [("-o", output), ("--plot", picture_path), ("--animate", film_path), ("--json", printed)]
+    check_outputs(outputs, inputs)
+    refuse_early(picture_path, film_path)
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
     from ..paths.read_path import path_blocks
@@ -109,13 +115,13 @@ def track(
     return 0 if told.is_well else 1
 
 
-def refuse_early(picture_path: Path | None, film_path: Path | None, inputs: tuple[Path, ...]) -> None:
-    """Stop before the work begins where a picture or film cannot be written, or would replace what was read."""
+def refuse_early(picture_path: Path | None, film_path: Path | None) -> None:
+    """Stop before the work begins where a picture or film cannot be written."""
     from ..view.saving import FILMS, PICTURES
 
     for path, endings in ((picture_path, PICTURES), (film_path, FILMS)):
         if path is not None:
-            ending_checked(path, endings, inputs)
+            require_ending(path, endings)
             require("pictures", "matplotlib", "plot")
 
 
@@ -165,7 +171,7 @@ def answered(
     from .track_rows import Rows
 
     rows: Rows | None = None
-    with telling(f"tracking {total or ''} targets") as tell:
+    with telling(f"tracking {counted(total, 'target') if total else 'targets'}") as tell:
         on_progress = None if tell is None else lambda done: tell(done, total or 0)
         parts = follow_parts(mechanism, blocks, options=options, speed_limits=limits or None, on_progress=on_progress)
         for path, followed, first in parts:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -11,6 +10,7 @@ import numpy as np
 import pfabrik as pf
 
 from ..answers.words import short_names
+from ..cells import CsvWriter
 from ..description.readouts import readouts
 from ..paths.along import Extremes, largest_tilts, least_margins
 from ..rotations import to_rpy
@@ -36,7 +36,7 @@ class Rows:
 
     def __init__(self, handle: TextIO, mechanism: Mechanism, path: Path, has_rods: bool) -> None:
         """Write the header for a path that begins with `path`."""
-        self._writer = csv.writer(handle, lineterminator="\n")
+        self._writer = CsvWriter(handle)
         self._units = path.angle_units
         self._unit: AngleUnit = "deg" if "deg" in path.angle_units else "rad"
         self._is_angle = np.array([each.is_angle for each in readouts(mechanism)])

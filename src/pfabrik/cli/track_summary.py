@@ -13,6 +13,7 @@ import numpy as np
 import pfabrik as pf
 
 from ..description.readouts import readouts
+from ..errors import counted
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
@@ -39,7 +40,7 @@ class Targets:
 
     def __str__(self) -> str:
         more = f", and {self.count - NAMED} more" if self.count > NAMED else ""
-        return f"target{'s' * (self.count > 1)} {', '.join(map(str, self.first))}{more}"
+        return f"target{'s' * (self.count != 1)} {', '.join(map(str, self.first))}{more}"
 
 
 @dataclass
@@ -112,7 +113,7 @@ class Summary:
         if self._counts["projected"]:
             told.append(f"farthest from its target {self._farthest:.3g} {self._mechanism.length_unit}")
         if self._jumps.count:
-            told.append(f"{self._jumps.count} jump{'s' * (self._jumps.count > 1)} ({self._jumps})")
+            told.append(f"{counted(self._jumps.count, 'jump')} ({self._jumps})")
         for name, (targets, shown) in self._hasty.items():
             if name in self._speeds:
                 fastest = float(shown.display(np.array(self._speeds[name])))

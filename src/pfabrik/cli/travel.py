@@ -11,6 +11,7 @@ import pfabrik as pf
 
 from .finite import FINITE
 from .mech import MECH, load
+from .outputs import STANDARD, check_outputs
 from .picture import picture
 from .target import Triple, target_of, targeted
 
@@ -39,13 +40,14 @@ def travel(
     It starts at a pose within reach (default: home) and stays in its working mode; a limit, or the length of the links,
     stops it. By default it goes both ways along and about each axis of the task.
     """
+    check_outputs([("--plot", path), ("--json", STANDARD if as_json else None)], [Path(mech)])
     mechanism = load(mech)
     start = pf.solve_ik(mechanism, target_of(mechanism, position, rpy, joint))
     if not start:
         raise click.ClickException(f"cannot start there: {str(start.status).lower()}; see `pfabrik ik`")
     found = pf.travel(start, along=along or None, about=about or None, pivot=pivot)
     if path is not None:
-        with picture(path, inputs=(Path(mech),)):
+        with picture(path):
             pf.plot_travel(found)
     click.echo(json.dumps(found.to_dict(), allow_nan=False) if as_json else str(found))
     return 0

@@ -10,6 +10,7 @@ import click
 
 import pfabrik as pf
 
+from ..errors import counted
 from .mech import MECH, load
 
 if TYPE_CHECKING:
@@ -48,9 +49,10 @@ def describe(mechanism: Mechanism, found: Verification) -> str:
     unit = mechanism.length_unit
     if not found.poses:
         return f"{mechanism.name}: no pose was reached"
+    agrees = "agrees" if found else "does not agree"
     return "\n".join(
         [
-            f"{mechanism.name}: {'agrees' if found else 'does not agree'} with MuJoCo on {found.poses} poses",
+            f"{mechanism.name}: {agrees} with MuJoCo on {counted(found.poses, 'pose')}",
             f"largest loop gap             {found.loop_gap:.1e} {unit}",
             f"largest position difference  {found.position_difference:.1e} {unit}",
             f"largest rotation difference  {found.rotation_difference:.1e} rad",

@@ -10,9 +10,11 @@ import click
 
 import pfabrik as pf
 
+from ..checks import require_ending
+from ..errors import counted
 from ..telling import telling
 from .mech import MECH, STANDARD_INPUT, load
-from .picture import ending_checked
+from .outputs import check_outputs
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
@@ -35,12 +37,13 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
     --html writes what is shown as one file, which opens in any browser without this program.
     """
     if html is not None:
-        ending_checked(html, (".html", ".htm"), inputs=(Path(mech), *([path] if path else [])))
+        check_outputs([("--html", html)], [Path(mech), *([path] if path else [])])
+        require_ending(html, (".html", ".htm"))
     shown: str | Mechanism | Track = mech if mech != STANDARD_INPUT and path is None else load(mech)
     if path is not None:
         mechanism = load(mech)
         targets = pf.read_path(path, mechanism).targets
-        with telling(f"tracking {len(targets)} targets") as on_progress:
+        with telling(f"tracking {counted(len(targets), 'target')}") as on_progress:
             shown = pf.track(mechanism, targets, on_progress=on_progress)
     with pf.view(shown, port=port, host=host) as viewer:
         if html is not None:
@@ -50,8 +53,5 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
         click.echo(f"{viewer.mechanism.name} at {viewer.url} (Ctrl-C ends it)")
         if not no_browser:
             webbrowser.open(viewer.url)
-        try:
-            viewer.wait()
-        except KeyboardInterrupt:
-            click.echo()
+        viewer.wait()
     return 0

@@ -9,23 +9,10 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, TextIO
-
-import click
+from typing import TextIO
 
 from ..writing import whole_path
-
-STANDARD = Path("-")
-"""Standard input or output, in place of a file."""
-
-
-def standard_if_so_named(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """Standard output also by the name that systems have for it."""
-    return STANDARD if path == Path("/dev/stdout") else path
-
-
-OUTPUT: dict[str, Any] = {"type": click.Path(path_type=Path, allow_dash=True), "callback": standard_if_so_named}
-"""What an option is that takes a file to write."""
+from .outputs import STANDARD, real, refuse_input
 
 
 @contextmanager
@@ -52,30 +39,6 @@ def whole_file(path: Path, inputs: Iterable[Path] = ()) -> Iterator[TextIO]:
         yield handle
 
 
-def refuse_existing(path: Path, force: bool) -> None:
-    """Stop if an output would replace a file, unless that is wanted."""
-    if path.is_dir():
-        raise click.ClickException(f"{path}: is a folder; expected the name of a file")
-    if path != STANDARD and path.is_file() and not force:
-        raise click.ClickException(f"{path}: exists already; --force replaces it")
-
-
-def refuse_input(path: Path, inputs: Iterable[Path]) -> None:
-    """Stop if an output would overwrite a file that was read."""
-    if any(is_same_file(path, read) for read in inputs):
-        raise click.UsageError(f"{path}: found a file that was read; expected another file")
-
-
-def is_same_file(path: Path, read: Path) -> bool:
-    """Whether a path leads to the file that was read, or that standard input (``-``) comes from."""
-    if read != STANDARD:
-        return path.exists() and read.exists() and path.samefile(read)
-    try:
-        return path.is_file() and os.path.samestat(path.stat(), os.fstat(sys.stdin.fileno()))
-    except (OSError, ValueError):  # standard input is closed, or no file at all
-        return False
-
-
 @contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
     """An empty folder beside `path` that goes when the block ends; a failure speaks of `path`, which the user knows."""
@@ -93,7 +56,7 @@ def new_folder(path: Path) -> Iterator[Path]:
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
     """A folder to fill; its files move into `path` only when the block ends without an error."""
-    path = path.resolve()
+    path = real(path)
     if path.exists() and not path.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(path))
     with new_folder(path) as part:

@@ -13,12 +13,14 @@ import click
 import pfabrik as pf
 
 from ..answers.table import aligned
+from ..checks import require_ending
 from ..extras import require
 from ..view.saving import PICTURES
 from ..workspace.saving import ENDINGS
 from .finite import FINITE, is_finite
 from .mech import MECH, load
-from .picture import ending_checked, picture
+from .outputs import STANDARD, check_outputs
+from .picture import picture
 from .target import Triple
 
 if TYPE_CHECKING:
@@ -78,8 +80,9 @@ def workspace(
         raise click.UsageError("--centre says nothing without --largest")
     if tilt is not None and not 0.0 <= tilt <= 180.0:
         raise click.UsageError(f"--tilt {tilt:g}: expected an angle from 0 to 180 degrees")
+    check_outputs([*(("-o", path) for path in outputs), ("--json", STANDARD if as_json else None)], [Path(mech)])
     for path in outputs:
-        ending_checked(path, (*ENDINGS, *PICTURES), (Path(mech),))
+        require_ending(path, (*ENDINGS, *PICTURES))
         if path.suffix.lower() in PICTURES:
             require("pictures", "matplotlib", "plot")
     mechanism = load(mech)

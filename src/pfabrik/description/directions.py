@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ..errors import Fault, near_miss
+from ..errors import Fault, counted, near_miss
 from ..tolerances import TOLERANCES
 from .coercion import unit_vector
 from .form_faults import direction_faults, shown
@@ -38,7 +38,7 @@ def directions(place: str, value: Any, centres: Sequence[Vector | None], faults:
     if not isinstance(value, tuple) or not all(map(is_direction, value)):
         faults.append(Fault(place, shown(value), EXPECTED))
     elif len(value) != len(centres):
-        faults.append(Fault(place, f"{len(value)} directions", f"one, or one for each leg: {len(centres)}"))
+        faults.append(Fault(place, counted(len(value), "direction"), f"one, or one for each leg: {len(centres)}"))
     else:
         pairs = list(zip(value, centres, strict=True))
         faults += [fault for index, pair in enumerate(pairs) for fault in _faults(f"{place}[{index}]", *pair)]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from numpy.typing import ArrayLike
 
 from ..checks import require_mapping
-from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
+from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, counted
 from .coercion import items
 from .faults import find_faults, in_order, joint_index, merged
 from .form_faults import joint_faults, shown
@@ -169,8 +169,8 @@ class Mechanism(Structure):
     def _doubts_of_freedom(self) -> Iterator[str]:
         left = end_effector_freedom(self, frozenset(drive.column for drive in self.drives))
         if left > 0:
-            freedoms = "1 freedom" if left == 1 else f"{left} freedoms"
-            yield f"{len(self.actuator_names)} actuators leave the end effector {freedoms} at home"
+            drives, leaves = len(self.actuator_names), "leave" if len(self.actuator_names) > 1 else "leaves"
+            yield f"{counted(drives, 'actuator')} {leaves} the end effector {counted(left, 'freedom')} at home"
         missed_by = inexactness(self)
         if missed_by > 0.0:
             yield (

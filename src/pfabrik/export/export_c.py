@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias, get_args
 
 from ..checks import require_names
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument, UnsupportedMechanism
+from ..errors import InvalidArgument, UnsupportedMechanism, counted
 from ..writing import whole_path
 from .machine import Machine
 from .source import source
@@ -69,6 +69,6 @@ def c_source(
         raise InvalidArgument("name", repr(name), "lower-case letters, digits and underscores, a letter first")
     machine = Machine(mechanism)
     if "fk" in parts and machine.uncontrolled:
-        left = f"its actuators leave the end effector {machine.uncontrolled} freedoms: leave 'fk' out"
+        left = f"its actuators leave the end effector {counted(machine.uncontrolled, 'freedom')}: leave 'fk' out"
         raise UnsupportedMechanism(mechanism.name, [left], "exported")
     return source(machine, name, precision, parts)

@@ -5,6 +5,10 @@
 #ifndef PFK_H
 #define PFK_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef double pfk_real;
 
 typedef struct {
@@ -49,6 +53,10 @@ int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
    how many there were. Limits are not asked for. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is
    returned. */
 int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
+#endif
+
+#ifdef __cplusplus
+}
 #endif
 
 #endif
@@ -1084,7 +1092,7 @@ static int pfk_motions(const pfk_pose *pose, int moves, pfk_real motion[PFK_UNKN
     for (i = 0; i < 3 && moves != PFK_ARMS_ALONE; ++i)
         if (moves == PFK_ALL || !pfk_axes[i])
             motion[count++][i] = PFK_SIZE;
-    if (moves == PFK_ALL ? PFK_TURNING : moves == PFK_WHAT_IS_LEFT && PFK_ROTATIONS == 0) {
+    if ((moves == PFK_ALL && PFK_TURNING) || (moves == PFK_WHAT_IS_LEFT && PFK_ROTATIONS == 0)) {
         for (i = 0; i < 3; ++i)
             motion[count++][3 + i] = 1.0;
     } else if (moves == PFK_WHAT_IS_LEFT && PFK_ROTATIONS == 2) {
@@ -1272,7 +1280,7 @@ const char *pfk_what(int code)
     if (code > 0 && code <= PFK_LIMITS)
         return pfk_limit_words[code - 1];
 #endif
-    if (code > PFK_LEG && code <= PFK_LEG + PFK_LEGS)
+    if (code > PFK_LEG && code - PFK_LEG <= PFK_LEGS)
         return pfk_leg_words[code - PFK_LEG - 1];
     return "no code of this file";
 }

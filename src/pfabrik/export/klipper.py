@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..description.mechanism import Mechanism
+from ..description.rods import uneven_rods, with_lengths
 from ..errors import UnsupportedMechanism
 from ..tolerances import TOLERANCES
 from .fits import Thigh, Tower, angle_of, thighs_of, towers_of
@@ -26,6 +27,10 @@ def klipper(mechanism: Mechanism) -> str:
     ------
     UnsupportedMechanism : a machine that Klipper has no kinematics for.
     """
+    uneven = [with_lengths(rods, mechanism.length_unit) for rods in uneven_rods(mechanism)]
+    if uneven:
+        reasons = [f"rods {each} differ, and Klipper's deltas have pairs of rods of one length" for each in uneven]
+        raise UnsupportedMechanism(mechanism.name, reasons, "exported")
     machine = Machine(mechanism)
     towers, thighs = towers_of(machine), thighs_of(machine)
     if towers is not None:

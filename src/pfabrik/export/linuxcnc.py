@@ -92,7 +92,7 @@ def _genhexkins(mechanism: Mechanism, struts: list[tuple[Floats, Floats, float]]
             lines += [
                 f"setp genhexkins.{part}.{place}.{axis} {value:.12g}" for axis, value in zip("xyz", point, strict=True)
             ]
-    lines.append("# it knows no limits of joints U and S: `pfabrik export --c` has them")
+    lines.append("# it knows no limits of joints U and S: `pfabrik export MECH c` has them")
     return "\n".join([*lines, ""])
 
 
@@ -111,5 +111,5 @@ def _rotarydeltakins(mechanism: Mechanism, thighs: Sequence[Thigh]) -> str:
     names = ("platformradius", "thighlength", "shinlength", "footradius")
     values = zip(names, _radii(thighs[0]), strict=True)
     lines += [f"setp rotarydeltakins.{name} {value:.12g}" for name, value in values]
-    lines.append("# it knows no limits of joints U and S: `pfabrik export --c` has them")
+    lines.append("# it knows no limits of joints U and S: `pfabrik export MECH c` has them")
     return "\n".join([*lines, ""])

@@ -18,11 +18,11 @@ provided "as is" and without any warranty; its authors are not liable for anythi
 
 def source(machine: Machine, name: str, precision: Precision, parts: Sequence[str]) -> str:
     """The text of the file."""
-    included = {"machine.h": machine_h(machine, parts), "tables.h": tables_h(machine, precision, parts)}
-    if "ik" in parts:
-        included["checks.h"] = checks_h(checks_of(machine, "limits" in parts), EXACT[precision])
     routines = resources.files(__package__).joinpath("kinematics.c").read_text(encoding="utf-8")
     text = _kept(routines[routines.index("#ifndef") :], features(machine, parts))
+    included = {"machine.h": machine_h(machine, parts), "tables.h": tables_h(machine, precision, parts, text)}
+    if "ik" in parts:
+        included["checks.h"] = checks_h(checks_of(machine, "limits" in parts), EXACT[precision])
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
     return in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, parts)}\n{text}"), name, precision)
 
@@ -50,7 +50,8 @@ def _header(machine: Machine, parts: Sequence[str]) -> str:
     lines = [
         f"The kinematics of '{mechanism.name}', written by pfabrik from its description.",
         "",
-        "C99, no memory but the stack, nothing that changes between calls, only the C library's mathematics.",
+        "C99, and C++ as it is; no memory but the stack, nothing that changes between calls, only the C library's",
+        "mathematics.",
         f"Lengths in {unit}, angles in radians. A pose maps platform coordinates, as at home and from the reference",
         "point, to base coordinates: p is where the reference point is, R the rotation.",
         f"Task: {' '.join(mechanism.task)}."
@@ -58,8 +59,9 @@ def _header(machine: Machine, parts: Sequence[str]) -> str:
         "All of it in the working mode of home: each crank and carriage on the side where it is there.",
         "",
         "Tables say what is this machine's own; the functions are the same for all that have legs of such kinds.",
-        "Include it with PFK_DECLARATIONS_ONLY defined for the declarations alone; compile it with PFK_SELF_TEST",
-        "defined for a program that checks itself.",
+        "Include it with PFK_DECLARATIONS_ONLY defined for the declarations alone; with PFK_SELF_TEST defined it is a",
+        "program that checks itself:",
+        "    cc -std=c99 -D PFK_SELF_TEST FILE -lm -o check && ./check",
         "",
         "actuator  joint                 home",
     ]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -17,6 +18,9 @@ KINDS = {K.ROD: "PFK_ROD", K.PIVOT: "PFK_PIVOT", K.ARM: "PFK_ARM"}
 FRAMES = {K.FROM_BASE: "PFK_FROM_BASE", K.FROM_PLATFORM: "PFK_FROM_PLATFORM", K.FROM_ITSELF: "PFK_FROM_ITSELF"}
 CARRIERS = {K.CRANK: "PFK_CRANK", K.CARRIAGE: "PFK_CARRIAGE", K.SHARED: "PFK_SHARED"}
 ENDINGS = {K.WELD: "PFK_WELD", K.HINGE: "PFK_HINGE", K.CROSS: "PFK_CROSS", K.TRIPLE: "PFK_TRIPLE", K.BALL: "PFK_BALL"}
+TOGETHER = 6
+"""Short values in a line at most."""
+
 FAR = 1e30
 """Stands for a bound that there is not."""
 
@@ -49,10 +53,10 @@ def machine_h(machine: Machine, parts: Sequence[str]) -> str:
     return f"enum {{ PFK_ACTUATORS = {len(machine.driven)}, PFK_LIMITS = {limits} }};\n"
 
 
-def tables_h(machine: Machine, precision: Precision, parts: Sequence[str]) -> str:
-    """Numbers and tables for the routines."""
-    lines = [*_numbers(machine, precision, parts)]
-    lines += _table("pfk_leg pfk_legs[PFK_LEGS]", (_leg(leg) for leg in machine.legs))
+def tables_h(machine: Machine, precision: Precision, parts: Sequence[str], routines: str) -> str:
+    """Numbers and tables for the routines, which declare what a leg is."""
+    lines, members = [*_numbers(machine, precision, parts)], _members(routines, "pfk_leg")
+    lines += _table("pfk_leg pfk_legs[PFK_LEGS]", (_leg(leg, members) for leg in machine.legs))
     lines += _table("pfk_coordinate pfk_driven[PFK_ACTUATORS]", map(_coordinate, machine.driven))
     if "limits" in parts:
         lines += _table("pfk_coordinate pfk_limited[]", map(_coordinate, machine.limited))
@@ -124,8 +128,21 @@ def _words(name: str, words: Sequence[str]) -> Iterator[str]:
     yield ""
 
 
-def _leg(leg: Leg) -> str:
-    """All that is not zero of a leg."""
+def _members(routines: str, struct: str) -> dict[str, str]:
+    """The members of a structure in the order of its declaration, and what is zero of the type of each."""
+    plain = re.sub(r"/\*.*?\*/", "", routines, flags=re.DOTALL)
+    end = plain.index(f"}} {struct};")
+    found = {}
+    for declared in plain[plain.rindex("{", 0, end) + 1 : end].split(";")[:-1]:
+        kind, names = declared.split(None, 1)
+        for name in names.split(","):
+            depth = name.count("[")
+            found[name.split("[")[0].strip()] = "{" * depth + ("0" if kind == "int" else "0.0") + "}" * depth
+    return found
+
+
+def _leg(leg: Leg, members: Mapping[str, str]) -> str:
+    """A leg, member by member in their order: C++ knows other ways only since 2020."""
     record = leg.record
     told = {"kind": KINDS[int(record["kind"])], "carrier": CARRIERS.get(int(record["carrier"]), "")}
     told["frame"] = FRAMES.get(int(record["frame"]), str(record["frame"]))
@@ -141,8 +158,25 @@ def _leg(leg: Leg) -> str:
         whole |= {"is_twin": record["twin"] >= 0}
     told |= {name: str(int(value)) for name, value in whole.items() if value}
     told |= {name: literal(value) for name, value in leg.numbers.items() if np.any(value)}
-    lines = [f"        .{name} = {value}" for name, value in told.items() if value]
-    return f"    {{ /* {comment(', '.join(leg.joints))} */\n" + ",\n".join(lines) + "\n    }"
+    values = {name: told.pop(name, "") or zero for name, zero in members.items()}
+    assert not any(told.values()), f"no members of pfk_leg: {told}"
+    lines = [f"    {{ /* {comment(', '.join(leg.joints))} */"]
+    together: list[str] = []
+    for name, value in values.items():
+        is_long = value.startswith("{") and value != members[name]
+        if together and (is_long or len(together) == TOGETHER):
+            lines.append(_labelled(together, values))
+            together = []
+        together.append(name)
+        if is_long:
+            lines.append(_labelled(together, values))
+            together = []
+    return "\n".join([*lines, *([_labelled(together, values)] if together else []), "    }"])
+
+
+def _labelled(names: Sequence[str], values: Mapping[str, str]) -> str:
+    """A line of values behind their names."""
+    return f"        /* {', '.join(names)} */ {', '.join(values[name] for name in names)},"
 
 
 def _coordinate(each: Coordinate) -> str:

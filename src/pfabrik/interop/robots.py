@@ -16,7 +16,7 @@ from ..description.graph import welded
 from ..description.joint_types import KINDS, TASK_COORDINATES
 from ..description.joints import Cone, Joint
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument, UnknownName
+from ..errors import InvalidArgument, UnknownName, counted
 from ..files.units import metres_of
 from ..motion.mobility import generic_of
 from .assembling import Imported, assemble
@@ -127,7 +127,8 @@ def _of_task(mechanism: Mechanism) -> Iterator[Note]:
     if mechanism.task == mechanism.whole_task and freedoms < whole:
         coordinates = ", ".join(TASK_COORDINATES)
         yield Note(
-            f"the end effector has {freedoms} freedoms of {whole}: `task` says which of {coordinates} targets set"
+            f"the end effector has {counted(freedoms, 'freedom')} of {whole}: "
+            f"`task` says which of {coordinates} targets set"
         )
 
 

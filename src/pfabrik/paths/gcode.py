@@ -13,14 +13,18 @@ import numpy as np
 from ..arrays import Floats
 from ..files.units import METRES
 from .path import WrongPath
+from .unread import CODES, IN_ONE_PROGRAM, has_offset, refuse_code, refuse_steering
 
 WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
 COMMENT = re.compile(r"\([^()]*\)|;.*")
 AXES = "XYZABC"
 OFFSETS = "IJK"
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
-IGNORED = {40, 49, 54, 61, 64, 80, 94}
-"""Codes that change no position here: no compensation of the tool, the first work offset, feed per minute."""
+IGNORED = {11, 40, 49, 54, 61, 64, 69, 80, 91.1, 94, 97}
+"""Codes that change no position here: no offset of the tool, no turn, the first work offset, feed per minute."""
+
+RETRACTS = (10, 92)
+"""Codes of printers that change no position either, unless they are those of other machines: `has_offset`."""
 
 OTHER_AXES = "UVW"
 
@@ -30,8 +34,8 @@ CODE = re.compile(r"(?:N\s*\d+\s*)?M\s*(\d{1,9})(?![\d.])")
 MESSAGES = (117, 118)
 """Codes followed by words for people."""
 
-CALLS = (97, 98, 206)
-"""Codes of M that change positions: calls of other programs, and an offset."""
+CALLS = (97, 98, 99, 198)
+"""Codes that steer a program, and set nothing."""
 
 FARTHEST = 1e9
 """Numbers beyond are no places of a machine."""
@@ -63,6 +67,7 @@ class State:
     ----------
     place : x, y, z [length of the machine], and a, b, c [deg].
     unit : of the program's lengths, in those of the machine.
+    has_number : whether the program has said its number.
     feed : as the program says it, per minute; NaN before it does.
     """
 
@@ -72,6 +77,7 @@ class State:
     is_relative: bool = False
     plane: int = 17
     feed: float = math.nan
+    has_number: bool = False
     units: dict[int, float] = field(default_factory=dict)
 
 
@@ -106,6 +112,7 @@ def _words(text: str, number: int) -> dict[str, list[float]]:
     plain = COMMENT.sub(" ", text).strip().upper()
     if plain.startswith(("%", "/")) or _is_setting(plain):
         return {}
+    refuse_steering(plain, number)
     found: dict[str, list[float]] = {}
     rest = WORD.sub(" ", plain).split()
     if rest:
@@ -125,15 +132,19 @@ def _is_setting(plain: str) -> bool:
     """Whether all words of a line belong to a code of M, as those of printers do: `M205 X8` sets what a jerk may be."""
     begin = CODE.match(plain)
     code = int(begin[1]) if begin else 0
-    is_printers = code in (17, 18) or code >= 80  # others may stand beside a motion
-    return code in MESSAGES or (is_printers and code not in CALLS and "G" not in plain)
+    is_printers = code in (17, 18, 73) or code >= 80  # others may stand beside a motion
+    return code in MESSAGES or (is_printers and f"M{code}" not in CODES and code not in CALLS and "G" not in plain)
 
 
 def _obey(state: State, words: dict[str, list[float]], number: int) -> None:
     """Take in what is no motion."""
+    if "O" in words:
+        if state.has_number or state.motion is not None:
+            raise WrongPath(f"line {number}: found O{words['O'][-1]:g}, another program; expected {IN_ONE_PROGRAM}")
+        state.has_number = True
     for code in words.get("M", []):
-        if code in CALLS:
-            raise WrongPath(f"line {number}: found M{code:g}; expected all moves in one program, without offsets")
+        if f"M{code:g}" in CODES:
+            refuse_code(f"M{code:g}", number)
     for code in words.get("G", []):
         if code in (0, 1, 2, 3):
             state.motion = int(code)
@@ -143,12 +154,14 @@ def _obey(state: State, words: dict[str, list[float]], number: int) -> None:
             state.unit = state.units[int(code)]
         elif code in (90, 91):
             state.is_relative = code == 91
-        elif code in (4, 92) and not any(letter in words for letter in AXES):
-            continue  # a dwell; of the extruder alone
+        elif code == 4 and not any(letter in words for letter in AXES):
+            continue  # a dwell
+        elif code in RETRACTS and not has_offset(f"G{code:g}", words, AXES):
+            continue
         elif code == 28 and state.motion is None:
             continue  # homing, before anything else
-        elif code not in IGNORED and code != 91.1:
-            raise WrongPath(f"line {number}: found G{code:g}; expected G0 to G3, G17 to G21, G90 or G91")
+        elif code not in IGNORED:
+            refuse_code(f"G{code:g}", number)
     if "F" in words and 4.0 not in words.get("G", []):  # whose F is a time
         state.feed = words["F"][-1]
         if not state.feed > 0.0:
@@ -177,7 +190,9 @@ def _move(state: State, words: dict[str, list[float]], number: int, tolerance: f
 
 def _parts(length: float, longest: float, number: int) -> int:
     if length / longest > FARTHEST:
-        raise WrongPath(f"line {number}: a move of {length:g}, in steps of {longest:g}: too many")
+        raise WrongPath(
+            f"line {number}: a move of {length:g}, in steps of {longest:g}: too many steps; expected longer ones"
+        )
     return max(1, math.ceil(length / longest * (1.0 - ROUNDING)))
 
 
@@ -201,7 +216,12 @@ def _arc(
     start, stop = math.atan2(-centre[1], -centre[0]), math.atan2(*(chord - centre)[::-1])
     turn = (sense * (stop - start)) % (2.0 * math.pi)
     turn = 2.0 * math.pi if turn < ONE_PLACE else turn
-    flat = 2.0 * math.acos(max(1.0 - tolerance / radius, 0.0)) if tolerance < radius else math.pi / 2.0
+    flat = math.pi / 2.0
+    if tolerance < radius:  # the cosine of half of it would be 1, rounded, where the tolerance is small
+        flat = 4.0 * math.asin(math.sqrt(tolerance) / math.sqrt(2.0 * radius))
+    if turn / flat > FARTHEST:
+        said = f"an arc of radius {radius:g} in steps that are off by {tolerance:g} at most: too many steps"
+        raise WrongPath(f"line {number}: {said}; expected a larger tolerance")
     count = max(_parts(radius * turn, longest, number), math.ceil(turn / flat))
     for part in range(1, count):
         share = part / count

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import contextmanager
+from io import BufferedReader
 from itertools import chain, islice, repeat
 from os import PathLike
 from pathlib import Path as FilePath
@@ -19,10 +20,11 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..poses import pose
 from ..rotations import to_rpy
+from .encodings import as_text
 from .gcode import COMMENT, Step, steps_of
 from .path import BLOCK, MOST_STEPS, Path, WrongPath, joined
 from .sampling import at_rate, divided, timed
-from .table import Table
+from .table import SAID, Table
 
 GCODE = (".gcode", ".nc", ".ngc", ".g", ".gco", ".tap")
 CHORD, LONGEST = 1e-5, 1e-2
@@ -49,7 +51,8 @@ def read_path(
 ) -> Path:
     """A path for a mechanism from a CSV file, or from G-code.
 
-    A CSV file has a header with columns in any order: x, y, z, and roll, pitch, yaw (in degrees, or in the unit that
+    A CSV file, separated by commas, semicolons or tabs (with the last two also decimal commas), in UTF-8, UTF-16 or
+    Latin-1, has a header with columns in any order: x, y, z, and roll, pitch, yaw (in degrees, or in the unit that
     their names end in; or a_deg, b_rad and the like) or the quaternion qx, qy, qz, qw, then t [s] and feed [length/s];
     others are handed on, and coordinates that the machine cannot change may be missing. G-code, by its file's ending or
     if the first line is no header, begins at home and has G0 to G3, planes, G20, G21, G90, G91 and F per minute; A, B,
@@ -120,10 +123,24 @@ def path_blocks(
         raise InvalidArgument(name, "a file that is no text", "CSV or G-code") from None
 
 
-def _opened(path: FilePath) -> AbstractContextManager[TextIO]:
-    if str(path) == "-":
-        return nullcontext(sys.stdin)
-    return path.open(newline="", encoding="utf-8-sig")
+@contextmanager
+def _opened(path: FilePath) -> Iterator[TextIO]:
+    if str(path) != "-":
+        with path.open("rb") as raw:
+            yield as_text(raw)
+        return
+    standard = getattr(sys.stdin, "buffer", None)
+    if standard is None:
+        yield sys.stdin
+        return
+    raw = standard if isinstance(standard, BufferedReader) else BufferedReader(standard)
+    text = as_text(raw)
+    try:
+        yield text
+    finally:
+        text.detach()  # else standard input would be closed with it
+        if raw is not standard:
+            raw.detach()
 
 
 def _text(handle: TextIO) -> Iterator[str]:
@@ -153,7 +170,9 @@ def _begun(lines: Iterator[str], ending: str) -> tuple[bool, Iterator[str]]:
 def _is_header(line: str) -> bool:
     """Whether a line names columns: G-code has numbers after its letters."""
     plain = COMMENT.sub(" ", line)
-    return "," in plain or (plain.strip().isidentifier() and FIRST_WORD.match(plain) is None)
+    if "," in plain or SAID.fullmatch(line.strip()):
+        return True
+    return FIRST_WORD.match(plain) is None and ("\t" in plain.strip() or plain.strip().isidentifier())
 
 
 def _home(mechanism: Mechanism) -> Floats:

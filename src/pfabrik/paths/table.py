@@ -1,22 +1,23 @@
-"""CSV: a header that names columns in any order, then one target a line."""
+"""CSV: a header that names columns in any order, then one target a line; commas and points as countries have them."""
 
 from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice
+from itertools import chain, islice
 
 import numpy as np
 
 from ..arrays import Floats
+from ..cells import is_finite, unmarked
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..errors import near_miss
+from ..errors import counted, near_miss
 from ..motion.mobility import generic_of
 from ..poses import pose
 from ..tolerances import TOLERANCES
-from .numbers import is_finite
 from .path import BLOCK, AngleUnit, Path, WrongPath
 
 POSITION = ("x", "y", "z")
@@ -33,6 +34,10 @@ AMBIGUOUS = ("rx", "ry", "rz")
 
 OF_POSES = (*POSITION, *(column for columns in OF_ANGLES.values() for column in columns), *QUATERNION)
 NUMERIC = (*OF_POSES, "t", "feed")
+SEPARATORS = (",", ";", "\t")
+SAID = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
+"""A first line by which spreadsheets are told the separator."""
+
 EXPECTED = "expected x, y, z and roll, pitch, yaw or qx, qy, qz, qw"
 
 
@@ -50,11 +55,13 @@ class Table:
 
     def __init__(self, lines: Iterable[str], mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._rows = ((number, cells) for number, cells in _numbered(lines) if any(cells))
+        self._separator, lines = _separated(iter(lines))
+        self._decimal = "." if self._separator == "," else None
+        self._rows = ((number, cells) for number, cells in _numbered(lines, self._separator) if any(cells))
         number, header = next(self._rows, (1, []))
         if not header:
             raise WrongPath("empty; expected a header with x, y, z")
-        self._header = [name.lower() if name.lower() in OF_POSES else name for name in header]
+        self._header = [name.lower() if name.lower() in OF_POSES else unmarked(name) for name in header]
         _check_header(number, self._header, mechanism)
         self.has_times = "t" in self._header or "feed" in self._header
 
@@ -77,17 +84,56 @@ class Table:
         lines = [number for number, _ in rows]
         for number, cells in rows:
             if len(cells) != len(self._header):
-                raise WrongPath(f"line {number}: found {len(cells)} cells; expected {len(self._header)}")
+                raise WrongPath(f"line {number}: found {counted(len(cells), 'cell')}; expected {len(self._header)}")
         told = dict(zip(self._header, zip(*(cells for _, cells in rows), strict=True), strict=True))
-        for name in self._header:
-            if name in NUMERIC:
-                columns[name] = _numbers(name, told[name], lines)
-        others = {name: cells for name, cells in told.items() if name not in OF_POSES}
+        others: dict[str, Sequence[str]] = {}
+        for name, texts in told.items():
+            if name not in NUMERIC:
+                others[name] = [unmarked(cell) for cell in texts]
+                continue
+            numbers = self._with_points(name, texts, lines)
+            columns[name] = _numbers(name, numbers, lines)
+            if name not in OF_POSES:
+                others[name] = numbers
         return _path(columns, others, lines, self._mechanism)
 
+    def _with_points(self, name: str, cells: Sequence[str], lines: Sequence[int]) -> Sequence[str]:
+        """Numbers with decimal points; WrongPath where some have commas, and others points."""
+        if self._separator == ",":
+            return cells
+        for line, cell in zip(lines, cells, strict=True):
+            if "," in cell and not is_finite(cell.replace(",", ".")):
+                raise WrongPath(f"line {line}: column '{name}': found '{cell[:20]}'; expected a finite number")
+            sign = "," if "," in cell else "." if "." in cell else self._decimal
+            if self._decimal not in (None, sign):
+                said = f"found '{cell[:20]}'; expected decimals with '{self._decimal}', as before"
+                raise WrongPath(f"line {line}: column '{name}': {said}")
+            self._decimal = sign
+        return [cell.replace(",", ".") for cell in cells] if self._decimal == "," else cells
 
-def _numbered(lines: Iterable[str]) -> Iterator[tuple[int, list[str]]]:
-    reader = csv.reader(lines)
+
+def _separated(lines: Iterator[str]) -> tuple[str, Iterator[str]]:
+    """What separates cells, as a first line says, or by the names of columns that it makes of the header; all lines."""
+    begun: list[str] = []
+    for line in lines:
+        begun.append(line)
+        if line.strip():
+            break
+    said = SAID.fullmatch(begun[-1].strip()) if begun else None
+    if said is not None:
+        begun[-1] = "\n"
+        return said[1], chain(begun, lines)
+    return max(SEPARATORS, key=lambda each: _names(begun[-1:], each)), chain(begun, lines)
+
+
+def _names(header: Sequence[str], separator: str) -> tuple[int, int]:
+    """How many known names, and how many cells, a header has with a separator."""
+    cells = [cell.strip() for row in csv.reader(header, delimiter=separator) for cell in row]
+    return sum(name in NUMERIC or name.lower() in OF_POSES for name in cells), len(cells)
+
+
+def _numbered(lines: Iterable[str], separator: str) -> Iterator[tuple[int, list[str]]]:
+    reader = csv.reader(lines, delimiter=separator)
     try:
         for cells in reader:
             yield reader.line_num, [cell.strip() for cell in cells]

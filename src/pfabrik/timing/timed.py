@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias
@@ -10,8 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
 from ..description.readouts import readouts
+from ..errors import counted
 from ..extras import require
 from ..rotations import to_rpy
 from ..writing import whole_path
@@ -68,7 +69,7 @@ class Timed:
 
     def __repr__(self) -> str:
         name = self.mechanism.name
-        return f"<Timed path of '{name}': {self.duration:.6g} s, {len(self.times)} samples>"
+        return f"<Timed path of '{name}': {self.duration:.6g} s, {counted(len(self.times), 'sample')}>"
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write times, poses, actuators, their rates and accelerations; angles in degrees.
@@ -83,7 +84,7 @@ class Timed:
         shown = readouts(self.mechanism)
         units = np.array([float(each.display(np.ones(1))[0]) for each in shown])
         names = [f"{each.name}{'_deg' if each.is_angle else ''}" for each in shown]
-        writer = csv.writer(handle, lineterminator="\n")
+        writer = CsvWriter(handle)
         header = ["t", "step", "x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg"]
         header += [f"{kind}_{name}" for kind in ("actuator", "rate", "acceleration") for name in names]
         writer.writerow([*header, "platform_speed", "held_back_by"])

@@ -28,7 +28,7 @@ SIZE, SLIDE_SIZE = 20.0, 44.0
 RAIL_DASHES = (0, (4, 2))
 
 
-def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence[str] = ()) -> Axes:
+def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence[str] | bool = ()) -> Axes:
     """Draw a machine at home, or one answer: in space, or a planar machine in its plane.
 
     Joints are markers by type, actuated ones filled; links are lines, and bodies with three or more joints faces. The
@@ -40,7 +40,7 @@ def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence
     shown : a Mechanism, or one Solution.
     ax : matplotlib axes to draw on: three-dimensional ones, or any for a planar machine. Default: those of a new
         figure, which is `ax.figure`; its `savefig` writes PNG, SVG and PDF.
-    names : joints whose names are written beside them, such as `mechanism.actuator_names`.
+    names : joints whose names are written beside them, such as `mechanism.actuator_names`; True for all joints.
 
     Returns
     -------
@@ -53,6 +53,8 @@ def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence
     MissingLibrary : matplotlib is not installed.
     """
     mechanism, _ = checked_shown(shown)
+    if isinstance(names, bool):
+        names = [joint.name for joint in mechanism.joints] if names else ()
     owners = {each.name: each.joint.name for each in mechanism.coordinates}
     named = {mechanism.joint(owners.get(name, name)).name for name in require_names("names", names)}
     skeleton = skeleton_of(shown)

@@ -15,7 +15,7 @@ from ..arrays import Floats, Mask
 from ..checks import require_method
 from ..description.readouts import Readout, readouts
 from ..drawing import SMALL, new_figure
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, counted
 from .canvas import Canvas, canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD, LINE_COLOURS, SHADE
 from .machine import draw_machine, key_of
@@ -94,7 +94,7 @@ def checked_track(track: Track) -> NDArray[np.intp]:
 def told(solution: Solution) -> str:
     """How many steps were reached, and how far the others stay from their targets."""
     off = int((np.asarray(solution.status) != Status.REACHED).sum())
-    reached = f"{len(solution) - off} of {len(solution)} steps reached"
+    reached = f"{len(solution) - off} of {counted(len(solution), 'step')} reached"
     farthest = f"{float(np.nanmax(solution.position_error)):.3g} {solution.mechanism.length_unit}"
     return f"{reached}, the others at most {farthest} from their targets" if off else reached
 

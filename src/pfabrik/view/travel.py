@@ -140,7 +140,7 @@ def _bar(axes: Axes, reach: Reach, side: float, height: int, longest: float, uni
 def _stop(reach: Reach) -> list[str]:
     """The limits that stop a way, those beyond the second as how many there are."""
     if not reach.stopped_by:
-        return ["links stretched"]
+        return wrap(reach.why, LETTERS)
     first = short_names(reach.stopped_by[:2])
     more = len(reach.stopped_by) - 2
     return wrap(f"{first}; {more} more" if more > 0 else first, LETTERS)

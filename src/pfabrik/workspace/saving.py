@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Callable
 from os import PathLike
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Ints
+from ..cells import CsvWriter
 from ..checks import require_ending
 from ..errors import InvalidArgument
 from ..writing import whole_path
@@ -85,7 +85,7 @@ def _triangles(found: Region) -> Ints:
 def _as_csv(found: Region) -> bytes:
     """Points of the border, one a row, with the limit that forms it there; angles in radians, named so."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = CsvWriter(text)
     named = [f"{name}_rad" if unit == "rad" else name for name, unit in zip(found.names, found.units, strict=True)]
     writer.writerow([*named, "joint", "bound"])
     for point, limit in zip(found.vertices.tolist(), found.vertex_limit.tolist(), strict=True):

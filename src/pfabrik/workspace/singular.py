@@ -15,7 +15,7 @@ from ..answers.tracked import Track
 from ..arrays import Floats, Ints
 from ..checks import require_positive
 from ..description.mechanism import Mechanism, checked_mechanism, told_apart
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, counted
 from ..ik import solve_ik
 from ..motion.singularities import NUMBERS, Singularity, parallel_signs
 from ..options import Options
@@ -80,7 +80,7 @@ class SingularityMap:
         least = float(np.min(self.measures.parallel, initial=np.inf))
         n = int((self.sizes > LEAST_SHARE).sum())
         found = f"{n} part{'s' * (n != 1)} between parallel singularities" if len(self.locus_faces) else "none parallel"
-        return f"<SingularityMap of {len(self.points)} points: {found}, least parallel measure {least:.3g}>"
+        return f"<SingularityMap of {counted(len(self.points), 'point')}: {found}, least parallel measure {least:.3g}>"
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from ...answers.status import Status
 from ...description.mechanism import Mechanism
 from ...description.readouts import Readout, readouts
 from ...description.task import task_of
+from ...errors import counted
 from ...rotations import to_rpy
 from ..looks import ACHIEVED, HELD
 from .session import DIGITS, Session
@@ -114,7 +115,7 @@ class Panel:
 
     def list_modes(self, kind: str, modes: Sequence[Solution], words: Sequence[str]) -> None:
         """Offer modes to choose from."""
-        self._modes.options = (f"{len(modes)} {kind} modes", *words)
+        self._modes.options = (counted(len(modes), f"{kind} mode"), *words)
         self._modes.visible = bool(modes)
 
     def show_step(self, step: int) -> None:

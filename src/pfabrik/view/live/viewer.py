@@ -80,10 +80,15 @@ class Viewer:
         self._searches = Searches(lambda: self._stage, self._lock, self._complain)
         self._player: Player | None = None
         self._ready: Mechanism | None = None
-        self._build(what)
-        self._server.on_client_connect(lambda _: self._newest.post(self._prepare))
-        atexit.register(self.close)
-        self._watch = Watch(path, self._changed) if path is not None and path.is_file() else None
+        self._watch: Watch | None = None
+        try:
+            self._build(what)
+            self._server.on_client_connect(lambda _: self._newest.post(self._prepare))
+            atexit.register(self.close)
+            self._watch = Watch(path, self._changed) if path is not None and path.is_file() else None
+        except BaseException:  # an interruption too: nobody else knows of it yet
+            self.close()
+            raise
 
     # What a program does with it.
 
