@@ -6,6 +6,7 @@ preparation and its own compiled code.
 
 from __future__ import annotations
 
+from .errors import NoClosedForm
 from .ik import Geometric, solve_ik
 
-__all__ = ["Geometric", "solve_ik"]
+__all__ = ["Geometric", "NoClosedForm", "solve_ik"]
