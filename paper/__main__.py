@@ -17,9 +17,9 @@ def main(line: list[str] | None = None) -> int:
     """Run the experiments: 0 if all holds that must, 1 if not, 2 where something is missing."""
     parser = argparse.ArgumentParser(
         prog="python -m paper",
-        description="Run the paper's experiments again: accuracy on paths inside the workspace, cost at random targets, "
-        "and circles that leave the workspace, for three mechanisms. report.md with its tables, pictures and CSV files "
-        "go to a folder. Ends with 0 if all holds that must.",
+        description="Run the paper's experiments again: accuracy on paths inside the workspace, cost at random "
+        "targets, and circles that leave the workspace, for three mechanisms. report.md with its tables, pictures "
+        "and CSV files go to a folder. Ends with 0 if all holds that must.",
     )
     parser.add_argument("--out", type=Path, default=Path("out"), metavar="FOLDER", help="folder to write (out)")
     parser.add_argument("--quick", action="store_true", help="fewer steps, targets and searches")
@@ -34,7 +34,7 @@ def main(line: list[str] | None = None) -> int:
     given = parser.parse_args(line)
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
-        parser.error(f"this needs {' and '.join(missing)}; install it with: pip install 'pfabrik[reproduce]'")
+        parser.error(f"this needs {' and '.join(missing)}; install it with: python -m pip install {' '.join(missing)}")
     if given.page is not None and not given.page.is_file():
         parser.error(f"{given.page}: no such file")
     return reproduce(given.out, given.quick, given.page)

@@ -23,6 +23,9 @@ MOST_DRAWN = 2_000_000
 COPIES = 10
 """How often the targets are repeated in a batch that is timed, so that one call's overhead does not count."""
 
+NEVER = 1e-300
+"""A tolerance that is never met [length, rad]."""
+
 ANY_MODE = {name: replace(options, working_mode="any") for name, options in SETTINGS.items()}
 """Targets are independent: from whatever seed, an answer may be in another working mode."""
 
@@ -63,7 +66,9 @@ class Efficiency:
     answers : by options ("paper", "default") and start ("cold": home, "warm": the answer to the target before).
     agreement : largest difference of an actuator from the closed form's, cold, default options [length or rad]; None
         for redundant mechanisms, where both may be right.
-    times : of one target [s], by what was timed: ("paper", "default" or "geometric", start, "batch" or "call").
+    times : of one target [s], by what was timed: ("paper", "default" or "geometric", start, "batch", "call" or
+        "single").
+    pass_time : of a forward and backward pass of all chains [s].
     """
 
     case: Case
@@ -71,10 +76,15 @@ class Efficiency:
     answers: dict[tuple[str, str], Answered]
     agreement: float | None
     times: dict[tuple[str, str, str], float]
+    pass_time: float
 
-    def ratio(self, options: str, start: str) -> float:
-        """Time of a target in a batch over that of the geometric approach, from the same start."""
-        return self.times[options, start, "batch"] / self.times["geometric", start, "batch"]
+    def ratio(self, start: str) -> float:
+        """Time of a target of a batch by default over that of the geometric approach, from the same start."""
+        return self.times["default", start, "batch"] / self.times["geometric", start, "batch"]
+
+    def ratio_of_passes(self, start: str) -> float:
+        """Time of the passes that a target takes over that of the geometric approach for a target alone."""
+        return self.answers["paper", start].iterations * self.pass_time / self.times["geometric", start, "single"]
 
 
 def run(case: Case, extent: Extent, tick: Tick) -> Efficiency:
@@ -93,8 +103,9 @@ def run(case: Case, extent: Extent, tick: Tick) -> Efficiency:
     redundant = len(mechanism.actuator_names) > 6
     agreement = None if redundant else float(np.abs(default.actuators - closed.actuators).max())
     times = timed(mechanism, targets, answers, extent.repeats)
+    a_pass = time_a_pass(mechanism, targets, extent.repeats)
     tick()
-    return Efficiency(case, targets, answers, agreement, times)
+    return Efficiency(case, targets, answers, agreement, times, a_pass)
 
 
 def draw(case: Case, count: int) -> Floats:
@@ -144,31 +155,50 @@ def timed(
 ) -> dict[tuple[str, str, str], float]:
     """Median time of one target [s], on one core, each way by turns.
 
-    "batch": its share of one call of the library for all targets, many times over. "call": a call of its own from
-    Python, of a prepared `Solver` for the library.
+    "batch": its share of one call for all targets, many times over. "call": a call of its own from Python, of a
+    prepared `Solver`. "single": a call of its own from compiled code, of the geometric approach alone.
     """
     calls: dict[tuple[str, str, str], Callable[[], object]] = {}
     many, after = np.tile(targets, (COPIES, 1, 1)), np.tile(targets[1:], (COPIES, 1, 1))
+    first = np.tile(np.arange(len(targets) - 1), COPIES)
     for name, options in ANY_MODE.items():
-        before = answers[name, "cold"].solution[np.tile(np.arange(len(targets) - 1), COPIES)]
+        before = answers[name, "cold"].solution[first]
         calls[name, "cold", "batch"] = partial(solve_ik, mechanism, many, options=options)
         calls[name, "warm", "batch"] = partial(solve_ik, mechanism, after, start=before, options=options)
-        calls[name, "cold", "call"] = partial(one_by_one, Solver(mechanism, options=options).ik, targets)
-    calls["geometric", "cold", "batch"] = partial(geometric.solve_ik, mechanism, many)
-    calls["geometric", "warm", "batch"] = partial(
-        geometric.solve_ik, mechanism, after, start=geometric.solve_ik(mechanism, np.roll(after, 1, axis=0))
-    )
-    calls["geometric", "cold", "call"] = partial(one_by_one, partial(geometric.solve_ik, mechanism), targets)
-    counts = {"cold": len(many), "warm": len(after)}
+        calls[name, "cold", "call"] = partial(ask_one_by_one, Solver(mechanism, options=options).ik, targets)
+    closed = partial(geometric.solve_ik, mechanism)
+    calls["geometric", "cold", "batch"] = partial(closed, many)
+    calls["geometric", "warm", "batch"] = partial(closed, after, start=closed(targets[first]))
+    calls["geometric", "cold", "call"] = partial(ask_one_by_one, closed, targets)
+    calls["geometric", "cold", "single"] = geometric.one_by_one(mechanism, targets)
+    calls["geometric", "warm", "single"] = geometric.one_by_one(mechanism, targets[1:], closed(targets[:-1]))
+    counts = {"batch": {"cold": len(many), "warm": len(after)}}
+    alone = {"cold": len(targets), "warm": len(targets) - 1}
     with one_core():
         seconds = median_times(calls, repeats)
-    return {key: seconds[key] / (len(targets) if key[-1] == "call" else counts[key[1]]) for key in calls}
+    return {key: seconds[key] / counts.get(key[2], alone)[key[1]] for key in calls}
 
 
-def one_by_one(answer: Callable[[Floats], object], targets: Floats) -> None:
+def ask_one_by_one(answer: Callable[[Floats], object], targets: Floats) -> None:
     """Ask for every target by a call of its own."""
     for target in targets:
         answer(target)
+
+
+def time_a_pass(mechanism: Mechanism, targets: Floats, repeats: int) -> float:
+    """Time of a forward and backward pass of all chains [s], on one core.
+
+    The library answers more than the passes: joint coordinates, loops and limits. What a pass takes is by how much
+    longer a batch takes whose chains may make K of them than one whose chains stop after the first, where none comes
+    near enough to stop before, over the passes that were made more.
+    """
+    endless = replace(ANY_MODE["paper"], tolerance=NEVER, rotation_tolerance=NEVER, max_rounds=1)
+    few, most = replace(endless, max_iterations=1), replace(endless, max_iterations=ANY_MODE["paper"].max_iterations)
+    calls = {options: partial(solve_ik, mechanism, targets, options=options) for options in (few, most)}
+    made = {options: int(np.sum(call().iterations)) for options, call in calls.items()}
+    with one_core():
+        seconds = median_times(calls, repeats)
+    return (seconds[most] - seconds[few]) / (made[most] - made[few])
 
 
 def summary(found: Efficiency) -> list[dict[str, Any]]:
@@ -202,4 +232,13 @@ def time_rows(found: Efficiency) -> list[dict[str, Any]]:
             "ratio_to_geometric": seconds / found.times["geometric", start, how],
         }
         for (method, start, how), seconds in found.times.items()
+    ] + [
+        {
+            "mechanism": found.case.key,
+            "method": "paper",
+            "start": "",
+            "how": "pass",
+            "microseconds": 1e6 * found.pass_time,
+            "ratio_to_geometric": found.pass_time / found.times["geometric", "cold", "single"],
+        }
     ]

@@ -77,12 +77,12 @@ def draw_efficiency(found: Sequence[Efficiency], path: Path) -> None:
     left, right = figure.subplots(1, 2)
     ratios = {
         "paper": [each.case.printed.ratio for each in found],
-        "passes": [each.ratio("paper", "cold") for each in found],
-        "default": [each.ratio("default", "cold") for each in found],
+        "passes, single": [each.ratio_of_passes("cold") for each in found],
+        "default, batch": [each.ratio("cold") for each in found],
     }
     draw_bars(left, [each.case.label for each in found], ratios)
     left.axhline(1.0, color=EDGE, linewidth=1)
-    left.set(yscale="log", ylabel="time ÷ geometric approach", title="time of a target in a batch, one core")
+    left.set(yscale="log", ylabel="time ÷ geometric approach", title="time, one core")
     passes = {
         "paper": [each.case.printed.iterations for each in found],
         "ours, cold start": [each.answers["paper", "cold"].iterations for each in found],

@@ -140,7 +140,7 @@ def without_noise(text: str) -> list[str]:
 
 
 LINES = [line for block in blocks(ROOT / "README.md", "") for line in block.splitlines() if line.startswith("pfabrik ")]
-ELSEWHERE = ("pfabrik demo --quick", "pfabrik reproduce --quick")
+ELSEWHERE = ("pfabrik demo --quick",)
 """Commands that take long, and that tests of their own run just so."""
 
 

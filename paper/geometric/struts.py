@@ -64,9 +64,7 @@ def read_strut(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[dict[str, A
     universal, slide, spherical = steps
     foot, head = centre(universal), centre(spherical)
     length = float(np.linalg.norm(head - foot))
-    require(
-        length > ALIGNMENT * mechanism.characteristic_length, f"{slide.joint.name} has no length at home"
-    )
+    require(length > ALIGNMENT * mechanism.characteristic_length, f"{slide.joint.name} has no length at home")
     sign, offset = _count(mechanism, steps, (head - foot) / length, length)
     low, high = sorted((bound - offset) * sign for bound in range_of(slide))
     slack, _ = tolerances(mechanism)
