@@ -34,10 +34,10 @@ TRIED = 24
 def record(path: Path, only: list[str] | None) -> int:
     """Ask every machine, and keep what it answers."""
     kept: dict[str, Any] = {}
-    for name, text in machines():
-        if only and not any(word in name for word in only):
+    for name, make in machines().items():
+        if not wanted(name, only):
             continue
-        began = time.perf_counter()
+        began, text = time.perf_counter(), make()
         asked = asked_of(text, affordable(seconds_a_target(text)))
         kept |= {f"{name}/asked/{field}": np.asarray(value) for field, value in asked._asdict().items()}
         for question, answered in given(asked):
@@ -48,6 +48,11 @@ def record(path: Path, only: list[str] | None) -> int:
     np.savez_compressed(path, **kept)
     print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
     return 0
+
+
+def wanted(name: str, only: list[str] | None) -> bool:
+    """Whether a machine is one of those asked for."""
+    return not only or any(word in name for word in only)
 
 
 def seconds_a_target(text: str) -> float:
@@ -105,10 +110,12 @@ class Tally:
         off = np.where(same, 0.0, differences(before.numbers, now.numbers))
         worst = off.max(axis=1, initial=0.0)
         other = np.array(before.words) != np.array(now.words)
+        if "status" in before.columns:  # the first column
+            changed = before.numbers[:, 0] != now.numbers[:, 0]
+            self.statuses += int(changed.sum())
+            other |= changed
         self.equal += int((same.all(axis=1) & ~other).sum())
         self.largest = max(self.largest, float(worst.max(initial=0.0)))
-        if "status" in before.columns:
-            self.statuses += int((before.numbers[:, 0] != now.numbers[:, 0]).sum())
         beyond = other | ((worst > tolerance) if tolerance else ~same.all(axis=1))
         if beyond.any():
             self.differing[machine] = int(beyond.sum())
@@ -127,7 +134,7 @@ def compare(path: Path, tolerance: float, only: list[str] | None) -> int:
     """Ask again, and print how the answers differ."""
     tallies: dict[str, Tally] = {}
     for name, asked, before in recorded(np.load(path)):
-        if only and not any(word in name for word in only):
+        if not wanted(name, only):
             continue
         now = dict(given(asked))
         for question, table in before.items():

@@ -6,7 +6,8 @@ import dataclasses
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +25,10 @@ from machines.trunks import TRUNKS
 Array = NDArray[np.float64]
 SEED = 20261124
 COPIED = ("stewart", "five_bar", "nrpm", "servo_hexapod", "delta", "rps", "canfield", "g1_ankle")
+LITERATURE = (
+    *(published.planar_arm, published.tripod, published.similar_hexagons, published.seven_struts),
+    published.four_rails,
+)
 KINDS = ("3-PRS", "3-RPR", "3-RPS", "3-RRR", "5-bar", "6-PUS", "6-RUS", "6-UPS", "delta")
 
 TARGETS = (200, 120, 80, 48, 24, 12)
@@ -55,24 +60,31 @@ class Asked(NamedTuple):
     values: Array
 
 
-def machines() -> Iterator[tuple[str, str]]:
-    """Names of machines, and the files that describe them."""
-    for name in pf.catalog():
-        yield f"catalogue {name}", as_text(pf.load(name))
-    with tempfile.TemporaryDirectory() as folder:
-        for kind in KINDS:
-            path = Path(folder) / f"{kind}.toml"
-            command = [sys.executable, "-m", "pfabrik", "new", kind, "-o", str(path)]
-            subprocess.run(command, check=True, capture_output=True)
-            yield f"new {kind}", path.read_text(encoding="utf-8")
-    for name, make in (MACHINES | CLOSED | ON_ARMS | TRUNKS).items():
-        yield f"tests {name}", as_text(make())
-    for make in (published.planar_arm, published.tripod, published.similar_hexagons, published.seven_struts):
-        yield f"tests {make.__name__}", as_text(make())
-    yield "tests dietmaier", as_text(published.dietmaier()[0])
-    for name in COPIED:
-        for how, copy in copies(pf.load(name)):
-            yield f"{how} {name}", as_text(copy)
+def machines() -> dict[str, Callable[[], str]]:
+    """Machines by name: what gives the text of the file that describes each."""
+    tested = MACHINES | CLOSED | ON_ARMS | TRUNKS | {make.__name__: make for make in LITERATURE}
+    makers: dict[str, Callable[[], str]] = {f"catalogue {name}": partial(loaded, name) for name in pf.catalog()}
+    makers |= {f"new {kind}": partial(new, kind) for kind in KINDS}
+    makers |= {f"tests {name}": partial(made, make) for name, make in tested.items()}
+    return makers | {f"{how} {name}": partial(copied, name, copy) for name in COPIED for how, copy in COPIES.items()}
+
+
+def loaded(name: str) -> str:
+    return as_text(pf.load(name))
+
+
+def made(make: Callable[[], pf.Mechanism]) -> str:
+    return as_text(make())
+
+
+def copied(name: str, copy: Callable[[pf.Mechanism], pf.Mechanism]) -> str:
+    return as_text(copy(pf.load(name)))
+
+
+def new(kind: str) -> str:
+    """The starting file for a kind of machines, as the command prints it."""
+    command = [sys.executable, "-m", "pfabrik", "new", kind]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
 def as_text(mechanism: pf.Mechanism) -> str:
@@ -91,18 +103,14 @@ def as_machine(text: str) -> pf.Mechanism:
         return pf.load(path)
 
 
-def copies(mechanism: pf.Mechanism) -> Iterator[tuple[str, pf.Mechanism]]:
-    """The machine in another place, unit and order, and without its limits."""
-    if "rotation" in mechanism.task or mechanism.end_effector_is_joint:  # other tasks know the base's axes
-        yield "moved", moved(mechanism)
-    yield "scaled", scaled(mechanism, 0.01)
+def reordered(mechanism: pf.Mechanism) -> pf.Mechanism:
+    """The machine with its joints in another order."""
     order = np.random.default_rng(SEED).permutation(len(mechanism.joints))
-    yield "reordered", dataclasses.replace(mechanism, joints=tuple(mechanism.joints[k] for k in order))
-    yield "unlimited", mechanism.without_limits()
+    return dataclasses.replace(mechanism, joints=tuple(mechanism.joints[k] for k in order))
 
 
 def moved(mechanism: pf.Mechanism) -> pf.Mechanism:
-    """The machine turned and set down elsewhere."""
+    """The machine turned and set down elsewhere; its task, if it leaves out a part of the pose, is then another."""
     L = mechanism.characteristic_length
     T = pf.pose([0.3 * L, -0.7 * L, 0.2 * L], rotvec=[0.4, -0.9, 0.5])
     R, t = T[:3, :3], T[:3, 3]
@@ -122,7 +130,7 @@ def moved(mechanism: pf.Mechanism) -> pf.Mechanism:
     return with_joints(mechanism, [move(joint) for joint in mechanism.joints], R @ mechanism.reference_point + t)
 
 
-def scaled(mechanism: pf.Mechanism, factor: float) -> pf.Mechanism:
+def scaled(mechanism: pf.Mechanism, factor: float = 0.01) -> pf.Mechanism:
     """The machine in another unit; those of the catalogue that are copied have no cylindrical joints."""
 
     def scale(joint: pf.Joint) -> pf.Joint:
@@ -140,6 +148,14 @@ def with_joints(mechanism: pf.Mechanism, joints: list[pf.Joint], point: Array) -
     """The machine with other joints, and another reference point where that is not a joint's."""
     reference = None if mechanism.end_effector_is_joint else tuple(point)
     return dataclasses.replace(mechanism, joints=tuple(joints), reference_point=reference)
+
+
+COPIES: dict[str, Callable[[pf.Mechanism], pf.Mechanism]] = {
+    "moved": moved,
+    "scaled": scaled,
+    "reordered": reordered,
+    "unlimited": pf.Mechanism.without_limits,
+}
 
 
 def asked_of(text: str, count: int) -> Asked:
