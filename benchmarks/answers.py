@@ -17,15 +17,19 @@ import sys
 import time
 import warnings
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 import pfabrik as pf
 from answers_asked import Asked, affordable, as_machine, asked_of, machines
 from answers_given import Table, given
+
+A = TypeVar("A")
+B = TypeVar("B")
 
 TRIED = 24
 """Targets by which it is told how long a machine takes for one."""
@@ -34,20 +38,34 @@ TRIED = 24
 def record(path: Path, only: list[str] | None) -> int:
     """Ask every machine, and keep what it answers."""
     kept: dict[str, Any] = {}
-    for name, make in machines().items():
-        if not wanted(name, only):
-            continue
-        began, text = time.perf_counter(), make()
-        asked = asked_of(text, affordable(seconds_a_target(text)))
+    names = [name for name in machines() if wanted(name, only)]
+    for name, asked, answered, seconds in on_all_cores(asked_anew, names):
         kept |= {f"{name}/asked/{field}": np.asarray(value) for field, value in asked._asdict().items()}
-        for question, answered in given(asked):
-            kept[f"{name}/given/{question}"] = shuffled(answered.numbers)
-            kept[f"{name}/words/{question}"] = np.array(json.dumps([answered.columns, answered.words]))
-        seconds = time.perf_counter() - began
+        for question, table in answered.items():
+            kept[f"{name}/given/{question}"] = shuffled(table.numbers)
+            kept[f"{name}/words/{question}"] = np.array(json.dumps([table.columns, table.words]))
         print(f"{name:32s} {len(asked.targets):4d} targets {seconds:6.1f} s", flush=True)
     np.savez_compressed(path, **kept)
-    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+    print(f"{path}: {len(names)} machines, {path.stat().st_size / 1e6:.1f} MB")
     return 0
+
+
+def asked_anew(name: str) -> tuple[str, Asked, dict[str, Table], float]:
+    """A machine, what it is asked, what it answers, and the processor's time that takes [s]."""
+    began, text = time.process_time(), machines()[name]()
+    asked = asked_of(text, affordable(seconds_a_target(text)))
+    return name, asked, dict(given(asked)), time.process_time() - began
+
+
+def asked_again(asked: Asked) -> dict[str, Table]:
+    """What a machine of a file answers now."""
+    return dict(given(asked))
+
+
+def on_all_cores(ask: Callable[[A], B], what: list[A]) -> Iterator[B]:
+    """Ask several machines at a time, each in a process; answers in order."""
+    with ProcessPoolExecutor(initializer=warnings.simplefilter, initargs=("ignore", pf.errors.MobilityWarning)) as pool:
+        yield from pool.map(ask, what)
 
 
 def wanted(name: str, only: list[str] | None) -> bool:
@@ -133,10 +151,9 @@ def differences(before: np.ndarray, now: np.ndarray) -> np.ndarray:
 def compare(path: Path, tolerance: float, only: list[str] | None) -> int:
     """Ask again, and print how the answers differ."""
     tallies: dict[str, Tally] = {}
-    for name, asked, before in recorded(np.load(path)):
-        if not wanted(name, only):
-            continue
-        now = dict(given(asked))
+    machines = [machine for machine in recorded(np.load(path)) if wanted(machine[0], only)]
+    answers = on_all_cores(asked_again, [asked for _, asked, _ in machines])
+    for (name, _, before), now in zip(machines, answers, strict=True):
         for question, table in before.items():
             tally = tallies.setdefault(question, Tally())
             tally.add(name, table, now.get(question, Table({}, np.zeros((0, 0)), [])), tolerance)
@@ -162,7 +179,6 @@ def main() -> int:
     parser.add_argument("--tolerance", type=float, default=0.0, help="difference that counts as none, relative above 1")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="machines whose name contains one of these")
     asked = parser.parse_args()
-    warnings.simplefilter("ignore", pf.errors.MobilityWarning)
     if asked.what == "record":
         return record(asked.file, asked.only)
     return compare(asked.file, asked.tolerance, asked.only)

@@ -34,11 +34,11 @@ KINDS = ("3-PRS", "3-RPR", "3-RPS", "3-RRR", "5-bar", "6-PUS", "6-RUS", "6-UPS",
 TARGETS = (200, 120, 80, 48, 24, 12)
 """How many targets a machine may have: as many as `BUDGET` allows."""
 
-BUDGET = 1.2
+BUDGET = 2.0
 """Processor time that the targets of a machine may take, by all questions together, about [s]."""
 
-QUESTIONS = 8
-"""How many questions have all targets, about."""
+QUESTIONS = 12
+"""How many times all targets are asked for, about."""
 
 
 class Asked(NamedTuple):

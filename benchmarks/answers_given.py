@@ -178,6 +178,6 @@ def jacobians(solution: pf.Solution) -> Table:
 def reaches(origin: pf.Solution, n_targets: int) -> Table:
     """How far it is in each direction, and what stops it; in one only where answers take long."""
     axes = [axis for name, axis in zip("xyz", np.eye(3), strict=True) if name in origin.mechanism.task]
-    found = pf.travel(origin) if n_targets >= 100 or not axes else pf.travel(origin, along=axes[0])
+    found = pf.travel(origin) if n_targets >= 200 or not axes else pf.travel(origin, along=axes[0])
     words = [f"{each.kind} {'; '.join(f'{limit.joint} {limit.bound}' for limit in each.stopped_by)}" for each in found]
     return table({"distance": found.distances, "direction": [each.direction for each in found]}, words)
