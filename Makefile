@@ -6,10 +6,14 @@ READY := .venv/.ready
 STAMP := .venv/.installed
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 
-.PHONY: demo test test-fast test-interpreted campaign check bench clean
+.PHONY: demo reproduce test test-fast test-interpreted campaign check bench clean
 
 demo: $(READY)
 	@$(BIN)/pfabrik demo
+
+# The experiments of the paper, next to what it printed: a report, pictures and CSV files in out/.
+reproduce: $(STAMP)
+	@$(BIN)/python -m paper
 
 # In parallel: the kernels are compiled first, once, and every worker loads them. The routines that kernels are made of
 # are tested as plain Python: compiled alone, each would take longer than its tests.
@@ -33,7 +37,7 @@ campaign: $(STAMP)
 check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy --strict src tests/typing
+	$(BIN)/mypy --strict src paper tests/typing
 	$(BIN)/lint-imports
 
 bench: $(STAMP)

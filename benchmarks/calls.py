@@ -13,9 +13,9 @@ from pfabrik.closure.solve import ClosureEngine
 from pfabrik.motion.displacements import rate_units
 from pfabrik.motion.first_order import actuated_columns
 from pfabrik.motion.singularities import measures
-from pfabrik.reproduce.timing import one_core
 from table import Row, cells, machine, table
 from timing import best_times, draw
+from yardstick import one_core
 
 CALLS = 200
 

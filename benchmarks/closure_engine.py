@@ -12,9 +12,9 @@ import pfabrik as pf
 from closed_forms import Array, Struts
 from newton import StrutNewton
 from pfabrik.closure.solve import ClosureEngine
-from pfabrik.reproduce.timing import one_core
 from table import Row
 from timing import best_times, draw
+from yardstick import one_core
 
 DIETMAIER_FEET = np.array(
     [

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pfabrik as pf
-from pfabrik.reproduce.timing import one_core
 from table import machine
 from timing import best_times
+from yardstick import one_core
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from checks import gap_of_points

@@ -9,9 +9,9 @@ import numpy as np
 
 import pfabrik as pf
 from closed_forms import Struts
-from pfabrik.reproduce.timing import one_core
 from table import machine
 from timing import best_times, draw
+from yardstick import one_core
 
 TARGETS, SIZE, TILT = 2000, 1.0, 0.5
 ROUNDS = (1, 2, 4, 8, 12, 25, 50, 1000)

@@ -19,12 +19,11 @@ from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
 from in_c import IS_THERE, InC
 from in_placo import peer
-from pfabrik import geometric
-from pfabrik.reproduce.timing import one_core
 from table import Row, cells, machine, table
 from timing import Solve, best_times, draw, in_blocks
 from viewer import viewer
 from workspaces import workspaces
+from yardstick import geometric, one_core
 
 CENTROID, NEAREST = pf.Options(projection="centroid"), pf.Options(projection="nearest")
 
@@ -96,7 +95,7 @@ def batches(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
             in_c = InC(form)
             agree(pf.solve_ik(mechanism, targets), in_c.solve(targets)[0])
             baselines["C, all limits"] = partial(in_c.solve, targets)
-        baselines["pf.geometric"] = partial(geometric.solve_ik, mechanism, targets)
+        baselines["geometric approach"] = partial(geometric.solve_ik, mechanism, targets)
         if isinstance(form, Struts):
             baselines["NumPy, lengths only"] = partial(in_blocks, form.lengths, targets)
         yield from batch_rows(mechanism, f"{what}, batch, reachable", targets, baselines, runs)
@@ -112,7 +111,7 @@ def batches(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
         targets = drawn[which & (found.status == pf.Status.REACHED)][: n // 50]
         baselines = {
             "NumPy, six lengths, arms unmoved": partial(in_blocks, struts.lengths, targets),
-            "pf.geometric": partial(geometric.solve_ik, mechanism, targets),
+            "geometric approach": partial(geometric.solve_ik, mechanism, targets),
         }
         yield from batch_rows(mechanism, f"NRPM, batch, reachable within 0.4 L, {what}", targets, baselines, runs)
 

@@ -21,16 +21,12 @@ settings.load_profile(os.environ.get("PFABRIK_HYPOTHESIS", "fixed"))
 COMPILING = """
 import sys
 import numba
-import pfabrik as pf
 from pfabrik.kernels import ahead
 
 of_legs = sys.argv[1] == "legs"
 for kernel, arguments in ahead.KERNELS:
     if kernel.py_func.__module__.startswith(("pfabrik.kernels.legs", "pfabrik.kernels.reaching")) == of_legs:
         kernel.compile(tuple(numba.typeof(argument) for argument in arguments))
-if of_legs:
-    for mechanism in map(pf.load, ("stewart", "five_bar", "nrpm")):
-        pf.geometric.solve_ik(mechanism, mechanism.home_pose)
 """
 """Compiles all kernels in two parts that share little and take about as long, for two processes."""
 

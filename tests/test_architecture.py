@@ -19,11 +19,10 @@ FILES = {path.relative_to(PACKAGE).as_posix(): path for path in PACKAGE.rglob("*
 MAY_NAME_MACHINES = {
     "__init__.py": "the first lines of a session, for who reads the package's help",
     "catalog/": "the machines themselves",
-    "reproduce/paper.toml": "the machines of the paper's experiments, with what it printed of them",
+    "cli/demo.toml": "the machines of the demo, with their circles",
     "export/linuxcnc.py": "the kinematics of a firmware, by their names there",
     "export/klipper.py": "the kinematics of a firmware, by their names there",
     "cli/export.py": "the printers that a firmware knows",
-    "geometric/": "closed forms, which speak of the machines that are known for theirs",
 }
 """Beginnings of paths, and why names of the catalogue may stand there."""
 VOCABULARY = ("delta", "prr", "prs", "psu", "rpr", "rps", "rrr", "ucu")
@@ -106,7 +105,7 @@ def loaded_by(heavy: str, lines: list[list[str]]) -> tuple[list[tuple[int | None
 
 COMMANDS = (
     *("catalog", "new", "info", "check", "ik", "fk", "track", "travel", "workspace", "plot", "view"),
-    *("import", "export", "verify", "demo", "reproduce"),
+    *("import", "export", "verify", "demo"),
 )
 HELP = [["--help"], *[[command, "--help"] for command in COMMANDS]]
 WRONG = [

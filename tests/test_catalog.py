@@ -16,9 +16,9 @@ import oracles_by_leg as by_leg
 import pfabrik as pf
 from machines.published import PUBLISHED, moved_from_home
 from oracles import search
+from paper import geometric
 from pfabrik import Mechanism, Solution, Status
 from pfabrik.catalog import catalog_file, description
-from pfabrik.errors import NoClosedForm
 
 Array = NDArray[np.float64]
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -196,8 +196,8 @@ def test_what_is_called_out_of_reach_is(name: str, count: int) -> None:
 
 def reached_in_closed_form(mechanism: Mechanism, targets: Array) -> NDArray[np.bool_] | None:
     """Which targets (n, 4, 4) a closed form reaches, (n,); None without one."""
-    for solve_ik in (by_leg.solve_ik, pf.geometric.solve_ik):
-        with suppress(by_leg.Unsuitable, NoClosedForm):
+    for solve_ik in (by_leg.solve_ik, geometric.solve_ik):
+        with suppress(by_leg.Unsuitable, geometric.NoClosedForm):
             return np.asarray(solve_ik(mechanism, targets).reached)
     return None
 

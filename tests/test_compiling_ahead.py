@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
 import pfabrik as pf
-from pfabrik.kernels import ahead
+from copied import copied
+from pfabrik.kernels import _jit, ahead
 from test_compiled_and_interpreted import INTERPRETED
 
 pytestmark = pytest.mark.skipif(INTERPRETED, reason="nothing is compiled")
@@ -55,3 +58,32 @@ def test_a_kernel_is_announced_when_it_is_compiled_and_not_when_it_is_loaded(tmp
         told.append(ran.stderr)
     assert told[0].startswith("pfabrik: compiling double ... ") and told[0].endswith(" s\n")
     assert told[1] == ""
+
+
+def load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("edited", ["kernels/vectors.py", "beside/part.py"])
+def test_an_edit_beside_a_kernel_or_in_the_kernels_it_uses_makes_its_cache_stale(
+    edited: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder in ("kernels", "beside"):
+        (tmp_path / folder).mkdir()
+    for source in Path(_jit.__file__).parent.glob("*.py"):
+        (tmp_path / "kernels" / source.name).write_bytes(source.read_bytes())
+    caller = tmp_path / "beside" / "caller.py"
+    (tmp_path / "beside" / "part.py").touch()
+    uses = "    from ..kernels import vectors\n    from .part import share\n"
+    caller.write_text(f"def double(x):\n    return 2.0 * x\n\ndef triple(x):\n{uses}")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
+    kernels = []  # all kept: a module that cannot be imported by name is found only while one of them lives
+    for _ in range(2):
+        for _again in range(2):
+            kernels.append(copied(tmp_path / "kernels", "_jit").kernel(load(caller).double))
+            assert kernels[-1](2.0) == 4.0
+        (tmp_path / edited).write_text("# edited\n")
+    assert [sum(double.stats.cache_hits.values()) for double in kernels] == [0, 1, 0, 1]

@@ -169,7 +169,7 @@ def test_the_citation_is_of_this_version_and_of_the_paper_that_the_pages_name() 
 
 
 LINES = [line for block in blocks(ROOT / "README.md", "") for line in block.splitlines() if line.startswith("pfabrik ")]
-ELSEWHERE = ("pfabrik demo --quick", "pfabrik reproduce --quick")
+ELSEWHERE = ("pfabrik demo --quick",)
 """Commands that take long, and that tests of their own run just so."""
 
 

@@ -15,7 +15,6 @@ PUBLIC = [
     errors.PfabrikError("anything"),
     errors.InvalidMechanism([FAULT, FAULT], "my.toml"),
     errors.UnsupportedMechanism("m", ["one", "two"]),
-    errors.NoClosedForm("m", ["R-S"], "no driven joint", ["U-P*-S", "R*-U-S"]),
     errors.ContinuumOfSolutions("m", 2),
     errors.ContinuumOfWorkingModes("m", 1, ["j4", "j6"]),
     errors.InvalidArgument("target", "a text", "numbers", rows=[3, 5]),

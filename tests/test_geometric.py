@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
-import importlib.util
 import os
 import pickle
 import re
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,12 +18,11 @@ from scipy.spatial.transform import RigidTransform, Rotation
 import oracles
 import oracles_by_leg as by_leg
 import pfabrik as pf
-from copied import copied
+from paper import geometric
+from paper.geometric import NoClosedForm, arms, facts, targets
+from paper.geometric.topologies import TOPOLOGIES, closed_form
 from pfabrik import Cone, Joint, Mechanism
-from pfabrik.errors import InvalidArgument, NoClosedForm
-from pfabrik.geometric import arms, facts, targets
-from pfabrik.geometric.topologies import TOPOLOGIES, closed_form
-from pfabrik.kernels import _jit
+from pfabrik.errors import InvalidArgument
 from pfabrik.tolerances import TOLERANCES
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -92,7 +89,7 @@ def test_every_closed_form_says_how_many_solutions_which_branch_and_where_from(t
 def test_reached_exactly_where_the_oracle_says(name: str) -> None:
     mechanism = pf.load(name)
     wanted = some_targets(mechanism, 4000)
-    answer = pf.geometric.solve_ik(mechanism, wanted)
+    answer = geometric.solve_ik(mechanism, wanted)
     margin = oracles.margin(mechanism, wanted)
     clear = abs(margin) > ON_THE_EDGE
     np.testing.assert_array_equal(answer.reached[clear], margin[clear] > 0)
@@ -104,14 +101,14 @@ def test_reached_exactly_where_the_oracle_says(name: str) -> None:
 def test_the_solver_reaches_every_redundant_target_that_the_closed_form_reaches() -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism)
-    answer, solution = pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
+    answer, solution = geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
     assert (solution.status[answer.reached] == pf.Status.REACHED).all()
 
 
 def test_a_grid_of_candidates_finds_nearly_every_reachable_target_and_no_other() -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism)
-    reached = pf.geometric.solve_ik(mechanism, wanted).reached
+    reached = geometric.solve_ik(mechanism, wanted).reached
     margin = oracles.margin(mechanism, wanted)
     assert not reached[margin < -ON_THE_EDGE].any()
     assert reached[margin > 0].mean() > 0.97
@@ -131,7 +128,7 @@ def arm_slacks(mechanism: Mechanism, wanted: oracles.Array, values: oracles.Arra
 def test_redundant_answers_close_and_keep_every_limit() -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism)
-    answer = pf.geometric.solve_ik(mechanism, wanted)
+    answer = geometric.solve_ik(mechanism, wanted)
     wanted, values = wanted[answer.reached], answer.actuators[answer.reached]
     assert (arm_slacks(mechanism, wanted, values) > -ON_THE_EDGE).all()
     column = mechanism.actuator_names.index
@@ -154,7 +151,7 @@ def test_a_leg_takes_its_other_branch_where_homes_breaks_a_limit_and_only_there(
     """As leg by leg in NumPy; an elbow may have two intervals of bends, and a crank counts where its range has it."""
     mechanism = relimited(pf.load("five_bar"), p1=crank, p5=(-3.0, 3.0), p2=elbow, p4=(-2.5, 1.7))
     wanted = some_targets(mechanism, 500)
-    answer, expected = pf.geometric.solve_ik(mechanism, wanted), by_leg.solve_ik(mechanism, wanted)
+    answer, expected = geometric.solve_ik(mechanism, wanted), by_leg.solve_ik(mechanism, wanted)
     np.testing.assert_array_equal(answer.reached, expected.reached)
     assert answer.reached.any()
     np.testing.assert_allclose(answer.actuators, expected.actuators, rtol=0, atol=1e-9)
@@ -180,26 +177,26 @@ def test_a_leg_reaches_out_to_its_stretch_and_not_beyond() -> None:
     slack = TOLERANCES.limit * mechanism.characteristic_length
     direction = np.array([0.6, 0.8, 0.0])
     for distance, reached in ((180 - 1e-3, True), (180 + 0.5 * slack, True), (180 + 2 * slack, False)):
-        assert pf.geometric.solve_ik(mechanism, distance * direction).reached is reached
+        assert geometric.solve_ik(mechanism, distance * direction).reached is reached
     for distance, reached in ((40 + 1e-3, True), (40 - 0.5 * slack, True), (40 - 2 * slack, False)):
-        assert pf.geometric.solve_ik(mechanism, distance * direction).reached is reached
-    answer = pf.geometric.solve_ik(mechanism, 180 * direction)
+        assert geometric.solve_ik(mechanism, distance * direction).reached is reached
+    answer = geometric.solve_ik(mechanism, 180 * direction)
     assert answer.actuators[0] == pytest.approx(np.arctan2(0.8, 0.6), abs=1e-6)
 
 
 def test_a_tip_off_its_plane_is_not_reached() -> None:
     mechanism = five_bar()
     slack = TOLERANCES.limit * mechanism.characteristic_length
-    assert pf.geometric.solve_ik(mechanism, [90, 80, 0.5 * slack])
-    assert not pf.geometric.solve_ik(mechanism, [90, 80, -2 * slack])
+    assert geometric.solve_ik(mechanism, [90, 80, 0.5 * slack])
+    assert not geometric.solve_ik(mechanism, [90, 80, -2 * slack])
 
 
 def test_where_a_leg_has_no_side_the_branch_is_the_documented_one() -> None:
-    on_shoulder = pf.geometric.solve_ik(five_bar(), [0.0, 0, 0])
+    on_shoulder = geometric.solve_ik(five_bar(), [0.0, 0, 0])
     assert on_shoulder
     assert on_shoulder.actuators[0] == 0.0  # every angle serves: home's
     mechanism = five_bar(stretched=True)
-    bent = pf.geometric.solve_ik(mechanism, 0.9 * np.array(mechanism.reference_point))
+    bent = geometric.solve_ik(mechanism, 0.9 * np.array(mechanism.reference_point))
     assert bent
     assert bent.actuators[0] == pytest.approx(np.arccos(0.9))  # home is stretched: to the left
 
@@ -209,9 +206,7 @@ def test_a_tip_has_no_orientation() -> None:
     wanted = some_targets(bar, 100)
     turned = wanted.copy()
     turned[:, :3, :3] = Rotation.random(len(wanted), random_state=1).as_matrix()
-    np.testing.assert_array_equal(
-        pf.geometric.solve_ik(bar, turned).actuators, pf.geometric.solve_ik(bar, wanted).actuators
-    )
+    np.testing.assert_array_equal(geometric.solve_ik(bar, turned).actuators, geometric.solve_ik(bar, wanted).actuators)
 
 
 # --- redundant coordinates -------------------------------------------------------------------------------------------
@@ -235,7 +230,7 @@ def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(started: bool
         for arm in oracles.arms(mechanism):
             for joint in (arm.hinge, arm.slide):
                 starts[:, column(joint.name)] = rng.uniform(*joint.range, len(wanted))
-    answer = pf.geometric.solve_ik(mechanism, wanted, start=SimpleNamespace(actuators=starts) if started else None)
+    answer = geometric.solve_ik(mechanism, wanted, start=SimpleNamespace(actuators=starts) if started else None)
     grid = grid_of(mechanism)
     found = np.ones(len(wanted), bool)
     stayed = 0
@@ -262,27 +257,27 @@ def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(started: bool
 def test_an_answer_as_start_keeps_its_redundant_coordinates() -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism, 400)
-    wanted = wanted[pf.geometric.solve_ik(mechanism, wanted).reached]
-    for first in (pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)):
-        again = pf.geometric.solve_ik(mechanism, wanted, start=first)
+    wanted = wanted[geometric.solve_ik(mechanism, wanted).reached]
+    for first in (geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)):
+        again = geometric.solve_ik(mechanism, wanted, start=first)
         np.testing.assert_allclose(again.actuators, first.actuators, rtol=0, atol=1e-6)
 
 
 def test_a_single_start_serves_every_row_as_it_serves_one() -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism, 400)
-    near = pf.geometric.solve_ik(mechanism, pf.pose([30, 20, 215]))
-    batch = pf.geometric.solve_ik(mechanism, wanted, start=near)
+    near = geometric.solve_ik(mechanism, pf.pose([30, 20, 215]))
+    batch = geometric.solve_ik(mechanism, wanted, start=near)
     rows = SimpleNamespace(actuators=np.tile(near.actuators, (len(wanted), 1)))
-    np.testing.assert_array_equal(batch.actuators, pf.geometric.solve_ik(mechanism, wanted, start=rows).actuators)
+    np.testing.assert_array_equal(batch.actuators, geometric.solve_ik(mechanism, wanted, start=rows).actuators)
     for row in range(0, len(wanted), 37):
-        single = pf.geometric.solve_ik(mechanism, wanted[row], start=near)
+        single = geometric.solve_ik(mechanism, wanted[row], start=near)
         np.testing.assert_array_equal(single.actuators, batch.actuators[row])
 
 
 def test_a_start_out_of_range_does_not_stay() -> None:
     mechanism = pf.load("nrpm")
-    home = pf.geometric.solve_ik(mechanism, mechanism.home_pose).actuators
+    home = geometric.solve_ik(mechanism, mechanism.home_pose).actuators
     for joint, value, slack in (("A1", np.radians(135), 1e-9), ("B2", 130.0, 1e-9 * mechanism.characteristic_length)):
         wide = relimited(mechanism, **{name: None for name in mechanism.actuator_names if name[0] == "D"})
         wide = wide.with_limits(dict.fromkeys(("CL1", "CR1", "EL1", "ER1", "CL2", "CR2", "EL2", "ER2")))
@@ -290,7 +285,7 @@ def test_a_start_out_of_range_does_not_stay() -> None:
         for beyond, stays in ((0.5 * slack, True), (2 * slack, False)):
             start = home.copy()
             start[column] = value + beyond
-            answer = pf.geometric.solve_ik(wide, mechanism.home_pose, start=SimpleNamespace(actuators=start))
+            answer = geometric.solve_ik(wide, mechanism.home_pose, start=SimpleNamespace(actuators=start))
             assert answer
             assert (answer.actuators[column] == start[column]) == stays
             assert answer.actuators[column] == pytest.approx(value)
@@ -299,8 +294,8 @@ def test_a_start_out_of_range_does_not_stay() -> None:
 def test_arms_without_ranges_search_a_turn_and_a_length_to_either_side() -> None:
     mechanism = relimited(pf.load("nrpm"), **{f"{name}{i}": None for name in "AB" for i in (1, 2, 3)})
     wanted = some_targets(mechanism, 400)
-    limited = pf.geometric.solve_ik(pf.load("nrpm"), wanted)
-    answer, solution = pf.geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
+    limited = geometric.solve_ik(pf.load("nrpm"), wanted)
+    answer, solution = geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
     assert answer.reached.sum() > 0.9 * limited.reached.sum()
     assert (solution.status[answer.reached] == pf.Status.REACHED).all()
 
@@ -341,7 +336,7 @@ def test_a_range_is_kept_to_its_tolerance_and_no_further(name: str, joint: str) 
     low, high = mechanism.joint(joint).range
     for inside, stays in ((0.5 * slack, True), (2 * slack, False)):
         limits = (low, value - inside) if value > home else (value + inside, high)
-        answer = pf.geometric.solve_ik(relimited(mechanism, **{joint: limits}), target)
+        answer = geometric.solve_ik(relimited(mechanism, **{joint: limits}), target)
         if name == "nrpm":  # the arm moves, and so the limit is kept
             assert (answer.actuators[mechanism.actuator_names.index(joint)] == pytest.approx(value, abs=1e-6)) == stays
         else:
@@ -359,7 +354,7 @@ def test_a_cone_is_kept_to_its_tolerance_and_no_further(joint: str, other: str) 
     wide = {each.name: None for each in stewart.joints if each.cone and each.name != joint}
     for inside, reached in ((0.5e-9, True), (2e-9, False)):
         limited = relimited(stewart, **wide, **{joint: dataclasses.replace(cone, half_angle=angle - inside)})
-        assert pf.geometric.solve_ik(limited, target).reached is reached
+        assert geometric.solve_ik(limited, target).reached is reached
 
 
 @pytest.mark.parametrize("joint, other", [("CL1", "EL1"), ("CR3", "ER3"), ("EL2", "CL2")])
@@ -371,7 +366,7 @@ def test_a_cone_on_a_crossbar_moves_the_arm_when_it_is_exceeded(joint: str, othe
     at_home = [nrpm.home_coordinate(nrpm.actuator_names[column]) for column in columns]
     for inside, stays in ((0.5e-9, True), (2e-9, False)):
         limited = relimited(nrpm, **{joint: dataclasses.replace(cone, half_angle=angle - inside)})
-        answer = pf.geometric.solve_ik(limited, target)
+        answer = geometric.solve_ik(limited, target)
         assert (answer.actuators[columns] == at_home).all() == stays
 
 
@@ -383,7 +378,7 @@ def test_cones_of_half_a_turn_and_more_limit_nothing() -> None:
     }
     wanted = some_targets(stewart, 400)
     for mechanism in (stewart.with_limits(wide), stewart.without_limits()):
-        assert pf.geometric.solve_ik(mechanism, wanted)
+        assert geometric.solve_ik(mechanism, wanted)
 
 
 def test_a_strut_without_length_keeps_every_cone() -> None:
@@ -391,7 +386,7 @@ def test_a_strut_without_length_keeps_every_cone() -> None:
     head = np.array(stewart.joint("CL1").at) - stewart.reference_point
     only = {joint.name: None for joint in stewart.joints if joint.cone and joint.name not in ("AL1", "CL1")}
     foot = np.array(stewart.joint("AL1").at)
-    answer = pf.geometric.solve_ik(stewart.with_limits(only), foot - head)
+    answer = geometric.solve_ik(stewart.with_limits(only), foot - head)
     assert answer
     assert answer.actuators[stewart.actuator_names.index("BL1")] == pytest.approx(0.0, abs=1e-12)
 
@@ -413,8 +408,8 @@ def test_a_strut_may_be_described_from_its_other_end_and_counted_from_home() -> 
         BR1=backwards | {"axis": np.subtract(stewart.joint("AR1").at, stewart.joint("CR1").at)},
     )
     wanted = some_targets(stewart)
-    answer, solution = pf.geometric.solve_ik(other, wanted), pf.solve_ik(other, wanted)
-    plain = pf.geometric.solve_ik(stewart, wanted)
+    answer, solution = geometric.solve_ik(other, wanted), pf.solve_ik(other, wanted)
+    plain = geometric.solve_ik(stewart, wanted)
     np.testing.assert_array_equal(answer.reached, solution.status == pf.Status.REACHED)
     np.testing.assert_array_equal(answer.reached, plain.reached)
     np.testing.assert_allclose(answer.actuators[answer.reached], solution.actuators[answer.reached], rtol=0, atol=1e-9)
@@ -435,7 +430,7 @@ def test_arms_and_cranks_may_be_described_from_their_other_end() -> None:
     )
     for mechanism, other, signs in ((nrpm, turned_arm, {}), (bar, turned_crank, {"p5": -1.0})):
         wanted = some_targets(mechanism, 400)
-        plain, answer = pf.geometric.solve_ik(mechanism, wanted), pf.geometric.solve_ik(other, wanted)
+        plain, answer = geometric.solve_ik(mechanism, wanted), geometric.solve_ik(other, wanted)
         expected = plain.actuators * [signs.get(name, 1.0) for name in mechanism.actuator_names]
         np.testing.assert_array_equal(answer.reached, plain.reached)
         np.testing.assert_allclose(answer.actuators, expected, rtol=0, atol=1e-9)
@@ -447,8 +442,8 @@ def test_bodies_that_are_fixed_to_the_base_count_as_the_base() -> None:
     joints = [dataclasses.replace(joint, **mount) if joint.name == "AL1" else joint for joint in stewart.joints]
     mounted = dataclasses.replace(stewart, joints=(*joints, Joint("bolt", "fixed", ("base", "mount"), at=(90, 0, 0))))
     wanted = some_targets(stewart, 400)
-    expected = pf.geometric.solve_ik(stewart, wanted)
-    np.testing.assert_array_equal(pf.geometric.solve_ik(mounted, wanted).actuators, expected.actuators)
+    expected = geometric.solve_ik(stewart, wanted)
+    np.testing.assert_array_equal(geometric.solve_ik(mounted, wanted).actuators, expected.actuators)
 
 
 # --- batches and wrong calls -----------------------------------------------------------------------------------------
@@ -458,17 +453,17 @@ def test_bodies_that_are_fixed_to_the_base_count_as_the_base() -> None:
 def test_a_batch_is_answered_row_by_row(name: str) -> None:
     mechanism = pf.load(name)
     wanted = some_targets(mechanism, 300)[: 2 * (len(some_targets(mechanism, 300)) // 2)]
-    flat = pf.geometric.solve_ik(mechanism, wanted)
+    flat = geometric.solve_ik(mechanism, wanted)
     assert flat.reached.shape == (len(wanted),)
     assert not flat
     np.testing.assert_array_equal(
         np.isnan(flat.actuators), np.tile(~flat.reached, (len(mechanism.actuator_names), 1)).T
     )
-    folded = pf.geometric.solve_ik(mechanism, wanted.reshape(2, -1, 4, 4))
+    folded = geometric.solve_ik(mechanism, wanted.reshape(2, -1, 4, 4))
     assert folded.reached.shape == (2, len(wanted) // 2)
     np.testing.assert_array_equal(folded.actuators.reshape(flat.actuators.shape), flat.actuators)
     for row in range(0, len(wanted), 29):
-        single = pf.geometric.solve_ik(mechanism, wanted[row])
+        single = geometric.solve_ik(mechanism, wanted[row])
         assert single.actuators.shape == flat.actuators.shape[1:]
         assert single.reached is bool(flat.reached[row]) is bool(single)
         np.testing.assert_array_equal(single.actuators, flat.actuators[row])
@@ -478,17 +473,17 @@ def test_a_batch_is_answered_row_by_row(name: str) -> None:
 def test_targets_come_in_every_form_that_the_solver_takes(name: str) -> None:
     mechanism = pf.load(name)
     wanted = some_targets(mechanism, 60)
-    expected = pf.geometric.solve_ik(mechanism, wanted)
+    expected = geometric.solve_ik(mechanism, wanted)
     locked = wanted.copy()
     locked.setflags(write=False)
     strided = np.asfortranarray(np.repeat(wanted, 2, axis=0))[::2]
     for form in (wanted.tolist(), locked, strided, RigidTransform.from_matrix(wanted)):
-        answer = pf.geometric.solve_ik(mechanism, form)
+        answer = geometric.solve_ik(mechanism, form)
         np.testing.assert_allclose(answer.actuators, expected.actuators, rtol=0, atol=1e-9)
     level = oracles.poses(wanted[:, :3, 3])
     np.testing.assert_array_equal(
-        pf.geometric.solve_ik(mechanism, wanted[:, :3, 3]).actuators,
-        pf.geometric.solve_ik(mechanism, level).actuators,
+        geometric.solve_ik(mechanism, wanted[:, :3, 3]).actuators,
+        geometric.solve_ik(mechanism, level).actuators,
     )
     if not INTERPRETED:
         assert len(closed_form(mechanism).kernel.signatures) == 1
@@ -506,7 +501,7 @@ def test_rows_that_are_no_poses_are_named_as_the_solver_names_them(name: str) ->
     wanted[74, 3, 3] = 2.0
     wanted[75, 3, 0] = np.nan
     errors = []
-    for solve in (pf.geometric.solve_ik, pf.solve_ik):
+    for solve in (geometric.solve_ik, pf.solve_ik):
         with pytest.raises(InvalidArgument) as caught:
             solve(mechanism, wanted)
         errors.append(caught.value)
@@ -514,7 +509,7 @@ def test_rows_that_are_no_poses_are_named_as_the_solver_names_them(name: str) ->
     assert str(errors[0]) == str(errors[1])
     for row in range(70, 76):
         with pytest.raises(InvalidArgument):
-            pf.geometric.solve_ik(mechanism, wanted[row])
+            geometric.solve_ik(mechanism, wanted[row])
 
 
 @pytest.mark.parametrize("factor", [0.9, 1.1])
@@ -525,11 +520,11 @@ def test_a_rotation_typed_with_few_digits_counts_as_the_solver_counts_it(factor:
     rough[:3, 0] *= np.sqrt(1 + factor * TOLERANCES.rotation_matrix)
     if factor > 1:
         with pytest.raises(InvalidArgument):
-            pf.geometric.solve_ik(stewart, rough)
+            geometric.solve_ik(stewart, rough)
         return
     for noise in (rough, np.round(BESIDE["stewart"], 7)):
         expected = pf.solve_ik(stewart, noise).actuators
-        np.testing.assert_allclose(pf.geometric.solve_ik(stewart, noise).actuators, expected, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(geometric.solve_ik(stewart, noise).actuators, expected, rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("distance", [1e4, 1e10, 1e12, 1e160, 1e308])
@@ -537,7 +532,7 @@ def test_a_rotation_typed_with_few_digits_counts_as_the_solver_counts_it(factor:
 def test_no_target_is_too_far_to_be_missed(name: str, distance: float) -> None:
     for mechanism in (pf.load(name), pf.load(name).without_limits()):
         length = mechanism.characteristic_length
-        answer = pf.geometric.solve_ik(mechanism, np.array([[0.0, 0.0, distance], [0.0, -distance, distance / 3]]))
+        answer = geometric.solve_ik(mechanism, np.array([[0.0, 0.0, distance], [0.0, -distance, distance / 3]]))
         may_reach = name != "five_bar" and mechanism == mechanism.without_limits() and distance < facts.HORIZON * length
         assert answer.reached.tolist() == [may_reach, may_reach]
         assert np.isnan(answer.actuators).all() == (not may_reach)
@@ -591,7 +586,7 @@ UNSUITABLE = {
 def test_what_has_no_closed_form_is_told_what_has(reason: str) -> None:
     mechanism = UNSUITABLE[reason]()
     with pytest.raises(NoClosedForm, match=re.escape(reason)) as caught:
-        pf.geometric.solve_ik(mechanism, mechanism.home_pose)
+        geometric.solve_ik(mechanism, mechanism.home_pose)
     error = caught.value
     assert (error.mechanism, error.sub_chains) == (mechanism.name, tuple(map(str, pf.decompose(mechanism))))
     assert [part in str(error) for part in (mechanism.name, *error.sub_chains, *EXAMPLES)].count(False) == 0
@@ -607,41 +602,8 @@ def test_wrong_calls_are_told() -> None:
         (stewart, [0, 0, 190], "home", "start"),
         (stewart, [0, 0, 190], SimpleNamespace(actuators=[1, 2]), "start"),
         (stewart, [[0, 0, 190]] * 3, SimpleNamespace(actuators=np.ones((2, 6))), "start"),
-        (stewart, [0, 0, 190], pf.geometric.solve_ik(stewart, [0, 0, 1e4]), "start"),
+        (stewart, [0, 0, 190], geometric.solve_ik(stewart, [0, 0, 1e4]), "start"),
     ):
         with pytest.raises(InvalidArgument) as caught:
-            pf.geometric.solve_ik(mechanism, target, start=start)
+            geometric.solve_ik(mechanism, target, start=start)
         assert caught.value.argument == argument
-
-
-# --- the cache -------------------------------------------------------------------------------------------------------
-
-
-def load(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.mark.skipif(INTERPRETED, reason="nothing is cached")
-@pytest.mark.parametrize("edited", ["kernels/vectors.py", "closed/part.py"])
-def test_an_edit_beside_a_closed_form_or_in_the_kernels_makes_its_cache_stale(
-    edited: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for folder in ("kernels", "closed"):
-        (tmp_path / folder).mkdir()
-    for source in Path(_jit.__file__).parent.glob("*.py"):
-        (tmp_path / "kernels" / source.name).write_bytes(source.read_bytes())
-    caller = tmp_path / "closed" / "caller.py"
-    (tmp_path / "closed" / "part.py").touch()
-    uses = "    from ..kernels import vectors\n    from .part import share\n"
-    caller.write_text(f"def double(x):\n    return 2.0 * x\n\ndef triple(x):\n{uses}")
-    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
-    kernels = []  # all kept: a module that cannot be imported by name is found only while one of them lives
-    for _ in range(2):
-        for _again in range(2):
-            kernels.append(copied(tmp_path / "kernels", "_jit").kernel(load(caller).double))
-            assert kernels[-1](2.0) == 4.0
-        (tmp_path / edited).write_text("# edited\n")
-    assert [sum(double.stats.cache_hits.values()) for double in kernels] == [0, 1, 0, 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import json
 import os
@@ -12,28 +13,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import oracles
 import pfabrik as pf
-from pfabrik.cli import main
-from pfabrik.reproduce import efficacy, robustness
-from pfabrik.reproduce.closest import nearest_distance
-from pfabrik.reproduce.feasible import model_of, worst_excess
-from pfabrik.reproduce.report import BEGIN, END, put_into
-from pfabrik.reproduce.study import QUICK, cases
-from pfabrik.reproduce.tables import write_csv
+from paper import __main__ as command
+from paper import efficacy, robustness
+from paper.closest import nearest_distance
+from paper.feasible import model_of, worst_excess
+from paper.report import BEGIN, END, put_into
+from paper.study import QUICK, cases
+from paper.tables import write_csv
 
+ROOT = Path(__file__).parents[1]
 MACHINES = ("five_bar", "stewart", "nrpm")
 SUMMARIES = ("efficacy.csv", "efficiency.csv", "robustness.csv")
-README = f"# Title\n\nbefore\n\n{BEGIN}\nstale numbers\n{END}\n\nafter\n"
+PAGE = f"# Title\n\nbefore\n\n{BEGIN}\nstale numbers\n{END}\n\nafter\n"
 
 
 def reproduce(folder: Path) -> subprocess.CompletedProcess[str]:
-    (folder / "README.md").write_text(README, encoding="utf-8")
-    command = [sys.executable, "-m", "pfabrik", "reproduce", "--quick", "--out", "out", "--readme", "README.md"]
-    environment = os.environ | {"PYTHONPATH": str(Path(pf.__file__).parents[1])}
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    (folder / "page.md").write_text(PAGE, encoding="utf-8")
+    line = [sys.executable, "-m", "paper", "--quick", "--out", "out", "--page", "page.md"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(pf.__file__).parents[1])])}
+    return subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
 @pytest.fixture(scope="session")
@@ -139,8 +140,8 @@ def test_every_random_target_is_reached_as_the_closed_form_has_it(rows: Rows) ->
 
 
 @pytest.mark.slow
-def test_the_readme_changes_between_its_marks_only(folder: Path) -> None:
-    text = (folder / "README.md").read_text(encoding="utf-8")
+def test_the_page_changes_between_its_marks_only(folder: Path) -> None:
+    text = (folder / "page.md").read_text(encoding="utf-8")
     assert text.startswith(f"# Title\n\nbefore\n\n{BEGIN}\n|")
     assert text.endswith(f"\n{END}\n\nafter\n")
     assert "stale" not in text
@@ -171,21 +172,83 @@ def test_the_same_numbers_come_out_of_every_run(folder: Path, tmp_path: Path) ->
         assert first[name] == again[name], name
 
 
-@pytest.mark.parametrize("text", ["no marks", f"{BEGIN}\n", f"{END}\n{BEGIN}\n", README + README])
-def test_a_readme_without_its_two_marks_is_left_as_it_is(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "README.md"
+@pytest.mark.parametrize("text", ["no marks", f"{BEGIN}\n", f"{END}\n{BEGIN}\n", PAGE + PAGE])
+def test_a_page_without_its_two_marks_is_left_as_it_is(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "page.md"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(pf.errors.InvalidArgument, match="reproduce: begin"):
         put_into(path, "new")
     assert path.read_text(encoding="utf-8") == text
 
 
-def test_it_says_how_to_get_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pfabrik.cli.reproduce.find_spec", lambda name: None if name == "scipy" else name)
-    result = CliRunner().invoke(main, ["reproduce"])
-    assert result.exit_code == 2
-    assert "scipy; install it with: pip install 'pfabrik[reproduce]'" in result.output
-    assert "matplotlib" not in result.output
+def test_it_says_how_to_get_what_it_needs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(command, "find_spec", lambda name: None if name == "scipy" else name)
+    with pytest.raises(SystemExit) as leaving:
+        command.main([])
+    assert leaving.value.code == 2
+    assert "this needs scipy; install it with: python -m pip install scipy" in capsys.readouterr().err
+
+
+def test_a_page_that_is_not_there_is_told_before_anything_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as leaving:
+        command.main(["--out", str(tmp_path / "out"), "--page", str(tmp_path / "none.md")])
+    assert leaving.value.code == 2
+    assert "none.md: no such file" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_page_of_the_documentation_has_the_marks_for_the_table() -> None:
+    assert command.PAGE == ROOT / "docs" / "reproduction.md"
+    text = command.PAGE.read_text(encoding="utf-8")
+    assert text.count(BEGIN) == text.count(END) == 1
+
+
+def test_the_paper_stands_on_the_public_names_of_the_library() -> None:
+    """Names of `pfabrik` itself and of `pfabrik.errors`, and no attribute that begins with an underscore."""
+    files = sorted(command.PAGE.parents[1].glob("paper/**/*.py"))
+    assert len(files) > 20
+    assert [found for path in files for found in private_uses(path)] == []
+
+
+def private_uses(path: Path) -> list[str]:
+    """What a source file takes of the library beyond its public names, with its place."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        place = f"{path.name}:{getattr(node, 'lineno', 0)}"
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "pfabrik" and not node.level:
+            public = {"pfabrik": pf.__all__, "pfabrik.errors": pf.errors.__all__}.get(node.module, ())
+            found += [f"{place}: {node.module}.{each.name}" for each in node.names if each.name not in public]
+        elif isinstance(node, ast.Import):
+            modules = [each.name for each in node.names if each.name.startswith("pfabrik")]
+            found += [f"{place}: {name}" for name in modules if name not in ("pfabrik", "pfabrik.errors")]
+        elif isinstance(node, ast.Attribute):
+            taken = isinstance(node.value, ast.Name) and node.value.id in ("pf", "pfabrik")
+            if is_private(node) or (taken and node.attr not in pf.__all__):
+                found.append(f"{place}: .{node.attr}")
+    return found
+
+
+def is_private(node: ast.Attribute) -> bool:
+    """Whether it is somebody else's attribute that begins with an underscore; `_asdict` is what named tuples have."""
+    own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+    return node.attr.startswith("_") and not node.attr.startswith("__") and not own and node.attr != "_asdict"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from pfabrik.tolerances import TOLERANCES",
+        "import pfabrik.kernels",
+        "from pfabrik import kernels",
+        "import pfabrik as pf\npf.kernels",
+        "solution._rows",
+    ],
+)
+def test_what_is_private_is_seen(tmp_path: Path, text: str) -> None:
+    (tmp_path / "uses.py").write_text(text, encoding="utf-8")
+    assert len(private_uses(tmp_path / "uses.py")) == 1
 
 
 def test_the_machines_of_the_study_are_those_of_the_paper() -> None:

@@ -13,7 +13,7 @@ Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residu
 Look over   workspace, singularity_map
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 See        plot, plot_track, plot_travel, animate; view (in the browser)
-Structure  decompose, SubChain; geometric (closed forms of the paper's machines); errors
+Structure  decompose, SubChain; errors
 Exchange   interop (MuJoCo and URDF, in and out)
 
 Lengths are in the mechanism's own unit, angles in radians; a pose is a 4x4 matrix from platform to base coordinates;
@@ -79,12 +79,12 @@ _NAMES = {
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}
 # Modules that are themselves public.
-_MODULES = ("errors", "geometric", "interop")
+_MODULES = ("errors", "interop")
 
 __all__ = [*sorted([*_HOMES, *_MODULES]), "__version__"]
 
 if TYPE_CHECKING:
-    from . import errors as errors, geometric as geometric, interop as interop
+    from . import errors as errors, interop as interop
     from .answers.differential import (
         Mobility as Mobility,
         Singularity as Singularity,

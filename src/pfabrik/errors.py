@@ -15,7 +15,6 @@ __all__ = [
     "InvalidMechanism",
     "MissingLibrary",
     "MobilityWarning",
-    "NoClosedForm",
     "PfabrikError",
     "UnknownName",
     "UnsupportedMechanism",
@@ -93,28 +92,6 @@ class UnsupportedMechanism(PfabrikError, ValueError):
         self.mechanism = mechanism
         self.reasons = tuple(reasons)
         super().__init__(f"'{mechanism}' cannot be {purpose}: " + "; ".join(self.reasons))
-
-
-class NoClosedForm(PfabrikError, ValueError):
-    """A valid mechanism whose topology has no closed form here; the engines may solve it all the same.
-
-    Attributes
-    ----------
-    mechanism : its name.
-    sub_chains : its sub-chains, as `decompose` prints them.
-    reason : what it lacks.
-    topologies : which topologies have a closed form.
-    """
-
-    def __init__(self, mechanism: str, sub_chains: Sequence[str], reason: str, topologies: Sequence[str]) -> None:
-        self.mechanism = mechanism
-        self.sub_chains = tuple(sub_chains)
-        self.reason = reason
-        self.topologies = tuple(topologies)
-        super().__init__(
-            f"'{mechanism}' has no closed form: found sub-chains {'; '.join(self.sub_chains)} ({reason}); "
-            f"expected only {', or only '.join(self.topologies)}"
-        )
 
 
 class ContinuumOfSolutions(PfabrikError, ValueError):

@@ -17,7 +17,7 @@ __all__ = ["main"]
         *("ik", "fk", "track", "travel", "workspace", "time", "speed"),
         *("plot", "view"),
         *("import", "export", "verify"),
-        *("compile", "demo", "reproduce"),
+        *("compile", "demo"),
     ),
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},

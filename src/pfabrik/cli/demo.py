@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import time
+import tomllib
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
 import pfabrik as pf
 
@@ -22,7 +26,6 @@ from .whole import new_folder, whole_folder
 
 if TYPE_CHECKING:
     from ..answers.tracked import Track
-    from ..reproduce.study import Case
 
 QUICK_STEPS = 36
 
@@ -51,18 +54,16 @@ def demo(output: Path, steps: int, quick: bool) -> int:
     The upper arc of each circle is out of reach: there the answer is the feasible pose that is nearest
     to the target, and every limit is still kept.
     """
-    from ..reproduce.study import cases
-
     require("pictures", "matplotlib", "plot")
     check_outputs([("-o", output)])
     with new_folder(real(output)):  # what cannot be written is found before the work begins
         runs = []
     count = QUICK_STEPS if quick else steps
-    for case in sorted(cases(), key=lambda case: case.mechanism.end_effector_is_joint):  # soonest compiled first
-        runs.append(follow(case, count))
+    for key, targets in circles(count):
+        runs.append(follow(key, targets))
         with whole_folder(output) as folder:
             draw(runs[-1], folder)
-        click.echo(f"wrote {output / case.key}.png", err=True)
+        click.echo(f"wrote {output / key}.png", err=True)
     with whole_folder(output) as folder:
         for run in runs:
             write(run, folder)
@@ -71,16 +72,27 @@ def demo(output: Path, steps: int, quick: bool) -> int:
     return 0 if all(holds(run.solution) for run in runs) else 1
 
 
-def follow(case: Case, steps: int) -> Run:
+def circles(steps: int) -> Iterator[tuple[str, Floats]]:
+    """Each mechanism's name in the catalogue and its circle, poses (steps, 4, 4) from the lowest and back.
+
+    The mechanism whose kernels are compiled soonest comes first.
+    """
+    turn = np.linspace(0, 2 * np.pi, steps)
+    around = np.stack([np.zeros(steps), np.sin(turn), -np.cos(turn)], axis=-1)
+    text = files(__package__).joinpath("demo.toml").read_text(encoding="utf-8")
+    for key, circle in tomllib.loads(text).items():
+        yield key, pf.pose(circle["center"] + circle["radius"] * around)
+
+
+def follow(key: str, targets: Floats) -> Run:
     """Track one circle, and time it without the compilation of the kernels."""
-    mechanism = case.mechanism
-    targets = case.leaving.poses(steps)
+    mechanism, steps = pf.load(key), len(targets)
     pf.track(mechanism, targets[:: max(1, steps // 12)])  # inside and outside: each has kernels of its own
     with telling(f"{mechanism.name}: {steps} steps") as on_progress:
         start = time.perf_counter()
         solution = pf.track(mechanism, targets, on_progress=on_progress)
         seconds = time.perf_counter() - start
-    return Run(case.key, targets, solution, seconds)
+    return Run(key, targets, solution, seconds)
 
 
 def draw(run: Run, folder: Path) -> None:

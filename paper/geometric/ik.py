@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from pfabrik import Mechanism
+from pfabrik.errors import InvalidArgument
+
 from ..arrays import Floats, Mask
-from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument
-from ..kernels.threads import in_blocks
-from ..poses import as_floats, as_poses, what_is_wrong
+from .asked import as_poses, as_starts, what_is_wrong
 from .targets import INVALID, REACHED
+from .threads import in_blocks
 from .topologies import closed_form
 
 ROWS_A_BLOCK = 4096
@@ -57,11 +58,12 @@ def solve_ik(mechanism: Mechanism, target: Any, *, start: Any = None) -> Geometr
     NoClosedForm : the mechanism's topology has none.
     InvalidArgument : a target or start of the wrong shape, or rows that are no poses.
     """
-    checked_mechanism(mechanism)
+    if not isinstance(mechanism, Mechanism):
+        raise InvalidArgument("mechanism", type(mechanism).__name__, "a Mechanism")
     form = closed_form(mechanism)
     targets, shape = as_poses(target)
     n_actuators = len(mechanism.actuator_names)
-    starts = form.home if start is None else _starts(start, shape, n_actuators)
+    starts = form.home if start is None else as_starts(start, shape, n_actuators)
     actuators, status = np.empty((len(targets), n_actuators)), np.empty(len(targets), np.int8)
 
     def run(block: slice) -> int:
@@ -75,18 +77,3 @@ def solve_ik(mechanism: Mechanism, target: Any, *, start: Any = None) -> Geometr
         raise InvalidArgument("target", found, "finite poses whose rotation is one", rows=bad[:5].tolist())
     reached = (status == REACHED).reshape(shape)
     return Geometric(reached if shape else bool(reached), actuators.reshape(*shape, n_actuators))
-
-
-def _starts(start: Any, shape: tuple[int, ...], n_actuators: int) -> Floats:
-    """The actuators of a start, (1 or n, n_a); InvalidArgument where they do not fit, or are none."""
-    expected = f"an answer with {n_actuators} actuators, single or of batch shape {shape}"
-    if not hasattr(start, "actuators"):
-        raise InvalidArgument("start", type(start).__name__, expected)
-    values = as_floats("start", start.actuators, expected)
-    if values.shape not in ((n_actuators,), (*shape, n_actuators)):
-        raise InvalidArgument("start", f"actuators of shape {values.shape}", expected)
-    values = values.reshape(-1, n_actuators)
-    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-    if len(bad):
-        raise InvalidArgument("start", "actuators that are not finite", "reached answers", rows=bad[:5].tolist())
-    return values

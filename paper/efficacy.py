@@ -7,13 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..answers.solution import Solution
-from ..answers.status import Status
-from ..arrays import Floats
-from ..fk import solve_fk
-from ..options import Options
-from ..rotations import angles_between
-from ..track import track
+from pfabrik import Options, Solution, Status, solve_fk, track
+
+from .arrays import Floats
 from .checking import Feasibility, feasibility
 from .study import SETTINGS, Case, Extent, Tick
 
@@ -75,6 +71,12 @@ def follow(case: Case, targets: Floats, options: Options) -> Followed:
         newton=float(np.mean(np.append(start.iterations, rest.iterations))),
         feasibility=feasibility(solution),
     )
+
+
+def angles_between(one: Floats, other: Floats) -> Floats:
+    """Angles (n,) [rad] from rotations to others, matrices (n, 3, 3): by their chord, exact also where tiny."""
+    half_sine = np.sqrt(((one - other) ** 2).sum(axis=(1, 2)) / 8.0)
+    return np.asarray(2.0 * np.arcsin(np.minimum(half_sine, 1.0)))
 
 
 def rms(values: Floats) -> float:

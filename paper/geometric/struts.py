@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pfabrik import Mechanism, SubChain
+
 from ..arrays import Floats, Records
-from ..decomposition.decompose import SubChain
-from ..description.graph import Step
-from ..description.mechanism import Mechanism
-from ..kernels._jit import kernel, routine
-from ..tolerances import TOLERANCES
+from ..step import Step
+from ..tolerances import ALIGNMENT
+from .compiled import kernel, routine
 from .facts import NO_CONE, centre, home_of, is_parallel, least_cosine, range_of, require, tolerances
 from .targets import BLOCK, FREE, OVER, REACHED, Statuses, load_block
 
@@ -64,9 +64,7 @@ def read_strut(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[dict[str, A
     universal, slide, spherical = steps
     foot, head = centre(universal), centre(spherical)
     length = float(np.linalg.norm(head - foot))
-    require(
-        length > TOLERANCES.alignment * mechanism.characteristic_length, f"{slide.joint.name} has no length at home"
-    )
+    require(length > ALIGNMENT * mechanism.characteristic_length, f"{slide.joint.name} has no length at home")
     sign, offset = _count(mechanism, steps, (head - foot) / length, length)
     low, high = sorted((bound - offset) * sign for bound in range_of(slide))
     slack, _ = tolerances(mechanism)

@@ -6,6 +6,8 @@ preparation and its own compiled code.
 
 from __future__ import annotations
 
+from .errors import NoClosedForm
 from .ik import Geometric, solve_ik
+from .single import one_by_one
 
-__all__ = ["Geometric", "solve_ik"]
+__all__ = ["Geometric", "NoClosedForm", "one_by_one", "solve_ik"]

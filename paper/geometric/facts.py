@@ -7,10 +7,11 @@ from typing import TypeAlias
 
 import numpy as np
 
+from pfabrik import Mechanism
+
 from ..arrays import Floats
-from ..description.graph import Step
-from ..description.mechanism import Mechanism
-from ..tolerances import TOLERANCES
+from ..step import Step
+from ..tolerances import ALIGNMENT, LIMIT
 
 Interval: TypeAlias = tuple[float, float]
 
@@ -56,16 +57,16 @@ def range_of(step: Step) -> Interval:
 
 def least_cosine(half_angle: float) -> float:
     """The cosine that a line within a cone has at least, tolerance included."""
-    angle = half_angle + TOLERANCES.limit
+    angle = half_angle + LIMIT
     return NO_CONE if angle >= math.pi else math.cos(angle) - COSINE_ROUNDING
 
 
 def is_parallel(a: Floats, b: Floats) -> bool:
     """Whether two unit vectors are parallel or opposite."""
-    return float(np.linalg.norm(np.cross(a, b))) <= TOLERANCES.alignment
+    return float(np.linalg.norm(np.cross(a, b))) <= ALIGNMENT
 
 
 def tolerances(mechanism: Mechanism) -> tuple[float, float]:
     """What a length may exceed its limits by, and how far a target may be away to count [length]."""
     length = mechanism.characteristic_length
-    return TOLERANCES.limit * length, HORIZON * length
+    return LIMIT * length, HORIZON * length

@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..answers.residual import closure_residual
-from ..answers.solution import Solution
-from ..answers.status import Status
-from ..tolerances import TOLERANCES
+from pfabrik import Solution, Status, closure_residual
+
 from .feasible import worst_excess
+from .tolerances import LIMIT, POSITION
 
 
 class Feasibility(NamedTuple):
@@ -32,8 +31,8 @@ class Feasibility(NamedTuple):
     @property
     def holds(self) -> bool:
         """Whether every limit is kept and every loop is closed."""
-        kept = max(self.limit_excess, self.independent) <= TOLERANCES.limit
-        return not self.failed and kept and self.closure <= TOLERANCES.position
+        kept = max(self.limit_excess, self.independent) <= LIMIT
+        return not self.failed and kept and self.closure <= POSITION
 
 
 def feasibility(solution: Solution) -> Feasibility:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..kernels._jit import inlined, routine
-from ..tolerances import TOLERANCES
+from ..tolerances import ROTATION_MATRIX
+from .compiled import routine
 
 Statuses: TypeAlias = NDArray[np.int8]
 
@@ -23,7 +23,7 @@ BLOCK = 64
 LAST_ROW, OVER, FREE = 12, 13, 14
 # Largest deviation of R^T R from I in a target, and below which it is left as it is: it moves no point by more than a
 # thousandth of what limits allow.
-NOT_A_ROTATION, ROUNDED = TOLERANCES.rotation_matrix, 1e-12
+NOT_A_ROTATION, ROUNDED = ROTATION_MATRIX, 1e-12
 
 
 @routine
@@ -75,7 +75,7 @@ def judge_block(n: int, far: float, table: Floats) -> None:
         table[OVER, i] = 0.0 if plain & is_near(i, far, table) else 1.0
 
 
-@inlined
+@routine
 def is_near(i: int, far: float, table: Floats) -> bool:
     """Whether column `i` is no farther away than `far`, along any axis."""
     return bool((abs(table[3, i]) <= far) & (abs(table[7, i]) <= far) & (abs(table[11, i]) <= far))

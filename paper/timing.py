@@ -6,7 +6,7 @@ import os
 import platform
 import statistics
 import time
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
@@ -40,7 +40,7 @@ def one_core() -> Iterator[None]:
         os.sched_setaffinity(0, cores)
 
 
-def median_times(calls: dict[Key, Callable[[], object]], repeats: int) -> dict[Key, float]:
+def median_times(calls: Mapping[Key, Callable[[], object]], repeats: int) -> dict[Key, float]:
     """Median time of each call [s]; taken by turns, after one call each to warm up, so that noise hits all alike."""
     first = {}
     for name, call in calls.items():

@@ -7,20 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ..answers.status import Status
-from ..answers.tracked import Track
-from ..answers.words import short_names
-from ..arrays import Floats, Mask
-from ..description.mechanism import Mechanism
-from ..ik import solve_ik
-from ..tolerances import TOLERANCES
-from ..track import track
-from ..workspace.ask import workspace
-from ..workspace.result import Workspace
+from pfabrik import Mechanism, Status, Track, Workspace, solve_ik, track, workspace
+
+from .arrays import Floats, Mask
 from .checking import Feasibility, feasibility
 from .closest import Comparison, compare
 from .study import CENTROID, NEAREST, Case, Extent, Tick
 from .timing import clock, one_core
+from .tolerances import ROTATION
 
 
 @dataclass(frozen=True)
@@ -148,7 +142,7 @@ def summary(found: Robustness) -> dict[str, Any]:
         "projected": int(found.projected.sum()),
         **found.feasibility._asdict(),
         "largest_distance": float(found.solution.position_error.max()),
-        "orientation_given_up": int((found.solution.rotation_error > TOLERANCES.rotation).sum()),
+        "orientation_given_up": int((found.solution.rotation_error > ROTATION).sum()),
         "compared": len(found.compared),
         **ratio_cells("ratio", found.ratios),
         **ratio_cells("exact_ratio", found.exact_ratios),
@@ -192,7 +186,7 @@ def steps(found: Robustness) -> list[dict[str, Any]]:
             "residual": solution.residual[i],
             "limit_excess": solution.limit_excess[i],
             **dict(zip(solution.mechanism.actuator_names, solution.actuators[i], strict=True)),
-            "active_limits": short_names(solution.active_limits[i]),
+            "active_limits": "; ".join(f"{limit.joint} {limit.bound}" for limit in solution.active_limits[i]),
         }
         for i in range(len(found.targets))
     ]

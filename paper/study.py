@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
-from ..description.mechanism import Mechanism
-from ..files import load
-from ..options import Options
-from ..poses import pose
+from pfabrik import Mechanism, Options, load, pose
+
+from .arrays import Floats
 
 Tick = Callable[[], None]
 

@@ -9,26 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from .. import geometric
-from ..answers.solution import Solution
-from ..answers.status import Status
-from ..arrays import Floats, Mask
-from ..closure.configurations import new_rows, rows_at
-from ..closure.projection import ways_of
-from ..decomposition.leg_table import LegTable, leg_table
-from ..decomposition.plan import compile_plan
-from ..description.mechanism import Mechanism
-from ..engine import inverse_engine_of
-from ..geometric.topologies import closed_form
-from ..ik import solve_ik
-from ..platform.nearest import move_arms
-from ..platform.table import machine
-from ..poses import pose
-from ..reaching.positions import new_reached, positions_of
-from ..reaching.solve import settings_of
+from pfabrik import Mechanism, Solution, Solver, Status, pose, solve_ik
+
+from . import geometric
+from .arrays import Floats, Mask
 from .checking import Feasibility, feasibility
 from .efficacy import rms
-from .one_by_one import closed_form_one_by_one, legs_one_by_one, p_fabrik_one_by_one
 from .study import SETTINGS, Case, Extent, Tick
 from .timing import median_times, one_core
 
@@ -36,6 +22,9 @@ DRAWN_AT_ONCE = 4096
 MOST_DRAWN = 2_000_000
 COPIES = 10
 """How often the targets are repeated in a batch that is timed, so that one call's overhead does not count."""
+
+NEVER = 1e-300
+"""A tolerance that is never met [length, rad]."""
 
 ANY_MODE = {name: replace(options, working_mode="any") for name, options in SETTINGS.items()}
 """Targets are independent: from whatever seed, an answer may be in another working mode."""
@@ -77,7 +66,9 @@ class Efficiency:
     answers : by options ("paper", "default") and start ("cold": home, "warm": the answer to the target before).
     agreement : largest difference of an actuator from the closed form's, cold, default options [length or rad]; None
         for redundant mechanisms, where both may be right.
-    times : of one target [s], by what was timed: ("paper", "default" or "geometric", start, "single" or "batch").
+    times : of one target [s], by what was timed: ("paper", "default" or "geometric", start, "batch", "call" or
+        "single").
+    pass_time : of a forward and backward pass of all chains [s].
     """
 
     case: Case
@@ -85,10 +76,15 @@ class Efficiency:
     answers: dict[tuple[str, str], Answered]
     agreement: float | None
     times: dict[tuple[str, str, str], float]
+    pass_time: float
 
-    def ratio(self, options: str, start: str, how: str) -> float:
-        """Time with these options over that of the geometric approach, from the same start and in the same way."""
-        return self.times[options, start, how] / self.times["geometric", start, how]
+    def ratio(self, start: str) -> float:
+        """Time of a target of a batch by default over that of the geometric approach, from the same start."""
+        return self.times["default", start, "batch"] / self.times["geometric", start, "batch"]
+
+    def ratio_of_passes(self, start: str) -> float:
+        """Time of the passes that a target takes over that of the geometric approach for a target alone."""
+        return self.answers["paper", start].iterations * self.pass_time / self.times["geometric", start, "single"]
 
 
 def run(case: Case, extent: Extent, tick: Tick) -> Efficiency:
@@ -106,9 +102,10 @@ def run(case: Case, extent: Extent, tick: Tick) -> Efficiency:
     default = answers["default", "cold"].solution
     redundant = len(mechanism.actuator_names) > 6
     agreement = None if redundant else float(np.abs(default.actuators - closed.actuators).max())
-    times = timed(mechanism, targets, extent.repeats)
+    times = timed(mechanism, targets, answers, extent.repeats)
+    a_pass = time_a_pass(mechanism, targets, extent.repeats)
     tick()
-    return Efficiency(case, targets, answers, agreement, times)
+    return Efficiency(case, targets, answers, agreement, times, a_pass)
 
 
 def draw(case: Case, count: int) -> Floats:
@@ -153,67 +150,55 @@ def in_tour(targets: Floats, mechanism: Mechanism) -> Floats:
     return targets[order]
 
 
-def timed(mechanism: Mechanism, targets: Floats, repeats: int) -> dict[tuple[str, str, str], float]:
+def timed(
+    mechanism: Mechanism, targets: Floats, answers: dict[tuple[str, str], Answered], repeats: int
+) -> dict[tuple[str, str, str], float]:
     """Median time of one target [s], on one core, each way by turns.
 
-    "single" is one kernel call a target, made by compiled code; "batch" one call of the library for all targets.
+    "batch": its share of one call for all targets, many times over. "call": a call of its own from Python, of a
+    prepared `Solver`. "single": a call of its own from compiled code, of the geometric approach alone.
     """
     calls: dict[tuple[str, str, str], Callable[[], object]] = {}
-    table, many = leg_table(mechanism), np.tile(targets, (COPIES, 1, 1))
-    assert isinstance(table, LegTable)
-    for start in ("cold", "warm"):
-        is_warm = start == "warm"
-        calls["paper", start, "single"] = _single_passes(mechanism, targets, is_warm)
-        calls["default", start, "single"] = _single_legs(mechanism, table, targets, is_warm)
-        calls["geometric", start, "single"] = _single_closed(mechanism, targets, is_warm)
+    many, after = np.tile(targets, (COPIES, 1, 1)), np.tile(targets[1:], (COPIES, 1, 1))
+    first = np.tile(np.arange(len(targets) - 1), COPIES)
     for name, options in ANY_MODE.items():
+        before = answers[name, "cold"].solution[first]
         calls[name, "cold", "batch"] = partial(solve_ik, mechanism, many, options=options)
-    calls["geometric", "cold", "batch"] = partial(geometric.solve_ik, mechanism, many)
+        calls[name, "warm", "batch"] = partial(solve_ik, mechanism, after, start=before, options=options)
+        calls[name, "cold", "call"] = partial(ask_one_by_one, Solver(mechanism, options=options).ik, targets)
+    closed = partial(geometric.solve_ik, mechanism)
+    calls["geometric", "cold", "batch"] = partial(closed, many)
+    calls["geometric", "warm", "batch"] = partial(closed, after, start=closed(targets[first]))
+    calls["geometric", "cold", "call"] = partial(ask_one_by_one, closed, targets)
+    calls["geometric", "cold", "single"] = geometric.one_by_one(mechanism, targets)
+    calls["geometric", "warm", "single"] = geometric.one_by_one(mechanism, targets[1:], closed(targets[:-1]))
+    counts = {"batch": {"cold": len(many), "warm": len(after)}}
+    alone = {"cold": len(targets), "warm": len(targets) - 1}
     with one_core():
         seconds = median_times(calls, repeats)
-    return {key: seconds[key] / (len(many) if key[-1] == "batch" else len(targets)) for key in calls}
+    return {key: seconds[key] / counts.get(key[2], alone)[key[1]] for key in calls}
 
 
-def _single_passes(mechanism: Mechanism, targets: Floats, warm: bool) -> Callable[[], object]:
-    """One kernel call of the paper's method a target."""
-    compiled, options = compile_plan(mechanism), ANY_MODE["paper"]
-    settings = settings_of(mechanism, options, ways_of(mechanism, options.hold, options.rotation_length)[0])
-    seeds = compiled.home_seed
-    if warm:
-        answers = inverse_engine_of(mechanism, options).answer(targets, None, options, keep_mode=False)
-        before = np.concatenate([np.zeros((1, answers.coordinates.shape[1])), answers.coordinates[:-1]])
-        seeds = positions_of(mechanism, compiled, before)
-    return partial(p_fabrik_one_by_one, compiled.plan, targets, seeds, settings, new_reached(compiled, len(targets)))
+def ask_one_by_one(answer: Callable[[Floats], object], targets: Floats) -> None:
+    """Ask for every target by a call of its own."""
+    for target in targets:
+        answer(target)
 
 
-def _single_legs(mechanism: Mechanism, table: LegTable, targets: Floats, warm: bool) -> Callable[[], object]:
-    """One kernel call of legs in closed form a target, and where arms must move, of the search for where to."""
-    begins = np.concatenate([mechanism.home_pose[None], targets[:-1]]) if warm else mechanism.home_pose[None]
-    legs, rows = machine(table), new_rows(mechanism, len(targets))
-    sides = np.repeat(table.home_sides, len(targets), axis=0)
+def time_a_pass(mechanism: Mechanism, targets: Floats, repeats: int) -> float:
+    """Time of a forward and backward pass of all chains [s], on one core.
 
-    def answer() -> None:
-        if not legs_one_by_one(legs.address, targets, begins, table.home_sides, rows) or not len(table.arms):
-            return
-        rest = np.flatnonzero(rows.status != Status.REACHED)
-        moved, _ = move_arms(mechanism, table, targets, begins, sides, rest)
-        for i in moved:
-            legs_one_by_one(
-                legs.address, targets[i : i + 1], begins[:1], sides[i : i + 1], rows_at(rows, slice(i, i + 1))
-            )
-
-    return answer
-
-
-def _single_closed(mechanism: Mechanism, targets: Floats, warm: bool) -> Callable[[], object]:
-    """One kernel call of the closed form a target."""
-    form = closed_form(mechanism)
-    loop = closed_form_one_by_one(form.kernel)
-    actuators, status = np.empty((len(targets), len(mechanism.actuator_names))), np.empty(len(targets), np.int8)
-    seeds = np.asarray(form.home)
-    if warm:
-        seeds = np.concatenate([seeds, geometric.solve_ik(mechanism, targets).actuators[:-1]])
-    return lambda: loop(form.plan, targets, seeds, not warm, actuators, status)
+    The library answers more than the passes: joint coordinates, loops and limits. What a pass takes is by how much
+    longer a batch takes whose chains may make K of them than one whose chains stop after the first, where none comes
+    near enough to stop before, over the passes that were made more.
+    """
+    endless = replace(ANY_MODE["paper"], tolerance=NEVER, rotation_tolerance=NEVER, max_rounds=1)
+    few, most = replace(endless, max_iterations=1), replace(endless, max_iterations=ANY_MODE["paper"].max_iterations)
+    calls = {options: partial(solve_ik, mechanism, targets, options=options) for options in (few, most)}
+    made = {options: int(np.sum(call().iterations)) for options, call in calls.items()}
+    with one_core():
+        seconds = median_times(calls, repeats)
+    return (seconds[most] - seconds[few]) / (made[most] - made[few])
 
 
 def summary(found: Efficiency) -> list[dict[str, Any]]:
@@ -247,4 +232,13 @@ def time_rows(found: Efficiency) -> list[dict[str, Any]]:
             "ratio_to_geometric": seconds / found.times["geometric", start, how],
         }
         for (method, start, how), seconds in found.times.items()
+    ] + [
+        {
+            "mechanism": found.case.key,
+            "method": "paper",
+            "start": "",
+            "how": "pass",
+            "microseconds": 1e6 * found.pass_time,
+            "ratio_to_geometric": found.pass_time / found.times["geometric", "cold", "single"],
+        }
     ]

@@ -16,12 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pfabrik import Mechanism, SubChain
+
 from ..arrays import Floats, Records
-from ..decomposition.decompose import SubChain
-from ..description.graph import Step
-from ..description.mechanism import Mechanism
-from ..kernels._jit import kernel, routine
-from ..tolerances import TOLERANCES
+from ..step import Step
+from ..tolerances import LIMIT
+from .compiled import kernel, routine
 from .facts import Interval, centre, home_of, range_of, require, tolerances
 from .struts import FOOT_SIZE, measure_strut, read_strut, strut_records, write_status, write_strut
 from .targets import BLOCK, FREE, OVER, Statuses, load_block
@@ -79,7 +79,7 @@ def plan_arms(mechanism: Mechanism, chains: Sequence[SubChain]) -> ArmPlan:
 def _read_arm(mechanism: Mechanism, trunk: Sequence[Step], arm: np.void) -> None:
     """Fill the record of an arm, but for its struts."""
     hinge, slide = trunk
-    slack = np.array([TOLERANCES.limit, tolerances(mechanism)[0]])
+    slack = np.array([LIMIT, tolerances(mechanism)[0]])
     arm["pivot"], arm["axis"] = centre(hinge), np.array(hinge.joint.axis) * hinge.sign
     arm["slide"] = np.array(mechanism.home_axis(slide.joint.name)) * slide.sign
     arm["swing_home"], arm["extension_home"] = (home_of(mechanism, step) for step in trunk)

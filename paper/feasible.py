@@ -14,12 +14,10 @@ from typing import cast
 
 import numpy as np
 
-from ..answers.solution import Solution
-from ..arrays import Floats
-from ..decomposition.decompose import decompose
-from ..description.graph import Step
-from ..description.mechanism import Cone, Joint, Mechanism, Range
-from ..rotations import from_rotvec, square_to
+from pfabrik import Cone, Joint, Mechanism, Solution, decompose
+
+from .arrays import Floats
+from .step import Step
 
 ROOM = 4.0
 """How far from home positions are looked for, along each axis [L]."""
@@ -80,8 +78,8 @@ def _at(joint: Joint) -> Floats:
     return np.array(joint.at, dtype=float)
 
 
-def _range(joint: Joint) -> Range:
-    return cast(Range, joint.range or (-np.inf, np.inf))
+def _range(joint: Joint) -> tuple[float, float]:
+    return cast(tuple[float, float], joint.range or (-np.inf, np.inf))
 
 
 class Struts(Model):
@@ -124,12 +122,19 @@ def _placed(arm: Sequence[Step], values: Floats, length: float) -> tuple[Floats,
     for step, value in zip(arm, values, strict=False):
         joint, axis = step.joint, np.array(step.joint.axis)
         if joint.type == "revolute":
-            turn = from_rotvec(axis * (step.sign * (value - joint.home)))
+            turn = _turn_about(axis, step.sign * (value - joint.home))
             shift = shift + rotation @ (_at(joint) - turn @ _at(joint))
             rotation = rotation @ turn
         else:
             shift = shift + rotation @ axis * (step.sign * (value * length - joint.home))
     return rotation, shift
+
+
+def _turn_about(axis: Floats, angle: float) -> Floats:
+    """The rotation (3, 3) by an angle [rad] about a unit vector, by Rodrigues' formula."""
+    x, y, z = axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * K + 2.0 * np.sin(0.5 * angle) ** 2 * (K @ K))
 
 
 def _angles(lines: Floats, axes: Floats) -> Floats:
@@ -185,7 +190,7 @@ class Cranks(Model):
 
     def __init__(self, mechanism: Mechanism) -> None:
         normal = np.array(mechanism.joint(mechanism.end_effector).axis)
-        axes = square_to(normal)
+        axes = np.linalg.svd(normal[None])[2][1:]  # square to it, and to each other
         axes = axes if np.cross(*axes) @ normal > 0.0 else axes[::-1]
         legs = [chain.branches[0] for chain in decompose(mechanism)]
         super().__init__(mechanism, axes, [shoulder.joint for shoulder, *_ in legs])

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from pfabrik import Mechanism, SubChain, decompose
+
 from ..arrays import Floats
-from ..decomposition.decompose import SubChain, decompose
-from ..description.mechanism import Mechanism
-from ..errors import NoClosedForm
 from .arms import plan_arms, solve_arms
 from .dyads import plan_dyads, solve_dyads
+from .errors import NoClosedForm
 from .facts import Unsuitable, require
 from .struts import plan_struts, solve_struts
 from .targets import Statuses

@@ -10,12 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..answers.status import Status
-from ..description.readouts import readout
-from ..view.looks import ACHIEVED, ASKED, HELD, SHADE
-from ..view.track import common_keys, draw_actuator, line_style, shade_steps
 from .efficacy import Efficacy, is_point
 from .efficiency import Efficiency
+from .panels import ACHIEVED, ASKED, HELD, SHADE, common_keys, draw_joint, line_style, shade_steps
 from .robustness import Robustness
 
 if TYPE_CHECKING:
@@ -80,9 +77,8 @@ def draw_efficiency(found: Sequence[Efficiency], path: Path) -> None:
     left, right = figure.subplots(1, 2)
     ratios = {
         "paper": [each.case.printed.ratio for each in found],
-        "passes, single": [each.ratio("paper", "cold", "single") for each in found],
-        "default, single": [each.ratio("default", "cold", "single") for each in found],
-        "default, batch": [each.ratio("default", "cold", "batch") for each in found],
+        "passes, single": [each.ratio_of_passes("cold") for each in found],
+        "default, batch": [each.ratio("cold") for each in found],
     }
     draw_bars(left, [each.case.label for each in found], ratios)
     left.axhline(1.0, color=EDGE, linewidth=1)
@@ -150,11 +146,8 @@ def draw_path(axes: Axes, found: Robustness) -> None:
 
 def draw_joints(panels: Sequence[Axes], found: Robustness) -> None:
     """Values of the joints that are shown, with their limits; a panel for each."""
-    mechanism = found.case.mechanism
-    known = {each.name: readout(each, mechanism.length_unit) for each in mechanism.coordinates}
     for axes, name in zip(panels, found.case.shown, strict=True):
-        values = np.asarray(found.solution.joints[name])
-        draw_actuator(axes, known[name], known[name].display(values), found.solution)
+        draw_joint(axes, found.solution, name)
     panels[0].set_title(f"{found.case.label}: joint values and limits")
     panels[-1].set_xlabel("step")
     below = BELOW | {"bbox_to_anchor": (0.5, -0.16 * len(panels))}
@@ -171,5 +164,5 @@ def draw_cost(axes: Axes, found: Robustness) -> None:
     clock = axes.twinx()
     times = clock.plot(1e6 * found.seconds, label="time of one call from Python", linewidth=1.2, **line_style(4))
     clock.set(ylabel="time [µs]", ylim=(0, 1.15e6 * np.quantile(found.seconds, 0.99)))
-    band = Line2D([], [], color=SHADE, linewidth=7, label=Status.PROJECTED.name.lower())
+    band = Line2D([], [], color=SHADE, linewidth=7, label="projected")
     axes.legend(handles=[*passes, *times, band], **BELOW, ncols=3)

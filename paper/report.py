@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Floats
-from ..errors import InvalidArgument
+from pfabrik.errors import InvalidArgument
+
+from .arrays import Floats
 from .checking import Feasibility
 from .efficacy import Efficacy, is_point
 from .efficiency import Efficiency
@@ -52,7 +53,7 @@ def report(findings: Findings) -> str:
     """The whole report, as Markdown."""
     parts = [
         "# The paper's experiments, run again",
-        "Written by `pfabrik reproduce`. *Paper*: as printed in P-FABRIK; it does not print the dimensions of its "
+        "Written by `python -m paper`. *Paper*: as printed in P-FABRIK; it does not print the dimensions of its "
         "machines, ours have others. *Paper's E*: `Options.paper()`, the passes of P-FABRIK alone with E = 0.01 mm. "
         "*Default*: `Options()`, which for legs that have closed forms takes these and makes no passes.",
         "## What must hold",
@@ -60,8 +61,12 @@ def report(findings: Findings) -> str:
         "## Next to what the paper printed",
         summary(findings),
         "Passes are averages over the targets that are reached. A warm start is the answer to the target before; the "
-        "targets are in an order in which each is the nearest one left. *Single*: one kernel call a target, in a "
-        "compiled loop. *Batch*: one call of the library, per target. Times are medians, one core, in µs.",
+        "targets are in an order in which each is the nearest one left. Times are medians on one core. *A pass*: "
+        "forward and backward, of all chains: by how much longer a batch takes that makes a hundred, over a hundred. "
+        "*Single*: the passes that a target takes, without what a call sets up, next to the geometric approach for a "
+        "target alone, in a compiled loop. *Of a batch*: the share of one call, which also works out joint coordinates "
+        "and measures loops and limits; with the paper's E this takes longer than the passes. *One call*: of a "
+        "prepared `Solver`.",
         "Out of reach: the distance from the target over that of the nearest feasible pose of the same orientation, "
         "which the exact projection (`projection='nearest'`) finds, or a general optimiser, whichever comes nearer.",
         "The CSV files have every number: jumps of the actuators, those with twice as many steps too, and all times.",
@@ -167,7 +172,7 @@ def feasibility_table(findings: Findings) -> str:
 
 
 def summary(findings: Findings) -> str:
-    """The table of the README: the paper's numbers next to ours, for each machine."""
+    """The table of the documentation: the paper's numbers next to ours, for each machine."""
     groups = zip(findings.efficacy, findings.efficiency, findings.robustness, strict=True)
     columns = [{**accuracy(inside), **cost(random), **out_of_reach(leaving)} for inside, random, leaving in groups]
     header = ["", *[f"{each.case.label}, {who}" for each in findings.efficacy for who in ("paper", "ours")]]
@@ -201,21 +206,23 @@ def cost(found: Efficiency) -> Cells:
         answered = found.answers[name, "cold"]
         return f"{100 * answered.reached / len(answered.solution):.4g} %"
 
-    def single(name: str) -> str:
-        return " / ".join(number(1e6 * found.times[name, start, "single"], 2) for start in ("cold", "warm"))
+    def batch(name: str) -> str:
+        return " / ".join(number(1e6 * found.times[name, start, "batch"], 2) for start in ("cold", "warm"))
 
-    def ratios(name: str) -> str:
-        return " / ".join(number(found.ratio(name, start, "single"), 2) for start in ("cold", "warm"))
-
+    passes, default = (
+        " / ".join(number(ratio(start), 2) for start in ("cold", "warm"))
+        for ratio in (found.ratio_of_passes, found.ratio)
+    )
     return {
         "random targets reached, paper's E": ("–", reached("paper")),
         "random targets reached, default": ("–", reached("default")),
         "passes, paper's E, cold / warm start": (number(printed.iterations), both("paper")),
-        "single answer by passes, cold / warm start [µs]": (number(1e3 * printed.time), single("paper")),
-        "single answer by default, cold / warm start [µs]": ("–", single("default")),
-        "passes ÷ geometric approach, single": (number(printed.ratio, 2), ratios("paper")),
-        "default ÷ geometric approach, single": ("–", ratios("default")),
-        "default ÷ geometric approach, batch": ("–", number(found.ratio("default", "cold", "batch"), 2)),
+        "a pass [µs]": (number(1e3 * printed.time / printed.iterations, 2), number(1e6 * found.pass_time, 2)),
+        "passes ÷ geometric approach, single, cold / warm start": (number(printed.ratio, 2), passes),
+        "a target of a batch, paper's E, cold / warm start [µs]": ("–", batch("paper")),
+        "a target of a batch, default, cold / warm start [µs]": ("–", batch("default")),
+        "default ÷ geometric approach, batch, cold / warm start": ("–", default),
+        "one call from Python, default [µs]": ("–", number(1e6 * found.times["default", "cold", "call"], 2)),
     }
 
 
@@ -248,5 +255,5 @@ def put_into(path: Path, text: str) -> None:
     before, begin, rest = path.read_text(encoding="utf-8").partition(BEGIN)
     _, end, after = rest.partition(END)
     if not (begin and end) or BEGIN in rest or END in after:
-        raise InvalidArgument("readme", f"{path} without them", f"one line '{BEGIN}', then one line '{END}'")
+        raise InvalidArgument("page", f"{path} without them", f"one line '{BEGIN}', then one line '{END}'")
     path.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", encoding="utf-8")

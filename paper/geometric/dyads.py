@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pfabrik import Mechanism, SubChain
+
 from ..arrays import Floats, Records
-from ..decomposition.decompose import SubChain
-from ..description.graph import Step
-from ..description.mechanism import Mechanism
-from ..kernels._jit import kernel, routine
-from ..tolerances import TOLERANCES
+from ..step import Step
+from ..tolerances import ALIGNMENT, LIMIT
+from .compiled import kernel, routine
 from .facts import Interval, centre, home_of, is_parallel, range_of, require, tolerances
 from .struts import write_status
 from .targets import BLOCK, FREE, OVER, Statuses, load_block
@@ -72,7 +72,7 @@ def _read_dyad(mechanism: Mechanism, steps: Sequence[Step], dyad: np.void) -> No
     at = [centre(step) + normal * float(normal @ (tip - centre(step))) for step in (shoulder, elbow)]
     crank, forearm = at[1] - at[0], tip - at[1]
     links = float(np.linalg.norm(crank)), float(np.linalg.norm(forearm))
-    slack, least = tolerances(mechanism)[0], TOLERANCES.alignment * mechanism.characteristic_length
+    slack, least = tolerances(mechanism)[0], ALIGNMENT * mechanism.characteristic_length
     require(min(links) > least, f"a link at {elbow.joint.name} has no length")
     side = -1.0 if float(normal @ np.cross(tip - at[0], crank)) < -least * sum(links) else 1.0
     low, high = _turns(mechanism, shoulder, normal)
@@ -98,7 +98,7 @@ def _turns(mechanism: Mechanism, step: Step, normal: Floats) -> Interval:
     """The range of a joint as turns from home about `normal`, tolerance included [rad]."""
     home, sense = home_of(mechanism, step), _sense(step, normal)
     low, high = sorted((bound - home) * sense for bound in range_of(step))
-    return low - TOLERANCES.limit, high + TOLERANCES.limit
+    return low - LIMIT, high + LIMIT
 
 
 def _bends(low: float, high: float, bend_home: float, side: float) -> list[Interval]:

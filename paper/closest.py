@@ -9,13 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from ..answers.solution import Solution
-from ..answers.status import Status
-from ..answers.tracked import Track
-from ..arrays import Floats
-from ..tolerances import TOLERANCES
+from pfabrik import Solution, Status, Track
+
+from .arrays import Floats
 from .feasible import Model, model_of
 from .study import Tick
+from .tolerances import POSITION, ROTATION
 
 FEASIBLE = 1e-8
 """How far the optimiser may exceed a limit or open a loop and still count [L or rad]."""
@@ -53,10 +52,10 @@ def compare(targets: Floats, solution: Track, exact: Solution, searches: int, ti
 
     Left out are answers that gave up the target's orientation.
     """
-    held = (np.asarray(solution.status) == Status.PROJECTED) & (solution.rotation_error <= TOLERANCES.rotation)
+    held = (np.asarray(solution.status) == Status.PROJECTED) & (solution.rotation_error <= ROTATION)
     steps = np.flatnonzero(held)
     steps = steps[np.unique(np.linspace(0, len(steps) - 1, min(searches, len(steps))).astype(int))]
-    nearest = np.where(exact.rotation_error <= TOLERANCES.rotation, exact.position_error, np.nan)
+    nearest = np.where(exact.rotation_error <= ROTATION, exact.position_error, np.nan)
     model, found = model_of(solution.mechanism), []
     for step, x in zip(steps.tolist(), model.variables(solution[steps]), strict=True):
         searched = nearest_distance(model, targets[step], x)
@@ -71,7 +70,7 @@ def nearest_distance(model: Model, target: Floats, start: Floats) -> float:
     NaN where no start led to a feasible pose.
     """
     wanted = model.axes @ target[:3, 3] / model.length
-    scale = max(float(np.linalg.norm(start[: len(wanted)] - wanted)), TOLERANCES.position)
+    scale = max(float(np.linalg.norm(start[: len(wanted)] - wanted)), POSITION)
     best = np.nan
     for begin in _starts(model, start):
         distance = _descend(model, wanted, target[:3, :3], begin, scale)
