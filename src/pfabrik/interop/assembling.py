@@ -20,7 +20,7 @@ from ..motion.displacements import centres, columns, displacements, screws
 from ..tolerances import TOLERANCES
 from .closing import CLOSED, Closer, Placed, bounds, closed
 from .opened import ROWS, Note, OpenMechanism
-from .simplify import simplified
+from .simplify import simplified, without_twins
 from .straighten import straightened
 
 
@@ -73,7 +73,8 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
         told.append(Note(f"the digits of the file do not fit together: joints are put midway in gaps of up to {left}"))
     moved = [*_moved(opened, placed), *_met(opened, closer, placed)]
     reference = _reference(opened, placed)
-    return Imported(_built(opened, moved, reference, told), gap * closer.length, tuple(told))
+    slack = max(placed.gap, CLOSED) if gap > CLOSED else 0.0
+    return Imported(_built(opened, moved, reference, slack, told), gap * closer.length, tuple(told))
 
 
 def _placed(opened: OpenMechanism, closer: Closer, told: list[Note]) -> tuple[Placed, OpenMechanism]:
@@ -171,12 +172,15 @@ def _reference(opened: OpenMechanism, placed: Placed) -> Floats | None:
     return np.asarray(motion[:3, :3] @ opened.reference_point + motion[:3, 3])
 
 
-def _built(opened: OpenMechanism, joints: Sequence[Joint], reference: Floats | None, told: list[Note]) -> Mechanism:
+def _built(
+    opened: OpenMechanism, joints: Sequence[Joint], reference: Floats | None, slack: float, told: list[Note]
+) -> Mechanism:
     """The mechanism of closed joints, as plain as it can be said."""
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always", MobilityWarning)
-        plain = simplified(joints, opened.base, opened.end_effector, opened.cones, told)
-        made = straightened(plain, opened, reference, told)
+        single = without_twins(joints, opened.base, opened.end_effector)
+        exact = straightened(single, opened, reference, slack, told)
+        made = simplified(exact, opened.base, opened.end_effector, opened.cones, told)
         mechanism = Mechanism(
             opened.name,
             made,
