@@ -16,12 +16,13 @@ import numpy as np
 
 from ..arrays import Floats
 from ..description.home_mobility import unclear_conditions
-from ..description.joints import Joint
+from ..description.joints import Joint, Vector
 from ..description.structure import Structure
 from ..tolerances import TOLERANCES
 from .axis_directions import ROUNDED, Axis, Bundle, bundles_of
 from .axis_points import Meeting, meetings_of, moved_points
 from .digits import Rounding, worst
+from .nearest_moving import nearest_moving
 from .opened import Note, OpenMechanism
 
 UNTOLD = 1e-14
@@ -41,22 +42,53 @@ def straightened(
     slack : by how much closing the loops may have moved joints out of place, besides [rad or size].
     """
 
-    def locks(made: Sequence[Joint]) -> tuple[int, float]:
+    def structure(made: Sequence[Joint]) -> Structure:
         point: Any = None if reference is None else tuple(reference)
-        values = unclear_conditions(Structure(opened.name, tuple(made), opened.end_effector, point, opened.base))
-        return len(values), float(max(values, default=0.0))
+        return Structure(opened.name, tuple(made), opened.end_effector, point, opened.base)
 
-    before = locks(joints)
-    if not opened.roundings and before == (0, 0.0):
+    def unclear(made: Sequence[Joint]) -> list[float]:
+        return unclear_conditions(structure(made))
+
+    before, left = unclear(joints), len(told)
+    if not opened.roundings and not before:
         return joints
     size = _size(joints)
-    axes = list(_axes(joints, _roundings(joints, opened.roundings, size)))
-    notes: list[Note] = []
-    straight = _made_exact(joints, axes, slack, size, opened.length_unit, notes)
-    if locks(straight) > before or (not opened.roundings and locks(straight) == before):
-        return joints
-    told += notes
-    return straight
+    roundings = _roundings(joints, opened.roundings, size)
+    straight = _made_exact(joints, list(_axes(joints, roundings)), slack, size, opened.length_unit, told)
+    after = unclear(straight)
+    if _order(after) > _order(before) or (not opened.roundings and _order(after) == _order(before)):
+        del told[left:]
+        straight, after = list(joints), before
+    if not after:
+        return straight
+    if not opened.roundings:
+        roundings = [Rounding(TOLERANCES.alignment * size, TOLERANCES.alignment)] * len(joints)
+    moving = nearest_moving(
+        structure(straight), [Rounding(each.length + slack * size, each.angle + slack) for each in roundings]
+    )
+    if moving is None:
+        return straight
+    told.append(_note_of_moving(straight, moving, opened.length_unit))
+    return moving
+
+
+def _order(unclear: Sequence[float]) -> tuple[int, float]:
+    """How nearly loops lock: fewer are better, then smaller ones."""
+    return len(unclear), max(unclear, default=0.0)
+
+
+def _note_of_moving(joints: Sequence[Joint], moving: Sequence[Joint], unit: str) -> Note:
+    """How far joints were moved to the nearest machine that moves."""
+    pairs = list(zip(joints, moving, strict=True))
+    shift = max((_apart(old.at, new.at) for old, new in pairs), default=0.0)
+    turn = max((_apart(old.axis, new.axis) for old, new in pairs), default=0.0)
+    names = tuple(old.name for old, new in pairs if _apart(old.at, new.at) + _apart(old.axis, new.axis) > UNTOLD)
+    what = "the digits of the file lock the loops: made the nearest machine that moves, by up to"
+    return Note(f"{what} {shift:.1g} {unit} and {turn:.1g} rad", names)
+
+
+def _apart(one: Vector | None, other: Vector | None) -> float:
+    return 0.0 if one is None or other is None else float(np.linalg.norm(np.subtract(one, other)))
 
 
 def _size(joints: Sequence[Joint]) -> float:
