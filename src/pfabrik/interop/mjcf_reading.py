@@ -17,7 +17,7 @@ from .assembling import Imported
 from .cuts import unique
 from .digits import Rounding, worst
 from .mjcf_digits import ModelDigits
-from .mjcf_plain import plain_model
+from .mjcf_plain import compiled, plain_model
 from .mjcf_writing import NOTE
 from .opened import Loop, LoopType, Note
 from .robots import Rates, Robot, mechanism_of
@@ -90,7 +90,7 @@ class _Model:
 
         self._mujoco: Any = mujoco
         try:
-            self.model: Any = mujoco.MjModel.from_xml_string(ET.tostring(plain, encoding="unicode"))
+            self.model: Any = compiled(ET.tostring(plain, encoding="unicode"))
         except ValueError as error:
             said = str(error).replace("\n", " ").strip()
             raise fault("model", f"what MuJoCo does not compile ({said})", "a model that it does") from None
