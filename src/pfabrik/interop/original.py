@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from ..answers.solution import Solution
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..extras import require
@@ -73,13 +73,15 @@ class Original:
         self._columns = dict(self._matched())
         self._require_drives()
         self._body = self._end_effector()
-        self._free = self._may_move()
+        self._free, self._unknown = self._may_move()
+        self._put(np.array([each.home for each in mechanism.coordinates]), 1.0)
+        self._closed = np.ones(self.model.neq, bool)
         digits = worst(ModelDigits(plain, self.model).bodies)
         length = mechanism.characteristic_length * self.metres
-        self.rotation_tolerance = max(TOLERANCES.rotation, EXACT * (digits.angle + digits.length / length))
-        self.position_tolerance = max(TOLERANCES.position, self.rotation_tolerance) * length
-        self._put(np.array([each.home for each in mechanism.coordinates]), 1.0)
-        self.home_gap = self._close(NEWTON_STEPS)
+        gap = self._close_home(TOLERANCES.file_gap * length)
+        off = digits.angle + (digits.length + (gap if gap <= TOLERANCES.file_gap * length else 0.0)) / length
+        self.rotation_tolerance = max(TOLERANCES.rotation, EXACT * off)
+        self.position_tolerance = max(TOLERANCES.position * length, self.rotation_tolerance * length)
         self._home = self.data.qpos.copy()
         self._home_pose = self._pose()
 
@@ -127,9 +129,10 @@ class Original:
             raise UnknownName("end effector in the original", tips[0], names)
         return names.index(found)
 
-    def _may_move(self) -> Any:
-        """Which degrees of freedom close loops, (nv,): those of passive joints that the mechanism has."""
-        model, free = self.model, np.zeros(self.model.nv, bool)
+    def _may_move(self) -> tuple[Mask, Mask]:
+        """Which degrees of freedom close loops, (nv,): those of passive joints that the mechanism has; and which are
+        of joints that it has not."""
+        model, (free, unknown) = self.model, np.zeros((2, self.model.nv), bool)
         driven = {drive.column for drive in self.mechanism.drives}
         balls = {joint.name for joint in self.mechanism.joints if joint.type == "spherical"}
         for index, name in enumerate(self._names):
@@ -137,7 +140,8 @@ class Original:
             end = int(model.jnt_dofadr[index + 1]) if index + 1 < model.njnt else model.nv
             passive = index in self._columns and self._columns[index] not in driven
             free[begin:end] = passive or (name in balls and index not in self._columns)
-        return free
+            unknown[begin:end] = name not in balls and index not in self._columns
+        return free, unknown
 
     def _put(self, q: Floats, share: float) -> None:
         """Lead the joints that are known by name towards coordinates (nq,) by a share of the way from home."""
@@ -152,13 +156,43 @@ class Original:
         """Newton's method on MuJoCo's rows, with the actuated joints held; the largest gap that is left [m or rad]."""
         model, data, move = self.model, self.data, np.zeros(self.model.nv)
         for _ in range(steps):
-            slopes = data.efc_J.reshape(-1, model.nv)[: data.ne][:, self._free]
-            move[self._free] = -np.linalg.lstsq(slopes, data.efc_pos[: data.ne], rcond=SAME_ROW)[0]
+            rows, slopes = self._rows()
+            move[self._free] = -np.linalg.lstsq(slopes, rows, rcond=SAME_ROW)[0]
             self._mujoco.mj_integratePos(model, data.qpos, move, 1.0)
             self._mujoco.mj_fwdPosition(model, data)
             if np.abs(move).max(initial=0.0) <= STILL:
                 break
-        return float(np.abs(data.efc_pos[: data.ne]).max(initial=0.0))
+        return float(np.abs(self._rows()[0]).max(initial=0.0))
+
+    def _close_home(self, most: float) -> float:
+        """Close the loops at home, and find out which: those with joints that the mechanism has not may be others'.
+
+        A joint that was held when the mechanism was imported is in loops of the mechanism, which close without it; one
+        that was left out, for the end effector does not depend on it, is in loops that do not.
+        """
+        begin = self.data.qpos.copy()
+        gap = self._close(NEWTON_STEPS)
+        if gap <= most:
+            return gap
+        slopes = self.data.efc_J.reshape(-1, self.model.nv)[: self.data.ne]
+        doubtful = np.unique(self.data.efc_id[: self.data.ne][slopes[:, self._unknown].any(axis=1)])
+        self._closed[doubtful] = False
+        for equality in [None, *doubtful]:
+            if equality is not None:
+                self._closed[equality] = True
+            self.data.qpos[:] = begin
+            self._mujoco.mj_fwdPosition(self.model, self.data)
+            if self._close(NEWTON_STEPS) > most and equality is not None:
+                self._closed[equality] = False
+        self.data.qpos[:] = begin
+        self._mujoco.mj_fwdPosition(self.model, self.data)
+        return self._close(NEWTON_STEPS)
+
+    def _rows(self) -> tuple[Floats, Floats]:
+        """What is open of the loops that the mechanism has, and how that changes with what may move."""
+        slopes = self.data.efc_J.reshape(-1, self.model.nv)[: self.data.ne][:, self._free]
+        ours = slopes.any(axis=1) & self._closed[self.data.efc_id[: self.data.ne]]
+        return self.data.efc_pos[: self.data.ne][ours], slopes[ours]
 
     def _pose(self) -> tuple[Floats, Floats]:
         return self.data.xpos[self._body].copy(), self.data.xmat[self._body].reshape(3, 3).copy()

@@ -25,8 +25,8 @@ from .digits import Rounding, worst
 from .nearest_moving import nearest_moving
 from .opened import Note, OpenMechanism
 
-UNTOLD = 1e-14
-"""Angle [rad] or share of the size by which what is moved is not worth a note."""
+UNTOLD = 1e-12
+"""Angle [rad] or share of the size by which what is moved is not worth a note: what closing the loops leaves."""
 
 
 def straightened(

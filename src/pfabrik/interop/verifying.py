@@ -42,10 +42,9 @@ class AgainstOriginal:
     rotation_tolerance: float
 
     def __bool__(self) -> bool:
-        """Whether poses differ by no more than the digits of the file explain."""
-        return (
-            self.position_difference <= self.position_tolerance and self.rotation_difference <= self.rotation_tolerance
-        )
+        """Whether its loops close, and poses differ, by no more than the digits of the file explain."""
+        apart = max(self.loop_gap, self.position_difference)
+        return apart <= self.position_tolerance and self.rotation_difference <= self.rotation_tolerance
 
 
 @dataclass(frozen=True)
