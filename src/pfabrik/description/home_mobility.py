@@ -133,6 +133,18 @@ def unclear_conditions(mechanism: Structure) -> list[float]:
     return [float(value) for value in values[unclear]]
 
 
+def unclear_joints(mechanism: Structure) -> frozenset[int]:
+    """Indices of the joints in the loops whose conditions `unclear_conditions` finds."""
+    _, closure = _home_motion(mechanism, frozenset())
+    if not closure.size:
+        return frozenset()
+    left, values, _ = np.linalg.svd(closure, full_matrices=False)
+    unclear = left[:, (values > TOLERANCES.implied) & (values < TOLERANCES.nearly_implied)]
+    loops = tree_of(mechanism).loops
+    parts = np.abs(unclear).reshape(len(loops), -1).max(axis=1, initial=0.0)
+    return frozenset(np.flatnonzero(loops[parts > TOLERANCES.alignment].any(axis=0)).tolist())
+
+
 def universal_axes(mechanism: Structure, joint: Joint) -> Floats:
     """The two axes of a universal joint at home, shape (2, 3): its own, or the default where none are given.
 

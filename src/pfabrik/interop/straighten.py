@@ -9,19 +9,19 @@ joint is moved by itself, no further than rounding may have put it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats
-from ..description.home_mobility import unclear_conditions
+from ..description.home_mobility import unclear_conditions, unclear_joints
 from ..description.joints import Joint, Vector
 from ..description.structure import Structure
 from ..tolerances import TOLERANCES
 from .axis_directions import ROUNDED, Axis, Bundle, bundles_of
 from .axis_points import Meeting, meetings_of, moved_points
-from .digits import Rounding, worst
+from .digits import NOTHING, Rounding, worst
 from .nearest_moving import nearest_moving
 from .opened import Note, OpenMechanism
 
@@ -34,7 +34,8 @@ def straightened(
 ) -> Sequence[Joint]:
     """The joints with what was meant exactly made exact, as far as the roundings tell it; and what was done, told.
 
-    Where nothing is known of the digits, only if the loops all but lock without, and less with it.
+    Joints of loops that all but lock are moved as far as rounding may have put them; others no further than what counts
+    as parallel or aligned anyway, or, where nothing is known of the digits, not at all.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def straightened(
     if not opened.roundings and not before:
         return joints
     size = _size(joints)
-    roundings = _roundings(joints, opened.roundings, size)
+    roundings = _roundings(joints, opened.roundings, size, unclear_joints(structure(joints)))
     straight = _made_exact(joints, list(_axes(joints, roundings)), slack, size, opened.length_unit, told)
     after = unclear(straight)
     if _order(after) > _order(before) or (not opened.roundings and _order(after) == _order(before)):
@@ -62,7 +63,8 @@ def straightened(
     if not after:
         return straight
     if not opened.roundings:
-        roundings = [Rounding(TOLERANCES.alignment * size, TOLERANCES.alignment)] * len(joints)
+        same = Rounding(TOLERANCES.alignment * size, TOLERANCES.alignment)
+        roundings = [same if each.angle > 0.0 else each for each in roundings]
     moving = nearest_moving(
         structure(straight), [Rounding(each.length + slack * size, each.angle + slack) for each in roundings]
     )
@@ -96,10 +98,18 @@ def _size(joints: Sequence[Joint]) -> float:
     return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) if len(points) > 1 else 1.0
 
 
-def _roundings(joints: Sequence[Joint], known: Mapping[str, Rounding], size: float) -> list[Rounding]:
+def _roundings(
+    joints: Sequence[Joint], known: Mapping[str, Rounding], size: float, locked: Set[int]
+) -> list[Rounding]:
     """Of every joint; where nothing is known, what the digits of files are at worst."""
     other = worst(known.values()) if known else Rounding(TOLERANCES.file_gap * size, TOLERANCES.file_angle)
-    return [known.get(joint.name, other) for joint in joints]
+    same = Rounding(TOLERANCES.alignment * size, TOLERANCES.alignment) if known else NOTHING
+    found = []
+    for index, joint in enumerate(joints):
+        own = known.get(joint.name, other)
+        most = other if index in locked else same
+        found.append(Rounding(min(own.length, most.length), min(own.angle, most.angle)))
+    return found
 
 
 def _axes(joints: Sequence[Joint], roundings: Sequence[Rounding]) -> Iterator[Axis]:
