@@ -72,7 +72,7 @@ def describe(mechanism: Mechanism, found: Verification) -> str:
         return f"{mechanism.name}: no pose was reached"
     went, own = found.travelled, found.original
     spans = ", ".join(span(drive, went.drives[drive.name], unit) for drive in mechanism.drives)
-    size = went.position / mechanism.characteristic_length
+    shift = f"{went.position / mechanism.characteristic_length:.2g} L ({went.position:.3g} {unit})"
     lines = [
         f"{mechanism.name}: {'agrees' if found.agrees else 'does not agree'} with MuJoCo on {found.poses} poses",
         f"largest loop gap             {found.loop_gap:.1e} {unit}",
@@ -81,13 +81,14 @@ def describe(mechanism: Mechanism, found: Verification) -> str:
     ]
     if own is not None:
         lines += [
-            f"original file                {'agrees' if own else 'does not agree'}; its loops open by {own.loop_gap:.1e}",
+            f"original file                {'agrees' if own else 'does not agree'}",
+            f"its own loops, left open by   {own.loop_gap:.1e} {unit}, of {own.position_tolerance:.1e}",
             f"position difference from it  {own.position_difference:.1e} {unit}, of {own.position_tolerance:.1e}",
             f"rotation difference from it  {own.rotation_difference:.1e} rad, of {own.rotation_tolerance:.1e}",
         ]
     lines += [
         f"actuators went through       {spans}",
-        f"end effector went up to      {size:.2g} L ({went.position:.3g} {unit}), {math.degrees(went.rotation):.2g} deg",
+        f"end effector went up to      {shift}, {math.degrees(went.rotation):.2g} deg",
     ]
     if not found.goes_far:
         lines.append(

@@ -1,4 +1,4 @@
-"""Directions of axes that are parallel or square to each other, or lie in one plane, up to rounding, made so exactly."""
+"""Directions of axes that are parallel, square to each other or in one plane up to rounding, made so exactly."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ class Axis:
     along : unit vector; None of a ball.
     at : a point on it [length]; None of a slide.
     rounding : how far it is from what was meant at most.
+    bodies : the two bodies of its joint.
     """
 
     joint: int
@@ -38,6 +39,7 @@ class Axis:
     along: Floats | None
     at: Floats | None
     rounding: Rounding
+    bodies: frozenset[str]
 
 
 @dataclass

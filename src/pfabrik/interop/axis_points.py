@@ -21,6 +21,9 @@ LEFT = 1e-13
 FURTHER = 3.0
 """How many times its rounding a joint may be moved, for others are moved with it."""
 
+AT_ONCE = 4
+"""Of meetings that ask for too much together, one of so many is given up at once: those of the fewest axes."""
+
 
 @dataclass
 class Meeting:
@@ -72,7 +75,10 @@ def _on_one_line(axes: Sequence[Axis], bundle: Bundle, slack: float) -> Iterator
 
 
 def _in_one_point(axes: Sequence[Axis], slack: float) -> Iterator[Meeting]:
-    """For every two that meet, all that go through their point."""
+    """For every two that meet, all that go through their point.
+
+    That of two alone counts if they are on one body, which keeps them there; else they meet by chance, at home.
+    """
     placed = [index for index, axis in enumerate(axes) if axis.at is not None]
     for pair in combinations(placed, 2):
         one, other = (axes[index] for index in pair)
@@ -80,7 +86,8 @@ def _in_one_point(axes: Sequence[Axis], slack: float) -> Iterator[Meeting]:
         if found is not None:
             point, near = found
             members = [index for index in placed if _off(axes[index], point) <= _reach(axes[index], point) + near]
-            yield Meeting(frozenset({*pair, *members}), point)
+            if len({*pair, *members}) > 2 or one.bodies & other.bodies:
+                yield Meeting(frozenset({*pair, *members}), point)
 
 
 def _crossing(one: Axis, other: Axis, slack: float) -> tuple[Floats, float] | None:
@@ -140,8 +147,9 @@ def moved_points(
         if max(left) <= LEFT * _size(axes) and not over:
             return points, kept
         wrong = [index for index, each in enumerate(kept) if over & {axes[place].joint for place in each.members}]
-        worst = wrong or [int(np.argmax(left))]
-        kept.pop(min(worst, key=lambda index: len(kept[index].members)))
+        wrong = sorted(wrong or [int(np.argmax(left))], key=lambda index: len(kept[index].members))
+        given_up = set(wrong[: max(1, len(wrong) // AT_ONCE)])
+        kept = [each for index, each in enumerate(kept) if index not in given_up]
     return {}, []
 
 

@@ -2,8 +2,8 @@
 
 Some linkages move because lengths and angles agree that no single pair of axes shows: a third rod of a parallelogram, a
 Bennett linkage. Rounding locks them. Unknown are small displacements xi of every joint, and the coordinates q of some
-configurations away from home, with the loop errors e(xi, q) = 0 in all of them. Where the machine moves, the slopes J of
-e by q have the rank that they have at home up to rounding; with N the left vectors that are then left over,
+configurations away from home, with the loop errors e(xi, q) = 0 in all of them. Where the machine moves, the slopes J
+of e by q have the rank that they have at home up to rounding; with N the left vectors that are then left over,
 
     N' (e + G xi) = 0      for the least xi, in units of the roundings,
     J q'  = -(e + G xi)    on the rest, by least squares,
@@ -52,7 +52,9 @@ CLEAR = 5e-3
 
 
 def nearest_moving(structure: Structure, roundings: Sequence[Rounding]) -> tuple[Joint, ...] | None:
-    """The joints of the machine nearest to one whose loops all but lock, in which they do not; None if rounding does not explain it.
+    """The joints of the nearest machine that moves, to one whose loops all but lock.
+
+    None where that is farther than rounding explains.
 
     Parameters
     ----------
@@ -128,7 +130,7 @@ def _adjoint(motions: Floats, point: Floats, length: float) -> Floats:
 
 
 def _walked(structure: Structure, rank: int, rng: np.random.Generator) -> Floats:
-    """Configurations (n, c) some steps from home along motions that are free up to rounding, closed as far as it lets."""
+    """Configurations (n, c) some steps from home along motions that are free up to rounding, and closed up to it."""
     q = np.zeros((SAMPLES, _count(structure)))
     for _ in range(STEPS):
         right = np.linalg.svd(_slopes(structure, q))[2][:, rank:]

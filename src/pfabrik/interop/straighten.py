@@ -1,9 +1,9 @@
 """Axes that were meant to be parallel, square, or to meet, and do so up to the digits of a file, made to do so exactly.
 
-A spherical linkage whose axes miss their common point by a ten-millionth of a metre does not move, nor does a loop of
-hinges whose axes are off by a millionth of a radian, which is what `1.5708` leaves of a quarter turn: they are locked by
-what is no more than rounding. In the assembled home configuration joints can be moved without opening a loop, so every
-joint is moved by itself, no further than rounding may have put it.
+A spherical linkage whose axes miss their common point by a ten-millionth of a metre does not move. Nor does a loop of
+hinges whose axes are off by a millionth of a radian, which is what `1.5708` leaves of a quarter turn. They are locked
+by no more than rounding. In the assembled home configuration joints can be moved without opening a loop, so every joint
+is moved by itself, no further than rounding may have put it.
 """
 
 from __future__ import annotations
@@ -98,9 +98,7 @@ def _size(joints: Sequence[Joint]) -> float:
     return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) if len(points) > 1 else 1.0
 
 
-def _roundings(
-    joints: Sequence[Joint], known: Mapping[str, Rounding], size: float, locked: Set[int]
-) -> list[Rounding]:
+def _roundings(joints: Sequence[Joint], known: Mapping[str, Rounding], size: float, locked: Set[int]) -> list[Rounding]:
     """Of every joint; where nothing is known, what the digits of files are at worst."""
     other = worst(known.values()) if known else Rounding(TOLERANCES.file_gap * size, TOLERANCES.file_angle)
     same = Rounding(TOLERANCES.alignment * size, TOLERANCES.alignment) if known else NOTHING
@@ -119,7 +117,7 @@ def _axes(joints: Sequence[Joint], roundings: Sequence[Rounding]) -> Iterator[Ax
             continue
         along = [joint.axis] if joint.axis is not None else [*(joint.axes or [None])]
         for place, axis in enumerate(along):
-            yield Axis(index, place, None if axis is None else np.array(axis), at, rounding)
+            yield Axis(index, place, None if axis is None else np.array(axis), at, rounding, frozenset(joint.connects))
 
 
 def _made_exact(
