@@ -115,8 +115,8 @@ def _make_square(bundles: Sequence[Bundle], slack: float) -> None:
         for row, members in enumerate(relations):
             along = [bundles[index].along for index in members]
             for place, index in enumerate(members):
-                others = along[:place] + along[place + 1 :]
-                slope = others[0] if len(others) == 1 else (-1.0) ** place * np.cross(*others)
+                first, *more = along[:place] + along[place + 1 :]
+                slope = (-1.0) ** place * np.cross(first, more[0]) if more else first
                 rows[row, 3 * index : 3 * index + 3] = slope * stiff[index]
             values[row] = along[0] @ (along[1] if len(along) == 2 else np.cross(along[1], along[2]))
         turns = -np.linalg.lstsq(rows, values, rcond=1e-9)[0].reshape(-1, 3) * stiff[:, None]

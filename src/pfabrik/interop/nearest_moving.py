@@ -80,7 +80,7 @@ def nearest_moving(structure: Structure, roundings: Sequence[Rounding]) -> tuple
 
 
 def _count(structure: Structure) -> int:
-    return graph_of(structure).rates.shape[1]
+    return len(graph_of(structure).path)
 
 
 def _rank(structure: Structure, q: Floats, threshold: float) -> int:

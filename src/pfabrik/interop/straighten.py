@@ -89,7 +89,7 @@ def _note_of_moving(joints: Sequence[Joint], moving: Sequence[Joint], unit: str)
     return Note(f"{what} {shift:.1g} {unit} and {turn:.1g} rad", names)
 
 
-def _apart(one: Vector | None, other: Vector | None) -> float:
+def _apart(one: Vector | Floats | None, other: Vector | Floats | None) -> float:
     return 0.0 if one is None or other is None else float(np.linalg.norm(np.subtract(one, other)))
 
 
@@ -164,7 +164,7 @@ def _notes_of_turns(
     """Which axes were turned, and by how much: with those that they are parallel to, or else square."""
     square: dict[str, float] = {}
     for bundle in bundles:
-        by = [float(np.linalg.norm(_was(joints, axes[index]) - axes[index].along)) for index in bundle.members]
+        by = [_apart(_was(joints, axes[index]), axes[index].along) for index in bundle.members]
         if max(by) <= UNTOLD:
             continue
         members = tuple(dict.fromkeys(names[axes[index].joint] for index in bundle.members))

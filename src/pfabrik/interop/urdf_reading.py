@@ -125,7 +125,7 @@ class _Links:
         """How exactly each joint is placed, from the root outward; links on the way."""
         origins = [origin for joint in self.joints if (origin := joint.find("origin")) is not None]
         places, turns = (digits_of(each.get(key, "") for each in origins) for key in ("xyz", "rpy"))
-        along = digits_of(axis.get("xyz", "") for joint in self.joints if (axis := joint.find("axis")) is not None)
+        along = digits_of(each.get("xyz", "") for joint in self.joints if (each := joint.find("axis")) is not None)
         for joint in self.joints:
             origin, parent, child = joint.find("origin"), _link(joint, "parent"), _link(joint, "child")
             offset, turn, axis = _numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"), _axis(joint)
