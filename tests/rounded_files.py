@@ -108,7 +108,7 @@ def bennett() -> Linkage:
 def mixture() -> Linkage:
     """A planar four-bar, on whose coupler there is a spherical one."""
     planar = planar_four_bar()
-    axes = [ANYWHERE @ unit(each) for each in ([1.0, 0.1, 0.3], [0.5, 0.8, 0.2], [-0.4, 0.9, 0.5], [-0.8, 0.2, 0.4])]
+    axes = [ANYWHERE @ unit(each) for each in ([0.1, 0.0, 1.0], [0.7, 0.1, 1.0], [0.6, 1.0, 0.7], [-0.4, 0.9, 0.8])]
     bodies, centre = ["coupler", "d", "e", "f", "coupler"], ORIGIN + ANYWHERE @ [0.1, 0.3, 0.05]
     spherical = [
         Hinge(f"s{k}", *sorted(bodies[k : k + 2], key=bodies[:4].index), centre + 0.05 * axes[k], axes[k])
