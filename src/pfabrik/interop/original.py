@@ -73,7 +73,7 @@ class Original:
         self._columns = dict(self._matched())
         self._require_drives()
         self._body = self._end_effector()
-        self._free, self._unknown = self._may_move()
+        self._free, self._balls, self._unknown = self._may_move()
         self._put(np.array([each.home for each in mechanism.coordinates]), 1.0)
         self._closed = np.ones(self.model.neq, bool)
         digits = worst(ModelDigits(plain, self.model).bodies)
@@ -90,7 +90,9 @@ class Original:
         self.data.qpos[:] = self._home
         for step in range(1, LED + 1):
             self._put(np.asarray(solution.q), step / LED)
-            gap = self._close(NEWTON_STEPS if step == LED else 3)
+            steps = NEWTON_STEPS if step == LED else 3
+            self._close(steps, self._balls)  # they were not put; what the drives leave open is to stay where it was
+            gap = self._close(steps)
         place, turned = self._pose()
         begin, before = self._home_pose
         turn = turned @ before.T
@@ -129,19 +131,20 @@ class Original:
             raise UnknownName("end effector in the original", tips[0], names)
         return names.index(found)
 
-    def _may_move(self) -> tuple[Mask, Mask]:
-        """Which degrees of freedom close loops, (nv,): those of passive joints that the mechanism has; and which are
-        of joints that it has not."""
-        model, (free, unknown) = self.model, np.zeros((2, self.model.nv), bool)
+    def _may_move(self) -> tuple[Mask, Mask, Mask]:
+        """Which degrees of freedom, (nv,), close loops, for they are of passive joints that the mechanism has; which of
+        these are of balls; and which are of joints that it has not."""
+        model, (free, loose, unknown) = self.model, np.zeros((3, self.model.nv), bool)
         driven = {drive.column for drive in self.mechanism.drives}
         balls = {joint.name for joint in self.mechanism.joints if joint.type == "spherical"}
         for index, name in enumerate(self._names):
             begin = int(model.jnt_dofadr[index])
             end = int(model.jnt_dofadr[index + 1]) if index + 1 < model.njnt else model.nv
             passive = index in self._columns and self._columns[index] not in driven
-            free[begin:end] = passive or (name in balls and index not in self._columns)
+            loose[begin:end] = name in balls and index not in self._columns
+            free[begin:end] = passive or loose[begin:end].any()
             unknown[begin:end] = name not in balls and index not in self._columns
-        return free, unknown
+        return free, loose, unknown
 
     def _put(self, q: Floats, share: float) -> None:
         """Lead the joints that are known by name towards coordinates (nq,) by a share of the way from home."""
@@ -152,17 +155,23 @@ class Original:
             self.data.qpos[self.model.jnt_qposadr[joint]] = value * (self.metres if slides else 1.0)
         self._mujoco.mj_fwdPosition(self.model, self.data)
 
-    def _close(self, steps: int) -> float:
-        """Newton's method on MuJoCo's rows, with the actuated joints held; the largest gap that is left [m or rad]."""
+    def _close(self, steps: int, free: Mask | None = None) -> float:
+        """Newton's method on MuJoCo's rows, with the actuated joints held; the largest gap that is left [m or rad].
+
+        Parameters
+        ----------
+        free : the degrees of freedom that move, (nv,). Default: of all passive joints.
+        """
         model, data, move = self.model, self.data, np.zeros(self.model.nv)
+        free = self._free if free is None else free
         for _ in range(steps):
-            rows, slopes = self._rows()
-            move[self._free] = -np.linalg.lstsq(slopes, rows, rcond=SAME_ROW)[0]
+            rows, slopes = self._rows(free)
+            move[free] = -np.linalg.lstsq(slopes, rows, rcond=SAME_ROW)[0]
             self._mujoco.mj_integratePos(model, data.qpos, move, 1.0)
             self._mujoco.mj_fwdPosition(model, data)
             if np.abs(move).max(initial=0.0) <= STILL:
                 break
-        return float(np.abs(self._rows()[0]).max(initial=0.0))
+        return float(np.abs(self._rows(self._free)[0]).max(initial=0.0))
 
     def _close_home(self, most: float) -> float:
         """Close the loops at home, and find out which: those with joints that the mechanism has not may be others'.
@@ -170,6 +179,7 @@ class Original:
         A joint that was held when the mechanism was imported is in loops of the mechanism, which close without it; one
         that was left out, for the end effector does not depend on it, is in loops that do not.
         """
+        self._close(NEWTON_STEPS, self._balls)
         begin = self.data.qpos.copy()
         gap = self._close(NEWTON_STEPS)
         if gap <= most:
@@ -188,9 +198,9 @@ class Original:
         self._mujoco.mj_fwdPosition(self.model, self.data)
         return self._close(NEWTON_STEPS)
 
-    def _rows(self) -> tuple[Floats, Floats]:
+    def _rows(self, free: Mask) -> tuple[Floats, Floats]:
         """What is open of the loops that the mechanism has, and how that changes with what may move."""
-        slopes = self.data.efc_J.reshape(-1, self.model.nv)[: self.data.ne][:, self._free]
+        slopes = self.data.efc_J.reshape(-1, self.model.nv)[: self.data.ne][:, free]
         ours = slopes.any(axis=1) & self._closed[self.data.efc_id[: self.data.ne]]
         return self.data.efc_pos[: self.data.ne][ours], slopes[ours]
 
