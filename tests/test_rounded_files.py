@@ -1,5 +1,5 @@
-"""Machines whose files have few digits: what was meant exactly is made exact, is told, and moves as MuJoCo moves the exact
-machine; what is off by more than rounding is left alone. And what a referee says of machines that hardly move."""
+"""Machines whose files have few digits: what was meant exactly is made exact, is told, and moves as MuJoCo moves the
+exact machine; what is off by more than rounding is left alone. And what a referee says of machines that hardly move."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def _roundings(joints: Sequence[Joint], known: Mapping[str, Rounding], size: flo
 def _axes(joints: Sequence[Joint], roundings: Sequence[Rounding]) -> Iterator[Axis]:
     for index, (joint, rounding) in enumerate(zip(joints, roundings, strict=True)):
         at = None if joint.at is None or joint.type == "prismatic" else np.array(joint.at)
-        if joint.type == "fixed":
+        if joint.type == "fixed" or (joint.type == "prismatic" and joint.axis is None):
             continue
         along = [joint.axis] if joint.axis is not None else [*(joint.axes or [None])]
         for place, axis in enumerate(along):
