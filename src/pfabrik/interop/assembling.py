@@ -114,7 +114,7 @@ def _outside(opened: OpenMechanism, q: Floats) -> list[tuple[Joint, bool]]:
 def _rounded(opened: OpenMechanism, closer: Closer) -> float:
     """How far the digits of a file let its loops be open [L or rad], where these are known."""
     digits = worst(opened.roundings.values())
-    return min(digits.length / closer.length + digits.angle, TOLERANCES.file_angle)
+    return min(digits.length / closer.length + digits.angle, TOLERANCES.file_digits)
 
 
 def _faults(opened: OpenMechanism, closer: Closer, best: Placed, most: float) -> list[Fault]:
