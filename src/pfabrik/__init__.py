@@ -33,6 +33,7 @@ __version__ = "0.1.0"
 _NAMES = {
     "answers.differential": (
         "Mobility",
+        "NearlyFree",
         "Singularity",
         "forward_jacobian",
         "inverse_jacobian",
@@ -87,6 +88,7 @@ if TYPE_CHECKING:
     from . import errors as errors, interop as interop
     from .answers.differential import (
         Mobility as Mobility,
+        NearlyFree as NearlyFree,
         Singularity as Singularity,
         forward_jacobian as forward_jacobian,
         inverse_jacobian as inverse_jacobian,

@@ -45,6 +45,8 @@ class Tolerances:
         square root of a length, and what a search for the nearest pose leaves of a length is up to a millionth.
     file_gap : gap [L or rad] that the digits of another program's file may leave in loops that it says are closed: more
         is a machine that cannot be closed.
+    file_digits : gap [L or rad] up to which loops may be open by the digits of a file, where these are known to explain
+        it: three digits, added up over a chain of bodies, leave that much.
     file_angle : angle [rad] up to which axes in such a file may have been meant to be parallel: `1.57` is off by 8e-4.
     same_mode : largest difference of positions [L] and rotation matrices of two solutions that count as one: where two
         solutions meet, closing the loops to 1e-13 places each to 3e-7 only.
@@ -68,6 +70,7 @@ class Tolerances:
     singular: float = 1e-4
     stretched: float = 1e-3
     file_gap: float = 1e-4
+    file_digits: float = 1e-2
     file_angle: float = 1e-3
 
 

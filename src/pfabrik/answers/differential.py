@@ -9,11 +9,11 @@ import numpy as np
 from ..arrays import Floats, shaped
 from ..closure.first_order import forward_map, inverse_map, singularities
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..motion.mobility import Mobility, generic_of
+from ..motion.mobility import Mobility, NearlyFree, generic_of
 from ..motion.singularities import NUMBERS, Singularity
 from .solution import Solution, checked_solution
 
-__all__ = ["Mobility", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]
+__all__ = ["Mobility", "NearlyFree", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]
 
 
 def mobility(mechanism: Mechanism) -> Mobility:

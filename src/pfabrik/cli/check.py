@@ -20,7 +20,7 @@ from ..description.task import task_of
 from ..errors import InvalidMechanism, counted
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
-from .info import NOT_COUNTED, counted_mobility
+from .info import NOT_COUNTED, counted_mobility, nearly_free
 from .mech import MECH, load
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ def notes(mechanism: Mechanism) -> Iterator[str]:
         yield f"freedoms are {NOT_COUNTED}: whether they suffice for the task is not known"
     else:
         yield from task_notes(mechanism, counted.platform)
+        yield from (f"the loops hardly resist a motion of {nearly_free(each)}" for each in counted.nearly_free)
     for _, joint, body in leaves(mechanism):
         yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
     yield from rod_notes(mechanism)

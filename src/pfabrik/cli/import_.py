@@ -51,7 +51,8 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) 
     found = imported(file, **asked)
     from ..files import dumps
 
-    text = dumps(found.mechanism)
+    name = "".join(letter for letter in file.name if letter.isprintable())
+    text = f"# imported from {name}; to compare: pfabrik verify THIS --original {name}\n\n{dumps(found.mechanism)}"
     if as_json:
         notes = [{"what": note.what, "names": note.names} for note in found.notes]
         told = {"name": found.mechanism.name, "gap": found.gap, "unit": found.mechanism.length_unit, "notes": notes}

@@ -18,10 +18,11 @@ from ..decomposition.leg_table import leg_table, legs_answer
 from ..description.joint_types import KINDS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
 from ..description.readouts import Readout, readout
+from ..tolerances import TOLERANCES
 from .mech import MECH, load
 
 if TYPE_CHECKING:
-    from ..answers.differential import Mobility
+    from ..answers.differential import Mobility, NearlyFree
     from ..description.mechanism import Joint, Mechanism
 
 
@@ -117,7 +118,14 @@ def freedom(counted: Mobility | None) -> list[str]:
     ]
     if counted.uncontrolled:
         lines.append(f"uncontrolled           {counted.uncontrolled} of the freedoms, with all actuators locked")
+    lines += [f"nearly free            {nearly_free(each)}" for each in counted.nearly_free]
     return lines
+
+
+def nearly_free(motion: NearlyFree) -> str:
+    """A motion that the loops hardly resist, its joints, and whether it was counted."""
+    counted = "counted" if motion.singular_value <= TOLERANCES.alignment else "not counted"
+    return f"{', '.join(motion.joints)}: singular value {motion.singular_value:.1e}, {counted} as a motion"
 
 
 def joint_table(mechanism: Mechanism) -> str:

@@ -118,19 +118,31 @@ def _bracketed(
     return total
 
 
-def inexactness(mechanism: Structure) -> float:
+def unclear_conditions(mechanism: Structure) -> list[float]:
     """By how much conditions of the loops at home fail to follow from the others, and yet hardly are their own.
 
     Returns
     -------
-    The largest singular value of this kind [L and rad], 0 if there is none. Where there is one, axes that should be
-    parallel, or meet, do so up to the digits of the description only: loops that close to `TOLERANCES.position` hinder
-    the joints, or keep them from moving. Or home is next to a configuration in which the mechanism gains a motion.
+    The singular values of this kind [L and rad], the largest first. Where there are any, axes that should be parallel,
+    or meet, do so up to the digits of the description only: loops that close to `TOLERANCES.position` hinder the
+    joints, or keep them from moving. Or home is next to a configuration in which the mechanism gains a motion.
     """
     _, closure = _home_motion(mechanism, frozenset())
     values = np.linalg.svd(closure, compute_uv=False) if closure.size else np.zeros(0)
-    unclear = values[(values > TOLERANCES.implied) & (values < TOLERANCES.nearly_implied)]
-    return float(unclear.max(initial=0.0))
+    unclear = (values > TOLERANCES.implied) & (values < TOLERANCES.nearly_implied)
+    return [float(value) for value in values[unclear]]
+
+
+def unclear_joints(mechanism: Structure) -> frozenset[int]:
+    """Indices of the joints in the loops whose conditions `unclear_conditions` finds."""
+    _, closure = _home_motion(mechanism, frozenset())
+    if not closure.size:
+        return frozenset()
+    left, values, _ = np.linalg.svd(closure, full_matrices=False)
+    unclear = left[:, (values > TOLERANCES.implied) & (values < TOLERANCES.nearly_implied)]
+    loops = tree_of(mechanism).loops
+    parts = np.abs(unclear).reshape(len(loops), -1).max(axis=1, initial=0.0)
+    return frozenset(np.flatnonzero(loops[parts > TOLERANCES.alignment].any(axis=0)).tolist())
 
 
 def universal_axes(mechanism: Structure, joint: Joint) -> Floats:

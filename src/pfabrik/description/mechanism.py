@@ -15,7 +15,7 @@ from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, 
 from .coercion import items
 from .faults import find_faults, in_order, joint_index, merged
 from .form_faults import joint_faults, shown
-from .home_mobility import end_effector_freedom, inexactness, is_held
+from .home_mobility import end_effector_freedom, is_held, unclear_conditions
 from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import faults_of_legs, legs_name, placed_joints
@@ -171,7 +171,7 @@ class Mechanism(Structure):
         if left > 0:
             drives, leaves = len(self.actuator_names), "leave" if len(self.actuator_names) > 1 else "leaves"
             yield f"{counted(drives, 'actuator')} {leaves} the end effector {counted(left, 'freedom')} at home"
-        missed_by = inexactness(self)
+        missed_by = max(unclear_conditions(self), default=0.0)
         if missed_by > 0.0:
             yield (
                 f"the loops all but lock at home, by {missed_by:.0e}: axes that should be parallel, or meet, need more "

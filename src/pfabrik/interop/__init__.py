@@ -9,11 +9,12 @@ from .assembling import Imported, assemble
 from .mjcf_reading import from_mjcf
 from .mjcf_writing import to_mjcf
 from .opened import Loop, Note, OpenMechanism
-from .referee import Verification, verify
 from .urdf_reading import from_urdf
+from .verifying import AgainstOriginal, Verification, verify
 from .xml_reading import kind_of
 
 __all__ = [
+    "AgainstOriginal",
     "Imported",
     "Loop",
     "Note",

@@ -19,8 +19,9 @@ from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
 from ..motion.displacements import centres, columns, displacements, screws
 from ..tolerances import TOLERANCES
 from .closing import CLOSED, Closer, Placed, bounds, closed
+from .digits import worst
 from .opened import ROWS, Note, OpenMechanism
-from .simplify import simplified
+from .simplify import simplified, without_twins
 from .straighten import straightened
 
 
@@ -73,7 +74,8 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
         told.append(Note(f"the digits of the file do not fit together: joints are put midway in gaps of up to {left}"))
     moved = [*_moved(opened, placed), *_met(opened, closer, placed)]
     reference = _reference(opened, placed)
-    return Imported(_built(opened, moved, reference, told), gap * closer.length, tuple(told))
+    slack = max(placed.gap, CLOSED) if gap > CLOSED else 0.0
+    return Imported(_built(opened, moved, reference, slack, told), gap * closer.length, tuple(told))
 
 
 def _placed(opened: OpenMechanism, closer: Closer, told: list[Note]) -> tuple[Placed, OpenMechanism]:
@@ -85,14 +87,16 @@ def _placed(opened: OpenMechanism, closer: Closer, told: list[Note]) -> tuple[Pl
     outside = [joint.name for joint, at in _outside(opened, np.zeros(len(owners))) if at]
     if outside:
         told.append(Note("home was outside the range, and is moved into it", tuple(outside)))
+    rounded = _rounded(opened, closer)
+    most = max(rounded, TOLERANCES.file_gap)
     tried = [closed(closer, ~driven | (low > 0.0) | (high < 0.0), low, high)]
-    if tried[-1].gap > CLOSED:
+    if tried[-1].gap > max(rounded, CLOSED):  # motors are not moved for what rounding leaves
         tried.append(closed(closer, everything, low, high))
-    if min(each.gap for each in tried) > TOLERANCES.file_gap:
+    if min(each.gap for each in tried) > most:
         tried.append(closed(closer, everything, np.full_like(low, -np.inf), np.full_like(high, np.inf)))
     best = next((each for each in tried if each.gap <= CLOSED), min(tried, key=lambda each: each.gap))
-    if best.gap > TOLERANCES.file_gap:
-        raise InvalidMechanism(_faults(opened, closer, best))
+    if best.gap > most:
+        raise InvalidMechanism(_faults(opened, closer, best, most))
     beyond = {joint.name for joint, at in _outside(opened, best.q) if at}
     if beyond:
         told.append(Note("home is outside the range, which is left out", tuple(sorted(beyond))))
@@ -107,13 +111,19 @@ def _outside(opened: OpenMechanism, q: Floats) -> list[tuple[Joint, bool]]:
     return [(joint, bool(beyond[columns(tree)[joint.name]].any())) for joint in opened.joints]
 
 
-def _faults(opened: OpenMechanism, closer: Closer, best: Placed) -> list[Fault]:
+def _rounded(opened: OpenMechanism, closer: Closer) -> float:
+    """How far the digits of a file let its loops be open [L or rad], where these are known."""
+    digits = worst(opened.roundings.values())
+    return min(digits.length / closer.length + digits.angle, TOLERANCES.file_digits)
+
+
+def _faults(opened: OpenMechanism, closer: Closer, best: Placed, most: float) -> list[Fault]:
     """What stays open, the worst first."""
     begin = closer.openings(np.zeros(closer.count))
     found = []
     for loop, before, after in zip(opened.loops, begin, closer.openings(best.q), strict=True):
         (far, turn), (was, _) = (tuple(float(np.linalg.norm(part)) for part in each) for each in (after, before))
-        if max(far, turn) > TOLERANCES.file_gap:
+        if max(far, turn) > most:
             by = f"{far * closer.length:.3g} {opened.length_unit} and {np.degrees(turn):.3g} deg"
             found.append(
                 (far + turn, f"open by {by} at best, from {was * closer.length:.3g} {opened.length_unit}", loop)
@@ -171,12 +181,15 @@ def _reference(opened: OpenMechanism, placed: Placed) -> Floats | None:
     return np.asarray(motion[:3, :3] @ opened.reference_point + motion[:3, 3])
 
 
-def _built(opened: OpenMechanism, joints: Sequence[Joint], reference: Floats | None, told: list[Note]) -> Mechanism:
+def _built(
+    opened: OpenMechanism, joints: Sequence[Joint], reference: Floats | None, slack: float, told: list[Note]
+) -> Mechanism:
     """The mechanism of closed joints, as plain as it can be said."""
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always", MobilityWarning)
-        plain = simplified(joints, opened.base, opened.end_effector, opened.cones, told)
-        made = straightened(plain, opened, reference, told)
+        single = without_twins(joints, opened.base, opened.end_effector)
+        exact = straightened(single, opened, reference, slack, told)
+        made = simplified(exact, opened.base, opened.end_effector, opened.cones, told)
         mechanism = Mechanism(
             opened.name,
             made,

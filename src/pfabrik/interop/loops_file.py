@@ -25,6 +25,7 @@ from ..description.form_faults import is_numbers, key_faults, shown
 from ..errors import Fault, InvalidArgument, InvalidMechanism, near_miss
 from ..extras import require
 from ..rotations import square_to
+from .digits import Rounding, digits_of, worst
 from .opened import Loop, LoopType
 from .xml_reading import fault, require_file
 
@@ -82,6 +83,20 @@ class LoopsFile:
         if faults:
             raise InvalidMechanism(faults)
         return [loop for loop in found if loop is not None]
+
+    def roundings(
+        self, of_links: Mapping[str, Rounding], frames: Mapping[str, Floats], link_of: Mapping[str, str]
+    ) -> dict[str, Rounding]:
+        """Loop -> how exactly the worse of its sides is placed [m, rad], of links that are so exactly."""
+        points = [each.get("at", np.zeros((2, 3))) for each in self.entries]
+        digits = digits_of(repr(float(value)) for value in np.ravel(points))
+        found = {}
+        for loop, own in zip(self.loops(frames, link_of), points, strict=True):
+            sides = zip(loop.connects, np.asarray(own, dtype=float), strict=True)
+            found[loop.name] = worst(
+                of_links[link].on(point, float(np.linalg.norm(digits.errors(point))), 0.0) for link, point in sides
+            )
+        return found
 
 
 def read_loops(source: str | os.PathLike[str] | Mapping[str, Any] | None) -> LoopsFile:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 from xml.etree import ElementTree as ET
 
 from .opened import Note
@@ -69,6 +70,18 @@ def plain_model(root: ET.Element, told: list[Note]) -> ET.Element:
     if springs:
         told.append(Note("springs are left out, of", springs))
     return plain
+
+
+def compiled(text: str) -> Any:
+    """The MuJoCo model of a text, whose sites are where it puts them.
+
+    MuJoCo takes frames that are less than 1e-6 apart, in whatever unit, for one; asked not to, it computes both.
+    """
+    import mujoco
+
+    model: Any = mujoco.MjModel.from_xml_string(text)
+    model.site_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
+    return model
 
 
 def _kept(element: ET.Element, left: Counter[str], tags: tuple[str, ...] = tuple(KEPT), copies: int = 1) -> ET.Element:

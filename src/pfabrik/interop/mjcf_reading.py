@@ -15,7 +15,9 @@ from ..errors import UnknownName
 from ..extras import require
 from .assembling import Imported
 from .cuts import unique
-from .mjcf_plain import plain_model
+from .digits import Rounding, worst
+from .mjcf_digits import ModelDigits
+from .mjcf_plain import compiled, plain_model
 from .mjcf_writing import NOTE
 from .opened import Loop, LoopType, Note
 from .robots import Rates, Robot, mechanism_of
@@ -75,7 +77,8 @@ def from_mjcf(
     if site is not None and own.get("end_effector") in places:
         places[own["end_effector"]] = (own["end_effector"], site[1])
     joints, loops = list(model.joints(told)), list(model.loops(told))
-    robot = Robot(root.get("model", "mechanism"), joints, loops, model.body(0), places, order=model.driven, **own)
+    name, roundings = root.get("model", "mechanism"), model.roundings
+    robot = Robot(name, joints, loops, model.body(0), places, order=model.driven, roundings=roundings, **own)
     return mechanism_of(robot, told, base, end_effector, actuated, fixed, length_unit, task)
 
 
@@ -87,12 +90,14 @@ class _Model:
 
         self._mujoco: Any = mujoco
         try:
-            self.model: Any = mujoco.MjModel.from_xml_string(ET.tostring(plain, encoding="unicode"))
+            self.model: Any = compiled(ET.tostring(plain, encoding="unicode"))
         except ValueError as error:
             said = str(error).replace("\n", " ").strip()
             raise fault("model", f"what MuJoCo does not compile ({said})", "a model that it does") from None
         self.data: Any = mujoco.MjData(self.model)
         self._configure(configuration)
+        self._digits = ModelDigits(plain, self.model)
+        self.roundings: dict[str, Rounding] = {}
         self.taken = {self.body(index) for index in range(self.model.nbody)}
 
     def _configure(self, configuration: str) -> None:
@@ -129,6 +134,7 @@ class _Model:
             if count == 0:
                 yield Joint(unique(f"{body}:weld", self.taken), "fixed", (parent, body))
             made = [part for joint in range(begin, begin + count) for part in self._parts(joint, joint in driven)]
+            self.roundings |= {self.joint(joint): self._digits.joint(joint) for joint in range(begin, begin + count)}
             for place, part in enumerate(made):
                 last = place == len(made) - 1
                 outer, parent = parent, body if last else unique(f"{body}:{part['name']}", self.taken)
@@ -170,6 +176,7 @@ class _Model:
                 resting.append(name)
                 continue
             bodies, points, frames = self._sides(index, weld)
+            self.roundings[name] = self._rounding(index, weld)
             only_point = not weld or model.eq_data[index, 10] == 0.0
             kind: LoopType = "spherical" if only_point else "fixed"
             yield Loop(name, kind, bodies, points, None if only_point else frames)
@@ -193,6 +200,16 @@ class _Model:
             self._mujoco.mju_quat2Mat(relative, own[6:10])
             turns[0] = turns[0] @ relative.reshape(3, 3)
         return (self.body(one), self.body(other)), points, turns
+
+    def _rounding(self, index: int, weld: bool) -> Rounding:
+        """How exactly the worse side of an equality is placed."""
+        model = self.model
+        ends = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
+        if model.eq_objtype[index] == self._mujoco.mjtObj.mjOBJ_SITE:
+            return worst(self._digits.site(end) for end in ends)
+        own = model.eq_data[index]
+        anchors = (own[3:6], own[:3]) if weld else (own[:3], own[3:6])
+        return worst(self._digits.anchor(end, anchors[side], bool(side)) for side, end in enumerate(ends))
 
     def places(self) -> dict[str, tuple[str, Floats]]:
         """Bodies and sites, each with its body and its place."""

@@ -13,6 +13,7 @@ from ..arrays import Floats
 from ..description.joints import Cone, Joint, Vector
 from ..description.structure import Structure
 from ..errors import InvalidArgument
+from .digits import Rounding
 
 LoopType = Literal["spherical", "revolute", "fixed"]
 ROWS: dict[LoopType, int] = {"spherical": 3, "revolute": 5, "fixed": 6}
@@ -77,6 +78,8 @@ class OpenMechanism:
     loops : what closes it.
     base, end_effector, reference_point, length_unit, task : as of a `Mechanism`; the end effector may be a loop.
     cones : joint or loop -> the cone that limits it.
+    roundings : joint or loop -> how far its digits put it from what was meant, at most [length, rad]; those that are
+        not named are as the worst of those that are. Empty where nothing is known.
     """
 
     name: str
@@ -88,6 +91,7 @@ class OpenMechanism:
     length_unit: str = "m"
     task: tuple[str, ...] | None = None
     cones: Mapping[str, Cone] = field(default_factory=dict)
+    roundings: Mapping[str, Rounding] = field(default_factory=dict)
 
     def tree(self) -> Structure:
         """The joints alone, as a structure that can be moved."""

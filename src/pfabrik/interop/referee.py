@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import reprlib
-from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 
 from ..answers.solution import Solution
-from ..answers.status import Status
 from ..arrays import Floats, Mask
 from ..description.home_mobility import end_effector_freedom
-from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument
+from ..description.mechanism import Mechanism
 from ..extras import require
 from ..files.units import metres_of
-from ..fk import solve_fk
-from ..ik import solve_ik
 from ..motion.displacements import columns
-from ..motion.mobility import generic_of
-from ..poses import pose
 from ..rotations import to_quaternion
-from ..tolerances import TOLERANCES
 from .cuts import cut_tree
 from .mjcf_bodies import names_of
+from .mjcf_plain import compiled
 from .mjcf_writing import to_mjcf
 
 NEWTON_STEPS = 30
@@ -40,105 +31,6 @@ APART = 1e-3
 SAME_ROW = 1e-9
 """Singular value, relative to the largest, below which a row of the loops says what others say."""
 
-SPREAD = (0.2, 0.35)
-"""How far from home random targets are at most, in each coordinate [L, rad]."""
-
-MOST_DRAWS = 8
-"""How often random targets, then actuator values, are drawn: each time as many as are asked for, until enough are
-reached."""
-
-
-@dataclass(frozen=True)
-class Verification:
-    """What the referee found: the largest differences over all poses, lengths in the mechanism's unit.
-
-    Attributes
-    ----------
-    poses : how many configurations were compared, of as many different targets.
-    loop_gap : how far MuJoCo finds our answers open, by its own constraint rows [length; angles times L].
-    position_difference, rotation_difference : between our pose and the one in which MuJoCo closes the loops by itself,
-        with the actuated joints where we have them [length], [rad].
-    tolerance : what counts as agreement [length].
-    """
-
-    poses: int
-    loop_gap: float
-    position_difference: float
-    rotation_difference: float
-    tolerance: float
-
-    def __bool__(self) -> bool:
-        """Whether the two agree on every pose, and there was one."""
-        apart = max(self.loop_gap, self.position_difference)
-        return self.poses > 0 and apart <= self.tolerance and self.rotation_difference <= TOLERANCES.rotation
-
-
-def verify(mechanism: Mechanism, *, poses: int = 100, seed: int = 0) -> Verification:
-    """Compare answers with MuJoCo's, over random targets that are reached.
-
-    The mechanism is written as a MuJoCo model. At each answer MuJoCo's constraint rows say how far the loops are open;
-    then the passive joints are moved off, and Newton's method on these rows closes the loops again, with the actuated
-    joints held: that must lead to the same pose.
-
-    Parameters
-    ----------
-    poses : how many.
-    seed : of the random targets.
-
-    Raises
-    ------
-    MissingLibrary : MuJoCo is not installed.
-    InvalidArgument : less than one pose.
-    """
-    checked_mechanism(mechanism)
-    given: tuple[tuple[str, Any, int], ...] = (("poses", poses, 1), ("seed", seed, 0))
-    for name, value, least in given:
-        if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:
-            raise InvalidArgument(name, reprlib.repr(value), f"an integer from {least} on")
-    rng = np.random.default_rng(seed)
-    referee = Referee(mechanism)
-    found = [referee.compare(solution, rng) for solution in reached_at_random(mechanism, poses, rng)]
-    gap, position, rotation = np.max(found, axis=0, initial=0.0) if found else np.full(3, np.nan)
-    tolerance = TOLERANCES.position * mechanism.characteristic_length
-    return Verification(len(found), float(gap), float(position), float(rotation), tolerance)
-
-
-def reached_at_random(mechanism: Mechanism, count: int, rng: np.random.Generator) -> list[Solution]:
-    """Reached configurations around home, as many as are asked for if so many are found.
-
-    Answers to random targets, nearer to home while most are out of reach; where targets are hardly ever reached, as
-    where they set more than the end effector can do, answers to random actuator values.
-    """
-    found: list[Solution] = []
-    for ask, drawn in ((solve_ik, _targets), (solve_fk, _actuators)):
-        near = 1.0
-        for _ in range(MOST_DRAWS):
-            if len(found) == count:
-                return found
-            answers = ask(mechanism, drawn(mechanism, count, near, rng))
-            reached = np.flatnonzero(np.asarray(answers.status) == Status.REACHED)
-            found += [answers[int(row)] for row in reached[: count - len(found)]]
-            near *= 0.6 if 2 * len(reached) < count else 1.0
-    return found
-
-
-def _actuators(mechanism: Mechanism, count: int, near: float, rng: np.random.Generator) -> Floats:
-    """Actuated values (n, n_a) off home; `near` scales how far."""
-    shift, turn = SPREAD
-    turns = np.array([drive.kind == "angle" for drive in mechanism.drives])
-    most = near * np.where(turns, turn, shift * mechanism.characteristic_length)
-    home = [drive.home for drive in mechanism.drives]
-    return np.asarray(home + rng.uniform(-most, most, (count, len(most))))
-
-
-def _targets(mechanism: Mechanism, count: int, near: float, rng: np.random.Generator) -> Floats:
-    """Poses (n, 4, 4) off home in those directions that the end effector has at all; `near` scales how far."""
-    directions = generic_of(mechanism).directions
-    most = near * np.repeat(SPREAD, 3)[: len(directions)]
-    twists = rng.uniform(-most, most, (count, len(directions))) @ directions @ directions.T
-    turns = twists[:, 3:] if twists.shape[1] > 3 else np.zeros((count, 3))
-    return pose(mechanism.reference_point + mechanism.characteristic_length * twists[:, :3], rotvec=turns)
-
 
 class Referee:
     """A mechanism in MuJoCo: put into configurations, measured, and closed by MuJoCo's own rows."""
@@ -150,7 +42,7 @@ class Referee:
         self.mechanism = mechanism
         self.metres = metres_of(mechanism.length_unit)
         self._mujoco: Any = mujoco
-        self.model: Any = mujoco.MjModel.from_xml_string(to_mjcf(mechanism))
+        self.model: Any = compiled(to_mjcf(mechanism))
         self.model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         self.data: Any = mujoco.MjData(self.model)
         tree = cut_tree(mechanism)

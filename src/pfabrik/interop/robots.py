@@ -21,6 +21,7 @@ from ..files.units import metres_of
 from ..motion.mobility import generic_of
 from .assembling import Imported, assemble
 from .cuts import unique
+from .digits import Rounding
 from .opened import Loop, Note, OpenMechanism
 from .pruning import prune
 
@@ -44,6 +45,7 @@ class Robot:
     base, end_effector, task, cones : what the file says of a mechanism in it, if anything.
     order : coordinates that are driven, in the order of the actuators; those that are not named come behind.
     rates : coordinate -> its highest speed and acceleration [rad or m, per s and per s^2], None where not known.
+    roundings : joint or loop -> how exactly the digits of the file place it [m, rad].
     """
 
     name: str
@@ -57,6 +59,7 @@ class Robot:
     cones: Mapping[str, Cone] = field(default_factory=dict)
     order: Sequence[str] = ()
     rates: Mapping[str, Rates] = field(default_factory=dict)
+    roundings: Mapping[str, Rounding] = field(default_factory=dict)
 
 
 def mechanism_of(
@@ -89,6 +92,7 @@ def mechanism_of(
         length_unit,
         require_names("task", task) if task is not None else robot.task if as_told else None,
         cones,
+        {name: Rounding(each.length / metres, each.angle) for name, each in robot.roundings.items()},
     )
     found = assemble(prune(opened, told), told)
     mechanism = _as_driven(found.mechanism, robot, metres)

@@ -19,17 +19,27 @@ SKEW = 0.1
 """Least sine between the axes of what is called a universal joint."""
 
 
+def without_twins(joints: Sequence[Joint], base: str, end_effector: str) -> list[Joint]:
+    """Balls that two bodies share as the one joint that they are together, and welded bodies as one.
+
+    Parameters
+    ----------
+    base, end_effector : names that stay.
+    """
+    return _without_welds(_hinged(joints), base, end_effector)
+
+
 def simplified(
     joints: Sequence[Joint], base: str, end_effector: str, cones: Mapping[str, Cone], told: list[Note]
 ) -> list[Joint]:
-    """The same machine in fewer words.
+    """The same machine in fewer joints.
 
     Parameters
     ----------
     base, end_effector : names that stay.
     cones : joint -> the cone that limits it.
     """
-    single = _grouped(_without_welds(_hinged(joints), base, end_effector), {base, end_effector}, told)
+    single = _grouped(joints, {base, end_effector}, told)
     return [dataclasses.replace(each, cone=cones[each.name]) if each.name in cones else each for each in single]
 
 

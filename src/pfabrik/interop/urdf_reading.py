@@ -14,6 +14,7 @@ from ..description.joints import Joint
 from ..errors import Fault, InvalidMechanism
 from ..rotations import from_rpy, square_to
 from .assembling import Imported
+from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .loops_file import LoopsFile, read_loops
 from .opened import Note
 from .robots import Rates, Robot, mechanism_of
@@ -78,6 +79,7 @@ def from_urdf(
         links.root,
         {link: (link, frame[:3, 3]) for link, frame in links.frames.items()},
         rates={element.get("name", ""): Rates(_speed(element)) for element in links.joints},
+        roundings=links.roundings | closing.roundings(links.of_links, links.frames, links.link_of),
     )
     return mechanism_of(robot, told, base, end_effector, actuated, fixed, length_unit, task)
 
@@ -89,6 +91,7 @@ class _Links:
     ----------
     frames : link -> where it is at zero, (4, 4) [m], in the frame of the root.
     link_of : joint -> its child, whose frame is the joint's.
+    of_links, roundings : link, and joint -> how exactly the digits of the file place it [m, rad].
     """
 
     def __init__(self, root: ET.Element, closing: LoopsFile) -> None:
@@ -115,6 +118,22 @@ class _Links:
                 self.joints.append(joint)
                 self.frames[_link(joint, "child")] = self.frames[link] @ _origin(joint)
                 ends.append(_link(joint, "child"))
+        self.of_links: dict[str, Rounding] = {self.root: NOTHING}
+        self.roundings = dict(self._rounded())
+
+    def _rounded(self) -> Iterator[tuple[str, Rounding]]:
+        """How exactly each joint is placed, from the root outward; links on the way."""
+        origins = [origin for joint in self.joints if (origin := joint.find("origin")) is not None]
+        places, turns = (digits_of(each.get(key, "") for each in origins) for key in ("xyz", "rpy"))
+        along = digits_of(each.get("xyz", "") for joint in self.joints if (each := joint.find("axis")) is not None)
+        for joint in self.joints:
+            origin, parent, child = joint.find("origin"), _link(joint, "parent"), _link(joint, "child")
+            offset, turn, axis = _numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"), _axis(joint)
+            by, angle = np.linalg.norm(places.errors(offset)), np.linalg.norm(turns.errors(turn, FEWEST - 1))
+            own = self.of_links[child] = self.of_links[parent].on(offset, float(by), float(angle))
+            skew = np.linalg.norm(along.errors(axis)) if np.count_nonzero(axis) > 1 else 0.0
+            size = np.linalg.norm(axis) or 1.0
+            yield joint.get("name", ""), own._replace(angle=own.angle + float(skew / size))
 
     def parts(self, element: ET.Element, told: list[Note]) -> Iterator[Joint]:
         """What one joint is: one of ours, or several in a row."""

@@ -15,6 +15,7 @@ from ..arrays import Floats
 from ..description.graph import tree_of
 from ..description.home_mobility import body_twist, column_joints, column_moves, loop_conditions, orthonormal_rates
 from ..description.mechanism import Mechanism
+from ..description.structure import Structure
 from .displacements import end_effector_pose, screws, stepped
 
 
@@ -41,7 +42,7 @@ class Graph:
 
 
 @lru_cache(maxsize=64)
-def graph_of(mechanism: Mechanism) -> Graph:
+def graph_of(mechanism: Structure) -> Graph:
     tree, owners = tree_of(mechanism), column_joints(mechanism)
     path = tree.paths[mechanism.end_effector_body][owners]
     orthonormal = np.linalg.qr(tree.loops.T)[0].T
@@ -50,7 +51,7 @@ def graph_of(mechanism: Mechanism) -> Graph:
     return Graph(path * moves, loops, orthonormal[:, owners] * moves, rates)
 
 
-def first_order(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats]:
+def first_order(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:
     """Loop conditions (n, 6 loops, c) and twist of the end effector (n, r, c), per orthonormal joint rate."""
     graph = graph_of(mechanism)
     present = graph.rates @ at_reference(mechanism, q, screws(mechanism, q))
@@ -60,7 +61,7 @@ def first_order(mechanism: Mechanism, q: Floats) -> tuple[Floats, Floats]:
     return loop_conditions(graph.orthonormal, present), np.concatenate(rows, axis=1)
 
 
-def at_reference(mechanism: Mechanism, q: Floats, origin_screws: Floats) -> Floats:
+def at_reference(mechanism: Structure, q: Floats, origin_screws: Floats) -> Floats:
     """Screws (n, k, 6) with the velocity of the present reference point in place of that at the base origin."""
     points = end_effector_pose(mechanism, q)[:, None, :3, 3] / mechanism.characteristic_length
     moved = origin_screws.copy()
@@ -68,7 +69,7 @@ def at_reference(mechanism: Mechanism, q: Floats, origin_screws: Floats) -> Floa
     return moved
 
 
-def moved(mechanism: Mechanism, q: Floats, rates: Floats) -> Floats:
+def moved(mechanism: Structure, q: Floats, rates: Floats) -> Floats:
     return stepped(mechanism, q, rates @ graph_of(mechanism).rates)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..description.notebook import card
 from ..tolerances import TOLERANCES
@@ -19,6 +20,24 @@ from .walks import around_home
 COUNTING, FEWEST = 4e9, 2
 """Cubes of the number of joint coordinates that motions are counted at in sum, so that it takes seconds of the longest
 chains; and at how many configurations at least: home may be special."""
+
+MOST_NAMED, TAKES_PART = 6, 0.1
+"""Most joints that are named of a motion, and the least of their rates, as a share of the largest."""
+
+
+@dataclass(frozen=True)
+class NearlyFree:
+    """A motion that the loops hardly resist, in general: by rounded axes, or next to a singularity.
+
+    Attributes
+    ----------
+    singular_value : the largest resistance found around home [L and rad per rate]; exact loops resist by 0, others by
+        0.02 and more.
+    joints : names of the joints that take part in it most, the fastest first.
+    """
+
+    singular_value: float
+    joints: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -34,6 +53,8 @@ class Mobility:
     actuators : number of actuated joints.
     uncontrolled : freedoms that the end effector keeps with all actuators locked.
     over_constraints : loop conditions that follow from the others.
+    nearly_free : motions that the loops hardly resist, the freest first: those up to `TOLERANCES.alignment` are counted
+        as motions, the others as none.
     """
 
     mobility: int
@@ -43,6 +64,7 @@ class Mobility:
     actuators: int
     uncontrolled: int
     over_constraints: int
+    nearly_free: tuple[NearlyFree, ...] = ()
 
     @property
     def redundancy(self) -> int:
@@ -105,9 +127,29 @@ def generic_of(mechanism: Mechanism) -> Generic:
         actuators=len(mechanism.actuator_names),
         uncontrolled=shown - driven,
         over_constraints=closure.shape[1] - rank,
+        nearly_free=_nearly_free(mechanism, values, right),
     )
     left, sizes, _ = np.linalg.svd(np.hstack(list(twists)), full_matrices=False)
     return Generic(counts, left[:, : int(_rank(sizes))], rank, bool(ranks[0] < rank))
+
+
+def _nearly_free(mechanism: Mechanism, values: Floats, right: Floats) -> tuple[NearlyFree, ...]:
+    """The motions that are nearly free in every configuration, from singular values (n, k) and vectors (n, c, c)."""
+    small = np.count_nonzero(values < TOLERANCES.nearly_implied, axis=1).min()
+    exact = np.count_nonzero(values <= TOLERANCES.rank, axis=1).min()
+    found = []
+    for place in range(values.shape[1] - exact - 1, values.shape[1] - small - 1, -1):
+        row = int(values[:, place].argmax())
+        found.append(NearlyFree(float(values[row, place]), _fastest(mechanism, right[row, place])))
+    return tuple(found)
+
+
+def _fastest(mechanism: Mechanism, motion: Floats) -> tuple[str, ...]:
+    """Names of the joints that take part in a motion (c,), the fastest first."""
+    speeds = np.zeros(len(mechanism.joints))
+    np.add.at(speeds, column_joints(mechanism), motion**2)
+    order = np.argsort(-speeds, kind="stable")[:MOST_NAMED]
+    return tuple(mechanism.joints[place].name for place in order if speeds[place] >= TAKES_PART**2 * speeds.max())
 
 
 def _rank(values: NDArray[Any]) -> Any:

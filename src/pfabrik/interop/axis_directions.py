@@ -1,0 +1,145 @@
+"""Directions of axes that are parallel, square to each other or in one plane up to rounding, made so exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from ..arrays import Floats
+from .digits import Rounding
+
+ROUNDED = 1e-14
+"""Sine that the arithmetic of a reader leaves of 0, beside the digits of the file."""
+
+SKEW = 0.1
+"""Least sine between directions that make a plane."""
+
+STEPS = 20
+"""Most steps in which directions are made square; their error is squared in each."""
+
+
+@dataclass
+class Axis:
+    """An axis or a centre of a joint; a universal joint has two axes.
+
+    Attributes
+    ----------
+    joint, place : its joint, and which axis of it.
+    along : unit vector; None of a ball.
+    at : a point on it [length]; None of a slide.
+    rounding : how far it is from what was meant at most.
+    bodies : the two bodies of its joint.
+    """
+
+    joint: int
+    place: int
+    along: Floats | None
+    at: Floats | None
+    rounding: Rounding
+    bodies: frozenset[str]
+
+
+@dataclass
+class Bundle:
+    """Axes that are parallel up to rounding.
+
+    Attributes
+    ----------
+    members : indices of axes.
+    along : the direction of all.
+    bound, stiff : how far it may be from what was meant [rad]: by the worst and by the best of its members.
+    slides : whether one of them is of a slide.
+    """
+
+    members: list[int]
+    along: Floats
+    bound: float
+    stiff: float
+    slides: bool
+
+
+def bundles_of(axes: Sequence[Axis], slack: float) -> list[Bundle]:
+    """The axes by their direction; directions square to each other up to rounding are made so.
+
+    Parameters
+    ----------
+    slack : what two directions may differ by besides their roundings [rad].
+    """
+    gathered = _gathered(axes, slack)
+    bundles = [_bundle(axes, members) for members in gathered]
+    _make_square(bundles, slack)
+    return bundles
+
+
+def _gathered(axes: Sequence[Axis], slack: float) -> list[list[int]]:
+    """Indices of axes, in lists of those that are parallel to the one in each that is known best."""
+    found: list[list[int]] = []
+    for index in sorted(range(len(axes)), key=lambda index: axes[index].rounding.angle):
+        along = axes[index].along
+        if along is None:
+            continue
+        for members in found:
+            best = axes[members[0]]
+            near = best.rounding.angle + axes[index].rounding.angle + slack
+            if best.along is not None and np.linalg.norm(np.cross(best.along, along)) <= near:
+                members.append(index)
+                break
+        else:
+            found.append([index])
+    return found
+
+
+def _bundle(axes: Sequence[Axis], members: list[int]) -> Bundle:
+    """Their mean, in which each counts by how well it is known."""
+    along = np.array([axes[index].along for index in members])
+    angles = np.array([axes[index].rounding.angle for index in members])
+    weights = 1.0 / np.maximum(angles, 1e-6 * angles.max() + ROUNDED) ** 2
+    signs = np.sign(along @ along[0])
+    mean = along[0] if len(members) == 1 else (signs * weights) @ along
+    slides = any(axes[index].at is None for index in members)
+    return Bundle(members, mean / np.linalg.norm(mean), float(angles.max()), float(angles.min()), slides)
+
+
+def _make_square(bundles: Sequence[Bundle], slack: float) -> None:
+    """Least turns, each by how well a direction is known, after which all that are nearly square are square."""
+    relations = list(_relations(bundles, slack))
+    if not relations:
+        return
+    begin = [bundle.along for bundle in bundles]
+    stiff = np.array([bundle.stiff for bundle in bundles]) + slack
+    for _ in range(STEPS):
+        rows, values = np.zeros((len(relations), 3 * len(bundles))), np.zeros(len(relations))
+        for row, members in enumerate(relations):
+            along = [bundles[index].along for index in members]
+            for place, index in enumerate(members):
+                first, *more = along[:place] + along[place + 1 :]
+                slope = (-1.0) ** place * np.cross(first, more[0]) if more else first
+                rows[row, 3 * index : 3 * index + 3] = slope * stiff[index]
+            values[row] = along[0] @ (along[1] if len(along) == 2 else np.cross(along[1], along[2]))
+        turns = -np.linalg.lstsq(rows, values, rcond=1e-9)[0].reshape(-1, 3) * stiff[:, None]
+        for bundle, turn in zip(bundles, turns, strict=True):
+            bundle.along = (bundle.along + turn) / np.linalg.norm(bundle.along + turn)
+        if np.abs(values).max() <= 0.1 * ROUNDED:
+            break
+    turned = [np.linalg.norm(bundle.along - old) for bundle, old in zip(bundles, begin, strict=True)]
+    if any(by > 2.0 * (bundle.bound + slack) for by, bundle in zip(turned, bundles, strict=True)):
+        for bundle, old in zip(bundles, begin, strict=True):  # not all of them can have been meant
+            bundle.along = old
+
+
+def _relations(bundles: Sequence[Bundle], slack: float) -> Iterator[tuple[int, ...]]:
+    """Two that are square to each other, and three in one plane, if slides are along all of them."""
+    for pair in combinations(range(len(bundles)), 2):
+        one, other = (bundles[index] for index in pair)
+        if abs(one.along @ other.along) <= one.bound + other.bound + slack:
+            yield pair
+    sliding = [index for index, bundle in enumerate(bundles) if bundle.slides]
+    for three in combinations(sliding, 3):
+        along = np.array([bundles[index].along for index in three])
+        skew = min(np.linalg.norm(np.cross(*along[list(pair)])) for pair in combinations(range(3), 2))
+        bound = sum(bundles[index].bound for index in three) + slack
+        if skew >= SKEW and abs(np.linalg.det(along)) <= bound:
+            yield three

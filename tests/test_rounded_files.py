@@ -1,0 +1,251 @@
+"""Machines whose files have few digits: what was meant exactly is made exact, is told, and moves as MuJoCo moves the
+exact machine; what is off by more than rounding is left alone. And what a referee says of machines that hardly move."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import pfabrik as pf
+from in_mujoco import Model
+from pfabrik.cli import main
+from pfabrik.errors import UnknownName
+from pfabrik.interop import Imported, from_mjcf, to_mjcf, verify
+from pfabrik.interop.digits import digits_of
+from rounded_files import LINKAGES, Linkage, model_text, planar_four_bar, spherical_three_legs
+
+pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+
+MAGNIFIED = 60.0
+"""How many units of the last digit poses may be off: loops add up the roundings of all their joints."""
+
+
+def told(found: Imported) -> str:
+    return "\n".join(map(str, found.notes))
+
+
+def imported(linkage: Linkage, text: str, **asked: str) -> Imported:
+    return from_mjcf(text, base="world", end_effector=linkage.end_effector, **asked)
+
+
+def answers_as_mujoco_does(found: Imported, linkage: Linkage, tolerance: float, scale: float = 1.0) -> None:
+    """Forward kinematics at drives far from home against MuJoCo's, of the same linkage in seventeen digits."""
+    model = Model.of(model_text(linkage, scale=scale))
+    model.lead(linkage.drives, np.zeros(len(linkage.drives)))
+    begin = model.pose(linkage.end_effector)
+    values = np.random.default_rng(1).uniform(-0.3, 0.3, (5, len(linkage.drives)))
+    solutions = pf.solve_fk(found.mechanism, values)
+    for value, solution in zip(values, solutions, strict=True):
+        assert solution, solution
+        assert solution.residual <= 1e-9
+        assert model.lead(linkage.drives, value) <= 1e-12 * scale
+        position, turned = model.pose(linkage.end_effector)
+        assert np.linalg.norm(solution.pose[:3, 3] - position) <= tolerance * scale
+        assert np.abs(solution.pose[:3, :3] - turned @ begin[1].T).max() <= 10.0 * tolerance
+
+
+@pytest.mark.parametrize("digits", [7, 6, 4])
+@pytest.mark.parametrize("name", LINKAGES)
+def test_what_rounding_locks_moves_as_the_exact_machine_does(name: str, digits: int) -> None:
+    linkage = LINKAGES[name]()
+    found = imported(linkage, model_text(linkage, digits))
+    counted = pf.mobility(found.mechanism)
+    assert counted.mobility == linkage.freedoms
+    assert not counted.nearly_free
+    answers_as_mujoco_does(found, linkage, MAGNIFIED * 10.0**-digits)
+
+
+@pytest.mark.parametrize("turned", ["euler", "xyaxes"])
+@pytest.mark.parametrize("name", ["spherical", "mixture"])
+def test_however_a_file_turns_its_bodies(name: str, turned: str) -> None:
+    linkage = LINKAGES[name]()
+    found = imported(linkage, model_text(linkage, 6, turned))
+    assert "made to meet in one point" in told(found)
+    answers_as_mujoco_does(found, linkage, MAGNIFIED * 1e-6)
+
+
+def test_numbers_in_millimetres_are_as_exact() -> None:
+    linkage = spherical_three_legs()
+    found = imported(linkage, model_text(linkage, 6, scale=1e3))
+    answers_as_mujoco_does(found, linkage, MAGNIFIED * 1e-6, scale=1e3)
+
+
+def test_what_was_made_exact_is_named_with_how_much() -> None:
+    linkage = spherical_three_legs()
+    found = imported(linkage, model_text(linkage, 7))
+    notes = [note for note in found.notes if "made to meet in one point" in note.what]
+    assert [sorted(note.names) for note in notes] == [
+        sorted(f"{hinge.name}_0" if hinge.name in ("q1", "q2") else hinge.name for hinge in linkage.hinges)
+    ]
+    by = float(notes[0].what.split("up to ")[1].split()[0])
+    assert 1e-9 < by < 1e-6
+    planar = told(imported(planar_four_bar(), model_text(planar_four_bar(), 7)))
+    assert "axes made parallel within the digits of the file, turned by up to" in planar
+    assert "made the nearest machine that moves" in told(
+        imported(LINKAGES["bennett"](), model_text(LINKAGES["bennett"](), 6))
+    )
+
+
+def test_axes_of_a_spherical_linkage_meet_to_the_last_bit() -> None:
+    linkage = spherical_three_legs()
+    mechanism = imported(linkage, model_text(linkage, 7)).mechanism
+    points, axes = (np.array([getattr(joint, key) for joint in mechanism.joints]) for key in ("at", "axis"))
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    centre = np.linalg.solve(across.sum(axis=0), np.einsum("nij,nj->i", across, points))
+    assert np.abs(np.cross(axes, points - centre)).max() <= 1e-15
+
+
+@pytest.mark.parametrize("by", [1e-3, 1e-4])
+def test_an_axis_that_is_off_by_more_than_rounding_is_left_where_it_is(by: float) -> None:
+    """A thousandth of a metre beside the point where the others meet, in a file of seven digits: not meant to meet."""
+    linkage = spherical_three_legs()
+    beside = by * np.cross(linkage.hinges[1].axis, [0.0, 0.0, 1.0])
+    linkage.hinges[1] = linkage.hinges[1]._replace(at=linkage.hinges[1].at + beside)
+    found = imported(linkage, model_text(linkage, 7))
+    joint = found.mechanism.joint("p0")
+    at, axis = np.array(joint.at), np.array(joint.axis)
+    assert np.linalg.norm(np.cross(axis, at - linkage.hinges[1].at)) <= 1e-6
+    assert "made the nearest machine" not in told(found)
+    assert not any("p0" in note.names for note in found.notes if "meet in one point" in note.what)
+
+
+def test_parallel_hinges_that_are_tilted_by_more_than_rounding_stay_tilted() -> None:
+    linkage = planar_four_bar()
+    first, second = linkage.hinges[1].axis, np.array([0.3, 0.2, -0.9])
+    tilted = first + 1e-3 * np.cross(first, second)
+    linkage.hinges[1] = linkage.hinges[1]._replace(axis=tilted / np.linalg.norm(tilted))
+    found = imported(linkage, model_text(linkage, 7))
+    axes = np.array([joint.axis for joint in found.mechanism.joints])
+    assert np.isclose(
+        np.linalg.norm(np.cross(axes, axes[0]), axis=1).max(), np.linalg.norm(np.cross(tilted, first)), rtol=1e-2
+    )
+
+
+@pytest.mark.parametrize("name", ["agile_eye", "five_bar", "delta", "stewart", "psu", "canfield"])
+def test_machines_of_the_catalogue_in_six_digits_answer_as_they_are(name: str, tmp_path: Path) -> None:
+    mechanism = pf.load(name)
+    words = to_mjcf(mechanism).split('"')
+    for place in range(1, len(words), 2):
+        if words[place - 1].endswith((" pos=", " axis=")):
+            words[place] = " ".join(f"{float(number):.6g}" for number in words[place].split())
+    found = from_mjcf('"'.join(words), length_unit=mechanism.length_unit).mechanism
+    assert pf.mobility(found).mobility == pf.mobility(mechanism).mobility
+    assert not pf.mobility(found).nearly_free
+    rng, length = np.random.default_rng(2), mechanism.characteristic_length
+    most = np.array([0.1 if drive.kind == "angle" else 0.03 * length for drive in mechanism.drives])
+    low, high = np.transpose([drive.limits for drive in mechanism.drives])
+    home = np.array([drive.home for drive in mechanism.drives])
+    values = np.clip(home + rng.uniform(-most, most, (6, len(most))), low, high)
+    one, other = (
+        pf.solve_fk(each, dict(zip(mechanism.actuator_names, values.T, strict=True))) for each in (mechanism, found)
+    )
+    reached = np.asarray(one.status) == 0
+    assert (np.asarray(other.status)[reached] == 0).all()
+    assert np.linalg.norm((one.pose - other.pose)[reached][:, :3, 3], axis=1).max(initial=0.0) <= 1e-4 * length
+
+
+@pytest.mark.parametrize(
+    ("texts", "value", "error"),
+    [
+        (["0.0206569 0.0357787", "0.21213 -0.0999988"], 0.123456, 0.5e-6),  # six significant digits
+        (["0.0206569 0.0357787", "0.21213 -0.0999988"], 0.0, 0.0),
+        (["0.020657 0.135779", "1.212130 -0.099999", "10.123457"], 1.5, 0.5e-6),  # six decimals
+        (["0.7071 0.7071", "0.866 0.5"], 0.7071, 0.5e-4),
+        (["0 0 1", "0.5 0 0"], 0.5, 0.0),  # as good as exact
+    ],
+)
+def test_the_last_digit_of_a_file_is_found(texts: list[str], value: float, error: float) -> None:
+    assert digits_of(texts).errors([value])[0] == pytest.approx(error, abs=1e-16)
+
+
+def test_a_quarter_turn_in_radians_is_rounded_wherever_it_stands() -> None:
+    digits = digits_of(["0.123456789012345 1.1234567890123456", "1.5708"])
+    assert digits.errors([1.5708], 3)[0] == pytest.approx(0.5e-4)
+
+
+def spoiled(by: float) -> pf.Mechanism:
+    """A four-bar with one axis that leans by an angle."""
+    linkage = planar_four_bar()
+    lean = linkage.hinges[1].axis + by * np.cross(linkage.hinges[1].axis, [0.3, 0.2, -0.9])
+    joints = [
+        pf.Joint(
+            each.name,
+            "revolute",
+            (each.parent, each.child),
+            each.at,
+            axis=lean if place == 1 else each.axis,
+            actuated=place == 0,
+        )
+        for place, each in enumerate(linkage.hinges)
+    ]
+    return pf.Mechanism("spoiled", joints, "coupler", (0.0, 0.0, 0.0), "world", length_unit="m")
+
+
+def test_nearly_free_motions_are_named_with_how_hard_the_loops_resist() -> None:
+    """To first order the resistance grows as the angle by which an axis leans; of exact axes there is none."""
+    small, twice, exact = (pf.mobility(spoiled(by)).nearly_free for by in (1e-5, 2e-5, 0.0))
+    assert exact == ()
+    assert len(small) == len(twice) == 1
+    assert twice[0].singular_value == pytest.approx(2.0 * small[0].singular_value, rel=1e-2)
+    assert 1e-7 < small[0].singular_value < 1e-5
+    assert set(small[0].joints) == {"h0", "h1", "h2", "h3"}
+    assert pf.mobility(spoiled(1e-5)).mobility == 0
+
+
+def test_the_commands_show_what_is_nearly_free(tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    pf.save(spoiled(1e-5), path)
+    shown = CliRunner().invoke(main, ["info", str(path)]).output
+    assert "nearly free" in shown
+    assert "not counted as a motion" in shown
+    value = json.loads(CliRunner().invoke(main, ["info", str(path), "--json"]).output)["mobility"]["nearly_free"][0]
+    assert value["singular_value"] == pf.mobility(pf.load(path)).nearly_free[0].singular_value
+    assert "the loops hardly resist a motion of" in CliRunner().invoke(main, ["check", str(path)]).output
+
+
+def test_the_referee_says_how_far_it_went_and_fails_where_that_is_too_near(tmp_path: Path) -> None:
+    mechanism = pf.load("five_bar")
+    found = verify(mechanism, poses=6)
+    assert found
+    assert found.goes_far
+    assert set(found.travelled.drives) == set(mechanism.actuator_names)
+    assert found.travelled.position <= 0.2 * np.sqrt(2.0) * mechanism.characteristic_length * (1.0 + 1e-9)
+    homes = {name: mechanism.home_coordinate(name) for name in ("p2", "p4")}
+    near = mechanism.with_limits({name: (at - 0.03, at + 0.03) for name, at in homes.items()})
+    held = verify(near, poses=6)
+    assert held.agrees
+    assert not held.goes_far
+    assert not held
+    path = tmp_path / "near.toml"
+    pf.save(near, path)
+    run = CliRunner().invoke(main, ["verify", str(path), "--poses", "6"])
+    assert run.exit_code == 1
+    assert "too near to home to say anything" in run.output
+
+
+def test_the_original_file_is_the_referee_too(tmp_path: Path) -> None:
+    linkage = spherical_three_legs()
+    original, machine = tmp_path / "robot.xml", tmp_path / "machine.toml"
+    original.write_text(model_text(linkage, 7))
+    pf.save(dataclasses.replace(imported(linkage, str(original)).mechanism, task=("rotation",)), machine)
+    ask = ["verify", str(machine), "--poses", "8", "--original", str(original)]
+    run = CliRunner().invoke(main, ask)
+    assert run.exit_code == 0, run.output
+    assert "original file                agrees" in run.output
+    against = json.loads(CliRunner().invoke(main, [*ask, "--json"]).output)["original"]
+    assert 1e-12 < against["rotation_difference"] < 1e-4
+    longer = spherical_three_legs()
+    turned = np.cross(longer.hinges[1].axis, [0.0, 0.0, 1.0])
+    longer.hinges[1] = longer.hinges[1]._replace(axis=longer.hinges[1].axis + 1e-2 * turned)
+    original.write_text(model_text(longer, 7))
+    other = CliRunner().invoke(main, ask)
+    assert other.exit_code == 1
+    assert "original file                does not agree" in other.output
+    original.write_text(model_text(linkage, 7).replace('"m1"', '"motor"'))
+    with pytest.raises(UnknownName, match="m1"):
+        verify(pf.load(machine), poses=1, original=original)
