@@ -833,7 +833,9 @@ def check_asked_again(mechanism: Mechanism, n: int, seed: int = 0) -> None:
     there = pf.solve_ik(mechanism, answers.pose, start=answers)
     assert (there.status == Status.REACHED).all()
     assert pose_differences(mechanism, answers, there).max() <= NEARER
-    assert np.abs(there.actuators - answers.actuators).max() <= 10.0 * NEARER * max(length, 1.0)
+    closed = closure_of(mechanism)
+    turned = np.abs(there.actuators - answers.actuators) * closed.scale[closed.actuated]
+    assert turned.max() <= 10.0 * NEARER  # next to dead points a pose tells of its actuators less well than of itself
 
 
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

@@ -256,3 +256,49 @@ def test_a_status_is_written_by_its_name() -> None:
     assert f"{Status.REACHED:>9}" == "  REACHED"
     assert f"{Status.PROJECTED:d}" == "1"
     assert Status.PROJECTED == 1
+
+
+@pytest.mark.parametrize("started", [False, True])
+def test_joints_of_a_part_are_found_for_that_part(started: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many rows as were asked for; the whole once, and nothing again after it."""
+    from pfabrik.platform import answers
+
+    machine, rows = pf.load("delta"), []
+
+    def counting(*told: object) -> object:
+        rows.append(len(told[2]))
+        return settled(*told)
+
+    settled = answers.settled
+    monkeypatch.setattr(answers, "settled", counting)
+    targets = np.random.default_rng(0).uniform(-10, 10, (400, 3)) + machine.home_pose[:3, 3]
+    start = pf.solve_ik(machine, targets) if started else None
+    whole = pf.solve_ik(machine, targets, start=start)
+    part, again = whole[100:110], whole[[5, 3, 5]]
+    some, others = part.joints, again[1:].joints
+    assert rows == ([10, 10, 3, 3] if started else [10, 3])
+    for name, values in whole.joints.items():
+        np.testing.assert_allclose(some[name], values[100:110], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(others[name], values[[3, 5]], rtol=0, atol=1e-12)
+    assert rows[-1] == 400
+    before = len(rows)
+    assert whole[7].points and len(whole[:50].joints) == len(whole.joints) and whole[3].q.shape == whole.q.shape[1:]
+    assert len(rows) == before
+
+
+def test_joints_of_all_rows_one_by_one_are_found_about_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    from pfabrik.platform import answers
+
+    machine, rows = pf.load("delta"), []
+
+    def counting(*told: object) -> object:
+        rows.append(len(told[2]))
+        return settled(*told)
+
+    settled = answers.settled
+    monkeypatch.setattr(answers, "settled", counting)
+    targets = np.random.default_rng(0).uniform(-40, 40, (300, 3)) + machine.home_pose[:3, 3]
+    whole = pf.solve_ik(machine, targets)
+    apart = np.array([row.q for row in whole])
+    assert len(rows) < 20 and sum(rows) < 2 * len(targets)
+    np.testing.assert_allclose(apart, whole.q, rtol=0, atol=1e-12)

@@ -122,8 +122,13 @@ def begins_of(
     if start.were_given:
         given = start.coordinates
         return lambda places: given if len(given) == 1 else given[places]
-    told = start.rows.poses, start.rows.actuators, sides
-    return lambda places: settled(mechanism, table, *(each if len(each) == 1 else each[places] for each in told), None)
+    poses, actuators, n = start.rows.poses, start.rows.actuators, len(start)
+
+    def settle(places: Places) -> Floats:
+        own = slice(None) if n == 1 else places
+        return settled(mechanism, table, poses[own], actuators[own], sides if len(sides) == 1 else sides[own], None)
+
+    return settle
 
 
 def coordinates_of(
