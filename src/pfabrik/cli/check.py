@@ -14,19 +14,13 @@ import numpy as np
 import pfabrik as pf
 
 from ..description.graph_faults import leaves
-from ..description.joint_types import TASK_TURNS
-from ..description.task import task_of
 from ..errors import InvalidMechanism
-from ..motion.mobility import generic_of
-from ..tolerances import TOLERANCES
+from ..motion.fitting_task import asks_too_much, too_much
 from .info import NOT_COUNTED, counted_mobility
 from .mech import MECH, load
 
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
-
-COUNTS = {"x": 1, "y": 1, "z": 1, **TASK_TURNS}
-"""Freedoms that each part of a task asks for."""
 
 FULL_TURN = 2.0 * math.pi
 
@@ -70,7 +64,7 @@ def notes(mechanism: Mechanism) -> Iterator[str]:
     if counted is None:
         yield f"freedoms are {NOT_COUNTED}: whether they suffice for the task is not known"
     else:
-        yield from task_notes(mechanism, counted.platform)
+        yield from task_notes(mechanism)
     for _, joint, body in leaves(mechanism):
         yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
     widths = [width for joint in mechanism.joints for width in angular_widths(joint)]
@@ -80,18 +74,10 @@ def notes(mechanism: Mechanism) -> Iterator[str]:
         yield f"no range of an angle is wider than {math.degrees(max(widths)):.3g} degrees; were radians meant?"
 
 
-def task_notes(mechanism: Mechanism, there: int) -> Iterator[str]:
-    """Whether a task asks for more than the end effector can do, which has so many freedoms."""
-    asked, task = sum(COUNTS[part] for part in mechanism.task), task_of(mechanism)
-    directions = generic_of(mechanism).directions
-    turns = [task.rotations > 1, task.rotations > 1, task.rotations > 0]
-    counts = [*task.axes, *turns][: len(directions)]  # of a joint end effector, three
-    twists = directions[counts]
-    if asked > there < np.linalg.matrix_rank(twists, TOLERANCES.alignment):  # not always the same, as in a plane
-        yield (
-            f"the task {' '.join(mechanism.task)} asks for {asked} freedoms, and the end effector has {there}, from "
-            "which the others follow: hardly any target can be reached; `task` says which count"
-        )
+def task_notes(mechanism: Mechanism) -> Iterator[str]:
+    """That a task asks for more than the end effector can do."""
+    if asks_too_much(mechanism):
+        yield f"{too_much(mechanism)}; hardly any target can be reached"
 
 
 def angular_widths(joint: Joint) -> Iterator[float]:

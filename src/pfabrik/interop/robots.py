@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -13,16 +13,16 @@ import numpy as np
 from ..arrays import Floats
 from ..checks import require_names
 from ..description.graph import welded
-from ..description.joint_types import KINDS, TASK_COORDINATES
+from ..description.joint_types import KINDS
 from ..description.joints import Cone, Joint
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..files.units import metres_of
-from ..motion.mobility import generic_of
 from .assembling import Imported, assemble
 from .cuts import unique
 from .opened import Loop, Note, OpenMechanism
 from .pruning import prune
+from .tasks import with_task
 
 
 class Rates(NamedTuple):
@@ -92,7 +92,9 @@ def mechanism_of(
     )
     found = assemble(prune(opened, told), told)
     mechanism = _as_driven(found.mechanism, robot, metres)
-    return dataclasses.replace(found, mechanism=mechanism, notes=(*found.notes, *_of_task(mechanism)))
+    notes = list(found.notes)
+    mechanism = with_task(mechanism, opened.task is not None, notes)
+    return dataclasses.replace(found, mechanism=mechanism, notes=tuple(notes))
 
 
 def _as_driven(mechanism: Mechanism, robot: Robot, metres: float) -> Mechanism:
@@ -118,17 +120,6 @@ def _as_driven(mechanism: Mechanism, robot: Robot, metres: float) -> Mechanism:
 
     driven = iter(sorted((joint for joint in mechanism.joints if joint.driven), key=rank))
     return mechanism._with_joints(rated(next(driven)) if joint.driven else joint for joint in mechanism.joints)
-
-
-def _of_task(mechanism: Mechanism) -> Iterator[Note]:
-    """That targets set more than the end effector can do, where nobody has said what they are to set."""
-    freedoms = generic_of(mechanism).mobility.platform
-    whole = 3 if mechanism.end_effector_is_joint else 6
-    if mechanism.task == mechanism.whole_task and freedoms < whole:
-        coordinates = ", ".join(TASK_COORDINATES)
-        yield Note(
-            f"the end effector has {freedoms} freedoms of {whole}: `task` says which of {coordinates} targets set"
-        )
 
 
 def _names(what: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
