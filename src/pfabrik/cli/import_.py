@@ -10,6 +10,7 @@ import click
 
 import pfabrik as pf
 
+from ..errors import PfabrikError
 from .group import complain
 from .whole import OUTPUT, STANDARD, refuse_existing, whole_file
 
@@ -46,7 +47,12 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) 
     All that is left out or changed is told on stderr, by name.
     """
     refuse_existing(output, force)
-    found = imported(file, **asked)
+    try:
+        found = imported(file, **asked)
+    except PfabrikError as error:
+        for note in getattr(error, "__notes__", []):
+            complain(note)
+        raise
     from ..files import dumps
 
     text = dumps(found.mechanism)

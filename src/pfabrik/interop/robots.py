@@ -6,7 +6,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,21 +15,18 @@ from ..checks import require_names
 from ..description.graph import welded
 from ..description.joint_types import KINDS
 from ..description.joints import Cone, Joint
-from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..files.units import metres_of
 from .assembling import Imported, assemble
+from .couplings import Coupling, coupled
 from .cuts import unique
+from .driving import Rates, as_driven, require_drives
 from .opened import Loop, Note, OpenMechanism
 from .pruning import prune
 from .tasks import with_task
 
-
-class Rates(NamedTuple):
-    """The highest speed and acceleration of a coordinate, None where not known."""
-
-    speed: float | None = None
-    acceleration: float | None = None
+MOST_NAMES = 24
+"""Most candidates that a refusal lists."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +41,8 @@ class Robot:
     base, end_effector, task, cones : what the file says of a mechanism in it, if anything.
     order : coordinates that are driven, in the order of the actuators; those that are not named come behind.
     rates : coordinate -> its highest speed and acceleration [rad or m, per s and per s^2], None where not known.
+    couplings : joints that follow others.
+    undriven : what the file has in place of driven joints, for the refusal of a machine without any.
     """
 
     name: str
@@ -57,6 +56,8 @@ class Robot:
     cones: Mapping[str, Cone] = field(default_factory=dict)
     order: Sequence[str] = ()
     rates: Mapping[str, Rates] = field(default_factory=dict)
+    couplings: Sequence[Coupling] = ()
+    undriven: str = "none in the file"
 
 
 def mechanism_of(
@@ -71,14 +72,16 @@ def mechanism_of(
 ) -> Imported:
     """The mechanism between the base and the end effector of a robot, its loops closed; asked for as of `from_mjcf`."""
     metres = metres_of(length_unit)
-    robot = _driven(_locked(robot, fixed), actuated)
+    chosen = () if actuated is None else require_names("actuated", actuated)
+    robot = _driven(_locked(robot, fixed), None if actuated is None else chosen)
     base = _base(robot, base)
     end_effector = _end_effector(robot, end_effector, base, told)
     tip, point = _place(robot, end_effector)
     as_told = (base, end_effector) == (robot.base, robot.end_effector)
     joints, loops, cones = _merged(robot, base, tip)
+    couplings = robot.couplings
     if point is not None:
-        joints, loops = _not_called(tip, joints, loops, told)
+        joints, loops, couplings = _not_called(tip, joints, loops, couplings, told)
     opened = OpenMechanism(
         robot.name,
         tuple(_in_unit(joint, metres) for joint in joints),
@@ -90,36 +93,12 @@ def mechanism_of(
         require_names("task", task) if task is not None else robot.task if as_told else None,
         cones,
     )
-    found = assemble(prune(opened, told), told)
-    mechanism = _as_driven(found.mechanism, robot, metres)
+    opened = coupled(prune(opened, told), joints, couplings, chosen, told)
+    require_drives(opened, robot.joints, robot.undriven)
+    found = assemble(opened, told)
     notes = list(found.notes)
-    mechanism = with_task(mechanism, opened.task is not None, notes)
+    mechanism = with_task(as_driven(found.mechanism, robot.order, robot.rates, metres), opened.task is not None, notes)
     return dataclasses.replace(found, mechanism=mechanism, notes=tuple(notes))
-
-
-def _as_driven(mechanism: Mechanism, robot: Robot, metres: float) -> Mechanism:
-    """With its actuators in the order of the file, and as fast as it says."""
-    place = {name: index for index, name in enumerate(robot.order)}
-    drives = {joint.name: [each for each in mechanism.drives if each.joint is joint] for joint in mechanism.joints}
-
-    def rank(joint: Joint) -> int:
-        return min(place.get(drive.name, len(place)) for drive in drives[joint.name])
-
-    def most(joint: Joint, what: int) -> tuple[float, ...] | float | None:
-        found = []
-        for drive in drives[joint.name]:
-            value = robot.rates.get(drive.name, Rates())[what]
-            if value is None:
-                return None
-            found.append(value if drive.kind == "angle" else value / metres)
-        return tuple(found) if len(found) > 1 else found[0]
-
-    def rated(joint: Joint) -> Joint:
-        rates: dict[str, Any] = {"max_speed": most(joint, 0), "max_acceleration": most(joint, 1)}
-        return dataclasses.replace(joint, **rates)
-
-    driven = iter(sorted((joint for joint in mechanism.joints if joint.driven), key=rank))
-    return mechanism._with_joints(rated(next(driven)) if joint.driven else joint for joint in mechanism.joints)
 
 
 def _names(what: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
@@ -177,7 +156,9 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str, told: list[
     touching = Counter(body for pair in pairs for body in pair if body != base)
     counts = touching.most_common()
     if not loops or len(counts) < 2 or counts[0][1] == counts[1][1]:
-        raise InvalidArgument("end_effector", "none, and no body where most legs meet", f"one of {', '.join(touching)}")
+        raise InvalidArgument(
+            "end_effector", "none, and no body where most legs meet", f"one of {', '.join(touching)} (--end-effector)"
+        )
     told.append(Note("taken for the end effector, for most joints meet there", (counts[0][0],)))
     return counts[0][0]
 
@@ -209,14 +190,18 @@ def _merged(robot: Robot, base: str, tip: str) -> tuple[list[Joint], list[Loop],
     return joints, [loop for loop in loops if loop.connects[0] != loop.connects[1]], cones
 
 
-def _not_called(tip: str, joints: list[Joint], loops: list[Loop], told: list[Note]) -> tuple[list[Joint], list[Loop]]:
+def _not_called(
+    tip: str, joints: list[Joint], loops: list[Loop], couplings: Sequence[Coupling], told: list[Note]
+) -> tuple[list[Joint], list[Loop], Sequence[Coupling]]:
     """With another name for a joint that is called as the end effector, a body."""
     taken = {tip, *(joint.name for joint in joints), *(loop.name for loop in loops)}
     name = unique(f"{tip}_joint", taken)
-    if any(each.name == tip for each in joints) or any(each.name == tip for each in loops):
-        told.append(Note(f"a joint is called as the end effector, '{tip}', and here", (name,)))
+    if tip not in [*(each.name for each in joints), *(each.name for each in loops)]:
+        return joints, loops, couplings
+    told.append(Note(f"a joint is called as the end effector, '{tip}', and here", (name,)))
     renamed = [dataclasses.replace(each, name=name) if each.name == tip else each for each in joints]
-    return renamed, [dataclasses.replace(each, name=name) if each.name == tip else each for each in loops]
+    loops = [dataclasses.replace(each, name=name) if each.name == tip else each for each in loops]
+    return renamed, loops, [each.renamed(tip, name) for each in couplings]
 
 
 def _in_unit(joint: Joint, metres: float) -> Joint:
