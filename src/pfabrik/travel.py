@@ -22,7 +22,7 @@ from .description.task import task_of
 from .engine import engine_of
 from .errors import InvalidArgument
 from .kernels.rows import REACHED
-from .motion.fitting_task import asks_too_much, motions_at, too_much
+from .motion.fitting_task import has_dependent_coordinates, motions_at, task_remark
 from .poses import as_floats
 from .rotations import from_rotvec
 from .tolerances import TOLERANCES
@@ -116,7 +116,7 @@ class Travel(Sequence[Reach]):
 
     def _remarks(self) -> list[str]:
         """What there is no room for in a table."""
-        said = too_much(self.origin.mechanism)
+        said = task_remark(self.origin.mechanism)
         return [said] if any(each.cause == said for each in self) else []
 
     def _distance(self, reach: Reach) -> tuple[str, str]:
@@ -215,7 +215,7 @@ def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> 
     velocity, turn : how it would go on, (3,) each: velocity of the reference point [L], and angular velocity.
     """
     mechanism, task = end.mechanism, task_of(end.mechanism)
-    if is_at_limit and not asks_too_much(mechanism):
+    if is_at_limit and not has_dependent_coordinates(mechanism):
         return ""
     motions, axes = motions_at(mechanism, end._coordinates), list(task.axes)
     about = task.turning_axes(end.pose) if len(motions) > 3 else np.zeros((0, 3))
@@ -223,8 +223,8 @@ def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> 
     wanted = np.concatenate([velocity[axes], about @ turn])
     left = wanted - able @ np.linalg.lstsq(able, wanted, rcond=TOLERANCES.alignment)[0]
     is_able = bool(np.linalg.norm(left) <= TOLERANCES.stretched * np.linalg.norm(wanted))
-    if asks_too_much(mechanism):
-        return "" if is_able else too_much(mechanism)
+    if has_dependent_coordinates(mechanism):
+        return "" if is_able else task_remark(mechanism)
     if are_stretched(mechanism, end._coordinates).any():
         return STRETCHED
     return "" if is_able else NO_FREEDOM

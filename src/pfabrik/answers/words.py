@@ -12,7 +12,7 @@ from ..arrays import Floats
 from ..closure.first_order import are_stretched, forward_map
 from ..description.joint_types import KINDS
 from ..description.readouts import readouts
-from ..motion.fitting_task import asks_too_much, too_much
+from ..motion.fitting_task import has_dependent_coordinates, task_remark
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -70,8 +70,8 @@ def given_up(answer: Answer) -> list[str]:
 
 def why_without_limits(answer: Answer) -> str:
     """What keeps an answer that no limit holds back from its target, as far as first order tells."""
-    if asks_too_much(answer.mechanism):
-        return too_much(answer.mechanism)
+    if has_dependent_coordinates(answer.mechanism):
+        return task_remark(answer.mechanism)
     inside, outside = missed(answer)
     found = []
     if inside and are_stretched(answer.mechanism, answer._coordinates).any():

@@ -15,7 +15,7 @@ import pfabrik as pf
 
 from ..description.graph_faults import leaves
 from ..errors import InvalidMechanism
-from ..motion.fitting_task import asks_too_much, too_much
+from ..motion.fitting_task import has_dependent_coordinates, task_remark
 from .info import NOT_COUNTED, counted_mobility
 from .mech import MECH, load
 
@@ -76,8 +76,8 @@ def notes(mechanism: Mechanism) -> Iterator[str]:
 
 def task_notes(mechanism: Mechanism) -> Iterator[str]:
     """That a task asks for more than the end effector can do."""
-    if asks_too_much(mechanism):
-        yield f"{too_much(mechanism)}; hardly any target can be reached"
+    if has_dependent_coordinates(mechanism):
+        yield f"{task_remark(mechanism)}; hardly any target can be reached"
 
 
 def angular_widths(joint: Joint) -> Iterator[float]:

@@ -81,7 +81,7 @@ def fitting_tasks(mechanism: Mechanism) -> tuple[FittingTask, ...]:
     return tuple(sorted(sound, key=rank))
 
 
-def asks_too_much(mechanism: Mechanism) -> bool:
+def has_dependent_coordinates(mechanism: Mechanism) -> bool:
     """Whether the task has coordinates that follow from its others, so that hardly any target can be reached.
 
     What is always the same, as a position out of the plane of a planar machine, asks for nothing.
@@ -92,7 +92,7 @@ def asks_too_much(mechanism: Mechanism) -> bool:
     return int(counts.sum()) > generic.mobility.platform < asked
 
 
-def too_much(mechanism: Mechanism) -> str:
+def task_remark(mechanism: Mechanism) -> str:
     """Why hardly any target of a task that asks too much can be reached, and which task fits, in words."""
     tasks, freedoms = fitting_tasks(mechanism), generic_of(mechanism).mobility.platform
     fits = f"a task that fits is {' '.join(tasks[0].words)}" if tasks else "no task fits, for nothing moves"
