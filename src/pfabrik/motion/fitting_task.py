@@ -24,7 +24,7 @@ TURNS: dict[str, tuple[bool, bool, bool]] = {
 }
 """What a task may say of a rotation, in the order of preference -> which rotations that are, about x, y and z."""
 
-POSITION, ALIKE = 0.5, 0.9
+POSITION, ALIKE = 0.25, 0.9
 """Share of the best conditioning from which on the whole position is taken, as users ask for it first; and from which
 on other tasks count as equally good."""
 
