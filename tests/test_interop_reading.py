@@ -773,7 +773,7 @@ def test_a_machine_without_drives_is_refused_with_the_cause_the_flag_and_the_can
     assert "winch (through tendon cable)" in str(caught.value)
     assert "`actuated` (--actuated A,B,...), from the base outward: qa, qb" in str(caught.value)
     assert any("tendons are left out: cable" in note for note in caught.value.__notes__)
-    with pytest.raises(InvalidMechanism, match="no actuator of a joint"):
+    with pytest.raises(InvalidMechanism, match="the model has no actuators"):
         from_mjcf(GEARS.format(equality="", actuator=""), end_effector="b")
     with pytest.raises(InvalidMechanism, match="drives elsewhere only: shoulder"):
         from_urdf(MIMIC.replace("mimic", "x"), base="arm", end_effector="fore")

@@ -91,6 +91,7 @@ def missed(answer: Answer) -> tuple[bool, bool]:
         return True, False
     axes = [axis in mechanism.task for axis in "xyz"]
     offset = (wanted.targets[0] - answer.pose)[:3, 3][axes]
+    offset = offset / (np.abs(offset).max(initial=0.0) or 1.0)  # so that no square is too large
     here = answer._coordinates
     motions = np.hstack(list(forward_map(mechanism, np.concatenate([0.0 * here, here]))[:, :3][:, axes]))
     along = motions @ np.linalg.lstsq(motions, offset, rcond=TOLERANCES.alignment)[0]

@@ -33,7 +33,10 @@ def words(context: click.Context, parameter: click.Parameter, value: str | None)
 )
 @click.option("--fixed", metavar="A,B,...", callback=words, help="Joints to hold where they are.")
 @click.option(
-    "--task", metavar="A,B,...", callback=words, help="What targets set, such as z,tilt. Default: everything."
+    "--task",
+    metavar="A,B,...",
+    callback=words,
+    help="What targets set, such as z,tilt. Default: what the end effector can do.",
 )
 @click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of MuJoCo: home.")
 @click.option("--unit", default="m", show_default=True, help="Unit of length of the mechanism.")

@@ -41,8 +41,9 @@ def from_mjcf(
     """The mechanism in a MuJoCo model.
 
     Hinges, slides, balls and free joints, several on one body too, become joints between bodies; `connect` becomes a
-    ball, two between the same bodies a hinge, `weld` makes two bodies one. Coordinates count as `qpos` does. Of a whole
-    robot, what the end effector's motion against the base does not depend on is left out. The loops are closed, if
+    ball, two between the same bodies a hinge, `weld` makes two bodies one; sites `closing_<name>_1` and
+    `closing_<name>_2` meet in a ball. Coordinates count as `qpos` does. Of a whole robot, what the end effector's
+    motion against the base does not depend on is left out. The loops are closed, if
     they are open, by moving passive joints. Base coordinates are those of the world at the configuration.
 
     Parameters
@@ -56,7 +57,8 @@ def from_mjcf(
     fixed : names of joints to hold where they are.
     configuration : "qpos0", or the name of a keyframe: home.
     length_unit : the unit of the mechanism: "mm", "m", ...; a model has metres.
-    task : what targets set, as of a `Mechanism`. Default: what the file says, else everything.
+    task : what targets set, as of a `Mechanism`. Default: what the file says, else everything or, where the end
+        effector has fewer freedoms, as much of it as can be set independently.
 
     Returns
     -------
@@ -65,7 +67,8 @@ def from_mjcf(
     Raises
     ------
     MissingLibrary : MuJoCo is not installed.
-    InvalidMechanism : no model, or one that cannot be closed or asks for too much, with what and where.
+    InvalidMechanism : no model, or one that cannot be closed or asks for too much, with what and where; joints that
+        follow others where both are there; nothing that is driven. All errors carry the notes so far as `__notes__`.
     UnknownName : a body, joint or keyframe that the model does not have.
     InvalidArgument : no end effector given, and none that is evident.
     """
@@ -100,6 +103,8 @@ def from_mjcf(
 
 def _undriven(root: ET.Element) -> str:
     """Why no joint of a model is driven, where none is."""
+    if root.find("actuator/*") is None:
+        return "the model has no actuators"
     through = [child for child in root.iterfind("actuator/*") if not (child.get("joint") or child.get("jointinparent"))]
     if through:
         return f"actuators that drive no joint itself: {', '.join(map(through_what, through))}"

@@ -64,7 +64,7 @@ def from_urdf(
     Raises
     ------
     MissingLibrary : PyYAML is not installed, and `loops` is a file.
-    InvalidMechanism : no URDF, or one that cannot be closed, with every fault that was found.
+    InvalidMechanism : no URDF, or one that cannot be closed, with every fault that was found; else as of `from_mjcf`.
     UnknownName, InvalidArgument : as of `from_mjcf`.
     """
     root = read_xml(source, "robot")
