@@ -100,7 +100,7 @@ def test_an_imported_machine_reaches_where_mujoco_says_that_it_can_go() -> None:
     assert mechanism.task == ("x", "y", "z")
     notes = "\n".join(map(str, found.notes))
     assert "the end effector has 3 freedoms of 6: targets set x y z, as with `--task x,y,z`" in notes
-    assert not list(filter(has_dependent_coordinates, [mechanism]))
+    assert not has_dependent_coordinates(mechanism)
     begin, _ = model.pose("platform")
     tilted = 0.0
     for values in np.random.default_rng(2).uniform(-0.3, 0.3, (20, 3)):
@@ -150,3 +150,25 @@ def test_what_stops_an_end_effector_where_no_limit_does_is_said() -> None:
     free = pf.load("five_bar").without_limits()
     out = pf.travel(pf.solve_ik(free, free.reference_point), along=[0, 0, 1])[0]
     assert not out.stopped_by and out.cause == "the links are stretched out or folded"
+
+
+def test_a_leg_of_five_freedoms_is_asked_for_all_five_and_other_tasks_are_named() -> None:
+    """Roll, yaw and pitch of a hip, a knee and an ankle that pitches: a position, and where the sole is level to."""
+    hinges = [("roll", "1 0 0", "0 0 1"), ("yaw", "0 0 1", "0 0 -0.1"), ("pitch", "0 1 0", "0.05 0 -0.1")]
+    hinges += [("knee", "0 1 0", "0.1 0 -0.4"), ("ankle", "0 1 0", "-0.1 0 -0.4")]
+    bodies = "".join(
+        f'<body name="b_{name}" pos="{at}"><joint name="{name}" axis="{axis}"/><geom size=".01"/>'
+        for name, axis, at in hinges
+    )
+    motors = "".join(f'<motor joint="{name}"/>' for name, *_ in hinges)
+    text = f"""<mujoco><worldbody>{bodies}<site name="sole" pos="0.05 0.02 -0.1"/>{"</body>" * 5}</worldbody>
+    <actuator>{motors}</actuator></mujoco>"""
+    found = from_mjcf(text, end_effector="sole")
+    mechanism, model = found.mechanism, Model.of(text)
+    assert mechanism.task == ("x", "y", "z", "tilt")
+    assert "--task x,y,z" in "\n".join(map(str, found.notes)).split("other tasks")[1]
+    for values in np.random.default_rng(3).uniform(-0.3, 0.3, (10, 5)):
+        model.lead(mechanism.actuator_names, values)
+        position, rotation = model.pose("b_ankle")
+        placed = position + rotation @ np.array([0.05, 0.02, -0.1])
+        assert pf.solve_ik(mechanism, pf.pose(placed, matrix=rotation))

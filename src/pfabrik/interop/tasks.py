@@ -30,7 +30,7 @@ def with_task(mechanism: Mechanism, is_asked_for: bool, told: list[Note]) -> Mec
     told.append(Note(f"{has}: targets set {' '.join(fits.words)}, as with `--task {fits}`"))
     able = [task for task in others if _is_choice(task, fits)]
     if able:
-        told.append(Note("other tasks that it can do", tuple(" ".join(task.words) for task in able[:MOST_TASKS])))
+        told.append(Note("other tasks that it can do", tuple(f"--task {task}" for task in able[:MOST_TASKS])))
     return mechanism._with(task=fits.words)
 
 

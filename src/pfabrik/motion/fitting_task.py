@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..description.joint_types import TASK_TURNS
-from ..description.mechanism import Mechanism
+from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM, Mechanism
 from ..tolerances import TOLERANCES
 from .first_order import first_order, right_singular
 from .mobility import generic_of
@@ -84,8 +84,11 @@ def fitting_tasks(mechanism: Mechanism) -> tuple[FittingTask, ...]:
 def has_dependent_coordinates(mechanism: Mechanism) -> bool:
     """Whether the task has coordinates that follow from its others, so that hardly any target can be reached.
 
-    What is always the same, as a position out of the plane of a planar machine, asks for nothing.
+    What is always the same, as a position out of the plane of a planar machine, asks for nothing. Of machines with so
+    many joints that counting freedoms takes long, it is not said.
     """
+    if len(mechanism.joints) > MOST_JOINTS_FOR_FREEDOM:
+        return False
     generic = generic_of(mechanism)
     counts = _counted(mechanism.task)[: len(generic.directions)]
     asked = int(np.linalg.matrix_rank(generic.directions[counts], TOLERANCES.alignment))
