@@ -293,7 +293,11 @@ def edited(name: str, *changes: tuple[str, str]) -> str:
 @pytest.mark.parametrize(
     ("name", "changes", "note"),
     [
-        ("3-RPS", [("^task.*$", "")], "the task x y z rotation asks for 6 freedoms, and the end effector has 3"),
+        (
+            "3-RPS",
+            [("^task.*$", "")],
+            "asks for 6 coordinates, of which the mechanism can vary 3 independently: a task that fits is z tilt",
+        ),
         ("5-bar", [(r"range = \[.*\]", "range = [-1, 1]")], "wider than 2 degrees; were radians meant?"),
         ("5-bar", [('angle = "deg"', 'angle = "rad"')], r"were degrees meant?"),
     ],

@@ -60,7 +60,7 @@ def test_check_notes_what_may_not_be_meant(tmp_path: Path) -> None:
     whole = tmp_path / "whole.toml"
     whole.write_text("\n".join(line for line in text.splitlines() if not line.startswith("task")), encoding="utf-8")
     (note,) = printed("check", str(whole))["notes"]
-    assert "asks for 6 freedoms" in note
+    assert "asks for 6 coordinates" in note
 
 
 def test_check_lists_every_fault(tmp_path: Path) -> None:
@@ -89,6 +89,9 @@ def test_ik_and_fk_give_the_fields_of_a_solution() -> None:
     mechanism = pf.load("five_bar")
     answer = pf.solve_ik(mechanism, (0, 10, 180))
     assert printed("ik", "five_bar", "--position", "0", "10", "180") == json.loads(json.dumps(answer.to_dict()))
+    far = printed("ik", "five_bar", "--position", "0", "10", "900", code=1)
+    assert far.pop("reason") == pf.solve_ik(mechanism, (0, 10, 900)).reason != ""
+    assert set(far) == set(answer.to_dict())
     degrees = [str(value) for value in np.degrees(answer.actuators)]
     back = printed("fk", "five_bar", *degrees)
     assert back["status"] == "REACHED"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import pfabrik as pf
+from machines import closure
 from pfabrik.cli import main
 
 
@@ -67,3 +69,17 @@ def test_what_makes_no_sense_is_told_in_a_line(words: list[str], told: str) -> N
     assert result.exit_code == 2
     assert told in result.stderr
     assert "Traceback" not in result.stderr
+
+
+def test_a_machine_without_closed_forms_is_told_of_at_once_and_how_far_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.import_module("pfabrik.cli.workspace"), "SECONDS_A_LINE", 0.0)
+    machine = closure.with_hinges_apart(pf.load("delta").without_limits())
+    pf.save(machine, tmp_path / "apart.toml")
+    asked = ["--fix", "z=-200", "--within", "x=-60:60", "--within", "y=-60:60", "--resolution", "30", "--json"]
+    result = CliRunner().invoke(main, ["workspace", str(tmp_path / "apart.toml"), *asked])
+    assert result.exit_code == 0 and json.loads(result.stdout)["size"] == pytest.approx(120.0**2)
+    first, *lines = result.stderr.splitlines()
+    assert "no closed forms, " in first and "points are tried one by one" in first
+    assert any("workspace: " in line and " of about " in line for line in lines)

@@ -19,7 +19,8 @@ from in_mujoco import Model
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.interop import Imported, Loop, OpenMechanism, assemble, from_mjcf, from_urdf, verify
-from pfabrik.interop.robots import Rates, Robot, mechanism_of
+from pfabrik.interop.driving import Rates
+from pfabrik.interop.robots import Robot, mechanism_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
@@ -86,7 +87,7 @@ def test_a_loop_between_sites_is_closed_and_all_that_is_left_out_is_named() -> N
     assert found.mechanism.actuator_names == ("qL", "qR")
     assert found.mechanism.joint("qL").range == pytest.approx(np.radians([-80, 80]))
     assert chains(found) == ["R*-R", "R*-R-S"]
-    for name in ("geom (2)", "mesh (1)", "cable", "winch", "eL", "finger, qL", "finger", "jointpos"):
+    for name in ("geom (2)", "mesh (1)", "cable", "winch", "eL", "finger = 1 qL", "finger", "jointpos"):
         assert name in told(found), name
     stripped = FIVE_BAR.replace('<geom type="mesh" mesh="m"/>', "").replace('<mesh name="m" file="nowhere.stl"/>', "")
     light = stripped.replace("<body name", "<body gravcomp='1' name").replace(
@@ -679,3 +680,171 @@ def test_a_missing_library_is_told_with_the_command_that_installs_it(monkeypatch
     for words in (("verify", "stewart"),):
         code, _, err = run(*words)
         assert code == 2 and "pip install '.[mujoco]'" in err
+
+
+# Machines whose files say little: no drives, drives through tendons, joints that follow others, loops told by names.
+
+MIMIC = """
+<robot name="geared">
+  <link name="base"/><link name="arm"/><link name="fore"/><link name="finger"/>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="1" velocity="3"/></joint>
+  <joint name="elbow" type="revolute"><parent link="arm"/><child link="fore"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="1" velocity="3"/>
+    <mimic joint="shoulder" multiplier="-0.5" offset="0.1"/></joint>
+  <joint name="grip" type="prismatic"><parent link="fore"/><child link="finger"/><origin xyz="0 0 0.2"/>
+    <axis xyz="0 0 1"/><limit lower="0" upper="0.05" effort="1" velocity="1"/><mimic joint="elbow"/></joint>
+  <transmission name="t"><joint name="shoulder"/></transmission>
+</robot>"""
+
+
+def test_joints_that_follow_each_other_are_refused_with_their_ratio_and_what_to_do() -> None:
+    with pytest.raises(InvalidMechanism) as caught:
+        from_urdf(MIMIC, end_effector="fore")
+    said = str(caught.value)
+    for part in ("joint 'elbow'", "follows 'shoulder' at the ratio -0.5", "elbow = 0.1 + -0.5 shoulder"):
+        assert part in said, part
+    assert "--actuated shoulder,elbow" in said and "--fixed elbow" in said
+    with pytest.raises(InvalidMechanism, match=r"follows 'shoulder' at the ratio -0\.5"):
+        from_urdf(MIMIC, end_effector="finger", fixed=["grip"])
+    both = from_urdf(MIMIC, end_effector="fore", actuated=["elbow", "shoulder"])
+    assert both.mechanism.actuator_names == ("elbow", "shoulder")
+    assert "a coupling is left to who drives these, elbow = 0.1 + -0.5 shoulder" in told(both)
+    held = from_urdf(MIMIC, end_effector="fore", fixed=["elbow"])
+    assert held.mechanism.actuator_names == ("shoulder",) and "elbow = 0.1 + -0.5 shoulder" in told(held)
+
+
+def test_of_coupled_joints_one_alone_is_driven_by_the_drive_of_the_other() -> None:
+    """The forearm against the arm: the elbow turns with the shoulder's motor, wherever that is."""
+    alone = from_urdf(MIMIC, base="arm", end_effector="fore")
+    assert alone.mechanism.actuator_names == ("elbow",)
+    assert "driven through a coupling, elbow = 0.1 + -0.5 shoulder" in told(alone)
+    first = from_urdf(MIMIC, end_effector="arm")
+    assert first.mechanism.actuator_names == ("shoulder",)
+    assert "coupled with joints that are left out, elbow = 0.1 + -0.5 shoulder" in told(first)
+
+
+def test_a_coupling_that_names_no_joint_or_no_number_is_a_fault() -> None:
+    wrong = MIMIC.replace('joint="shoulder" multiplier="-0.5"', 'joint="sholder" multiplier="half"')
+    with pytest.raises(InvalidMechanism, match=r"(?s)mimic.joint: found 'sholder'.*mimic.multiplier: found 'half'"):
+        from_urdf(wrong, end_effector="fore")
+
+
+GEARS = """
+<mujoco><worldbody>
+  <body name="a" pos="0 0 0"><joint name="qa" axis="0 1 0" ref="10"/><geom size=".01"/>
+    <body name="b" pos="0 0 0.2"><joint name="qb" axis="0 1 0"/><geom size=".01"/>
+      <body name="c" pos="0 0 0.2"><joint name="qc" axis="0 1 0"/><geom size=".01"/></body></body></body>
+</worldbody>
+<tendon><fixed name="cable"><joint joint="qa" coef="1"/></fixed></tendon>
+<equality>{equality}</equality><actuator>{actuator}</actuator></mujoco>"""
+
+
+def test_equalities_of_joints_in_a_model_couple_hold_or_rest() -> None:
+    motor = '<motor joint="qa"/>'
+    coupling = (
+        '<joint joint1="qb" joint2="qa" polycoef="0 3 0 0 0"/><joint joint1="qc" joint2="qb" polycoef="0 2 0 0 0"/>'
+    )
+    with pytest.raises(InvalidMechanism) as caught:
+        from_mjcf(GEARS.format(equality=coupling, actuator=motor), end_effector="c")
+    assert {fault.place for fault in caught.value.faults} == {"joint 'qb'", "joint 'qc'"}
+    assert "follows 'qa' at the ratio 3" in str(caught.value) and "follows 'qa' at the ratio 6" in str(caught.value)
+    bent = GEARS.format(equality='<joint joint1="qb" joint2="qa" polycoef="0 0 1 0 0"/>', actuator=motor)
+    with pytest.raises(InvalidMechanism, match=r"at no fixed ratio \(qb = .*1 qa\^2\)"):
+        from_mjcf(bent, end_effector="b")
+    resting = GEARS.format(equality='<joint joint1="qb" joint2="qa" active="false"/>', actuator=motor)
+    assert "an equality that is not active is left out, of: qb, qa" in told(from_mjcf(resting, end_effector="c"))
+    held = from_mjcf(GEARS.format(equality='<joint joint1="qb"/>', actuator=motor), end_effector="c")
+    assert "an equality holds these where they are: qb" in told(held)
+    assert [joint.name for joint in held.mechanism.joints] == ["qa", "qc"]
+
+
+def test_a_factor_of_a_coupling_counts_from_where_its_joints_count() -> None:
+    """MuJoCo counts both from the reference: with qa at 10 degrees there, qb = 3 (qa - 10 deg)."""
+    coupled = GEARS.format(
+        equality='<joint joint1="qb" joint2="qa" polycoef="0 3 0 0 0"/>', actuator='<motor joint="qa"/>'
+    )
+    found = from_mjcf(coupled, base="a", end_effector="b")
+    assert f"qb = {-3 * np.radians(10):.6g} + 3 qa" in told(found)
+
+
+def test_a_machine_without_drives_is_refused_with_the_cause_the_flag_and_the_candidates() -> None:
+    through = GEARS.format(equality="", actuator='<motor name="winch" tendon="cable"/>')
+    with pytest.raises(InvalidMechanism) as caught:
+        from_mjcf(through, end_effector="b")
+    assert "winch (through tendon cable)" in str(caught.value)
+    assert "`actuated` (--actuated A,B,...), from the base outward: qa, qb" in str(caught.value)
+    assert any("tendons are left out: cable" in note for note in caught.value.__notes__)
+    with pytest.raises(InvalidMechanism, match="the model has no actuators"):
+        from_mjcf(GEARS.format(equality="", actuator=""), end_effector="b")
+    with pytest.raises(InvalidMechanism, match="drives elsewhere only: shoulder"):
+        from_urdf(MIMIC.replace("mimic", "x"), base="arm", end_effector="fore")
+    with pytest.raises(InvalidMechanism, match="no transmission"):
+        from_urdf(MIMIC.replace("transmission", "x").replace("mimic", "x"), end_effector="fore")
+
+
+def test_the_command_says_what_it_noted_before_it_refuses(tmp_path: Path) -> None:
+    (tmp_path / "winch.xml").write_text(GEARS.format(equality="", actuator='<motor name="winch" tendon="cable"/>'))
+    code, out, err = run("import", str(tmp_path / "winch.xml"), "--end-effector", "b")
+    assert (code, out) == (2, "")
+    assert "note: tendons are left out: cable" in err and "--actuated" in err and "qa, qb" in err
+
+
+CLOSING = """
+<robot name="closing">
+  <link name="base"/><link name="left"/><link name="right"/><link name="fore_left"/><link name="fore_right"/>
+  <link name="closing_tip_1"/><link name="closing_tip_2"/>
+  <joint name="m1" type="continuous"><parent link="base"/><child link="left"/><origin xyz="-0.05 0 0"/>
+    <axis xyz="0 1 0"/></joint>
+  <joint name="m2" type="continuous"><parent link="base"/><child link="right"/><origin xyz="0.05 0 0"/>
+    <axis xyz="0 1 0"/></joint>
+  <joint name="p1" type="continuous"><parent link="left"/><child link="fore_left"/><origin xyz="-0.05 0 0.1"/>
+    <axis xyz="0 1 0"/></joint>
+  <joint name="p2" type="continuous"><parent link="right"/><child link="fore_right"/><origin xyz="0.05 0 0.1"/>
+    <axis xyz="0 1 0"/></joint>
+  <joint name="f1" type="fixed"><parent link="fore_left"/><child link="closing_tip_1"/>
+    <origin xyz="0.1 0 0.1"/></joint>
+  <joint name="f2" type="fixed"><parent link="fore_right"/><child link="closing_tip_2"/>
+    <origin xyz="-0.1 0 0.1"/></joint>
+</robot>"""
+
+
+def along(name: str, parent: str, at: str) -> str:
+    """A frame off along a hinge's axis, as exports have it."""
+    return (
+        f'<link name="{name}"/><joint name="{name}_frame" type="fixed"><parent link="{parent}"/><child link="{name}"/>'
+        f'<origin xyz="{at}"/></joint></robot>'
+    )
+
+
+def test_frames_that_are_called_closing_close_loops_as_a_second_file_does() -> None:
+    asked = {"end_effector": "fore_left", "actuated": ["m1", "m2"]}
+    table = {"loops": [{"name": "closing_tip", "frames": ["closing_tip_1", "closing_tip_2"], "type": "ball"}]}
+    named, written = from_urdf(CLOSING, **asked), from_urdf(CLOSING, table, **asked)
+    assert "as balls: closing_tip" in told(named) and "closing frames" not in told(written)
+    assert named.mechanism == written.mechanism
+    assert named.mechanism.joint("closing_tip").at == pytest.approx((0, 0, 0.2))
+    hinged = CLOSING.replace("</robot>", along("closing_tip_1_z", "fore_left", "0.1 0.1 0.1"))
+    hinged = hinged.replace("</robot>", along("closing_tip_2_z", "fore_right", "-0.1 0.1 0.1"))
+    hinge = from_urdf(hinged, **asked).mechanism.joint("closing_tip")
+    assert hinge.type == "revolute" and np.abs(hinge.axis) == pytest.approx((0, 1, 0))
+    tip = from_urdf(CLOSING, end_effector="closing_tip", actuated=["m1", "m2"]).mechanism
+    assert tip.task == ("x", "z") and pf.solve_ik(tip, [0.01, 0.0, 0.21])
+    alone = from_urdf(CLOSING.replace("closing_tip_2", "closing_top_2"), end_effector="fore_left", actuated=["m1"])
+    assert "closes no loop: closing_tip_1, closing_top_2" in told(alone)
+
+
+def test_sites_that_are_called_closing_close_loops_with_and_without_an_equality() -> None:
+    sites = FIVE_BAR.replace("tip_left", "closing_t_1").replace("tip_right", "closing_t_2")
+    asked = {"base": "frame", "end_effector": "fore_left", "task": ["x", "z"]}
+    equality = '<connect name="tip" site1="closing_t_1" site2="closing_t_2"/>'
+    with_it, without = from_mjcf(sites, **asked), from_mjcf(sites.replace(equality, ""), **asked)
+    assert "closing frames" not in told(with_it) and "as balls: closing_t" in told(without)
+    assert with_it.mechanism.joint("tip").at == pytest.approx(without.mechanism.joint("closing_t").at)
+    assert pf.solve_fk(without.mechanism, [0.1, -0.1]).pose == pytest.approx(
+        pf.solve_fk(with_it.mechanism, [0.1, -0.1]).pose
+    )
+    resting = from_mjcf(
+        sites.replace(equality, equality.replace("/>", ' active="false"/>')), actuated=["qL", "eL"], **asked
+    )
+    assert "not active is left out: tip" in told(resting) and "closing frames" not in told(resting)

@@ -306,8 +306,9 @@ def test_a_travel_is_a_sequence_that_becomes_json() -> None:
             "direction": [1.0, 0.0, 0.0],
             "distance": found.distances[0],
             "stopped_by": [{"joint": "P0", "bound": "max"}],
+            "cause": "",
         },
-        {"kind": "along", "direction": [0.0, 1.0, 0.0], "distance": None, "stopped_by": []},
+        {"kind": "along", "direction": [0.0, 1.0, 0.0], "distance": None, "stopped_by": [], "cause": ""},
     ]
 
 

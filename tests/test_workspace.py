@@ -23,6 +23,7 @@ from machines import closure
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument, PfabrikError
 from pfabrik.workspace.border import groups_of
+from pfabrik.workspace.verdicts import Question
 
 Array = NDArray[np.float64]
 
@@ -467,3 +468,26 @@ def test_a_window_is_looked_at_however_far_from_the_start_it_is() -> None:
     far = 9.0 * machine.characteristic_length
     found = pf.workspace(machine, within={"x": (far, far + 1.0)})
     np.testing.assert_allclose(found.bounds, [[far, -1.0], [far + 1.0, 1.0]], atol=0.05)
+
+
+def test_what_no_closed_form_answers_is_explored_to_the_workspace_of_what_it_nearly_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    exact = struts_only(pf.load("delta"))
+    apart = closure.with_hinges_apart(exact)
+    asked = {"fixed": {"z": -200.0}, "resolution": 15.0}
+    begin = np.array([0.0, 0.0])
+    with monkeypatch.context() as patched:
+        patched.setattr(Question, "_answers", None)  # what projects all that is out of reach
+        explored = pf.workspace(apart, **asked)
+        assert pf.workspace(apart, **asked, executor=NoExecutor()).size == explored.size
+    known = pf.workspace(exact, **asked)
+    assert explored.size == pytest.approx(known.size, rel=2e-3)
+    assert explored.bounds == pytest.approx(known.bounds, abs=0.5)
+    assert {limit for limit, share in explored.shares.items() if share > 0.05} == {(f"A{k}", "max") for k in (1, 2, 3)}
+    assert len(explored.components) == 1 and explored.at_start is not None
+    assert bool(explored.contains(begin)) and bool(known.contains(begin))
+
+
+class NoExecutor(Executor):
+    """One that nothing is handed to."""

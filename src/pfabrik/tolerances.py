@@ -35,6 +35,8 @@ class Tolerances:
     implied : singular value [L and rad] up to which a condition of the loops at home follows from the others exactly:
         rounding leaves 1e-15. From 1e-11 on, searches for nearest poses take conditions that miss each other for ones
         to keep, and stop early.
+    independent : conditioning [L and rad] below which coordinates of a task hardly vary independently: in machines that
+        are made to set them they have 0.3 and more, and parasitic motions leave a few hundredths.
     speed : share by which an actuator may be faster than its limit: a path that just keeps it must not be refused for
         the rounding of its answers.
     rank : sine or singular value [L and rad] up to which a direction of motion counts as lost at a configuration: its
@@ -64,6 +66,7 @@ class Tolerances:
     alignment: float = 1e-6
     nearly_implied: float = 1e-3
     implied: float = 1e-12
+    independent: float = 5e-2
     same_mode: float = 1e-5
     speed: float = 1e-6
     rank: float = 1e-9

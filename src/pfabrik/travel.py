@@ -13,7 +13,7 @@ from .answers.limits import ActiveLimit, active_limits
 from .answers.solution import Solution, checked_solution
 from .answers.status import Status
 from .answers.table import aligned, plain
-from .answers.words import short_names
+from .answers.words import NO_FREEDOM, STRETCHED, short_names
 from .arrays import Floats, Mask
 from .closure.first_order import are_stretched
 from .description.mechanism import Mechanism
@@ -22,6 +22,7 @@ from .description.task import task_of
 from .engine import engine_of
 from .errors import InvalidArgument, counted
 from .kernels.rows import REACHED
+from .motion.fitting_task import has_dependent_coordinates, motions_at, task_remark
 from .poses import as_floats
 from .rotations import from_rotvec
 from .tolerances import TOLERANCES
@@ -53,6 +54,8 @@ class Reach:
     stopped_by : the limits met there, and which of their bounds; empty where the links are stretched out, or nothing
         stops it.
     end : the last configuration on the way; None where nothing stops it.
+    cause : in words, what stops it where no limit does: the links are stretched out, the mechanism has no freedom that
+        way, or its task asks for more than it can do, on whatever limits it is there; else empty.
     """
 
     kind: Literal["along", "about"]
@@ -60,17 +63,12 @@ class Reach:
     distance: float
     stopped_by: tuple[ActiveLimit, ...]
     end: Solution | None
+    cause: str = ""
 
     @property
     def why(self) -> str:
         """What stops it, in a few words; empty where nothing does."""
-        if self.stopped_by or self.end is None:
-            return short_names(self.stopped_by)
-        unit = 1.0 if self.kind == "about" else self.end.mechanism.characteristic_length
-        is_stretched = self.distance > 2.0 * TOLERANCES.position * unit
-        if not is_stretched:
-            is_stretched = bool(are_stretched(self.end.mechanism, self.end._coordinates).any())
-        return "links stretched" if is_stretched else "no freedom that way"
+        return self.cause or short_names(self.stopped_by)
 
 
 @dataclass(frozen=True, repr=False)
@@ -102,15 +100,26 @@ class Travel(Sequence[Reach]):
         return f"<Travel of '{self.origin.mechanism.name}': {counted(len(self), 'direction')}>"
 
     def __str__(self) -> str:
-        """A table of them, angles in degrees."""
-        return aligned(_HEADER, self._rows())
+        """A table of them, angles in degrees, and what stops it where no limit does."""
+        return "\n\n".join([aligned(_HEADER, self._rows()), *self._remarks()])
 
     def _repr_html_(self) -> str:
         """The same for notebooks."""
-        return card(self.origin.mechanism.name, ["how far the end effector can go"], _HEADER, self._rows(), "")
+        return card(
+            self.origin.mechanism.name, ["how far the end effector can go", *self._remarks()], _HEADER, self._rows(), ""
+        )
 
     def _rows(self) -> list[tuple[str, ...]]:
-        return [(*_direction(each), *self._distance(each), each.why) for each in self]
+        return [(*_direction(each), *self._distance(each), self._in_short(each.cause) or each.why) for each in self]
+
+    def _in_short(self, cause: str) -> str:
+        """A cause that there is room for in a table; what else there is to say of the task is said below it."""
+        return "the task" if cause in self._remarks() else cause
+
+    def _remarks(self) -> list[str]:
+        """What there is no room for in a table."""
+        said = task_remark(self.origin.mechanism)
+        return [said] if any(each.cause == said for each in self) else []
 
     def _distance(self, reach: Reach) -> tuple[str, str]:
         """How far it is, and the unit: degrees about an axis."""
@@ -130,6 +139,7 @@ class Travel(Sequence[Reach]):
                 "direction": list(reach.direction),
                 "distance": reach.distance if np.isfinite(reach.distance) else None,
                 "stopped_by": [{"joint": limit.joint, "bound": limit.bound} for limit in reach.stopped_by],
+                "cause": reach.cause,
             }
             for reach in self
         ]
@@ -194,8 +204,32 @@ def travel(
         bounded = np.isfinite(distance)
         stop, end = (named[row], ends[row]) if bounded else ((), None)
         x, y, z = direction
-        reaches.append(Reach(kind, (x, y, z), distance, stop, end))
+        cause = "" if end is None else _cause(end, bool(stop), *search.twist(row, end.pose))
+        reaches.append(Reach(kind, (x, y, z), distance, stop, end, cause))
     return Travel(solution, tuple(reaches))
+
+
+def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> str:
+    """What stops an end effector besides limits, as far as first order tells: where it is at one, that may be the task.
+
+    Parameters
+    ----------
+    velocity, turn : how it would go on, (3,) each: velocity of the reference point [L], and angular velocity.
+    """
+    mechanism, task = end.mechanism, task_of(end.mechanism)
+    if is_at_limit and not has_dependent_coordinates(mechanism):
+        return ""
+    motions, axes = motions_at(mechanism, end._coordinates), list(task.axes)
+    about = task.turning_axes(end.pose) if len(motions) > 3 else np.zeros((0, 3))
+    able = np.concatenate([motions[:3][axes], about @ motions[3:] if len(about) else motions[:0]])
+    wanted = np.concatenate([velocity[axes], about @ turn])
+    left = wanted - able @ np.linalg.lstsq(able, wanted, rcond=TOLERANCES.alignment)[0]
+    is_able = bool(np.linalg.norm(left) <= TOLERANCES.stretched * np.linalg.norm(wanted))
+    if has_dependent_coordinates(mechanism):
+        return "" if is_able else task_remark(mechanism)
+    if are_stretched(mechanism, end._coordinates).any():
+        return STRETCHED
+    return "" if is_able else NO_FREEDOM
 
 
 def _lines(mechanism: Mechanism, along: ArrayLike | None, default: bool) -> Floats:
@@ -295,6 +329,13 @@ class _Search:
             near[near > farthest] = np.inf
             moving = moving[np.isfinite(near[moving]) & (step[moving] > SHORTEST * units[moving])]
         return near
+
+    def twist(self, row: int, pose: Floats) -> tuple[Floats, Floats]:
+        """How the end effector goes on in a direction at a pose (4, 4): its velocity [L], and its angular velocity."""
+        direction = self.directions[row]
+        if not self._turns[row]:
+            return direction, np.zeros(3)
+        return np.cross(direction, pose[:3, 3] - self._pivot) / self._length, direction
 
     def _go_on(self, which: NDArray[np.intp], distances: Floats) -> Mask:
         """Whether poses so far out in some directions are reached; where they are, the next go on from them."""

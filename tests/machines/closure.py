@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pfabrik import Cone, Joint, Mechanism
+from pfabrik.description.home_mobility import universal_axes
 
 from .positions import ring
 
@@ -773,3 +774,17 @@ ON_ARMS: dict[str, Callable[[], Mechanism]] = {
     "6-RRPS": offset_cardans,
 }
 """Machines with legs on arms that follow from their poses."""
+
+
+def with_hinges_apart(delta: Mechanism) -> Mechanism:
+    """A delta whose universal joints are two hinges, a hundredth of a millimetre apart: no closed forms answer it."""
+    joints: list[Joint] = []
+    for joint in delta.joints:
+        if joint.type != "universal":
+            joints.append(joint)
+            continue
+        at, (first, second), cross = np.array(joint.at), universal_axes(delta, joint), f"{joint.name}:cross"
+        joints.append(Joint(f"{joint.name}a", "revolute", (joint.connects[0], cross), at=at, axis=first))
+        off = at + [0.01, 0.0, 0.01]
+        joints.append(Joint(f"{joint.name}b", "revolute", (cross, joint.connects[1]), at=off, axis=second))
+    return Mechanism("apart", joints, "platform", delta.reference_point, length_unit="mm", task=delta.task)

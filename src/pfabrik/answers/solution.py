@@ -14,6 +14,7 @@ from ..kernels.rows import REACHED
 from .answer import Answer
 from .notebook import answer_html
 from .status import Status
+from .words import as_sentence, causes, given_up
 
 _AlongAxis: TypeAlias = int | slice | EllipsisType | Sequence[int] | NDArray[np.integer] | NDArray[np.bool_]
 Index: TypeAlias = _AlongAxis | tuple[_AlongAxis, ...]
@@ -53,6 +54,26 @@ class Solution(Answer):
         batch, one tuple a row, in row order. A projected answer may lie on other limits too; were one of those a little
         wider, it would not come nearer. Where a chain is at full stretch there may be none.
     """
+
+    @property
+    def reason(self) -> str:
+        """Why one target is not reached, in words: the limits that hold the answer back, or what does where none is
+        active, such as a task that asks for more than the mechanism can do; empty where it is reached.
+
+        Raises
+        ------
+        TypeError : a batch; its rows have one each: `solution[row].reason`.
+        """
+        if self.shape != ():
+            raise TypeError("a batch has a reason a row: solution[row].reason")
+        if self:
+            return ""
+        sentence = as_sentence(self)
+        return (
+            "; ".join([*given_up(self), *causes(self)])
+            if self.status == Status.PROJECTED and self._wanted
+            else sentence
+        )
 
     def __bool__(self) -> bool:
         """Whether the target, or every target of the batch, is REACHED."""

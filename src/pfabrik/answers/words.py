@@ -12,12 +12,17 @@ from ..arrays import Floats
 from ..closure.first_order import are_stretched, forward_map
 from ..description.joint_types import KINDS
 from ..description.readouts import readouts
+from ..motion.fitting_task import has_dependent_coordinates, task_remark
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
     from .answer import Answer
     from .limits import ActiveLimit
+
+
+STRETCHED, NO_FREEDOM = "the links are stretched out or folded", "the mechanism has no freedom that way"
+"""What stops an end effector where no limit does."""
 
 
 def as_sentence(answer: Answer, asked: Floats | None = None) -> str:
@@ -37,11 +42,15 @@ def as_sentence(answer: Answer, asked: Floats | None = None) -> str:
         why = reasons(answer) or ["no limit is active: no configuration with these values was found"]
         return "; ".join([f"projected: {actuator_distance(answer, asked)} from the values asked for", *why])
     if status == "projected":
-        why = reasons(answer) or [f"no limit is active: {why_without_limits(answer)}"]
-        return "; ".join([f"projected: {distance(answer)} from the target", *given_up(answer), *why])
+        return "; ".join([f"projected: {distance(answer)} from the target", *given_up(answer), *causes(answer)])
     if status == "exceeded":
         return f"exceeded: assembled, but beyond limits: {by_bound(exceeded(answer))}"
     return f"{status}: no feasible configuration found; {what_is_wrong(answer)}"
+
+
+def causes(answer: Answer) -> list[str]:
+    """What keeps a projected answer to a target from it: the limits, or what does where none is active."""
+    return reasons(answer) or [f"no limit is active: {why_without_limits(answer)}"]
 
 
 def given_up(answer: Answer) -> list[str]:
@@ -61,12 +70,14 @@ def given_up(answer: Answer) -> list[str]:
 
 def why_without_limits(answer: Answer) -> str:
     """What keeps an answer that no limit holds back from its target, as far as first order tells."""
+    if has_dependent_coordinates(answer.mechanism):
+        return task_remark(answer.mechanism)
     inside, outside = missed(answer)
     found = []
     if inside and are_stretched(answer.mechanism, answer._coordinates).any():
-        found.append("the links are stretched out or folded")
+        found.append(STRETCHED)
     if outside:
-        found.append("the mechanism has no freedom that way")
+        found.append(NO_FREEDOM)
     return ", and ".join(found) or "nothing nearer was found"
 
 
@@ -80,6 +91,7 @@ def missed(answer: Answer) -> tuple[bool, bool]:
         return True, False
     axes = [axis in mechanism.task for axis in "xyz"]
     offset = (wanted.targets[0] - answer.pose)[:3, 3][axes]
+    offset = offset / (np.abs(offset).max(initial=0.0) or 1.0)  # so that no square is too large
     here = answer._coordinates
     motions = np.hstack(list(forward_map(mechanism, np.concatenate([0.0 * here, here]))[:, :3][:, axes]))
     along = motions @ np.linalg.lstsq(motions, offset, rcond=TOLERANCES.alignment)[0]

@@ -14,20 +14,14 @@ import numpy as np
 import pfabrik as pf
 
 from ..description.graph_faults import leaves
-from ..description.joint_types import TASK_TURNS
 from ..description.rods import odd_rods, uneven_rods, with_lengths
-from ..description.task import task_of
 from ..errors import InvalidMechanism, counted
-from ..motion.mobility import generic_of
-from ..tolerances import TOLERANCES
+from ..motion.fitting_task import has_dependent_coordinates, task_remark
 from .info import NOT_COUNTED, counted_mobility, nearly_free
 from .mech import MECH, load
 
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
-
-COUNTS = {"x": 1, "y": 1, "z": 1, **TASK_TURNS}
-"""Freedoms that each part of a task asks for."""
 
 FULL_TURN = 2.0 * math.pi
 
@@ -67,12 +61,12 @@ def check(mech: str, as_json: bool) -> int:
 
 def notes(mechanism: Mechanism) -> Iterator[str]:
     """What a description says that its author may not have meant."""
-    counted = counted_mobility(mechanism)
-    if counted is None:
+    mobility = counted_mobility(mechanism)
+    if mobility is None:
         yield f"freedoms are {NOT_COUNTED}: whether they suffice for the task is not known"
     else:
-        yield from task_notes(mechanism, counted.platform)
-        yield from (f"the loops hardly resist a motion of {nearly_free(each)}" for each in counted.nearly_free)
+        yield from task_notes(mechanism)
+        yield from (f"the loops hardly resist a motion of {nearly_free(each)}" for each in mobility.nearly_free)
     for _, joint, body in leaves(mechanism):
         yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
     yield from rod_notes(mechanism)
@@ -98,18 +92,10 @@ def rod_notes(mechanism: Mechanism) -> Iterator[str]:
         yield f"{what} {with_lengths(odd, unit)}: the {len(others)} others alike are {length} long"
 
 
-def task_notes(mechanism: Mechanism, there: int) -> Iterator[str]:
-    """Whether a task asks for more than the end effector can do, which has so many freedoms."""
-    asked, task = sum(COUNTS[part] for part in mechanism.task), task_of(mechanism)
-    directions = generic_of(mechanism).directions
-    turns = [task.rotations > 1, task.rotations > 1, task.rotations > 0]
-    counts = [*task.axes, *turns][: len(directions)]  # of a joint end effector, three
-    twists = directions[counts]
-    if asked > there < np.linalg.matrix_rank(twists, TOLERANCES.alignment):  # not always the same, as in a plane
-        yield (
-            f"the task {' '.join(mechanism.task)} asks for {counted(asked, 'freedom')}, and the end effector has "
-            f"{there}, from which the others follow: hardly any target can be reached; `task` says which count"
-        )
+def task_notes(mechanism: Mechanism) -> Iterator[str]:
+    """That a task asks for more than the end effector can do."""
+    if has_dependent_coordinates(mechanism):
+        yield f"{task_remark(mechanism)}; hardly any target can be reached"
 
 
 def angular_widths(joint: Joint) -> Iterator[float]:

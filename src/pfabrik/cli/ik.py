@@ -58,7 +58,7 @@ def ik(
         return list_modes(mechanism, target, as_json)
     solution = pf.solve_ik(mechanism, target, options=options_projecting(hold, projection))
     if as_json:
-        answer = solution.to_dict()
+        answer = solution.to_dict() | ({} if solution else {"reason": solution.reason})
         if with_margins:
             from ..answers.margins import nearest_first
 

@@ -10,6 +10,7 @@ import click
 
 import pfabrik as pf
 
+from ..errors import PfabrikError
 from .group import complain
 from .outputs import OUTPUT, STANDARD, check_outputs, refuse_existing
 from .whole import whole_file
@@ -33,7 +34,10 @@ def words(context: click.Context, parameter: click.Parameter, value: str | None)
 )
 @click.option("--fixed", metavar="A,B,...", callback=words, help="Joints to hold where they are.")
 @click.option(
-    "--task", metavar="A,B,...", callback=words, help="What targets set, such as z,tilt. Default: everything."
+    "--task",
+    metavar="A,B,...",
+    callback=words,
+    help="What targets set, such as z,tilt. Default: what the end effector can do.",
 )
 @click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of MuJoCo: home.")
 @click.option("--unit", default="m", show_default=True, help="Unit of length of the mechanism.")
@@ -48,7 +52,12 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) 
     """
     refuse_existing(output, force)
     check_outputs([("-o", output)], [file])
-    found = imported(file, **asked)
+    try:
+        found = imported(file, **asked)
+    except PfabrikError as error:
+        for note in getattr(error, "__notes__", []):
+            complain(note)
+        raise
     from ..files import dumps
 
     name = "".join(letter for letter in file.name if letter.isprintable())

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import sys
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +20,7 @@ from ..extras import require
 from ..view.saving import PICTURES
 from ..workspace.saving import ENDINGS
 from .finite import FINITE, is_finite
+from .group import complain
 from .mech import MECH, load
 from .outputs import STANDARD, check_outputs
 from .picture import picture
@@ -25,10 +28,14 @@ from .target import Triple
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
+    from ..telling import OnProgress
     from ..workspace.inscribed import Inscribed, Kind
     from ..workspace.result import Workspace
 
 MOST_LIMITS = 12
+
+SECONDS_A_LINE = 5.0
+"""Between two lines that tell how far it is."""
 
 
 @click.command()
@@ -89,6 +96,7 @@ def workspace(
     turned = None if rpy is None else pf.pose([0, 0, 0], rpy=rpy, degrees=True)[:3, :3]
     held = {name: value for name, (value,) in pairs("--fix", fixed, 1).items()}
     names = None if over is None else over.split(",")
+    note_slow(mechanism)
     found = pf.workspace(
         mechanism,
         over=names,
@@ -97,6 +105,7 @@ def workspace(
         tilt=None if tilt is None else math.radians(tilt),
         within={name: (low, high) for name, (low, high) in pairs("--within", within, 2).items()} or None,
         resolution=None if resolution is None else in_its_unit(mechanism, names, held, resolution),
+        on_progress=None if sys.stderr.isatty() else told_in_lines(),
     )
     middle = None if centre is None else point(found, centre)
     shape = None if largest is None else found.inscribed(largest, middle)
@@ -104,6 +113,28 @@ def workspace(
         write(found, path)
     click.echo(json.dumps(plain_object(found, shape), allow_nan=False) if as_json else describe(found, shape))
     return 0 if len(found.faces) else 1
+
+
+def note_slow(mechanism: Mechanism) -> None:
+    """Say at once that it takes longer where no closed forms answer, and why."""
+    from ..decomposition.leg_table import LegTable, table_of_poses
+
+    table = table_of_poses(mechanism)
+    if not isinstance(table, LegTable):
+        complain(f"note: no closed forms, {table}: points are tried one by one, for about a minute")
+
+
+def told_in_lines() -> OnProgress:
+    """What tells how far it is where no terminal shows a bar: a line on stderr every few seconds."""
+    last = time.monotonic()
+
+    def tell(done: int, total: int) -> None:
+        nonlocal last
+        if time.monotonic() - last >= SECONDS_A_LINE:
+            last = time.monotonic()
+            complain(f"workspace: {done} of about {total} points")
+
+    return tell
 
 
 def pairs(option: str, words: Sequence[str], n: int) -> dict[str, list[float]]:

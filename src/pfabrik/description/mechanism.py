@@ -216,8 +216,12 @@ class Mechanism(Structure):
 
     def _with_joints(self, joints: Iterable[Joint]) -> Mechanism:
         """A checked copy; freedoms do not depend on limits, so it does not warn of them again."""
+        return self._with(joints=tuple(joints))
+
+    def _with(self, **changes: Any) -> Mechanism:
+        """A checked copy with other fields that freedoms do not depend on."""
         copy = object.__new__(Mechanism)
-        set_fields(copy, **(self.__getstate__() | {"joints": tuple(joints)}))
+        set_fields(copy, **(self.__getstate__() | changes))
         copy._check()
         return copy
 

@@ -20,7 +20,7 @@ from ..motion.displacements import centres, columns, displacements, screws
 from ..tolerances import TOLERANCES
 from .closing import CLOSED, Closer, Placed, bounds, closed
 from .digits import worst
-from .opened import ROWS, Note, OpenMechanism
+from .opened import ROWS, Note, OpenMechanism, noting
 from .simplify import simplified, without_twins
 from .straighten import straightened
 
@@ -61,6 +61,11 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
     if not isinstance(opened, OpenMechanism):
         raise InvalidArgument("opened", type(opened).__name__, "an OpenMechanism")
     told = list(notes)
+    with noting(told):
+        return _assembled(opened, told)
+
+
+def _assembled(opened: OpenMechanism, told: list[Note]) -> Imported:
     closer = Closer(opened)
     gap = closer.gap(np.zeros(closer.count))
     placed, opened = _placed(opened, closer, told)

@@ -24,9 +24,8 @@ from ..description.coercion import numbers
 from ..description.form_faults import is_numbers, key_faults, shown
 from ..errors import Fault, InvalidArgument, InvalidMechanism, near_miss
 from ..extras import require
-from ..rotations import square_to
 from .digits import Rounding, digits_of, worst
-from .opened import Loop, LoopType
+from .opened import Loop, LoopType, frame_along
 from .xml_reading import fault, require_file
 
 LARGEST = 1_000_000
@@ -197,15 +196,8 @@ def _loop(
     turned = np.array([frames[link][:3, :3] for link in links])
     if kind == "revolute":
         axes = np.array(entry.get("axis", [[0, 0, 1]] * 2), dtype=float)
-        turned = turned @ np.array([_about(axis) for axis in axes])
+        turned = turned @ np.array([frame_along(axis) for axis in axes])
     return Loop(name, kind, (links[0], links[1]), points, None if kind == "spherical" else turned)
-
-
-def _about(axis: Floats) -> Floats:
-    """A frame (3, 3) whose third column is along an axis."""
-    across = square_to(axis)[0]
-    third = axis / np.linalg.norm(axis)
-    return np.column_stack([across, np.cross(third, across), third])
 
 
 def _entry_faults(

@@ -21,6 +21,7 @@ KEPT: dict[str, tuple[str, ...]] = {
     "site": ("name", "class", "type", "size", "fromto", *PLACE),
     "connect": ("name", "body1", "body2", "anchor", "site1", "site2", "active"),
     "weld": ("name", "body1", "body2", "anchor", "relpose", "site1", "site2", "active", "torquescale"),
+    "joint of equality": ("name", "joint1", "joint2", "polycoef", "active"),
     "key": ("name", "qpos"),
 }
 """Elements that say something of the kinematics, and those of their attributes that do."""
@@ -32,6 +33,9 @@ REFUSED = {
     "flexcomp": "a flexible body",
 }
 """Elements that make bodies in a way that is not followed."""
+
+TRANSMISSIONS = ("tendon", "site", "body", "slidersite", "cranksite")
+"""What an actuator may drive in place of a joint."""
 
 MOST_COPIES = 1000
 """Most copies that `replicate` may make, of copies too."""
@@ -57,13 +61,14 @@ def plain_model(root: ET.Element, told: list[Note]) -> ET.Element:
         elif section.tag == "actuator":
             plain.append(_actuators(section, told))
         elif section.tag in ("tendon", "contact", "deformable", "sensor"):
-            names = tuple(child.get("name", f"a {child.tag}") for child in section)
+            nameless = Counter(child.tag for child in section if not child.get("name"))
+            names = (*filter(None, (child.get("name") for child in section)), *_counted(nameless))
             if names:
                 told.append(Note(f"{section.tag}s are left out", names))
         elif section.tag == "asset":
             left.update(child.tag for child in section)
     compiler.attrib |= {"boundmass": "1", "boundinertia": "1"}  # what moves has a mass; which one does not matter
-    shown = [f"{tag} ({count})" for tag, count in sorted(left.items()) if tag not in UNTOLD]
+    shown = _counted(Counter({tag: count for tag, count in left.items() if tag not in UNTOLD}))
     if shown:
         told.append(Note("left out, for they do not move anything", tuple(shown)))
     springs = tuple(joint.get("name", "a joint") for joint in root.iter("joint") if _number(joint, "stiffness"))
@@ -84,6 +89,11 @@ def compiled(text: str) -> Any:
     return model
 
 
+def _counted(tags: Counter[str]) -> list[str]:
+    """Elements that have no names, or too many: ``geom (30)``."""
+    return [f"{tag} ({count})" for tag, count in sorted(tags.items())]
+
+
 def _kept(element: ET.Element, left: Counter[str], tags: tuple[str, ...] = tuple(KEPT), copies: int = 1) -> ET.Element:
     """An element with what counts of it and inside it."""
     if element.tag == "replicate":
@@ -101,20 +111,18 @@ def _kept(element: ET.Element, left: Counter[str], tags: tuple[str, ...] = tuple
     return kept
 
 
-def _attributes(element: ET.Element) -> dict[str, str]:
-    return {key: value for key, value in element.attrib.items() if key in KEPT.get(element.tag, ())}
+def _attributes(element: ET.Element, kind: str | None = None) -> dict[str, str]:
+    """Attributes that are kept: of an element of a kind, or of its tag."""
+    known = KEPT.get(kind or "", KEPT.get(element.tag, ()))
+    return {key: value for key, value in element.attrib.items() if key in known}
 
 
 def _equalities(section: ET.Element, told: list[Note]) -> ET.Element:
-    """Those that close loops; couplings of joints and the rest are told."""
+    """Those that close loops, and those that couple joints; the rest is told."""
     kept = ET.Element("equality")
     for child in section:
-        if child.tag in ("connect", "weld"):
-            kept.append(ET.Element(child.tag, _attributes(child)))
-        elif child.tag == "joint":
-            pair = tuple(child.get(key, "") for key in ("joint1", "joint2") if child.get(key))
-            what = "a coupling is left out: these joints move freely" if len(pair) > 1 else "is not held where it was"
-            told.append(Note(what, pair))
+        if child.tag in ("connect", "weld", "joint"):
+            kept.append(ET.Element(child.tag, _attributes(child, f"{child.tag} of equality")))
         else:
             told.append(Note(f"an equality of a {child.tag} is left out", (child.get("name", "without a name"),)))
     return kept
@@ -128,8 +136,15 @@ def _actuators(section: ET.Element, told: list[Note]) -> ET.Element:
         if joint:
             ET.SubElement(kept, "general", joint=joint)
         else:
-            told.append(Note("an actuator of no joint is left out", (child.get("name", f"a {child.tag}"),)))
+            told.append(Note("an actuator that drives no joint itself is left out", (through_what(child),)))
     return kept
+
+
+def through_what(actuator: ET.Element) -> str:
+    """Name of an actuator, and what it drives: ``winch (through tendon cable)``."""
+    name = actuator.get("name", f"a {actuator.tag}")
+    ways = [f"{what} {actuator.get(what)}" for what in TRANSMISSIONS if actuator.get(what)]
+    return f"{name} (through {' and '.join(ways)})" if ways else name
 
 
 def _number(element: ET.Element, key: str) -> float:

@@ -10,17 +10,20 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from ..arrays import Floats
-from ..description.joints import Cone, Joint
+from ..checks import require_names
+from ..description.joints import Joint
 from ..errors import UnknownName
 from ..extras import require
 from .assembling import Imported
+from .closing_frames import closing_loops
+from .couplings import Coupling
 from .cuts import unique
 from .digits import Rounding, worst
 from .mjcf_digits import ModelDigits
-from .mjcf_plain import compiled, plain_model
-from .mjcf_writing import NOTE
-from .opened import Loop, LoopType, Note
-from .robots import Rates, Robot, mechanism_of
+from .mjcf_notes import own_notes
+from .mjcf_plain import compiled, plain_model, through_what
+from .opened import Loop, LoopType, Note, noting
+from .robots import Robot, mechanism_of
 from .xml_reading import fault, read_xml
 
 AXES = "xyz"
@@ -40,8 +43,9 @@ def from_mjcf(
     """The mechanism in a MuJoCo model.
 
     Hinges, slides, balls and free joints, several on one body too, become joints between bodies; `connect` becomes a
-    ball, two between the same bodies a hinge, `weld` makes two bodies one. Coordinates count as `qpos` does. Of a whole
-    robot, what the end effector's motion against the base does not depend on is left out. The loops are closed, if
+    ball, two between the same bodies a hinge, `weld` makes two bodies one; sites `closing_<name>_1` and
+    `closing_<name>_2` meet in a ball. Coordinates count as `qpos` does. Of a whole robot, what the end effector's
+    motion against the base does not depend on is left out. The loops are closed, if
     they are open, by moving passive joints. Base coordinates are those of the world at the configuration.
 
     Parameters
@@ -55,7 +59,8 @@ def from_mjcf(
     fixed : names of joints to hold where they are.
     configuration : "qpos0", or the name of a keyframe: home.
     length_unit : the unit of the mechanism: "mm", "m", ...; a model has metres.
-    task : what targets set, as of a `Mechanism`. Default: what the file says, else everything.
+    task : what targets set, as of a `Mechanism`. Default: what the file says, else everything or, where the end
+        effector has fewer freedoms, as much of it as can be set independently.
 
     Returns
     -------
@@ -64,22 +69,49 @@ def from_mjcf(
     Raises
     ------
     MissingLibrary : MuJoCo is not installed.
-    InvalidMechanism : no model, or one that cannot be closed or asks for too much, with what and where.
+    InvalidMechanism : no model, or one that cannot be closed or asks for too much, with what and where; joints that
+        follow others where both are there; nothing that is driven. All errors carry the notes so far as `__notes__`.
     UnknownName : a body, joint or keyframe that the model does not have.
     InvalidArgument : no end effector given, and none that is evident.
     """
     require("reading a MuJoCo model", "mujoco", "mujoco")
     root = read_xml(source, "mujoco")
     told: list[Note] = []
-    model = _Model(plain_model(root, told), configuration)
-    own, places = _own_notes(root), model.places()
-    site = places.get(own.pop("reference_point", ""))
-    if site is not None and own.get("end_effector") in places:
-        places[own["end_effector"]] = (own["end_effector"], site[1])
-    joints, loops = list(model.joints(told)), list(model.loops(told))
-    name, roundings = root.get("model", "mechanism"), model.roundings
-    robot = Robot(name, joints, loops, model.body(0), places, order=model.driven, roundings=roundings, **own)
-    return mechanism_of(robot, told, base, end_effector, actuated, fixed, length_unit, task)
+    with noting(told):
+        model = _Model(plain_model(root, told), configuration)
+        own, places = own_notes(root), model.places()
+        site = places.get(own.pop("reference_point", ""))
+        if site is not None and own.get("end_effector") in places:
+            places[own["end_effector"]] = (own["end_effector"], site[1])
+        joints, loops = list(model.joints(told)), list(model.loops(told))
+        taken = [*(each.name for each in joints), *(each.name for each in loops)]
+        named = closing_loops(places, [*loops, *model.resting()], taken, told)
+        coarsest = worst(model.roundings.values())
+        couplings = tuple(model.couplings(told))
+        robot = Robot(
+            root.get("model", "mechanism"),
+            joints,
+            [*loops, *named],
+            model.body(0),
+            places,
+            order=model.driven,
+            roundings=model.roundings | {loop.name: coarsest for loop in named},
+            couplings=couplings,
+            undriven=_undriven(root),
+            **own,
+        )
+        held = [*require_names("fixed", fixed), *model.held(told)]
+        return mechanism_of(robot, told, base, end_effector, actuated, held, length_unit, task)
+
+
+def _undriven(root: ET.Element) -> str:
+    """Why no joint of a model is driven, where none is."""
+    if root.find("actuator/*") is None:
+        return "the model has no actuators"
+    through = [child for child in root.iterfind("actuator/*") if not (child.get("joint") or child.get("jointinparent"))]
+    if through:
+        return f"actuators that drive no joint itself: {', '.join(map(through_what, through))}"
+    return "no actuator of a joint"
 
 
 class _Model:
@@ -166,22 +198,58 @@ class _Model:
 
     def loops(self, told: list[Note]) -> Iterator[Loop]:
         """Every equality that holds: two points, or two frames, that are to meet."""
-        model = self.model
-        taken = {self.joint(index) for index in range(model.njnt)}
-        resting = []
-        for index in range(model.neq):
-            weld = model.eq_type[index] == self._mujoco.mjtEq.mjEQ_WELD
-            name = unique(str(model.eq(index).name) or f"closure_{index + 1}", taken)
-            if not model.eq_active0[index]:
-                resting.append(name)
-                continue
-            bodies, points, frames = self._sides(index, weld)
-            self.roundings[name] = self._rounding(index, weld)
-            only_point = not weld or model.eq_data[index, 10] == 0.0
-            kind: LoopType = "spherical" if only_point else "fixed"
-            yield Loop(name, kind, bodies, points, None if only_point else frames)
+        resting = tuple(loop.name for loop in self.resting())
+        yield from self._equalities(True)
         if resting:
-            told.append(Note("an equality that is not active is left out", tuple(resting)))
+            told.append(Note("an equality that is not active is left out", resting))
+
+    def resting(self) -> Iterator[Loop]:
+        """Every equality that would close a loop, but is not active."""
+        return self._equalities(False)
+
+    def _equalities(self, active: bool) -> Iterator[Loop]:
+        """Every equality of points or frames that is active, or not."""
+        model, kinds = self.model, self._mujoco.mjtEq
+        taken = {self.joint(index) for index in range(model.njnt)}
+        for index in range(model.neq):
+            kind = kinds(int(model.eq_type[index]))
+            if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+                continue
+            weld = kind == kinds.mjEQ_WELD
+            name = unique(str(model.eq(index).name) or f"closure_{index + 1}", taken)
+            if bool(model.eq_active0[index]) == active:
+                bodies, points, frames = self._sides(index, weld)
+                self.roundings[name] = self._rounding(index, weld)
+                only_point = not weld or model.eq_data[index, 10] == 0.0
+                closed: LoopType = "spherical" if only_point else "fixed"
+                yield Loop(name, closed, bodies, points, None if only_point else frames)
+
+    def couplings(self, told: list[Note]) -> Iterator[Coupling]:
+        """Every active equality of two joints, as coordinates count."""
+        resting = []
+        for one, other, factors, active in self._joint_equalities():
+            if other >= 0 and active:
+                y, x = (float(self.model.qpos0[self.model.jnt_qposadr[joint]]) for joint in (one, other))
+                begin = y + factors[0] - factors[1] * x  # factors count from the reference; higher ones stay with it
+                yield Coupling(self.joint(one), self.joint(other), (begin, *factors[1:]))
+            elif not active:
+                resting += [self.joint(joint) for joint in (one, other) if joint >= 0]
+        if resting:
+            told.append(Note("an equality that is not active is left out, of", tuple(resting)))
+
+    def held(self, told: list[Note]) -> list[str]:
+        """Joints that an equality keeps where they are."""
+        names = [self.joint(one) for one, other, _, active in self._joint_equalities() if other < 0 and active]
+        if names:
+            told.append(Note("an equality holds these where they are", tuple(names)))
+        return names
+
+    def _joint_equalities(self) -> Iterator[tuple[int, int, tuple[float, ...], bool]]:
+        """The two joints of an equality, the second -1 where there is none, its factors, and whether it is active."""
+        model = self.model
+        for index in np.flatnonzero(model.eq_type == self._mujoco.mjtEq.mjEQ_JOINT):
+            factors = tuple(model.eq_data[index, :5].tolist())
+            yield int(model.eq_obj1id[index]), int(model.eq_obj2id[index]), factors, bool(model.eq_active0[index])
 
     def _sides(self, index: int, weld: bool) -> tuple[tuple[str, str], Floats, Floats]:
         """The two bodies of an equality, the point (2, 3) and the frame (2, 3, 3) on each."""
@@ -219,24 +287,3 @@ class _Model:
             for i in range(model.nsite)
         }
         return sites | {self.body(i): (self.body(i), data.xpos[i].copy()) for i in range(model.nbody)}
-
-
-def _own_notes(root: ET.Element) -> dict[str, Any]:
-    """What this library wrote of a mechanism that MuJoCo has no word for."""
-    texts = {text.get("name", ""): text.get("data", "") for text in root.iterfind("custom/text")}
-    own = {name.removeprefix(NOTE): data for name, data in texts.items() if name.startswith(NOTE)}
-    found: dict[str, Any] = {key: own[key] for key in ("base", "end_effector", "reference_point") if key in own}
-    if "task" in own:
-        found["task"] = tuple(own["task"].split())
-    cones = {
-        name.removeprefix("cone."): data.split(maxsplit=4) for name, data in own.items() if name.startswith("cone.")
-    }
-    found["cones"] = {
-        name: Cone(list(map(float, parts[:3])), float(parts[3]), parts[4]) for name, parts in cones.items()
-    }
-    fast, pushed = (
-        {name.removeprefix(what): float(data) for name, data in own.items() if name.startswith(what)}
-        for what in ("max_speed.", "max_acceleration.")
-    )
-    found["rates"] = {name: Rates(fast.get(name), pushed.get(name)) for name in {**fast, **pushed}}
-    return found

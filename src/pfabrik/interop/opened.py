@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -12,7 +13,8 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 from ..description.joints import Cone, Joint, Vector
 from ..description.structure import Structure
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, PfabrikError
+from ..rotations import square_to
 from .digits import Rounding
 
 LoopType = Literal["spherical", "revolute", "fixed"]
@@ -101,6 +103,13 @@ class OpenMechanism:
         return Structure(self.name, self.joints, body, reference, self.base, self.length_unit)
 
 
+def frame_along(axis: Floats) -> Floats:
+    """A frame (3, 3) whose third column is along an axis (3,) of any length but zero."""
+    across = square_to(axis)[0]
+    third = axis / np.linalg.norm(axis)
+    return np.column_stack([across, np.cross(third, across), third])
+
+
 @dataclass(frozen=True)
 class Note:
     """Something that an import left out, changed, or found, with the names of what it is about."""
@@ -110,3 +119,16 @@ class Note:
 
     def __str__(self) -> str:
         return f"{self.what}: {', '.join(self.names)}" if self.names else self.what
+
+
+@contextmanager
+def noting(told: list[Note]) -> Iterator[None]:
+    """Have an error carry what was noted before it, as `__notes__`."""
+    try:
+        yield
+    except PfabrikError as error:
+        there = getattr(error, "__notes__", [])
+        for note in told:
+            if f"note: {note}" not in there:
+                error.add_note(f"note: {note}")
+        raise

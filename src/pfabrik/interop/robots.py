@@ -4,33 +4,30 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats
 from ..checks import require_names
 from ..description.graph import welded
-from ..description.joint_types import KINDS, TASK_COORDINATES
+from ..description.joint_types import KINDS
 from ..description.joints import Cone, Joint
-from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument, UnknownName, counted
+from ..errors import InvalidArgument, UnknownName
 from ..files.units import metres_of
-from ..motion.mobility import generic_of
 from .assembling import Imported, assemble
+from .couplings import Coupling, coupled
 from .cuts import unique
 from .digits import Rounding
+from .driving import Rates, as_driven, require_drives
 from .opened import Loop, Note, OpenMechanism
 from .pruning import prune
+from .tasks import with_task
 
-
-class Rates(NamedTuple):
-    """The highest speed and acceleration of a coordinate, None where not known."""
-
-    speed: float | None = None
-    acceleration: float | None = None
+MOST_NAMES = 24
+"""Most candidates that a refusal lists."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +43,8 @@ class Robot:
     order : coordinates that are driven, in the order of the actuators; those that are not named come behind.
     rates : coordinate -> its highest speed and acceleration [rad or m, per s and per s^2], None where not known.
     roundings : joint or loop -> how exactly the digits of the file place it [m, rad].
+    couplings : joints that follow others.
+    undriven : what the file has in place of driven joints, for the refusal of a machine without any.
     """
 
     name: str
@@ -60,6 +59,8 @@ class Robot:
     order: Sequence[str] = ()
     rates: Mapping[str, Rates] = field(default_factory=dict)
     roundings: Mapping[str, Rounding] = field(default_factory=dict)
+    couplings: Sequence[Coupling] = ()
+    undriven: str = "none in the file"
 
 
 def mechanism_of(
@@ -74,14 +75,16 @@ def mechanism_of(
 ) -> Imported:
     """The mechanism between the base and the end effector of a robot, its loops closed; asked for as of `from_mjcf`."""
     metres = metres_of(length_unit)
-    robot = _driven(_locked(robot, fixed), actuated)
+    chosen = () if actuated is None else require_names("actuated", actuated)
+    robot = _driven(_locked(robot, fixed), None if actuated is None else chosen)
     base = _base(robot, base)
     end_effector = _end_effector(robot, end_effector, base, told)
     tip, point = _place(robot, end_effector)
     as_told = (base, end_effector) == (robot.base, robot.end_effector)
     joints, loops, cones = _merged(robot, base, tip)
+    couplings = robot.couplings
     if point is not None:
-        joints, loops = _not_called(tip, joints, loops, told)
+        joints, loops, couplings = _not_called(tip, joints, loops, couplings, told)
     opened = OpenMechanism(
         robot.name,
         tuple(_in_unit(joint, metres) for joint in joints),
@@ -94,46 +97,12 @@ def mechanism_of(
         cones,
         {name: Rounding(each.length / metres, each.angle) for name, each in robot.roundings.items()},
     )
-    found = assemble(prune(opened, told), told)
-    mechanism = _as_driven(found.mechanism, robot, metres)
-    return dataclasses.replace(found, mechanism=mechanism, notes=(*found.notes, *_of_task(mechanism)))
-
-
-def _as_driven(mechanism: Mechanism, robot: Robot, metres: float) -> Mechanism:
-    """With its actuators in the order of the file, and as fast as it says."""
-    place = {name: index for index, name in enumerate(robot.order)}
-    drives = {joint.name: [each for each in mechanism.drives if each.joint is joint] for joint in mechanism.joints}
-
-    def rank(joint: Joint) -> int:
-        return min(place.get(drive.name, len(place)) for drive in drives[joint.name])
-
-    def most(joint: Joint, what: int) -> tuple[float, ...] | float | None:
-        found = []
-        for drive in drives[joint.name]:
-            value = robot.rates.get(drive.name, Rates())[what]
-            if value is None:
-                return None
-            found.append(value if drive.kind == "angle" else value / metres)
-        return tuple(found) if len(found) > 1 else found[0]
-
-    def rated(joint: Joint) -> Joint:
-        rates: dict[str, Any] = {"max_speed": most(joint, 0), "max_acceleration": most(joint, 1)}
-        return dataclasses.replace(joint, **rates)
-
-    driven = iter(sorted((joint for joint in mechanism.joints if joint.driven), key=rank))
-    return mechanism._with_joints(rated(next(driven)) if joint.driven else joint for joint in mechanism.joints)
-
-
-def _of_task(mechanism: Mechanism) -> Iterator[Note]:
-    """That targets set more than the end effector can do, where nobody has said what they are to set."""
-    freedoms = generic_of(mechanism).mobility.platform
-    whole = 3 if mechanism.end_effector_is_joint else 6
-    if mechanism.task == mechanism.whole_task and freedoms < whole:
-        coordinates = ", ".join(TASK_COORDINATES)
-        yield Note(
-            f"the end effector has {counted(freedoms, 'freedom')} of {whole}: "
-            f"`task` says which of {coordinates} targets set"
-        )
+    opened = coupled(prune(opened, told), joints, couplings, chosen, told)
+    require_drives(opened, robot.joints, robot.undriven)
+    found = assemble(opened, told)
+    notes = list(found.notes)
+    mechanism = with_task(as_driven(found.mechanism, robot.order, robot.rates, metres), opened.task is not None, notes)
+    return dataclasses.replace(found, mechanism=mechanism, notes=tuple(notes))
 
 
 def _names(what: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
@@ -191,7 +160,9 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str, told: list[
     touching = Counter(body for pair in pairs for body in pair if body != base)
     counts = touching.most_common()
     if not loops or len(counts) < 2 or counts[0][1] == counts[1][1]:
-        raise InvalidArgument("end_effector", "none, and no body where most legs meet", f"one of {', '.join(touching)}")
+        raise InvalidArgument(
+            "end_effector", "none, and no body where most legs meet", f"one of {', '.join(touching)} (--end-effector)"
+        )
     told.append(Note("taken for the end effector, for most joints meet there", (counts[0][0],)))
     return counts[0][0]
 
@@ -223,14 +194,18 @@ def _merged(robot: Robot, base: str, tip: str) -> tuple[list[Joint], list[Loop],
     return joints, [loop for loop in loops if loop.connects[0] != loop.connects[1]], cones
 
 
-def _not_called(tip: str, joints: list[Joint], loops: list[Loop], told: list[Note]) -> tuple[list[Joint], list[Loop]]:
+def _not_called(
+    tip: str, joints: list[Joint], loops: list[Loop], couplings: Sequence[Coupling], told: list[Note]
+) -> tuple[list[Joint], list[Loop], Sequence[Coupling]]:
     """With another name for a joint that is called as the end effector, a body."""
     taken = {tip, *(joint.name for joint in joints), *(loop.name for loop in loops)}
     name = unique(f"{tip}_joint", taken)
-    if any(each.name == tip for each in joints) or any(each.name == tip for each in loops):
-        told.append(Note(f"a joint is called as the end effector, '{tip}', and here", (name,)))
+    if tip not in [*(each.name for each in joints), *(each.name for each in loops)]:
+        return joints, loops, couplings
+    told.append(Note(f"a joint is called as the end effector, '{tip}', and here", (name,)))
     renamed = [dataclasses.replace(each, name=name) if each.name == tip else each for each in joints]
-    return renamed, [dataclasses.replace(each, name=name) if each.name == tip else each for each in loops]
+    loops = [dataclasses.replace(each, name=name) if each.name == tip else each for each in loops]
+    return renamed, loops, [each.renamed(tip, name) for each in couplings]
 
 
 def _in_unit(joint: Joint, metres: float) -> Joint:

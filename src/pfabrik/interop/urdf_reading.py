@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -10,14 +11,18 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from ..arrays import Floats
+from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..errors import Fault, InvalidMechanism
 from ..rotations import from_rpy, square_to
 from .assembling import Imported
-from .digits import FEWEST, NOTHING, Rounding, digits_of
+from .closing_frames import closing_loops
+from .couplings import Coupling
+from .digits import FEWEST, NOTHING, Rounding, digits_of, worst
+from .driving import Rates
 from .loops_file import LoopsFile, read_loops
-from .opened import Note
-from .robots import Rates, Robot, mechanism_of
+from .opened import Note, noting
+from .robots import Robot, mechanism_of
 from .xml_reading import fault, read_xml
 
 UNTOLD = ("link", "joint", "transmission", "material", "gazebo")
@@ -45,7 +50,8 @@ def from_urdf(
     source : the path of a URDF file, or its text.
     loops : the path of a YAML file, or what such a file holds: which links meet where, and which joints are driven; in
         the plain form of the documentation, or that of Gepetto's example-parallel-robots (`closed_loop`, `type`,
-        `name_mot`).
+        `name_mot`). Frames that are called `closing_<name>_1` and `closing_<name>_2` meet in balls, or in hinges where
+        there are frames of the same names with `_z` behind them, unless this file says how they meet.
     base : the link that rests. Default: the root.
     end_effector : a link, or a joint or loop (whose centre is moved). Default: the link at which most joints meet.
     actuated : names of the joints that are driven, in the order of the actuators; a `velocity` that is not 0 is their
@@ -59,29 +65,57 @@ def from_urdf(
     Raises
     ------
     MissingLibrary : PyYAML is not installed, and `loops` is a file.
-    InvalidMechanism : no URDF, or one that cannot be closed, with every fault that was found.
+    InvalidMechanism : no URDF, or one that cannot be closed, with every fault that was found; else as of `from_mjcf`.
     UnknownName, InvalidArgument : as of `from_mjcf`.
     """
     root = read_xml(source, "robot")
     told: list[Note] = []
-    closing = read_loops(loops)
-    links = _Links(root, closing)
-    joints = [part for element in links.joints for part in links.parts(element, told)]
-    unknown = tuple(name for name in (*closing.retyped, *closing.actuated) if name not in links.link_of)
-    if unknown:
-        told.append(Note("told of in the loops, but no joint of the robot", unknown))
-    driven = [name for name in closing.actuated if name in links.link_of] or _with_transmission(root)
-    actuated = driven if actuated is None else actuated
-    robot = Robot(
-        root.get("name", "mechanism"),
-        joints,
-        closing.loops(links.frames, links.link_of),
-        links.root,
-        {link: (link, frame[:3, 3]) for link, frame in links.frames.items()},
-        rates={element.get("name", ""): Rates(_speed(element)) for element in links.joints},
-        roundings=links.roundings | closing.roundings(links.of_links, links.frames, links.link_of),
-    )
-    return mechanism_of(robot, told, base, end_effector, actuated, fixed, length_unit, task)
+    with noting(told):
+        closing = read_loops(loops)
+        links = _Links(root, closing)
+        driven = _with_transmission(root)
+        joints = [
+            dataclasses.replace(part, actuated=part.name in driven and KINDS[part.type].actuatable)
+            for element in links.joints
+            for part in links.parts(element, told)
+        ]
+        unknown = tuple(name for name in (*closing.retyped, *closing.actuated) if name not in links.link_of)
+        if unknown:
+            told.append(Note("told of in the loops, but no joint of the robot", unknown))
+        own = [name for name in closing.actuated if name in links.link_of]
+        places = {link: (link, frame[:3, 3]) for link, frame in links.frames.items()}
+        frames = {joint: places[link] for joint, link in links.link_of.items()} | places
+        told_of = closing.loops(links.frames, links.link_of)
+        taken = [*links.link_of, *(loop.name for loop in told_of)]
+        named = closing_loops(frames, told_of, taken, told)
+        roundings = links.roundings | closing.roundings(links.of_links, links.frames, links.link_of)
+        coarsest = worst(roundings.values())
+        robot = Robot(
+            root.get("name", "mechanism"),
+            joints,
+            [*told_of, *named],
+            links.root,
+            places,
+            order=driven,
+            rates={element.get("name", ""): Rates(_speed(element)) for element in links.joints},
+            roundings=roundings | {loop.name: coarsest for loop in named},
+            couplings=tuple(_couplings(links.joints)),
+            undriven="no transmission, and no motor in a file of loops",
+        )
+        return mechanism_of(
+            robot, told, base, end_effector, own or None if actuated is None else actuated, fixed, length_unit, task
+        )
+
+
+def _couplings(joints: Iterable[ET.Element]) -> Iterator[Coupling]:
+    """Joints that mimic others."""
+    for joint in joints:
+        mimic = joint.find("mimic")
+        if mimic is not None:
+            factors = (
+                float(_numbers(mimic, key, default)[0]) for key, default in (("offset", "0"), ("multiplier", "1"))
+            )
+            yield Coupling(joint.get("name", ""), mimic.get("joint", ""), tuple(factors))
 
 
 class _Links:
@@ -195,8 +229,19 @@ def _faults(root: ET.Element) -> Iterator[Fault]:
                 count = 3 if key in ("xyz", "rpy") else 1
                 if not _is_numbers(text, count):
                     yield Fault(f"{place}.{element.tag}.{key}", f"'{text}'", f"{count} numbers; xacro files want xacro")
+        yield from _mimic_faults(place, joint.find("mimic"), names)
         if joint.get("type") not in ("fixed", "floating") and not _axis(joint).any():
             yield Fault(f"{place}.axis", "no direction", "three numbers, not all zero")
+
+
+def _mimic_faults(place: str, mimic: ET.Element | None, names: Sequence[str]) -> Iterator[Fault]:
+    if mimic is None:
+        return
+    if mimic.get("joint", "") not in names:
+        yield Fault(f"{place}.mimic.joint", f"'{mimic.get('joint', '')}'", "a joint of the robot")
+    for key in ("multiplier", "offset"):
+        if not _is_numbers(mimic.get(key, "0"), 1):
+            yield Fault(f"{place}.mimic.{key}", f"'{mimic.get(key)}'", "a number")
 
 
 def _is_numbers(text: str, count: int) -> bool:

@@ -66,7 +66,9 @@ def workspace(
         forms answer; halved where a workspace would be smaller than 24 cells.
     start : a single Solution or joint vector q: whose working mode is meant, and what hangs together with it is
         `at_start`; default home.
-    executor : of `concurrent.futures`, or one like it: where points are measured; default: here, on all cores.
+    executor : of `concurrent.futures`, or one like it: where points are measured; default: here, on all cores. Where no
+        closed forms answer, points are explored here, each from one that is within reach, and what is apart from
+        these is found where some of 96 points that are spread over each look at the rest are within it.
     on_progress : called with (points done, points in all, about); default: a bar on a terminal, if it takes more than
         two seconds.
 

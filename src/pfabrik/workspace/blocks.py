@@ -35,12 +35,15 @@ class Measure:
         self.total = 0
         self._done = 0
         self._executor, self._on_progress = executor, on_progress
-        self._sent = b"" if executor is None else pickle.dumps(question)
+        self._explorer = question.explorer()
+        self._sent = b"" if executor is None or self._explorer is not None else pickle.dumps(question)
         slower = 1 if question.has_margins else SLOWER
         self._points_a_block = max(1, POSES_A_BLOCK // (slower * len(question.turns)))
 
     def __call__(self, points: Floats) -> tuple[Floats, Ints]:
         """Margins and bindings of points (n, d), as of `Question.measure`."""
+        if self._explorer is not None:
+            return self.question.explored(points, self._explorer, self._tell)
         blocks = [points[i : i + self._points_a_block] for i in range(0, len(points), self._points_a_block)]
         if self._executor is None:
             found = [self._told(self.question.measure(block), len(block)) for block in blocks]
@@ -68,11 +71,19 @@ class Measure:
             for future in futures:
                 future.cancel()
 
+    def name_limits(self, points: Floats) -> Ints:
+        """Which limits points (n, d) just beyond the border are beyond, as of `Question.name_limits`."""
+        return self.question.name_limits(points, self._explorer)
+
     def _told(self, found: tuple[Floats, Ints], n: int) -> tuple[Floats, Ints]:
+        self._tell(n)
+        return found
+
+    def _tell(self, n: int) -> None:
+        """Tell that so many points more are known about."""
         self._done += n
         if self._on_progress is not None:
             self._on_progress(self._done, max(self._done, self.total))
-        return found
 
 
 def measure_block(sent: bytes, points: Floats) -> tuple[Floats, Ints]:

@@ -186,7 +186,7 @@ def crossings(
         halve[rows] = far[rows] - near[rows] > 0.5 * wide
     unknown = np.flatnonzero(limits < 0) if measure.question.has_margins else np.arange(len(inner))
     if len(unknown):
-        limits[unknown] = measure.question.name_limits((inner + far[:, None] * (outer - inner))[unknown])
+        limits[unknown] = measure.name_limits((inner + far[:, None] * (outer - inner))[unknown])
     return inner + near[:, None] * (outer - inner), limits
 
 

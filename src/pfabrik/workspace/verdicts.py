@@ -11,12 +11,17 @@ from ..answers.limits import active_limits
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats, Ints, Mask
+from ..closure.solve import ClosureEngine
+from ..configuration import configuration
 from ..decomposition.leg_table import LegTable, table_of_poses
 from ..description.mechanism import Mechanism
+from ..engine import engine_of
 from ..feasibility import feasibility
 from ..ik import solve_ik
+from ..motion.displacements import home_coordinates
 from ..options import Options
 from ..tolerances import TOLERANCES
+from .exploring import Explorer, Tell
 from .orientations import least_of_all
 from .space import Space
 
@@ -64,11 +69,35 @@ class Question:
         own = _known_limits(self.mechanism, self.has_margins)
         return own + tuple((name, bound) for name in self.space.names for bound in ("min", "max"))
 
+    def explorer(self) -> Explorer | None:
+        """What explores from the start, where points are asked for one by one, and it can."""
+        engine = engine_of(self.mechanism)
+        if self.has_margins or self.hold == "position" or len(self.turns) > 1 or not isinstance(engine, ClosureEngine):
+            return None
+        home = home_coordinates(self.mechanism)
+        start = configuration(self.mechanism, home)._found if self.start is None else self.start._found
+        at = self.space.start
+        return Explorer(engine, start, self.space.poses(at[None])[0], at / self._lengths)
+
+    def explored(self, points: Floats, explorer: Explorer, tell: Tell) -> tuple[Floats, Ints]:
+        """As `measure`, from what was within reach before."""
+        reached, _ = explorer.explore(self.space.poses(points), points / self._lengths, tell)
+        margins, bindings = np.where(reached, INSIDE, OUTSIDE), np.full(len(points), self._unknown)
+        return self._cut(points, margins, bindings)
+
     def measure(self, points: Floats) -> tuple[Floats, Ints]:
         """Margins (n,) of points (n, d), negative beyond reach, and which of `limits` each is of; -1 for none."""
-        margins, bindings = least_of_all(self.turns, self.space.poses(points), self._of_poses)
+        return self._cut(points, *least_of_all(self.turns, self.space.poses(points), self._of_poses))
+
+    @property
+    def _lengths(self) -> Floats:
+        """What one is of each coordinate, (d,) [length or rad]: L of a length."""
+        return np.where(self.space.is_angle, 1.0, self.mechanism.characteristic_length)
+
+    def _cut(self, points: Floats, margins: Floats, bindings: Ints) -> tuple[Floats, Ints]:
+        """Margins and bindings with the ends of what is looked at."""
         first = len(_known_limits(self.mechanism, self.has_margins))
-        lengths = np.where(self.space.is_angle, 1.0, self.mechanism.characteristic_length)
+        lengths = self._lengths
         for axis, column in enumerate(points.T):
             for side, end in enumerate((self.lowest[axis], self.highest[axis])):
                 if np.isfinite(end):
@@ -98,18 +127,26 @@ class Question:
     def _unknown(self) -> int:
         return len(_known_limits(self.mechanism, self.has_margins)) - 1
 
-    def name_limits(self, points: Floats) -> Ints:
+    def name_limits(self, points: Floats, explorer: Explorer | None = None) -> Ints:
         """Which of `limits` points (n, d) just beyond the border are beyond, (n,)."""
-        margins, bindings = self.measure(points)
+        margins, bindings = self.measure(points) if explorer is None else self.explored(points, explorer, _untold)
         if self.has_margins or len(self.turns) > 1:
             return bindings
         rows = np.flatnonzero((margins < 0.0) & (bindings == self._unknown))
-        answers, _ = self._answers(self.space.poses(points[rows]))
+        poses = self.space.poses(points[rows])
+        if explorer is None:
+            coordinates = self._answers(poses)[0]._coordinates
+        else:
+            coordinates = explorer.explore(poses, points[rows] / self._lengths, _untold)[1]
         place = {limit: index for index, limit in enumerate(_known_limits(self.mechanism, self.has_margins))}
-        for row, held in zip(rows.tolist(), active_limits(self.mechanism, answers._coordinates), strict=True):
+        for row, held in zip(rows.tolist(), active_limits(self.mechanism, coordinates), strict=True):
             if held:
                 bindings[row] = place[held[0].joint, held[0].bound]
         return bindings
+
+
+def _untold(done: int) -> None:
+    """What is looked at again counts for nothing."""
 
 
 def _known_limits(mechanism: Mechanism, has_margins: bool) -> Limits:

@@ -1,0 +1,65 @@
+"""What is driven of a robot: the order of its drives, how fast they are, and what is said where there are none."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from ..description.joint_types import KINDS
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
+from ..errors import Fault, InvalidMechanism
+from .opened import OpenMechanism
+
+
+class Rates(NamedTuple):
+    """The highest speed and acceleration of a coordinate, None where not known."""
+
+    speed: float | None = None
+    acceleration: float | None = None
+
+
+def require_drives(opened: OpenMechanism, joints: Sequence[Joint], undriven: str) -> None:
+    """A fault where nothing is driven of what there is between base and end effector: why, and what could be.
+
+    Parameters
+    ----------
+    joints, undriven : all joints of the robot, and what its file has in place of driven ones.
+    """
+    if any(joint.driven for joint in opened.joints):
+        return
+    elsewhere = [joint.name for joint in joints if joint.driven]
+    why = f"drives elsewhere only: {', '.join(elsewhere)}" if elsewhere else undriven
+    able = [joint for joint in opened.joints if KINDS[joint.type].actuatable]
+    able.sort(key=lambda joint: opened.base not in joint.connects)
+    names = ", ".join(joint.name for joint in able) or "none, for nothing here can be driven"
+    expected = f"the driven joints by name, `actuated` (--actuated A,B,...), from the base outward: {names}"
+    raise InvalidMechanism(
+        [Fault("actuated joints", f"none between '{opened.base}' and '{opened.end_effector}': {why}", expected)]
+    )
+
+
+def as_driven(mechanism: Mechanism, order: Sequence[str], rates: Mapping[str, Rates], metres: float) -> Mechanism:
+    """With its actuators in the order of the file, and as fast as it says."""
+    place = {name: index for index, name in enumerate(order)}
+    drives = {joint.name: [each for each in mechanism.drives if each.joint is joint] for joint in mechanism.joints}
+
+    def rank(joint: Joint) -> int:
+        return min(place.get(drive.name, len(place)) for drive in drives[joint.name])
+
+    def most(joint: Joint, what: int) -> tuple[float, ...] | float | None:
+        found = []
+        for drive in drives[joint.name]:
+            value = rates.get(drive.name, Rates())[what]
+            if value is None:
+                return None
+            found.append(value if drive.kind == "angle" else value / metres)
+        return tuple(found) if len(found) > 1 else found[0]
+
+    def rated(joint: Joint) -> Joint:
+        highest: dict[str, Any] = {"max_speed": most(joint, 0), "max_acceleration": most(joint, 1)}
+        return dataclasses.replace(joint, **highest)
+
+    driven = iter(sorted((joint for joint in mechanism.joints if joint.driven), key=rank))
+    return mechanism._with_joints(rated(next(driven)) if joint.driven else joint for joint in mechanism.joints)

@@ -1,0 +1,154 @@
+"""Tasks that fit a mechanism: coordinates of a target that its end effector can vary independently of each other."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ..arrays import Floats, Mask
+from ..description.joint_types import TASK_TURNS
+from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM, Mechanism
+from ..tolerances import TOLERANCES
+from .first_order import first_order, right_singular
+from .mobility import generic_of
+from .walks import around_home
+
+AXES = ("x", "y", "z")
+TURNS: dict[str, tuple[bool, bool, bool]] = {
+    "tilt": (True, True, False),
+    "yaw": (False, False, True),
+    "rotation": (True, True, True),
+}
+"""What a task may say of a rotation, in the order of preference -> which rotations that are, about x, y and z."""
+
+POSITION, ALIKE = 0.25, 0.9
+"""Share of the best conditioning from which on the whole position is taken, as users ask for it first; and from which
+on other tasks count as equally good."""
+
+
+@dataclass(frozen=True)
+class FittingTask:
+    """A task, and how well the end effector can set its coordinates.
+
+    Attributes
+    ----------
+    count : how many coordinates it sets; of those that never vary, as the tilt out of a plane, none.
+    conditioning : smallest singular value of the end effector's motions, orthonormal twists, in these coordinates
+        [L and rad], the median of configurations around home: 1 where they are all that it can vary, 0 where they
+        depend on each other.
+    n_constant : how many more coordinates it has, which never vary.
+    """
+
+    words: tuple[str, ...]
+    count: int
+    conditioning: float
+    n_constant: int
+
+    @property
+    def kind(self) -> tuple[int, int]:
+        """Tasks that are compared by their conditioning have this in common."""
+        return self.count, self.n_constant
+
+    def __str__(self) -> str:
+        return ",".join(self.words)
+
+
+@lru_cache(maxsize=64)
+def fitting_tasks(mechanism: Mechanism) -> tuple[FittingTask, ...]:
+    """Tasks with independent coordinates, the one that suits best first; empty where nothing moves.
+
+    Those come first that set all freedoms of the end effector; of these, those with the fewest coordinates that are
+    constant; of these, those with the whole position, then the best conditioned. Where several are alike, those with
+    most of the position come first, and the tilt before the yaw.
+    """
+    bases, turned = _motions(mechanism)
+    found = [_judged(words, bases, turned) for words in _candidates(mechanism)]
+    sound = [task for task in found if task is not None and task.conditioning >= TOLERANCES.independent]
+    best: dict[tuple[int, int], float] = {}
+    for task in sound:
+        best[task.kind] = max(task.conditioning, best.get(task.kind, 0.0))
+
+    def rank(task: FittingTask) -> tuple[float, ...]:
+        share = task.conditioning / best[task.kind]
+        positions = sum(word in AXES for word in task.words)
+        goodness = 0.0 if positions == 3 and share >= POSITION else 1.0 if share >= ALIKE else 2.0 - share
+        order = [*AXES, *TURNS]
+        return -task.count, task.n_constant, goodness, -positions, *(order.index(word) for word in task.words)
+
+    return tuple(sorted(sound, key=rank))
+
+
+def has_dependent_coordinates(mechanism: Mechanism) -> bool:
+    """Whether the task has coordinates that follow from its others, so that hardly any target can be reached.
+
+    What is always the same, as a position out of the plane of a planar machine, asks for nothing. Of machines with so
+    many joints that counting freedoms takes long, it is not said.
+    """
+    if len(mechanism.joints) > MOST_JOINTS_FOR_FREEDOM:
+        return False
+    generic = generic_of(mechanism)
+    counts = _counted(mechanism.task)[: len(generic.directions)]
+    asked = int(np.linalg.matrix_rank(generic.directions[counts], TOLERANCES.alignment))
+    return int(counts.sum()) > generic.mobility.platform < asked
+
+
+def task_remark(mechanism: Mechanism) -> str:
+    """Why hardly any target of a task that asks too much can be reached, and which task fits, in words."""
+    tasks, freedoms = fitting_tasks(mechanism), generic_of(mechanism).mobility.platform
+    fits = f"a task that fits is {' '.join(tasks[0].words)}" if tasks else "no task fits, for nothing moves"
+    return (
+        f"the task {' '.join(mechanism.task)} asks for {int(_counted(mechanism.task).sum())} coordinates, of which the "
+        f"mechanism can vary {freedoms} independently: {fits}"
+    )
+
+
+def motions_at(mechanism: Mechanism, q: Floats) -> Floats:
+    """Twists (r, k) of the end effector, one for each motion that its loops allow at coordinates q (1, c)."""
+    closure, twist = first_order(mechanism, q)
+    values, right = right_singular(closure)
+    return np.asarray(twist[0] @ right[0, np.count_nonzero(values > TOLERANCES.alignment) :].T)
+
+
+def _candidates(mechanism: Mechanism) -> list[tuple[str, ...]]:
+    """All tasks that a mechanism may have."""
+    positions = [axes for n in range(4) for axes in itertools.combinations(AXES, n)]
+    turns: list[tuple[str, ...]] = [()] if mechanism.end_effector_is_joint else [(), *((name,) for name in TASK_TURNS)]
+    return [(*axes, *turn) for axes in positions for turn in turns if axes or turn]
+
+
+def _counted(words: tuple[str, ...]) -> Mask:
+    """Which rows of a twist [velocity; angular velocity] a task counts, (6,)."""
+    turns = next((TURNS[word] for word in words if word in TURNS), (False,) * 3)
+    return np.array([axis in words for axis in AXES] + list(turns))
+
+
+def _motions(mechanism: Mechanism) -> tuple[list[Floats], int]:
+    """Orthonormal twists (r, freedoms) of the end effector at generic configurations around home, and how many rows.
+
+    Motions that a joint's turn by one hardly shows in are none: they are what axes leave that meet up to some digits.
+    """
+    closure, twist = first_order(mechanism, around_home(mechanism))
+    values, right = right_singular(closure)
+    ranks = np.count_nonzero(values > TOLERANCES.alignment, axis=-1)
+    rank = int(ranks.max())
+    spread = twist[ranks == rank] @ np.swapaxes(right[ranks == rank, rank:], -1, -2)
+    left, sizes, _ = np.linalg.svd(spread, full_matrices=False)
+    shown = np.count_nonzero(sizes > TOLERANCES.nearly_implied, axis=-1)
+    freedoms = int(shown.max(initial=0))
+    return [basis[:, :freedoms] for basis, own in zip(left, shown, strict=True) if own == freedoms], spread.shape[1]
+
+
+def _judged(words: tuple[str, ...], bases: list[Floats], n_rows: int) -> FittingTask | None:
+    """How well a task fits; None where some of its coordinates follow from the others."""
+    counts = _counted(words)[:n_rows]
+    rows = [basis[counts] for basis in bases]
+    freedoms = bases[0].shape[1] if bases else 0
+    varied = int(np.linalg.matrix_rank(np.hstack(rows), TOLERANCES.alignment)) if rows else 0
+    n_constant = int(counts.sum()) - varied
+    if not 0 < varied <= freedoms or (len(rows) < 2 and n_constant):  # one configuration does not tell what is constant
+        return None
+    sizes = np.array([np.linalg.svd(each, compute_uv=False)[varied - 1] for each in rows])
+    return FittingTask(words, varied, float(np.median(sizes)), n_constant)
