@@ -54,7 +54,8 @@ def straightened(
     if not opened.roundings and not before:
         return joints
     size = _size(joints)
-    roundings = _roundings(joints, opened.roundings, size, unclear_joints(structure(joints)))
+    known = dict(opened.roundings) | dict(_of_hinges(opened, joints))
+    roundings = _roundings(joints, known, size, unclear_joints(structure(joints)))
     straight = _made_exact(joints, list(_axes(joints, roundings)), slack, size, opened.length_unit, told)
     after = unclear(straight)
     if _order(after) > _order(before) or (not opened.roundings and _order(after) == _order(before)):
@@ -96,6 +97,18 @@ def _apart(one: Vector | Floats | None, other: Vector | Floats | None) -> float:
 def _size(joints: Sequence[Joint]) -> float:
     points = np.array([joint.at for joint in joints if joint.at is not None]).reshape(-1, 3)
     return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) if len(points) > 1 else 1.0
+
+
+def _of_hinges(opened: OpenMechanism, joints: Sequence[Joint]) -> Iterator[tuple[str, Rounding]]:
+    """Roundings of hinges that two balls make: axes lean by what the balls are off, over the distance of these."""
+    balls = {loop.name: loop for loop in opened.loops if loop.type == "spherical" and loop.name in opened.roundings}
+    for joint in joints:
+        if joint.type == "revolute" and joint.name in balls:
+            own, first = opened.roundings[joint.name], balls[joint.name]
+            others = [ball for ball in balls.values() if set(ball.connects) == set(first.connects)]
+            apart = max(float(np.linalg.norm(ball.at[0] - first.at[0])) for ball in others)
+            if apart > 0.0:
+                yield joint.name, Rounding(own.length, own.angle + 2.0 * own.length / apart)
 
 
 def _roundings(joints: Sequence[Joint], known: Mapping[str, Rounding], size: float, locked: Set[int]) -> list[Rounding]:
