@@ -33,8 +33,8 @@ def solve_fk(
     """The pose of the end effector, and all joints, at given actuator values.
 
     Newton's method closes the loops from the start with the actuators locked. Where it strays, the actuators are led to
-    their values in steps; without a start other starts follow. The assembly mode is the start's wherever the first two
-    succeed: see `assembly_modes` for all.
+    their values in steps; where neither assembles them, other starts follow. The assembly mode is the start's wherever
+    the first two succeed: see `assembly_modes` for all.
 
     Parameters
     ----------

@@ -31,8 +31,8 @@ class Options:
     max_rounds : how often its projection may revise a target.
     working_mode : "keep" stays in the start's working mode (home's without a start), "any" may change it to reach;
         None keeps it if there is a start.
-    hold : what a projection keeps: "orientation" (the paper's choice) or "position" if any feasible pose has it, None
-        nothing. `Solution.held` tells what was kept.
+    hold : what a projection keeps: "orientation" (the paper's choice) or "position" if a feasible pose has it that is
+        not much farther from the target than the start, None nothing. `Solution.held` tells what was kept.
     projection : which feasible pose answers a target that is not reached: the "nearest" that local searches from
         several starts find; or the "centroid" of where the chains end, which is the paper's, where joint positions
         express the mechanism.

@@ -156,7 +156,7 @@ def _project(
     found = close(closure, *start, max_iterations=0)
     distance = np.full(len(rest), np.inf)
     ranged = np.isfinite(closure.loops.lo[closure.actuated]) | np.isfinite(closure.loops.hi[closure.actuated])
-    n, steps = descents_within(closure, 2 if seeded else 2 + PROJECTIONS, MOST_STEPS, np.count_nonzero(ranged))
+    n, steps = descents_within(closure, 2 if seeded else 2 + PROJECTIONS, MOST_STEPS, int(np.count_nonzero(ranged)))
     others = () if seeded else _newton_ends(closure, values)
     for coordinates, poses in islice(chain([ended, start], others), n):
         waiting = np.flatnonzero(distance > NEAR)

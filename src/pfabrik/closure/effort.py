@@ -54,7 +54,7 @@ def descents_within(closure: Closure, starts: int, most: int, met: int = 0) -> t
     ----------
     met : how many limits a step may meet: it takes them up one by one.
     """
-    moving = max(1, np.count_nonzero(~closure.idle))
+    moving = max(1, int(np.count_nonzero(~closure.idle)))
     steps = int(DESCENDING / (moving**2 * (moving + TAKEN_UP * met)))
     n = min(starts, max(1, steps // A_DESCENT))
     steps = min(most, steps // n)

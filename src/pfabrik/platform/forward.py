@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.assemble import NOISE, is_over_determined
-from ..closure.configurations import Configurations, new_rows
+from ..closure.configurations import Configurations, new_rows, rows_at
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
@@ -125,7 +125,7 @@ def _project_elsewhere(
     tolerance: float,
 ) -> None:
     """Project rows from anywhere; those that have their values so replace what they were."""
-    some = Rows(*(array[places] for array in rows))
+    some = rows_at(rows, places)
     ends = Starts(some.poses, found.q[places], found.sides[places])
     some.actuators[:] = values[places]
     _project(mechanism, table, wanted[places], own.of(places), np.arange(len(places)), some, ends, anywhere=True)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
+from math import hypot
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,80 +49,110 @@ def project(
     -------
     How many rows have none.
     """
-    asked = _ways(mechanism, options, options.hold, corners, stays)
-    left = asked[0].fill(targets, own, found)
-    for way in asked[1:]:
+    tolerances = options.tolerance, options.rotation_tolerance
+    asked = _asked(mechanism, options.hold, options.rotation_length, *tolerances, corners, stays)
+    first, *others = asked.searches
+    left = first.fill(targets, own, found)
+    for search in others:
         if not left:
             break
         if left == len(targets):
-            left = way.fill(targets, own, found)
+            left = search.fill(targets, own, found)
             continue
         lost = found.distances == np.inf
         some = found.at(lost)
-        left = way.fill(targets[lost], own.of(lost), some)
+        left = search.fill(targets[lost], own.of(lost), some)
         found.put(lost, some)
-    if len(asked) > 1:
-        _let_go(mechanism, options, asked[-1], targets, own, found)
-    if is_completed(mechanism) and len(ways_of(mechanism, "orientation", options.rotation_length)) > 1:
-        other = asked[1:] or _ways(mechanism, options, "orientation", corners, stays)
-        _reach_otherwise(other[0], targets, own, found)
+    if len(others) and _may_be_far(asked, targets, own, found):
+        _let_go(asked, targets, own, found)
+    if asked.otherwise is not None:
+        _reach_otherwise(asked.otherwise, targets, own, found)
     return left
 
 
-def is_completed(mechanism: Mechanism) -> bool:
-    """Whether legs reach only what they complete step by step: then what they miss may be reached."""
-    table = leg_table(mechanism)
+class Asked(NamedTuple):
+    """What is asked of projections."""
+
+    mechanism: Mechanism
+    length: float
+    ways: tuple[Way, ...]
+    searches: tuple[Approach, ...]
+    otherwise: Approach | None  # another way, where legs reach only what they complete step by step
+
+
+@lru_cache(maxsize=256)
+def _asked(
+    mechanism: Mechanism,
+    hold: str | None,
+    rotation_length: float | None,
+    tolerance: float | None,
+    rotation_tolerance: float,
+    corners: bool,
+    stays: bool,
+) -> Asked:
+    """The ways to project, in the order in which they are tried, and searches of each."""
+    table, length = leg_table(mechanism), mechanism.characteristic_length
     assert isinstance(table, LegTable)
-    return table.is_completed
+    settings = {"steps": MOST_STEPS, "stays": int(stays), "rotation": rotation_tolerance}
+    settings["position"] = tolerance or TOLERANCES.position * length
+    starts = corners_of(mechanism) if corners else no_starts(table)
+    ways = ways_of(mechanism, hold, rotation_length)
+    searches = tuple(_search(mechanism, table, way, settings, starts) for way in ways)
+    holding = ways_of(mechanism, "orientation", rotation_length)
+    otherwise = None
+    if table.is_completed and len(holding) > 1:
+        otherwise = searches[-1] if len(ways) > 1 else _search(mechanism, table, holding[0], settings, starts)
+    return Asked(mechanism, length, ways, searches, otherwise)
 
 
-def _reach_otherwise(way: Approach, targets: Floats, own: Starts, found: Found) -> None:
+def _search(mechanism: Mechanism, table: LegTable, way: Way, settings: Mapping[str, float], starts: Starts) -> Approach:
+    """Searches of one way, from each row's own start and then from others."""
+    length = mechanism.characteristic_length
+    held = {
+        "hold": way.hold,
+        "held_position": TOLERANCES.held * length if way.hold == HOLD_POSITION else np.inf,
+        "held_rotation": TOLERANCES.held if way.hold == HOLD_ORIENTATION else np.inf,
+    }
+    return Approach(mechanism, table, way.weights, {**settings, **held}, starts)
+
+
+def _reach_otherwise(search: Approach, targets: Floats, own: Starts, found: Found) -> None:
     """Answer the rows that another way to project reaches: near singularities each misses others."""
-    asked = ((found.status == PROJECTED) & (found.distances < np.inf) & (found.counters[:, HOLD] < CERTAIN)).nonzero()[
-        0
-    ]
+    is_open = (found.status == PROJECTED) & (found.counters[:, HOLD] < CERTAIN)
+    asked = (is_open & (found.distances < np.inf)).nonzero()[0]
     if not len(asked):
         return
     some = found.at(asked)
-    way.fill(targets[asked], own.of(asked), some)
+    search.fill(targets[asked], own.of(asked), some)
     reached = (some.status == REACHED) & (some.distances < np.inf)
     some.counters[:, HOLD] = HOLD_NOTHING
     found.put(asked[reached], some.at(reached))
 
 
-def _let_go(mechanism: Mechanism, options: Options, free: Approach, targets: Floats, own: Starts, found: Found) -> None:
+def _may_be_far(asked: Asked, targets: Floats, own: Starts, found: Found) -> bool:
+    """Whether a row may be farther from its target than where it starts; not of one whose position is nearer with its
+    orientation held, which is told at once."""
+    if len(targets) > 1 or asked.ways[0].hold != HOLD_ORIENTATION:
+        return True
+    at, start, scale = targets[0, :3, 3].tolist(), own.poses[0, :3, 3].tolist(), asked.length
+    (x, y, z), (a, b, c) = at, start
+    return bool(found.distances[0] * scale > hypot(x - a * scale, y - b * scale, z - c * scale))
+
+
+def _let_go(asked: Asked, targets: Floats, own: Starts, found: Found) -> None:
     """Hold nothing where what was held leads farther from targets than the start is, and nothing held does not: see
     `Way.is_too_far`."""
-    held, nothing = ways_of(mechanism, options.hold, options.rotation_length)
-    closure, length = closure_of(mechanism), mechanism.characteristic_length
-    starts = np.broadcast_to(in_lengths(own.poses, length), targets.shape)
+    held, nothing = asked.ways
+    closure = closure_of(asked.mechanism)
+    starts = np.broadcast_to(in_lengths(own.poses, asked.length), targets.shape)
     holds = (found.counters[:, HOLD] % CERTAIN == held.hold) & (found.distances < np.inf)
     far = (holds & held.is_too_far(closure, found.distances, starts, targets)).nonzero()[0]
     if not len(far):
         return
     some = found.at(far)
-    free.fill(targets[far], own.of(far), some)
+    asked.searches[-1].fill(targets[far], own.of(far), some)
     nearer = some.distances <= (1.0 + SAME) * nothing.distances(closure, starts[far], targets[far])
     found.put(far[nearer], some.at(nearer))
-
-
-@lru_cache(maxsize=256)
-def _ways(mechanism: Mechanism, options: Options, hold: str | None, corners: bool, stays: bool) -> tuple[Approach, ...]:
-    """The ways to project, in the order in which they are tried."""
-    table, length = leg_table(mechanism), mechanism.characteristic_length
-    assert isinstance(table, LegTable)
-    others = corners_of(mechanism) if corners else no_starts(table)
-    settings = {"steps": MOST_STEPS, "stays": int(stays), "rotation": options.rotation_tolerance}
-    settings["position"] = options.tolerance or TOLERANCES.position * length
-    ways = []
-    for way in ways_of(mechanism, hold, options.rotation_length):
-        held = {
-            "hold": way.hold,
-            "held_position": TOLERANCES.held * length if way.hold == HOLD_POSITION else np.inf,
-            "held_rotation": TOLERANCES.held if way.hold == HOLD_ORIENTATION else np.inf,
-        }
-        ways.append(Approach(mechanism, table, way.weights, settings | held, others))
-    return tuple(ways)
 
 
 def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: Way) -> Floats:
