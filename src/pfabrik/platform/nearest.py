@@ -132,7 +132,7 @@ def _reach_otherwise(search: Approach, targets: Floats, own: Starts, found: Foun
 def _may_be_far(asked: Asked, targets: Floats, own: Starts, found: Found) -> bool:
     """Whether a row may be farther from its target than where it starts; not of one whose position is nearer with its
     orientation held, which is told at once."""
-    if len(targets) > 1 or asked.ways[0].hold != HOLD_ORIENTATION:
+    if len(targets) > 1 or asked.ways[0].hold != HOLD_ORIENTATION or not all(task_of(asked.mechanism).axes):
         return True
     at, start, scale = targets[0, :3, 3].tolist(), own.poses[0, :3, 3].tolist(), asked.length
     (x, y, z), (a, b, c) = at, start
@@ -144,9 +144,15 @@ def _let_go(asked: Asked, targets: Floats, own: Starts, found: Found) -> None:
     `Way.is_too_far`."""
     held, nothing = asked.ways
     closure = closure_of(asked.mechanism)
-    starts = np.broadcast_to(in_lengths(own.poses, asked.length), targets.shape)
     holds = (found.counters[:, HOLD] % CERTAIN == held.hold) & (found.distances < np.inf)
-    far = (holds & held.is_too_far(closure, found.distances, starts, targets)).nonzero()[0]
+    if held.hold == HOLD_ORIENTATION:  # most are nearer in position alone
+        off = (targets[:, :3, 3] / asked.length - own.poses[:, :3, 3]) * task_of(asked.mechanism).axes
+        holds &= found.distances > np.sqrt(np.einsum("ij,ij->i", off, off))
+    far = holds.nonzero()[0]
+    if not len(far):
+        return
+    starts = np.broadcast_to(in_lengths(own.poses, asked.length), targets.shape)
+    far = far[held.is_too_far(closure, found.distances[far], starts[far], targets[far])]
     if not len(far):
         return
     some = found.at(far)
