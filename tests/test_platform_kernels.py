@@ -10,16 +10,18 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from conftest import INTERPRETED
-from machines import closure
+from machines import closure, published
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
+from pfabrik.kernels.holding import balance
 from pfabrik.kernels.legs import records as K
 from pfabrik.kernels.legs.records import Table
 from pfabrik.kernels.platform import equations as E
 from pfabrik.kernels.platform import forward as F
 from pfabrik.kernels.platform import limits
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
-from pfabrik.kernels.platform.records import Aim
+from pfabrik.kernels.platform.nearest import new_work
+from pfabrik.kernels.platform.records import SETTINGS, Aim, Plan
 from pfabrik.kernels.platform.search import new_search
 from pfabrik.platform.table import kernel_table
 
@@ -163,3 +165,20 @@ def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> 
         own, others = work.equations[:, None], by_leg.equations[None]
         apart = np.minimum(np.abs(own - others).max(axis=2), np.abs(own + others).max(axis=2))
         assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-12
+
+
+def test_limits_are_weighed_in_more_motions_than_there_are_limits() -> None:
+    """Of an arm with one limit: memory takes every motion, and the multiplier is the pull along the limit."""
+    table = leg_table(published.planar_arm())
+    assert isinstance(table, LegTable)
+    settings = np.zeros(1, SETTINGS)  # no steps: limits are weighed
+    plan = Plan(np.zeros(6), settings, np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
+    work = new_work(kernel_table(table), plan)
+    linear = work.search.first.linear
+    n = len(linear.g)
+    assert len(linear.h) < n
+    linear.metric[:] = np.eye(n)
+    linear.totals["motions"], linear.totals["limits"] = n, 1
+    linear.g[:], linear.G[0], linear.h[0] = -3.0, np.eye(n)[0], 0.0
+    assert balance(linear, 1e-6, work.p, work.pulls) == 1
+    assert work.p.x[0] == pytest.approx(3.0)

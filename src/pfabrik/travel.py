@@ -38,6 +38,9 @@ SHORTEST = 1e-12
 """How short a step is not halved again [L or rad]: so near to where a limit stops it, a joint is on that limit even if
 it turns a hundred thousand times as fast as the end effector goes. Beyond, its links are as good as stretched out."""
 
+IN_SHORT = {STRETCHED: "links stretched", NO_FREEDOM: "no freedom that way"}
+"""Causes as there is room for in a table or a picture."""
+
 FULL_TURN = 2.0 * np.pi
 """How far is looked about an axis [rad]: after a full turn the poses repeat."""
 
@@ -67,8 +70,8 @@ class Reach:
 
     @property
     def why(self) -> str:
-        """What stops it, in a few words; empty where nothing does."""
-        return self.cause or short_names(self.stopped_by)
+        """What stops it, in a few words that a table has room for; empty where nothing does."""
+        return IN_SHORT.get(self.cause, "the task") if self.cause else short_names(self.stopped_by)
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,11 +113,7 @@ class Travel(Sequence[Reach]):
         )
 
     def _rows(self) -> list[tuple[str, ...]]:
-        return [(*_direction(each), *self._distance(each), self._in_short(each.cause) or each.why) for each in self]
-
-    def _in_short(self, cause: str) -> str:
-        """A cause that there is room for in a table; what else there is to say of the task is said below it."""
-        return "the task" if cause in self._remarks() else cause
+        return [(*_direction(each), *self._distance(each), each.why) for each in self]
 
     def _remarks(self) -> list[str]:
         """What there is no room for in a table."""

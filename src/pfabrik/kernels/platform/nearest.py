@@ -79,9 +79,9 @@ def new_work(table: Table, plan: Plan) -> Work:
     setting, starts = plan.settings[0], plan.poses.shape[0]
     search, best = new_search(table, setting["cones"]), new_now(table.legs.shape[0])
     k, n = search.first.linear.G.shape
-    k = k if setting["steps"] == 0 else 0
+    k, n = (k, n) if setting["steps"] == 0 else (0, 0)
     tallies = np.zeros(1, TALLY), np.zeros(1, TALLY)
-    return Work(search, best, *tallies, np.zeros(1 + starts), np.zeros(6), new_qp(k, k), np.zeros((k, n)))
+    return Work(search, best, *tallies, np.zeros(1 + starts), np.zeros(6), new_qp(max(k, n), k), np.zeros((k, n)))
 
 
 _PLAN = Plan(np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
