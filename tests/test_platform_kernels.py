@@ -35,16 +35,16 @@ STEP = 1e-6
 ON_SPHERES = ["delta", "hexaglide", "linear_delta", "nrpm", "psu", "reachy_mini", "servo_hexapod", "stewart", "ucu"]
 
 
-def moved(now: E.Now, unknown: int, step: float, columns: np.ndarray) -> E.Now:
+def moved(state: E.PlatformState, unknown: int, step: float, columns: np.ndarray) -> E.PlatformState:
     """A configuration with one unknown changed: along an axis, about an axis, or of a carrier."""
-    pose, q = now.pose.copy(), now.q.copy()
+    pose, q = state.pose.copy(), state.q.copy()
     if unknown < 3:
         pose[unknown, 3] += step
     elif unknown < 6:
         pose[:3, :3] = Rotation.from_rotvec(step * np.eye(3)[unknown - 3]).as_matrix() @ pose[:3, :3]
     else:
         q[columns == unknown] += step
-    return E.Now(pose, q, now.sides)
+    return E.PlatformState(pose, q, state.sides)
 
 
 def described_by_name(name: str) -> tuple[pf.Mechanism, LegTable, Table]:
@@ -55,15 +55,15 @@ def described_by_name(name: str) -> tuple[pf.Mechanism, LegTable, Table]:
     return mechanism, described, kernel_table(described)
 
 
-def somewhere(mechanism: pf.Mechanism, table: LegTable, rng: np.random.Generator) -> E.Now:
+def somewhere(mechanism: pf.Mechanism, table: LegTable, rng: np.random.Generator) -> E.PlatformState:
     """A configuration about home, on its legs or not."""
-    now = E.new_now(len(table.legs))
-    now.sides[:], now.q[:] = table.home_sides[0], rng.uniform(-0.3, 0.3, len(table.legs))
-    now.pose[:] = pf.pose(
+    state = E.new_platform_state(len(table.legs))
+    state.sides[:], state.q[:] = table.home_sides[0], rng.uniform(-0.3, 0.3, len(table.legs))
+    state.pose[:] = pf.pose(
         mechanism.home_pose[:3, 3] / mechanism.characteristic_length + rng.uniform(-0.1, 0.1, 3),
         rotvec=rng.uniform(-0.2, 0.2, 3),
     )
-    return now
+    return state
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -77,8 +77,8 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
 
     on_carriers = [k for k, leg in enumerate(table.legs) if E.is_carried(leg)]
 
-    def values(now: E.Now) -> np.ndarray:
-        E.place(table, now, look)
+    def values(state: E.PlatformState) -> np.ndarray:
+        E.place(table, state, look)
         return np.array(
             [
                 *look.rows,
@@ -96,8 +96,8 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
         return found
 
     for _ in range(3):
-        now = somewhere(mechanism, described, rng)
-        E.place(table, now, look)
+        state = somewhere(mechanism, described, rng)
+        E.place(table, state, look)
         E.put_slopes(table, look)
         told_by = [
             *look.slopes.copy(),
@@ -106,7 +106,7 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
         ]
         told_by += slopes(limits.dead_point_slope, on_carriers)
         for unknown in range(n):
-            ends = [values(moved(now, unknown, sign * STEP, table.columns)) for sign in (1.0, -1.0)]
+            ends = [values(moved(state, unknown, sign * STEP, table.columns)) for sign in (1.0, -1.0)]
             difference = (ends[0] - ends[1]) / (2.0 * STEP)
             np.testing.assert_allclose(np.array(told_by)[:, unknown], difference, atol=1e-7)
 
@@ -131,12 +131,12 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
             search.hessian.multipliers[which] = 1.0
         else:
             search.balance[which - limits] = 1.0
-        now, own, every = somewhere(mechanism, described, rng), np.zeros(n), np.zeros(n)
+        state, own, every = somewhere(mechanism, described, rng), np.zeros(n), np.zeros(n)
         note_pulled(table, aim, search)
         seen.add(int(search.pulled.sum()))
-        lagrangian_gradient(table, 0, aim, now, search, own)
+        lagrangian_gradient(table, 0, aim, state, search, own)
         search.pulled[:] = 1
-        lagrangian_gradient(table, 0, aim, now, search, every)
+        lagrangian_gradient(table, 0, aim, state, search, every)
         np.testing.assert_allclose(own, every, rtol=0, atol=1e-12)
     assert min(seen) < len(table.legs)
 
@@ -153,12 +153,12 @@ def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> 
     no_spheres = work.spheres._replace(legs=np.zeros(0, np.int64))
     by_leg = work._replace(spheres=no_spheres, equations=np.zeros_like(work.equations))
     for _ in range(3):
-        now = somewhere(mechanism, described, rng)
-        for to, source in zip(work.now, now, strict=True):
+        state = somewhere(mechanism, described, rng)
+        for to, source in zip(work.state, state, strict=True):
             to[:] = source
         work.values[:] = rng.uniform(-0.3, 0.3, len(work.values))
         F.put_drivers(table, work)
-        F.set_spheres(table, work.values, work.now, work.look, work.spheres)
+        F.set_spheres(table, work.values, work.state, work.look, work.spheres)
         worst = F.put_residuals(table, work)
         assert worst == pytest.approx(F.put_residuals(table, by_leg), abs=1e-12)
         F.put_equations(table, by_leg)

@@ -192,15 +192,15 @@ def hold_of(table: Table, k: int, search: Search) -> tuple[float, Vec, Vec]:
         limited, at_lo, at_hi = table.limited[i], multipliers[2 * i], multipliers[2 * i + 1]
         if limited["leg"] != k or max(at_lo, at_hi) == 0.0:
             continue
-        now, spot, sense = deviation(limited, look.values), limited["place"], limited["sense"]
-        at_lo = at_lo if now - limited["lo"] < BALANCED else 0.0
-        at_hi = at_hi if limited["hi"] - now < BALANCED else 0.0
+        state, spot, sense = deviation(limited, look.values), limited["place"], limited["sense"]
+        at_lo = at_lo if state - limited["lo"] < BALANCED else 0.0
+        at_hi = at_hi if limited["hi"] - state < BALANCED else 0.0
         half = 0.5 * (limited["hi"] - limited["lo"])
         if spot == SLIDE:
             pull += sense * (at_hi - at_lo)
         elif half < math.pi and ((spot == FOOT and leg["foot"] == HINGE) or (spot == HEAD and leg["head"] == HINGE)):
             end, hinge = (AT_FOOT, leg["foot_axes"]) if spot == FOOT else (AT_HEAD, leg["head_axes"])
-            middle = rotate(u, seen(table, k, main, end, vec(hinge[0]), look), sense * (limited["lo"] + half - now))
+            middle = rotate(u, seen(table, k, main, end, vec(hinge[0]), look), sense * (limited["lo"] + half - state))
             stretch, lengthwise, push = bound_by(leg, max(at_lo, at_hi) / length, half)
             pull, at_head = pull + stretch, along(at_head, lengthwise, u)
             at_foot = along(at_foot, -push, middle) if end == AT_FOOT else at_foot
@@ -250,8 +250,8 @@ def room_of(table: Table, k: int, search: Search) -> tuple[float, float]:
     for i in range(table.limited.shape[0]):
         limited = table.limited[i]
         if limited["leg"] == k and limited["place"] == CARRIER:
-            now = deviation(limited, search.look.values)
-            lo, hi = limited["lo"] - now, limited["hi"] - now
+            state = deviation(limited, search.look.values)
+            lo, hi = limited["lo"] - state, limited["hi"] - state
             if not is_crank or hi - lo < 2.0 * math.pi:
                 least, most = (lo, hi) if limited["sense"] > 0.0 else (-hi, -lo)
     return least, most

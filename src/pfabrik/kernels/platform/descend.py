@@ -32,11 +32,11 @@ from ..sqp import (
     scale_objective,
 )
 from ..vectors import wrap
-from .equations import Now, close_rods
+from .equations import PlatformState, close_rods
 from .lagrangian import lagrangian_hessian
 from .linearise import linearise
 from .records import Aim
-from .search import NEAR, NEARBY, STEPS_AWAY, Search, copy_now, count_platform, move
+from .search import NEAR, NEARBY, STEPS_AWAY, Search, copy_platform_state, count_platform, move
 
 HOPELESS = 8.0
 """A search that is farther than the nearest yet by so many times what its last step promised is given up, unless the
@@ -65,7 +65,7 @@ dead point a carrier tells where the platform is so steeply that the model is go
 
 
 @routine
-def take(table: Table, view: FreeMotions, x: Floats, now: Now, search: Search) -> float:
+def take(table: Table, view: FreeMotions, x: Floats, state: PlatformState, search: Search) -> float:
     """Take a step of the free motions, and with it one that meets the equations; the share of it not too long."""
     step = search.step
     n = step.shape[0]
@@ -74,14 +74,21 @@ def take(table: Table, view: FreeMotions, x: Floats, now: Now, search: Search) -
     for j in range(n):
         most = max(most, abs(step[j]) * (ALONE if n == 6 else 1.0 if j < 6 else OF_CARRIERS))
     share = LONGEST_STEP / max(most, LONGEST_STEP)
-    move(table, search.step, share, now)
-    close_rods(table, now, search.look)
+    move(table, search.step, share, state)
+    close_rods(table, state, search.look)
     return share
 
 
 @routine
 def restore_feasibility(
-    table: Table, row: int, aim: Aim, now: Now, tolerance: float, search: Search, view: FreeMotions, steps: int
+    table: Table,
+    row: int,
+    aim: Aim,
+    state: PlatformState,
+    tolerance: float,
+    search: Search,
+    view: FreeMotions,
+    steps: int,
 ) -> bool:
     """Bring a configuration, at which `view` is, onto its equations and within its limits, by the shortest way.
 
@@ -96,20 +103,20 @@ def restore_feasibility(
         if not restoring_step(view, table.task[0]["arms"] > 0 or gap > STUCK * before, search.p):
             return False
         before = gap
-        take(table, view, search.p.x, now, search)
-        linearise(table, row, aim, now, search, view)
+        take(table, view, search.p.x, state, search)
+        linearise(table, row, aim, state, search, view)
     return is_closed(view.linear, max(tolerance, NEARLY_CLOSED))
 
 
 @routine
-def is_by(legs: Records, now: Now, met: Now, holding: Ints) -> bool:
+def is_by(legs: Records, state: PlatformState, met: PlatformState, holding: Ints) -> bool:
     """Whether a configuration is so near to another that a descent would end there.
 
     Parameters
     ----------
     holding : (legs,): 1 for those that hold the other where it is; arms of others may be anywhere.
     """
-    pose, other, q = now.pose, met.pose, now.q
+    pose, other, q = state.pose, met.pose, state.q
     for i in range(3):
         for j in range(4):
             if abs(pose[i, j] - other[i, j]) > BY:
@@ -145,7 +152,7 @@ def is_hopeless(behind: float, share: float, control: Record) -> bool:
 
 
 @routine
-def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Search) -> float:
+def descend(table: Table, row: int, aim: Aim, least: float, met: PlatformState, search: Search) -> float:
     """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible.
 
     And infinite where what steps promise says that it will not come as near as `least`; where it comes by the
@@ -163,11 +170,11 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
         search.force[j] *= unit[0]
     if view.linear.totals[0]["value"] == 0.0:
         return 0.0
-    copy_now(search.best, search.closed)
+    copy_platform_state(search.best, search.closed)
     for closing in range(2):
         search.control[0]["recovered"] = closing
         if closing == 1:
-            copy_now(search.closed, search.best)
+            copy_platform_state(search.closed, search.best)
             linearise(table, row, aim, search.best, search, view)
         distance = go_down(table, row, aim, least, met, closing, search)
         count_platform(2, search)
@@ -177,7 +184,7 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: Now, search: Se
 
 
 @routine
-def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: int, search: Search) -> float:
+def go_down(table: Table, row: int, aim: Aim, least: float, met: PlatformState, closing: int, search: Search) -> float:
     """Steps from `best`, at which `search.first` is, as of `descend`; negative if what they left open does not close.
 
     Parameters
@@ -194,7 +201,7 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
         led_down = False
         while not led_down and control["done"] == 0:
             if plan_step(view.linear, hessian, control, aim.pose.max_iterations, search.p):
-                copy_now(search.best, search.trial)
+                copy_platform_state(search.best, search.trial)
                 share = take(table, view, search.p.x, search.trial, search)
                 search.near[0] = min(NEAR, max(NEARBY, STEPS_AWAY * share * longest(search.step, search.step.shape[0])))
                 linearise(table, row, aim, search.trial, search, other)
@@ -211,7 +218,7 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
                     if missed == MISSES:
                         count_platform(1, search)
                 if led_down:
-                    copy_now(search.trial, search.best)
+                    copy_platform_state(search.trial, search.best)
                     view, other = other, view
                     if least < math.inf and is_by(table.legs, search.best, met, search.holding):
                         return least
@@ -219,7 +226,7 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: Now, closing: i
                     if is_hopeless(behind, share, control):
                         return math.inf
                     if is_closed(view.linear, CLOSED):
-                        copy_now(search.best, search.closed)
+                        copy_platform_state(search.best, search.closed)
                         if view.linear.totals[0]["value"] <= 0.5 * unit[0] * THERE * THERE:
                             control["done"] = 1
             if rests_open(view.linear, led_down, aim.pose.max_iterations, control):

@@ -49,7 +49,7 @@ from ..vectors import Vec, along, cross, dot, move, norm, scale, sub, turn, vec,
 SURELY = 1e-2
 
 
-class Now(NamedTuple):
+class PlatformState(NamedTuple):
     """A configuration under work."""
 
     pose: Floats  # (4, 4) [L]
@@ -68,9 +68,9 @@ class View(NamedTuple):
     slope: Floats  # (n,): that of a limit
 
 
-def new_now(legs: int) -> Now:
+def new_platform_state(legs: int) -> PlatformState:
     """Memory for a configuration."""
-    return Now(np.zeros((4, 4)), np.zeros(legs), np.zeros(legs))
+    return PlatformState(np.zeros((4, 4)), np.zeros(legs), np.zeros(legs))
 
 
 def new_view(table: Table) -> View:
@@ -113,13 +113,13 @@ def main_of(table: Table, k: int) -> int:
 
 
 @routine
-def place(table: Table, now: Now, view: View) -> float:
+def place(table: Table, state: PlatformState, view: View) -> float:
     """Read all legs at a configuration, and fill the equations; the largest of them, infinite if not a number."""
     legs, rows, main = table.legs, view.rows, 0
-    set_frames(now.pose, table.task[0], view.frames)
+    set_frames(state.pose, table.task[0], view.frames)
     for k in range(legs.shape[0]):
         main = main if legs[k]["carrier"] == SHARED else k
-        place_leg(table, k, main, now, view)
+        place_leg(table, k, main, state, view)
     worst = 0.0
     for i in range(rows.shape[0]):
         if not abs(rows[i]) <= worst:
@@ -128,7 +128,7 @@ def place(table: Table, now: Now, view: View) -> float:
 
 
 @routine
-def place_leg(table: Table, k: int, main: int, now: Now, view: View) -> None:
+def place_leg(table: Table, k: int, main: int, state: PlatformState, view: View) -> None:
     """Read one leg at a configuration whose `view.frames` are filled, and fill its equations.
 
     Parameters
@@ -139,14 +139,14 @@ def place_leg(table: Table, k: int, main: int, now: Now, view: View) -> None:
     leg, lead = legs[k], legs[main]
     frame = view.frames[leg["frame"]]
     if leg["kind"] == PIVOT:
-        place_pivot(leg, frame, now.sides[k], values[k])
+        place_pivot(leg, frame, state.sides[k], values[k])
         pivot_rows(leg, frame, view.rows)
     elif leg["kind"] == ARM:
-        place_arm(leg, coordinate_of(legs, k, now.q), view.frames, values[k])
+        place_arm(leg, coordinate_of(legs, k, state.q), view.frames, values[k])
     elif leg["kind"] == ROD:
         if is_carried(leg):
-            values[k, CARRIER] = now.q[k]
-            values[k, COSINE], values[k, SINE] = math.cos(now.q[k]), math.sin(now.q[k])
+            values[k, CARRIER] = state.q[k]
+            values[k, COSINE], values[k, SINE] = math.cos(state.q[k]), math.sin(state.q[k])
         read_rod(leg, lead, frame, values[main], values[k], lines[k])
         rod_rows(leg, lead, frame, values[main], values[k], lines[k], view.rows)
         if is_carried(leg):
@@ -154,11 +154,11 @@ def place_leg(table: Table, k: int, main: int, now: Now, view: View) -> None:
 
 
 @routine
-def close_rods(table: Table, now: Now, view: View) -> None:
+def close_rods(table: Table, state: PlatformState, view: View) -> None:
     """Bring carriers to where their rods have their lengths, on the sides that they are on, but not near dead points:
     there a pose says little of them."""
-    q, own = now.q, view.values
-    set_frames(now.pose, table.task[0], view.frames)
+    q, own = state.q, view.values
+    set_frames(state.pose, table.task[0], view.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
         if leg["by_plane"] == 1:

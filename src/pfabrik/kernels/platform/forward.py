@@ -23,10 +23,10 @@ from ..references import opener
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..sqp import longest
 from ..vectors import add, copy_row, copy_table, cross, put, sub, vec, wrap
-from .equations import Now, View, count_unknowns, new_now, new_view, place, put_slopes
+from .equations import PlatformState, View, count_unknowns, new_platform_state, new_view, place, put_slopes
 from .limits import coordinate_slope, counts_turns
 from .records import Starts
-from .search import copy_now, move
+from .search import copy_platform_state, move
 from .spheres import Spheres, new_spheres, put_spheres, set_spheres
 from .starts import put_carriers, put_sides
 
@@ -57,8 +57,8 @@ class Newton(NamedTuple):
     step: Floats  # (n,)
     values: Floats  # (n_a,): deviations from home that the actuators are led to
     begin: Floats  # (n_a,)
-    now: Now
-    first: Now
+    state: PlatformState
+    first: PlatformState
     spheres: Spheres  # none where equations are others too
 
 
@@ -89,8 +89,8 @@ def new_newton(table: Table, turns: bool) -> Newton:
         np.zeros(n),
         np.zeros(n_driven),
         np.zeros(n_driven),
-        new_now(legs),
-        new_now(legs),
+        new_platform_state(legs),
+        new_platform_state(legs),
         new_spheres(table),
     )
 
@@ -105,7 +105,7 @@ def drives_carrier(table: Table, i: int) -> bool:
 @routine
 def put_drivers(table: Table, work: Newton) -> None:
     """Put driven carriers where their values say."""
-    q = work.now.q
+    q = work.state.q
     for i in range(table.driven.shape[0]):
         if drives_carrier(table, i):
             q[table.driven[i]["leg"]] = table.driven[i]["sense"] * work.values[table.driven[i]["column"]]
@@ -137,8 +137,8 @@ def put_residuals(table: Table, work: Newton) -> float:
     Spheres are all that there is to read, and fill the left-hand sides too.
     """
     if has_spheres(work):
-        return put_spheres(work.now.pose, work.spheres, work.equations)
-    worst, rows, equations = place(table, work.now, work.look), work.look.rows, work.equations
+        return put_spheres(work.state.pose, work.spheres, work.equations)
+    worst, rows, equations = place(table, work.state, work.look), work.look.rows, work.equations
     m, e = work.free.shape[0], rows.shape[0]
     for r in range(e):
         equations[r, m] = -rows[r]
@@ -190,7 +190,7 @@ def newton(table: Table, steps: int, work: Newton) -> float:
     m, before = free.shape[0], math.inf
     put_drivers(table, work)
     if has_spheres(work):
-        set_spheres(table, work.values, work.now, work.look, work.spheres)
+        set_spheres(table, work.values, work.state, work.look, work.spheres)
     for taken in range(steps):
         worst = put_residuals(table, work)
         if not worst < math.inf or worst <= ASSEMBLED or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * before):
@@ -213,9 +213,9 @@ def take_step(table: Table, work: Newton) -> None:
 
     The reference point may be far away.
     """
-    pose, step, middle = work.now.pose, work.step, middle_of(work.now.pose, table.task[0])
+    pose, step, middle = work.state.pose, work.step, middle_of(work.state.pose, table.task[0])
     put(step, add(vec(step), cross(vec(step[3:]), middle)))
-    move(table, step, min(1.0, FAR_STEP / max(longest(step, step.shape[0]), FAR_STEP)), work.now)
+    move(table, step, min(1.0, FAR_STEP / max(longest(step, step.shape[0]), FAR_STEP)), work.state)
     off = sub(middle, middle_of(pose, table.task[0]))
     for i in range(3):
         pose[i, 3] += off[i]
@@ -224,8 +224,8 @@ def take_step(table: Table, work: Newton) -> None:
 @routine
 def lead(table: Table, values: Floats, work: Newton) -> float:
     """The same, with the actuators led to their values from those of the present configuration."""
-    begin, now = work.begin, work.values
-    place(table, work.now, work.look)
+    begin, state = work.begin, work.values
+    place(table, work.state, work.look)
     for i in range(table.driven.shape[0]):
         column = table.driven[i]["column"]
         begin[column] = deviation(table.driven[i], work.look.values)
@@ -233,8 +233,8 @@ def lead(table: Table, values: Floats, work: Newton) -> float:
             begin[column] = wrap(begin[column], values[column])
     worst = math.inf
     for stride in range(1, STRIDES + 1):
-        for column in range(now.shape[0]):
-            now[column] = begin[column] + (values[column] - begin[column]) * stride / STRIDES
+        for column in range(state.shape[0]):
+            state[column] = begin[column] + (values[column] - begin[column]) * stride / STRIDES
         worst = newton(table, STEPS if stride == STRIDES else LED_STEPS, work)
     return worst
 
@@ -243,7 +243,7 @@ def lead(table: Table, values: Floats, work: Newton) -> float:
 def is_feasible(table: Table, values: Floats, work: Newton) -> bool:
     """Whether the present configuration, assembled, keeps all limits, and its actuators those of theirs."""
     if has_spheres(work):
-        place(table, work.now, work.look)
+        place(table, work.state, work.look)
     for i in range(table.driven.shape[0]):
         value = values[table.driven[i]["column"]]
         if not max(table.driven[i]["lo"] - value, value - table.driven[i]["hi"]) <= KEPT:
@@ -253,13 +253,13 @@ def is_feasible(table: Table, values: Floats, work: Newton) -> bool:
 
 @routine
 def load_start(table: Table, starts: Starts, start: int, work: Newton) -> None:
-    now = work.now
-    copy_table(starts.poses[start], now.pose)
-    copy_row(starts.sides[start], now.sides)
+    state = work.state
+    copy_table(starts.poses[start], state.pose)
+    copy_row(starts.sides[start], state.sides)
     if starts.q.shape[0] > 0:
-        copy_row(starts.q[start], now.q)
+        copy_row(starts.q[start], state.q)
     else:
-        put_carriers(table, work.now, work.look)
+        put_carriers(table, work.state, work.look)
 
 
 @routine
@@ -290,7 +290,7 @@ def put_deviations(table: Table, values: Floats, wanted: Floats) -> None:
 def assemble_row(
     table: Table, given: Floats, own: Starts, row: int, others: Starts, wanted: Floats, work: Newton
 ) -> int:
-    """Assemble one row, into `work.now`, within all limits, and read the legs there; its status, see `assemble`."""
+    """Assemble one row, into `work.state`, within all limits, and read the legs there; its status, see `assemble`."""
     first, values, status = row if own.poses.shape[0] > 1 else 0, wanted[row], PENDING
     put_deviations(table, given[row], values)
     for attempt in range(2):
@@ -307,13 +307,13 @@ def assemble_row(
         load_start(table, others, start, work)
         copy_row(values, work.values)
         if newton(table, STEPS, work) <= NEARLY_ASSEMBLED and is_feasible(table, values, work):
-            distance = apart(work.now.pose, own.poses[first])
+            distance = apart(work.state.pose, own.poses[first])
             if distance < nearest:
                 nearest = distance
-                copy_now(work.now, work.first)
+                copy_platform_state(work.state, work.first)
     if nearest < math.inf:
-        copy_now(work.first, work.now)
-        place(table, work.now, work.look)
+        copy_platform_state(work.first, work.state)
+        place(table, work.state, work.look)
         return REACHED
     return status
 
@@ -322,15 +322,15 @@ def assemble_row(
 def write_assembled(table: Table, row: int, work: Newton, ends: Starts, measures: Floats) -> None:
     """Write a configuration that is assembled, its pose in [length], and what is measured of it."""
     length, pose = table.task[0]["length"], ends.poses[row]
-    make_exact(work.now.pose)
+    make_exact(work.state.pose)
     measures[row, RESIDUAL] = worst_of(work.look.rows) * length
     measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, work.look.values), 0.0)
-    copy_table(work.now.pose, pose)
+    copy_table(work.state.pose, pose)
     for i in range(3):
         pose[i, 3] *= length
-    put_sides(table, work.now, work.look)
-    copy_row(work.now.q, ends.q[row])
-    copy_row(work.now.sides, ends.sides[row])
+    put_sides(table, work.state, work.look)
+    copy_row(work.state.q, ends.q[row])
+    copy_row(work.state.sides, ends.sides[row])
 
 
 open_starts = opener(Starts(np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0))))

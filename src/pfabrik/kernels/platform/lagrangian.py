@@ -11,10 +11,10 @@ from ..legs.answer import end_of_rows
 from ..legs.frames import set_frames
 from ..legs.records import SHARED, Table
 from ..sqp import PROBE, symmetrise
-from .equations import Now, is_carried, own_row, place_leg, put_leg_slopes
+from .equations import PlatformState, is_carried, own_row, place_leg, put_leg_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .records import Aim
-from .search import Search, copy_now, move, put_objective
+from .search import Search, copy_platform_state, move, put_objective
 
 
 @routine
@@ -90,16 +90,16 @@ def note_pulled(table: Table, aim: Aim, search: Search) -> None:
 
 
 @routine
-def lagrangian_gradient(table: Table, row: int, aim: Aim, now: Now, search: Search, out: Floats) -> None:
+def lagrangian_gradient(table: Table, row: int, aim: Aim, state: PlatformState, search: Search, out: Floats) -> None:
     """Gradient of the Lagrangian at a configuration, from the legs that are `pulled`."""
     pulled, main = search.pulled, 0
-    set_frames(now.pose, table.task[0], search.look.frames)
+    set_frames(state.pose, table.task[0], search.look.frames)
     for k in range(pulled.shape[0]):
         main = main if table.legs[k]["carrier"] == SHARED else k
         if pulled[k] == 1:
-            place_leg(table, k, main, now, search.look)
+            place_leg(table, k, main, state, search.look)
             put_leg_slopes(table, k, main, search.look)
-    _, held = put_objective(table, row, aim, now, search)
+    _, held = put_objective(table, row, aim, state, search)
     put_force(table, search, out)
     add_balance(held, search, out)
 
@@ -122,7 +122,7 @@ def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: F
         probe = PROBE / math.sqrt(linear.metric[a, a])
         for j in range(step.shape[0]):
             step[j] = basis[j, a]
-        copy_now(search.best, search.trial)
+        copy_platform_state(search.best, search.trial)
         move(table, search.step, probe, search.trial)
         lagrangian_gradient(table, row, aim, search.trial, search, search.there)
         for j in range(step.shape[0]):

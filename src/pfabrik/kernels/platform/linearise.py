@@ -9,19 +9,19 @@ from ..free_motions import FreeMotions, add_limit, eliminate, project_gradient
 from ..legs.answer import deviation
 from ..legs.records import Table
 from ..vectors import dot, vec
-from .equations import Now, place, put_slopes
+from .equations import PlatformState, place, put_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .records import Aim
 from .search import Search, put_objective
 
 
 @routine
-def linearise(table: Table, row: int, aim: Aim, now: Now, search: Search, view: FreeMotions) -> None:
+def linearise(table: Table, row: int, aim: Aim, state: PlatformState, search: Search, view: FreeMotions) -> None:
     """Look at a configuration."""
     totals, errors = view.linear.totals[0], search.gradient.errors
-    gap = place(table, now, search.look)
+    gap = place(table, state, search.look)
     put_slopes(table, search.look)
-    totals["value"], held = put_objective(table, row, aim, now, search)
+    totals["value"], held = put_objective(table, row, aim, state, search)
     for k in range(held):
         gap = max(gap, abs(errors[k]))
     totals["gap"] = gap

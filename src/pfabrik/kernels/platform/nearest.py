@@ -35,10 +35,10 @@ from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global
 from .descend import descend
-from .equations import Now, is_carried, new_now, place
+from .equations import PlatformState, is_carried, new_platform_state, place
 from .linearise import linearise
 from .records import SETTINGS, Aim, Found, Plan, Starts
-from .search import Search, copy_now, fix, new_search
+from .search import Search, copy_platform_state, fix, new_search
 from .starts import begin, load_target, nearest_start, put_held, put_sides
 
 LARGEST_NUMBER = 1.7976931348623157e308
@@ -65,7 +65,7 @@ class Work(NamedTuple):
     """Scratch memory of one thread."""
 
     search: Search
-    best: Now
+    best: PlatformState
     met: Records  # (1,): TALLY
     away: Records  # (1,): TALLY of searches that did not come to what is held
     lost: Floats  # (1 + starts,): how far the first start, and each other, is from that; infinite where one is not lost
@@ -77,7 +77,7 @@ class Work(NamedTuple):
 def new_work(table: Table, plan: Plan) -> Work:
     """Scratch memory of one thread."""
     setting, starts = plan.settings[0], plan.poses.shape[0]
-    search, best = new_search(table, setting["cones"]), new_now(table.legs.shape[0])
+    search, best = new_search(table, setting["cones"]), new_platform_state(table.legs.shape[0])
     k, n = search.first.linear.G.shape
     k, n = (k, n) if setting["steps"] == 0 else (0, 0)
     tallies = np.zeros(1, TALLY), np.zeros(1, TALLY)
@@ -90,7 +90,7 @@ open_plan, open_work = opener(_PLAN), opener(new_work(SAMPLE, _PLAN))
 
 
 @routine
-def write(table: Table, row: int, aim: PoseObjective, search: Search, best: Now, found: Found) -> None:
+def write(table: Table, row: int, aim: PoseObjective, search: Search, best: PlatformState, found: Found) -> None:
     """Write a configuration, and what is measured of it."""
     look, task, own = search.look, table.task[0], aim.targets[row]
     pose, measures, length = found.poses[row], found.measures[row], task["length"]
@@ -161,13 +161,13 @@ def clear(tally: Record) -> None:
 
 
 @routine
-def take_nearer(distance: float, tally: Record, search: Search, best: Now) -> None:
+def take_nearer(distance: float, tally: Record, search: Search, best: PlatformState) -> None:
     """Take over where a search has ended if it is nearer, and count it."""
     least = tally["least"]
     if distance < (1.0 - SAME) * least:
         tally["others"] += tally["hits"]
         tally["least"], tally["hits"] = distance, 1.0
-        copy_now(search.best, best)
+        copy_platform_state(search.best, best)
         for k in range(search.holding.shape[0]):
             search.holding[k] = search.pulled[k]
     elif distance <= (1.0 + SAME) * least and least < math.inf:
@@ -184,7 +184,7 @@ def is_enough(tally: Record, hits: int) -> bool:
 
 @routine
 def search_from(
-    table: Table, row: int, aim: Aim, sides: Floats, stays: int, search: Search, best: Now, met: Record
+    table: Table, row: int, aim: Aim, sides: Floats, stays: int, search: Search, best: PlatformState, met: Record
 ) -> bool:
     """Search from where `search.best` is, and take it over if it is nearer; whether it is lost.
 

@@ -17,20 +17,20 @@ from ..legs.records import Table
 from ..legs.table import SAMPLE, open_table
 from ..references import opener
 from ..vectors import copy_row
-from .equations import Now, View, new_now, new_view, place
+from .equations import PlatformState, View, new_platform_state, new_view, place
 
 
 class Reading(NamedTuple):
     """Scratch memory of one thread."""
 
-    now: Now
+    state: PlatformState
     look: View
     follow: Floats  # (legs, 6): derivatives of carriers' coordinates
 
 
 def new_reading(table: Table) -> Reading:
     """Scratch memory of one thread."""
-    return Reading(new_now(len(table.legs)), new_view(table), np.zeros((len(table.legs), 6)))
+    return Reading(new_platform_state(len(table.legs)), new_view(table), np.zeros((len(table.legs), 6)))
 
 
 open_reading = opener(new_reading(SAMPLE))
@@ -59,22 +59,22 @@ def read(
         arms, (n or 0, rows, 6 + arms) [L, rad]: NaN where a leg is at a dead point, or beyond.
     """
     table, work = open_table(machine), open_reading(scratch)
-    now, look, legs, known = work.now, work.look, table.legs, table.known
+    state, look, legs, known = work.state, work.look, table.legs, table.known
     for row in range(poses.shape[0]):
-        load_pose(poses[row], table.task[0]["length"], now.pose)
-        copy_row(sides[row if sides.shape[0] > 1 else 0], now.sides)
+        load_pose(poses[row], table.task[0]["length"], state.pose)
+        copy_row(sides[row if sides.shape[0] > 1 else 0], state.sides)
         total = math.nan
         if carriers.shape[0] > 0:
             total = 0.0
-            copy_row(carriers[row], now.q)
-            for k in range(now.q.shape[0]):
-                total += now.q[k]
+            copy_row(carriers[row], state.q)
+            for k in range(state.q.shape[0]):
+                total += state.q[k]
         bearing = 1.0
         if abs(total) < math.inf:
-            place(table, now, look)
+            place(table, state, look)
         else:
-            set_frames(now.pose, table.task[0], look.frames)
-            _, bearing = place_legs(legs, look.frames, now.sides, look.values, look.lines)
+            set_frames(state.pose, table.task[0], look.frames)
+            _, bearing = place_legs(legs, look.frames, state.sides, look.values, look.lines)
         for i in range(known.shape[0] if found.shape[0] > 0 else 0):
             found[row, known[i]["column"]] = deviation(known[i], look.values) * known[i]["unit"]
         if rows.shape[0] > 0:

@@ -23,7 +23,7 @@ class Aim(NamedTuple):
 
 
 class Starts(NamedTuple):
-    """Configurations that searches start from: poses [L], coordinates of carriers and sides, as of `Now`."""
+    """Configurations that searches start from: poses [L], coordinates of carriers and sides, as of `PlatformState`."""
 
     poses: Floats  # (s, 4, 4)
     q: Floats  # (s, legs); no rows where they are what poses and sides tell

@@ -17,7 +17,7 @@ from ..legs.records import Table
 from ..qp import QP, new_qp
 from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import copy_row, copy_table, wrap
-from .equations import Now, View, count_unknowns, new_now, new_view
+from .equations import PlatformState, View, count_unknowns, new_platform_state, new_view
 from .limits import coordinate_slope, counts_turns
 from .records import Aim
 
@@ -42,9 +42,9 @@ class Search(NamedTuple):
     there: Floats  # (n,)
     step: Floats  # (n,)
     balance: Floats  # (rows,): multipliers of the equations and of what is held
-    best: Now
-    trial: Now
-    closed: Now  # the last that was closed entirely on the way
+    best: PlatformState
+    trial: PlatformState
+    closed: PlatformState  # the last that was closed entirely on the way
     target: Floats  # (4, 4): of the row [L]
     kept: Floats  # (legs,): the sides that carriers are to stay on; 0 for either
     pulled: Ints  # (legs,): 1 for those that the Lagrangian asks for
@@ -78,9 +78,9 @@ def new_search(table: Table, cones: int) -> Search:
         np.zeros(n),
         np.zeros(n),
         np.zeros(rows),
-        new_now(legs),
-        new_now(legs),
-        new_now(legs),
+        new_platform_state(legs),
+        new_platform_state(legs),
+        new_platform_state(legs),
         np.zeros((4, 4)),
         np.zeros(legs),
         np.zeros(legs, np.int64),
@@ -91,7 +91,7 @@ def new_search(table: Table, cones: int) -> Search:
 
 
 @routine
-def copy_now(source: Now, to: Now) -> None:
+def copy_platform_state(source: PlatformState, to: PlatformState) -> None:
     copy_table(source.pose, to.pose)
     copy_row(source.q, to.q)
     copy_row(source.sides, to.sides)
@@ -115,19 +115,19 @@ def count_platform(users: int, search: Search) -> None:
 
 
 @routine
-def move(table: Table, step: Floats, share: float, now: Now) -> None:
+def move(table: Table, step: Floats, share: float, state: PlatformState) -> None:
     """Take a share of a step."""
-    pose, q, columns = now.pose, now.q, table.columns
+    pose, q, columns = state.pose, state.q, table.columns
     for i in range(3):
         pose[i, 3] += share * step[i]
-    turn_pose(now.pose, (share * step[3], share * step[4], share * step[5]))
+    turn_pose(state.pose, (share * step[3], share * step[4], share * step[5]))
     for k in range(q.shape[0]):
         if columns[k] >= 0:
             q[k] += share * step[columns[k]]
 
 
 @routine
-def put_objective(table: Table, row: int, aim: Aim, now: Now, search: Search) -> tuple[float, int]:
+def put_objective(table: Table, row: int, aim: Aim, state: PlatformState, search: Search) -> tuple[float, int]:
     """The objective, its gradient into `search.force`; how many components of the twist are held by equations.
 
     None are where what is held is in its place and does not move: see `fix`.
@@ -137,7 +137,7 @@ def put_objective(table: Table, row: int, aim: Aim, now: Now, search: Search) ->
         force[j] = 0.0
     used = search.elimination.used
     turns = used[3] + used[4] + used[5] > 0
-    value, held = pose_gradient(aim.pose, search.target, now.pose, search.gradient, turns)
+    value, held = pose_gradient(aim.pose, search.target, state.pose, search.gradient, turns)
     held = held if used[3] > 0 and used[0] > 0 else 0
     for j in range(6):
         force[j] = search.gradient.force[j]

@@ -14,7 +14,7 @@ from ..legs.records import ARM, CARRIER, CRANK, Table
 from ..legs.rods import carry
 from ..rotations import yaw_of
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, sub, vec, wrap
-from .equations import Now, View, is_carried, side_of_arm
+from .equations import PlatformState, View, is_carried, side_of_arm
 from .records import STRETCHED, Starts
 from .search import Search
 
@@ -58,14 +58,14 @@ def begin(table: Table, starts: Starts, start: int, search: Search) -> None:
 
 
 @routine
-def put_carriers(table: Table, now: Now, look: View) -> None:
+def put_carriers(table: Table, state: PlatformState, look: View) -> None:
     """Put carriers and arms where the pose and the sides have them.
 
     Rods that are stretched out over what carries them are bent a little to their sides: stretched out, nothing says to
     first order that they could bend, and a search would stay there.
     """
-    q, sides = now.q, now.sides
-    set_frames(now.pose, table.task[0], look.frames)
+    q, sides = state.q, state.sides
+    set_frames(state.pose, table.task[0], look.frames)
     for k in range(q.shape[0]):
         leg, own = table.legs[k], look.values[k]
         q[k] = coordinate_of(table.legs, k, sides) if leg["kind"] == ARM else 0.0
@@ -82,27 +82,27 @@ def put_carriers(table: Table, now: Now, look: View) -> None:
 
 
 @routine
-def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, now: Now) -> None:
+def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, state: PlatformState) -> None:
     """Place the platform as it is to be held, and carriers where rods then put them.
 
     It turns about its middle, but where legs complete the position: they do so from where it was.
     """
-    pose, q, middle = now.pose, now.q, middle_of(now.pose, table.task[0])
+    pose, q, middle = state.pose, state.q, middle_of(state.pose, table.task[0])
     for i in range(3):
         for j in range(3):
             if aim.frame == BASE_AXES and aim.platform[3] == LOCKED:
                 pose[i, j] = target[i, j]
     if aim.frame == TARGET_AXES and aim.platform[3] == LOCKED:
-        axis = cross(column(now.pose, 2), column(target, 2))
+        axis = cross(column(state.pose, 2), column(target, 2))
         sine = norm(axis)
         if sine > 0.0:
-            turn_pose(now.pose, scale(math.atan2(sine, dot(column(now.pose, 2), column(target, 2))) / sine, axis))
+            turn_pose(state.pose, scale(math.atan2(sine, dot(column(state.pose, 2), column(target, 2))) / sine, axis))
     if aim.frame == HALF_WAY and aim.platform[5] == LOCKED:
-        bring_yaw(now.pose, yaw_of(target))
+        bring_yaw(state.pose, yaw_of(target))
     off = sub(middle, middle_of(pose, table.task[0])) if table.task[0]["unset"] == 0 else NOWHERE
     for i in range(3):
         pose[i, 3] = target[i, 3] if aim.platform[i] == LOCKED else pose[i, 3] + off[i]
-    set_frames(now.pose, table.task[0], view.frames)
+    set_frames(state.pose, table.task[0], view.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
         if leg["by_plane"] == 1:
@@ -139,10 +139,10 @@ def nearest_facing(arm: Record, rod: Record, frame: Floats, present: float) -> f
 
 
 @routine
-def put_sides(table: Table, now: Now, look: View) -> None:
+def put_sides(table: Table, state: PlatformState, look: View) -> None:
     """Tell which of their two solutions legs take, and where arms are."""
-    set_frames(now.pose, table.task[0], look.frames)
-    sides, q = now.sides, now.q
+    set_frames(state.pose, table.task[0], look.frames)
+    sides, q = state.sides, state.q
     for k in range(q.shape[0]):
         leg = table.legs[k]
         if leg["kind"] == ARM:
