@@ -71,36 +71,36 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
     """At any pose, on its legs or not; angles of two crossed hinges in a pivot only where it is kept, so not here."""
     mechanism, described, table = described_by_name(name)
     rng = np.random.default_rng(0)
-    n, look = E.count_unknowns(table), E.new_view(table)
+    n, leg_eval = E.count_unknowns(table), E.new_leg_evaluation(table)
     pivots = (table.legs["kind"] == K.PIVOT) & (table.legs["foot"] == K.CROSS)
     told = [each for each in (*table.limited, *table.driven) if not pivots[each["leg"]] or each["place"] >= K.HEAD]
 
     on_carriers = [k for k, leg in enumerate(table.legs) if E.is_carried(leg)]
 
     def values(state: E.PlatformState) -> np.ndarray:
-        E.place(table, state, look)
+        E.place(table, state, leg_eval)
         return np.array(
             [
-                *look.rows,
-                *(limits.coordinate_slope(table, each, look) for each in told),
-                *(limits.cone_slope(table, cone, look) for cone in table.cones),
-                *(limits.dead_point_slope(table, leg, look) for leg in on_carriers),
+                *leg_eval.rows,
+                *(limits.coordinate_slope(table, each, leg_eval) for each in told),
+                *(limits.cone_slope(table, cone, leg_eval) for cone in table.cones),
+                *(limits.dead_point_slope(table, leg, leg_eval) for leg in on_carriers),
             ]
         )
 
     def slopes(measure: Callable[..., float], asked: Sequence[np.void | int]) -> list[np.ndarray]:
         found = []
         for each in asked:
-            measure(table, each, look)
-            found.append(look.slope.copy())
+            measure(table, each, leg_eval)
+            found.append(leg_eval.slope.copy())
         return found
 
     for _ in range(3):
         state = somewhere(mechanism, described, rng)
-        E.place(table, state, look)
-        E.put_slopes(table, look)
+        E.place(table, state, leg_eval)
+        E.put_slopes(table, leg_eval)
         told_by = [
-            *look.slopes.copy(),
+            *leg_eval.slopes.copy(),
             *slopes(limits.coordinate_slope, told),
             *slopes(limits.cone_slope, list(table.cones)),
         ]
@@ -121,11 +121,11 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
     aim = Aim(objective, np.zeros((0, len(table.driven))), 0)
     search.target[:] = somewhere(mechanism, described, rng).pose
     search.gradient.unit[0] = 1.0
-    limits, rows = 2 * len(table.limited) + len(table.cones), len(search.look.rows)
+    limits, rows = 2 * len(table.limited) + len(table.cones), len(search.leg_eval.rows)
     seen = set()
     for which in range(limits + rows):
-        E.place(table, somewhere(mechanism, described, rng), search.look)
-        E.put_slopes(table, search.look)
+        E.place(table, somewhere(mechanism, described, rng), search.leg_eval)
+        E.put_slopes(table, search.leg_eval)
         search.hessian.multipliers[:], search.balance[:] = 0.0, 0.0
         if which < limits:
             search.hessian.multipliers[which] = 1.0
@@ -158,7 +158,7 @@ def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> 
             to[:] = source
         work.values[:] = rng.uniform(-0.3, 0.3, len(work.values))
         F.put_drivers(table, work)
-        F.set_spheres(table, work.values, work.state, work.look, work.spheres)
+        F.set_spheres(table, work.values, work.state, work.leg_eval, work.spheres)
         worst = F.put_residuals(table, work)
         assert worst == pytest.approx(F.put_residuals(table, by_leg), abs=1e-12)
         F.put_equations(table, by_leg)

@@ -46,7 +46,7 @@ from ..legs.records import (
     Table,
 )
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
-from .equations import View, direction, is_carried, main_of, own_row, place
+from .equations import LegEvaluation, direction, is_carried, main_of, own_row, place
 from .lagrangian import put_force
 from .limits import AT_FOOT, AT_HEAD, cone_slope, seen
 from .linearise import linearise
@@ -63,15 +63,15 @@ L]."""
 
 @routine
 def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
-    """Whether nothing feasible is nearer than `search.best`, as far as can be told; `search.look` is there then."""
+    """Whether nothing feasible is nearer than `search.best`, as far as can be told; `search.leg_eval` is there then."""
     pose, used, view = aim.pose, search.elimination.used, search.first
     if pose.frame != BASE_AXES or aim.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
         return False
     for i in range(3):
         if pose.platform[i] != 1.0:
             return False
-    if search.look.rows.shape[0] == 0:
-        place(table, search.best, search.look)
+    if search.leg_eval.rows.shape[0] == 0:
+        place(table, search.best, search.leg_eval)
         put_objective(table, row, aim, search.best, search)
     else:
         linearise(table, row, aim, search.best, search, view)
@@ -90,7 +90,7 @@ def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
 def share_of(table: Table, root: int, nearer: float, search: Search) -> tuple[Vec, float, float]:
     """How rods that reach the base by one leg, see `way_of`, hold the platform: with what force, how much they push,
     and what share their carriers need; infinite where these may bring something nearer."""
-    view, force, pushing, moved = search.look, NOWHERE, 0.0, NOWHERE
+    view, force, pushing, moved = search.leg_eval, NOWHERE, 0.0, NOWHERE
     A, B, b, push, lean, twist = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     hinge, slide = -1, -1
     for k in range(root, table.legs.shape[0]):
@@ -156,14 +156,14 @@ def way_of(table: Table, k: int) -> tuple[int, int, int]:
 
 
 @routine
-def axis_of(table: Table, carrier: int, view: View) -> Vec:
+def axis_of(table: Table, carrier: int, view: LegEvaluation) -> Vec:
     """The axis of a carrier as it is now."""
     lead = table.legs[carrier]
     return turn(view.frames[lead["frame"], AXES:], vec(lead["carrier_axis"]))
 
 
 @routine
-def head_from(table: Table, k: int, hinge: int, view: View) -> Vec:
+def head_from(table: Table, k: int, hinge: int, view: LegEvaluation) -> Vec:
     """Where the head of a rod is, from a hinge that it is on."""
     lead = table.legs[hinge]
     frame = view.frames[lead["frame"]]
@@ -174,8 +174,8 @@ def head_from(table: Table, k: int, hinge: int, view: View) -> Vec:
 def hold_of(table: Table, k: int, search: Search) -> tuple[float, Vec, Vec]:
     """How much a rod pushes, m, and what else holds it at its foot and at its head, parts of b; times the unit of the
     objective, as the body of the foot sees it."""
-    leg, main, look, multipliers = table.legs[k], main_of(table, k), search.look, search.hessian.multipliers
-    length, ranges, row, pull = norm(vec(look.lines[k])), table.limited.shape[0], leg["first_row"], 0.0
+    leg, main, leg_eval, multipliers = table.legs[k], main_of(table, k), search.leg_eval, search.hessian.multipliers
+    length, ranges, row, pull = norm(vec(leg_eval.lines[k])), table.limited.shape[0], leg["first_row"], 0.0
     at_foot, at_head = NOWHERE, NOWHERE
     if is_carried(leg):
         pull = search.balance[own_row(table, k)]
@@ -183,16 +183,16 @@ def hold_of(table: Table, k: int, search: Search) -> tuple[float, Vec, Vec]:
         pull = search.balance[row]
         row += 1
     if leg["foot"] == HINGE:
-        at_foot = scale(search.balance[row], seen(table, k, main, AT_FOOT, vec(leg["foot_axes"][0]), look))
+        at_foot = scale(search.balance[row], seen(table, k, main, AT_FOOT, vec(leg["foot_axes"][0]), leg_eval))
         row += 1
     if leg["head"] == HINGE:
-        at_head = scale(search.balance[row], seen(table, k, main, AT_HEAD, vec(leg["head_axes"][0]), look))
-    u = direction(look.lines[k])
+        at_head = scale(search.balance[row], seen(table, k, main, AT_HEAD, vec(leg["head_axes"][0]), leg_eval))
+    u = direction(leg_eval.lines[k])
     for i in range(table.limited.shape[0]):
         limited, at_lo, at_hi = table.limited[i], multipliers[2 * i], multipliers[2 * i + 1]
         if limited["leg"] != k or max(at_lo, at_hi) == 0.0:
             continue
-        state, spot, sense = deviation(limited, look.values), limited["place"], limited["sense"]
+        state, spot, sense = deviation(limited, leg_eval.values), limited["place"], limited["sense"]
         at_lo = at_lo if state - limited["lo"] < BALANCED else 0.0
         at_hi = at_hi if limited["hi"] - state < BALANCED else 0.0
         half = 0.5 * (limited["hi"] - limited["lo"])
@@ -200,17 +200,19 @@ def hold_of(table: Table, k: int, search: Search) -> tuple[float, Vec, Vec]:
             pull += sense * (at_hi - at_lo)
         elif half < math.pi and ((spot == FOOT and leg["foot"] == HINGE) or (spot == HEAD and leg["head"] == HINGE)):
             end, hinge = (AT_FOOT, leg["foot_axes"]) if spot == FOOT else (AT_HEAD, leg["head_axes"])
-            middle = rotate(u, seen(table, k, main, end, vec(hinge[0]), look), sense * (limited["lo"] + half - state))
+            middle = rotate(
+                u, seen(table, k, main, end, vec(hinge[0]), leg_eval), sense * (limited["lo"] + half - state)
+            )
             stretch, lengthwise, push = bound_by(leg, max(at_lo, at_hi) / length, half)
             pull, at_head = pull + stretch, along(at_head, lengthwise, u)
             at_foot = along(at_foot, -push, middle) if end == AT_FOOT else at_foot
             at_head = along(at_head, -push, middle) if end == AT_HEAD else at_head
     for i in range(table.cones.shape[0]):
         cone, push = table.cones[i], multipliers[2 * ranges + i]
-        if cone["leg"] != k or push == 0.0 or cone_slope(table, cone, look) < cone["half_angle"] - BALANCED:
+        if cone["leg"] != k or push == 0.0 or cone_slope(table, cone, leg_eval) < cone["half_angle"] - BALANCED:
             continue
         end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
-        axis = seen(table, k, main, end, vec(cone["axis"]), look)
+        axis = seen(table, k, main, end, vec(cone["axis"]), leg_eval)
         stretch, lengthwise, push = bound_by(leg, push / length, cone["half_angle"])
         pull, at_head = pull + stretch, along(at_head, lengthwise, u)
         at_foot = along(at_foot, -push, axis) if end == AT_FOOT else at_foot
@@ -250,7 +252,7 @@ def room_of(table: Table, k: int, search: Search) -> tuple[float, float]:
     for i in range(table.limited.shape[0]):
         limited = table.limited[i]
         if limited["leg"] == k and limited["place"] == CARRIER:
-            state = deviation(limited, search.look.values)
+            state = deviation(limited, search.leg_eval.values)
             lo, hi = limited["lo"] - state, limited["hi"] - state
             if not is_crank or hi - lo < 2.0 * math.pi:
                 least, most = (lo, hi) if limited["sense"] > 0.0 else (-hi, -lo)

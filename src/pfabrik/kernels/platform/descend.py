@@ -75,7 +75,7 @@ def take(table: Table, view: FreeMotions, x: Floats, state: PlatformState, searc
         most = max(most, abs(step[j]) * (ALONE if n == 6 else 1.0 if j < 6 else OF_CARRIERS))
     share = LONGEST_STEP / max(most, LONGEST_STEP)
     move(table, search.step, share, state)
-    close_rods(table, state, search.look)
+    close_rods(table, state, search.leg_eval)
     return share
 
 

@@ -57,7 +57,7 @@ class PlatformState(NamedTuple):
     sides: Floats  # (legs,): which of its two solutions a pivot of three hinges takes
 
 
-class View(NamedTuple):
+class LegEvaluation(NamedTuple):
     """What legs are like at a configuration."""
 
     frames: Floats  # (n, 7, 4): see `legs.frames`
@@ -73,12 +73,12 @@ def new_platform_state(legs: int) -> PlatformState:
     return PlatformState(np.zeros((4, 4)), np.zeros(legs), np.zeros(legs))
 
 
-def new_view(table: Table) -> View:
+def new_leg_evaluation(table: Table) -> LegEvaluation:
     """Memory for what is told of it."""
     legs, n = table.legs.shape[0], count_unknowns(table)
     m = table.task[0]["rows"] + count_carried(table)
     values, lines = np.zeros((legs, N_VALUES)), np.zeros((legs, 3))
-    return View(new_frames(table.legs), values, lines, np.zeros(m), np.zeros((m, n)), np.zeros(n))
+    return LegEvaluation(new_frames(table.legs), values, lines, np.zeros(m), np.zeros((m, n)), np.zeros(n))
 
 
 @routine
@@ -113,13 +113,13 @@ def main_of(table: Table, k: int) -> int:
 
 
 @routine
-def place(table: Table, state: PlatformState, view: View) -> float:
+def place(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> float:
     """Read all legs at a configuration, and fill the equations; the largest of them, infinite if not a number."""
-    legs, rows, main = table.legs, view.rows, 0
-    set_frames(state.pose, table.task[0], view.frames)
+    legs, rows, main = table.legs, leg_eval.rows, 0
+    set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(legs.shape[0]):
         main = main if legs[k]["carrier"] == SHARED else k
-        place_leg(table, k, main, state, view)
+        place_leg(table, k, main, state, leg_eval)
     worst = 0.0
     for i in range(rows.shape[0]):
         if not abs(rows[i]) <= worst:
@@ -128,48 +128,48 @@ def place(table: Table, state: PlatformState, view: View) -> float:
 
 
 @routine
-def place_leg(table: Table, k: int, main: int, state: PlatformState, view: View) -> None:
-    """Read one leg at a configuration whose `view.frames` are filled, and fill its equations.
+def place_leg(table: Table, k: int, main: int, state: PlatformState, leg_eval: LegEvaluation) -> None:
+    """Read one leg at a configuration whose `leg_eval.frames` are filled, and fill its equations.
 
     Parameters
     ----------
     main : the leg whose carrier it is on, read before; itself if it is on none but its own.
     """
-    legs, values, lines, rows = table.legs, view.values, view.lines, view.rows
+    legs, values, lines, rows = table.legs, leg_eval.values, leg_eval.lines, leg_eval.rows
     leg, lead = legs[k], legs[main]
-    frame = view.frames[leg["frame"]]
+    frame = leg_eval.frames[leg["frame"]]
     if leg["kind"] == PIVOT:
         place_pivot(leg, frame, state.sides[k], values[k])
-        pivot_rows(leg, frame, view.rows)
+        pivot_rows(leg, frame, leg_eval.rows)
     elif leg["kind"] == ARM:
-        place_arm(leg, coordinate_of(legs, k, state.q), view.frames, values[k])
+        place_arm(leg, coordinate_of(legs, k, state.q), leg_eval.frames, values[k])
     elif leg["kind"] == ROD:
         if is_carried(leg):
             values[k, CARRIER] = state.q[k]
             values[k, COSINE], values[k, SINE] = math.cos(state.q[k]), math.sin(state.q[k])
         read_rod(leg, lead, frame, values[main], values[k], lines[k])
-        rod_rows(leg, lead, frame, values[main], values[k], lines[k], view.rows)
+        rod_rows(leg, lead, frame, values[main], values[k], lines[k], leg_eval.rows)
         if is_carried(leg):
             rows[own_row(table, k)] = values[k, SLIDE]
 
 
 @routine
-def close_rods(table: Table, state: PlatformState, view: View) -> None:
+def close_rods(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> None:
     """Bring carriers to where their rods have their lengths, on the sides that they are on, but not near dead points:
     there a pose says little of them."""
-    q, own = state.q, view.values
-    set_frames(state.pose, table.task[0], view.frames)
+    q, own = state.q, leg_eval.values
+    set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
         if leg["by_plane"] == 1:
-            frame, rod = view.frames[leg["frame"]], table.legs[k + 1]
+            frame, rod = leg_eval.frames[leg["frame"]], table.legs[k + 1]
             found, sure = facing(leg, rod, frame, side_of_arm(leg, rod, frame, q[k]))
             if sure > SURELY:
                 q[k] = wrap(found, q[k]) if leg["carrier"] == CRANK else found
         if leg["kind"] == ARM:
-            place_arm(leg, coordinate_of(table.legs, k, q), view.frames, own[k])
+            place_arm(leg, coordinate_of(table.legs, k, q), leg_eval.frames, own[k])
         if is_carried(leg):
-            head = move(view.frames[leg["frame"]], vec(leg["head_point"]))
+            head = move(leg_eval.frames[leg["frame"]], vec(leg["head_point"]))
             if carry(leg, head, side_of(leg, head, q[k]), own[k]) > SURELY:
                 q[k] = wrap(own[k, CARRIER], q[k]) if leg["carrier"] == CRANK else own[k, CARRIER]
 
@@ -200,29 +200,29 @@ def own_row(table: Table, k: int) -> int:
 
 
 @routine
-def put_slopes(table: Table, view: View) -> None:
+def put_slopes(table: Table, leg_eval: LegEvaluation) -> None:
     """Fill the derivatives of the equations."""
-    legs, slopes, main = table.legs, view.slopes, 0
+    legs, slopes, main = table.legs, leg_eval.slopes, 0
     for i in range(slopes.shape[0]):
         for j in range(6, slopes.shape[1]):
             slopes[i, j] = 0.0
     for k in range(legs.shape[0]):
         main = main if legs[k]["carrier"] == SHARED else k
-        put_leg_slopes(table, k, main, view)
+        put_leg_slopes(table, k, main, leg_eval)
 
 
 @routine
-def put_leg_slopes(table: Table, k: int, main: int, view: View) -> None:
+def put_leg_slopes(table: Table, k: int, main: int, leg_eval: LegEvaluation) -> None:
     """Fill the derivatives of one leg's equations, by the unknowns that they have."""
-    leg, slopes = table.legs[k], view.slopes
+    leg, slopes = table.legs[k], leg_eval.slopes
     if leg["kind"] == PIVOT:
-        pivot_slopes(leg, view.frames[leg["frame"]], view.slopes)
+        pivot_slopes(leg, leg_eval.frames[leg["frame"]], leg_eval.slopes)
         for row in range(leg["first_row"], end_of_rows(table.legs, k, table.task[0]["rows"])):
-            put_arm_slopes(table, k, view, slopes[row])
+            put_arm_slopes(table, k, leg_eval, slopes[row])
     elif leg["kind"] == ROD:
         if is_carried(leg):
-            put_rate(table, k, k, direction(view.lines[k]), NOWHERE, NOWHERE, view, slopes[own_row(table, k)])
-        put_rod_slopes(table, k, main, view)
+            put_rate(table, k, k, direction(leg_eval.lines[k]), NOWHERE, NOWHERE, leg_eval, slopes[own_row(table, k)])
+        put_rod_slopes(table, k, main, leg_eval)
 
 
 @routine
@@ -231,7 +231,7 @@ def direction(line: Floats) -> Vec:
 
 
 @routine
-def put_rate(table: Table, k: int, main: int, a: Vec, b: Vec, c: Vec, view: View, slope: Floats) -> None:
+def put_rate(table: Table, k: int, main: int, a: Vec, b: Vec, c: Vec, leg_eval: LegEvaluation, slope: Floats) -> None:
     """Derivative (n,) of a . (dH - dF) + b . W + c . w of a rod; only the entries of its unknowns are written.
 
     Parameters
@@ -239,14 +239,14 @@ def put_rate(table: Table, k: int, main: int, a: Vec, b: Vec, c: Vec, view: View
     main : the leg whose carrier it is on; itself if on none.
     """
     rod, carrier, column = table.legs[k], table.legs[main], table.columns[main]
-    put_pose_slope(rod, view.frames[rod["frame"]], a, c, slope)
+    put_pose_slope(rod, leg_eval.frames[rod["frame"]], a, c, slope)
     if column >= 0:
-        slope[column] = carrier_rate(carrier, carried_foot(rod, carrier, view.values[main]), a, b)
-    put_arm_slopes(table, k, view, slope)
+        slope[column] = carrier_rate(carrier, carried_foot(rod, carrier, leg_eval.values[main]), a, b)
+    put_arm_slopes(table, k, leg_eval, slope)
 
 
 @routine
-def put_arm_slopes(table: Table, k: int, view: View, slope: Floats) -> None:
+def put_arm_slopes(table: Table, k: int, leg_eval: LegEvaluation, slope: Floats) -> None:
     """Derivatives by the arms that a leg is on, from those by the pose."""
     arm = table.legs[k]["arm"]
     while arm >= 0:
@@ -254,7 +254,7 @@ def put_arm_slopes(table: Table, k: int, view: View, slope: Floats) -> None:
         arm = table.legs[arm]["arm"]
     arm = table.legs[k]["arm"]
     while arm >= 0:
-        slope[table.columns[arm]] += by_arm(slope, view.values[arm])
+        slope[table.columns[arm]] += by_arm(slope, leg_eval.values[arm])
         arm = table.legs[arm]["arm"]
     if table.legs[k]["inner"] == 1:
         for j in range(6):
@@ -262,22 +262,27 @@ def put_arm_slopes(table: Table, k: int, view: View, slope: Floats) -> None:
 
 
 @routine
-def put_rod_slopes(table: Table, k: int, main: int, view: View) -> None:
+def put_rod_slopes(table: Table, k: int, main: int, leg_eval: LegEvaluation) -> None:
     """Fill the derivatives of the equations that `rod_rows` fills."""
-    rod, carrier, lead, slopes = table.legs[k], table.legs[main], view.values[main], view.slopes
-    frame, n, span, u = view.frames[rod["frame"]], rod["first_row"], vec(view.lines[k]), direction(view.lines[k])
+    rod, carrier, lead, slopes = table.legs[k], table.legs[main], leg_eval.values[main], leg_eval.slopes
+    frame, n, span, u = (
+        leg_eval.frames[rod["frame"]],
+        rod["first_row"],
+        vec(leg_eval.lines[k]),
+        direction(leg_eval.lines[k]),
+    )
     if rod["slides"] == 0 and not is_carried(rod):
-        put_rate(table, k, main, u, NOWHERE, NOWHERE, view, slopes[n])
+        put_rate(table, k, main, u, NOWHERE, NOWHERE, leg_eval, slopes[n])
         n += 1
     if rod["foot"] == HINGE:
         axis = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
-        put_rate(table, k, main, axis, cross(axis, span), NOWHERE, view, slopes[n])
+        put_rate(table, k, main, axis, cross(axis, span), NOWHERE, leg_eval, slopes[n])
         n += 1
     if rod["head"] == HINGE:
         axis = turn(frame, vec(rod["head_axes"][0]))
-        put_rate(table, k, main, axis, NOWHERE, cross(axis, span), view, slopes[n])
+        put_rate(table, k, main, axis, NOWHERE, cross(axis, span), leg_eval, slopes[n])
         n += 1
     if rod["twists"] == 1:
-        by_line, b, c = twist_rate(rod, carrier, frame, lead, view.values[k], u)
+        by_line, b, c = twist_rate(rod, carrier, frame, lead, leg_eval.values[k], u)
         by_line = scale(1.0 / norm(span), along(by_line, -dot(by_line, u), u))
-        put_rate(table, k, main, by_line, b, c, view, slopes[n])
+        put_rate(table, k, main, by_line, b, c, leg_eval, slopes[n])

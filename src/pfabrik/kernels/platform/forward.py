@@ -23,7 +23,15 @@ from ..references import opener
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..sqp import longest
 from ..vectors import add, copy_row, copy_table, cross, put, sub, vec, wrap
-from .equations import PlatformState, View, count_unknowns, new_platform_state, new_view, place, put_slopes
+from .equations import (
+    LegEvaluation,
+    PlatformState,
+    count_unknowns,
+    new_leg_evaluation,
+    new_platform_state,
+    place,
+    put_slopes,
+)
 from .limits import coordinate_slope, counts_turns
 from .records import Starts
 from .search import copy_platform_state, move
@@ -50,7 +58,7 @@ FAR_STEP = 0.5
 class Newton(NamedTuple):
     """Scratch memory of one thread."""
 
-    look: View
+    leg_eval: LegEvaluation
     free: Ints  # (m,): the unknowns that are free
     equations: Floats  # (e, m + 1): by these, right-hand side last
     normal: Floats  # (m, m + 1): normal equations
@@ -70,8 +78,8 @@ def new_newton(table: Table, turns: bool) -> Newton:
     turns : whether the platform turns; a point that is an end effector does not.
     """
     n, legs, n_driven = count_unknowns(table), table.legs.shape[0], table.driven.shape[0]
-    look, kept = new_view(table), np.zeros(n, np.int64)
-    equations = look.rows.shape[0]
+    leg_eval, kept = new_leg_evaluation(table), np.zeros(n, np.int64)
+    equations = leg_eval.rows.shape[0]
     for j in range(3, 6):
         kept[j] = 0 if turns else 1
     for i in range(n_driven):
@@ -82,7 +90,7 @@ def new_newton(table: Table, turns: bool) -> Newton:
     free = np.flatnonzero(kept == 0)
     m = free.shape[0]
     return Newton(
-        look,
+        leg_eval,
         free,
         np.zeros((equations, m + 1)),
         np.zeros((m, m + 1)),
@@ -138,14 +146,14 @@ def put_residuals(table: Table, work: Newton) -> float:
     """
     if has_spheres(work):
         return put_spheres(work.state.pose, work.spheres, work.equations)
-    worst, rows, equations = place(table, work.state, work.look), work.look.rows, work.equations
+    worst, rows, equations = place(table, work.state, work.leg_eval), work.leg_eval.rows, work.equations
     m, e = work.free.shape[0], rows.shape[0]
     for r in range(e):
         equations[r, m] = -rows[r]
     for i in range(table.driven.shape[0]):
         if not drives_carrier(table, i):
             driven = table.driven[i]
-            off = off_by(driven, deviation(driven, work.look.values), work)
+            off = off_by(driven, deviation(driven, work.leg_eval.values), work)
             worst, equations[e, m] = max(worst, abs(off)), -off
             e += 1
     return worst
@@ -154,15 +162,15 @@ def put_residuals(table: Table, work: Newton) -> float:
 @routine
 def put_equations(table: Table, work: Newton) -> None:
     """Fill the left-hand sides where the legs have been read."""
-    slopes, look = work.look.slopes, work.look
-    put_slopes(table, look)
+    slopes, leg_eval = work.leg_eval.slopes, work.leg_eval
+    put_slopes(table, leg_eval)
     e = slopes.shape[0]
     for r in range(e):
         put_slope(r, slopes[r], work)
     for i in range(table.driven.shape[0]):
         if not drives_carrier(table, i):
-            coordinate_slope(table, table.driven[i], look)
-            put_slope(e, look.slope, work)
+            coordinate_slope(table, table.driven[i], leg_eval)
+            put_slope(e, leg_eval.slope, work)
             e += 1
 
 
@@ -190,7 +198,7 @@ def newton(table: Table, steps: int, work: Newton) -> float:
     m, before = free.shape[0], math.inf
     put_drivers(table, work)
     if has_spheres(work):
-        set_spheres(table, work.values, work.state, work.look, work.spheres)
+        set_spheres(table, work.values, work.state, work.leg_eval, work.spheres)
     for taken in range(steps):
         worst = put_residuals(table, work)
         if not worst < math.inf or worst <= ASSEMBLED or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * before):
@@ -225,10 +233,10 @@ def take_step(table: Table, work: Newton) -> None:
 def lead(table: Table, values: Floats, work: Newton) -> float:
     """The same, with the actuators led to their values from those of the present configuration."""
     begin, state = work.begin, work.values
-    place(table, work.state, work.look)
+    place(table, work.state, work.leg_eval)
     for i in range(table.driven.shape[0]):
         column = table.driven[i]["column"]
-        begin[column] = deviation(table.driven[i], work.look.values)
+        begin[column] = deviation(table.driven[i], work.leg_eval.values)
         if table.driven[i]["turns"] == 1:
             begin[column] = wrap(begin[column], values[column])
     worst = math.inf
@@ -243,12 +251,12 @@ def lead(table: Table, values: Floats, work: Newton) -> float:
 def is_feasible(table: Table, values: Floats, work: Newton) -> bool:
     """Whether the present configuration, assembled, keeps all limits, and its actuators those of theirs."""
     if has_spheres(work):
-        place(table, work.state, work.look)
+        place(table, work.state, work.leg_eval)
     for i in range(table.driven.shape[0]):
         value = values[table.driven[i]["column"]]
         if not max(table.driven[i]["lo"] - value, value - table.driven[i]["hi"]) <= KEPT:
             return False
-    return bool(excess_of(table.limited, table.cones, work.look.values) <= KEPT)
+    return bool(excess_of(table.limited, table.cones, work.leg_eval.values) <= KEPT)
 
 
 @routine
@@ -259,7 +267,7 @@ def load_start(table: Table, starts: Starts, start: int, work: Newton) -> None:
     if starts.q.shape[0] > 0:
         copy_row(starts.q[start], state.q)
     else:
-        put_carriers(table, work.state, work.look)
+        put_carriers(table, work.state, work.leg_eval)
 
 
 @routine
@@ -313,7 +321,7 @@ def assemble_row(
                 copy_platform_state(work.state, work.first)
     if nearest < math.inf:
         copy_platform_state(work.first, work.state)
-        place(table, work.state, work.look)
+        place(table, work.state, work.leg_eval)
         return REACHED
     return status
 
@@ -323,12 +331,12 @@ def write_assembled(table: Table, row: int, work: Newton, ends: Starts, measures
     """Write a configuration that is assembled, its pose in [length], and what is measured of it."""
     length, pose = table.task[0]["length"], ends.poses[row]
     make_exact(work.state.pose)
-    measures[row, RESIDUAL] = worst_of(work.look.rows) * length
-    measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, work.look.values), 0.0)
+    measures[row, RESIDUAL] = worst_of(work.leg_eval.rows) * length
+    measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, work.leg_eval.values), 0.0)
     copy_table(work.state.pose, pose)
     for i in range(3):
         pose[i, 3] *= length
-    put_sides(table, work.state, work.look)
+    put_sides(table, work.state, work.leg_eval)
     copy_row(work.state.q, ends.q[row])
     copy_row(work.state.sides, ends.sides[row])
 

@@ -19,28 +19,28 @@ from .search import Search, copy_platform_state, move, put_objective
 
 @routine
 def put_force(table: Table, search: Search, out: Floats) -> None:
-    """Gradient of the objective and of the limits, by their multipliers, where `search.look` is."""
-    force, multipliers, slope, kept = search.force, search.hessian.multipliers, search.look.slope, search.kept
+    """Gradient of the objective and of the limits, by their multipliers, where `search.leg_eval` is."""
+    force, multipliers, slope, kept = search.force, search.hessian.multipliers, search.leg_eval.slope, search.kept
     for j in range(out.shape[0]):
         out[j] = force[j]
     ranges = table.limited.shape[0]
     for i in range(ranges):
         pull = multipliers[2 * i + 1] - multipliers[2 * i]
         if pull != 0.0:
-            coordinate_slope(table, table.limited[i], search.look)
+            coordinate_slope(table, table.limited[i], search.leg_eval)
             for j in range(out.shape[0]):
                 out[j] += pull * slope[j]
     for i in range(table.cones.shape[0]):
         pull = multipliers[2 * ranges + i]
         if pull != 0.0:
-            cone_slope(table, table.cones[i], search.look)
+            cone_slope(table, table.cones[i], search.leg_eval)
             for j in range(out.shape[0]):
                 out[j] += pull * slope[j]
     first = 2 * ranges + table.cones.shape[0]
     for k in range(kept.shape[0]):
         pull = multipliers[first + k] * kept[k]
         if pull != 0.0:
-            dead_point_slope(table, k, search.look)
+            dead_point_slope(table, k, search.leg_eval)
             for j in range(out.shape[0]):
                 out[j] += pull * slope[j]
 
@@ -48,7 +48,7 @@ def put_force(table: Table, search: Search, out: Floats) -> None:
 @routine
 def add_balance(held: int, search: Search, out: Floats) -> None:
     """Add the gradient of the equations, by their multipliers."""
-    balance, slopes, holds = search.balance, search.look.slopes, search.gradient.holds
+    balance, slopes, holds = search.balance, search.leg_eval.slopes, search.gradient.holds
     m = slopes.shape[0]
     for r in range(m):
         if balance[r] != 0.0:
@@ -93,12 +93,12 @@ def note_pulled(table: Table, aim: Aim, search: Search) -> None:
 def lagrangian_gradient(table: Table, row: int, aim: Aim, state: PlatformState, search: Search, out: Floats) -> None:
     """Gradient of the Lagrangian at a configuration, from the legs that are `pulled`."""
     pulled, main = search.pulled, 0
-    set_frames(state.pose, table.task[0], search.look.frames)
+    set_frames(state.pose, table.task[0], search.leg_eval.frames)
     for k in range(pulled.shape[0]):
         main = main if table.legs[k]["carrier"] == SHARED else k
         if pulled[k] == 1:
-            place_leg(table, k, main, state, search.look)
-            put_leg_slopes(table, k, main, search.look)
+            place_leg(table, k, main, state, search.leg_eval)
+            put_leg_slopes(table, k, main, search.leg_eval)
     _, held = put_objective(table, row, aim, state, search)
     put_force(table, search, out)
     add_balance(held, search, out)
@@ -110,13 +110,13 @@ def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: F
     diagonal.
 
     By differences of the gradient of the Lagrangian, whose multipliers of the equations balance it at pivot unknowns,
-    from `best`, where `search.look` still is.
+    from `best`, where `search.leg_eval` still is.
     """
     linear, H, basis, step = view.linear, search.hessian.H, view.basis, search.step
     motions, here, there = linear.totals[0]["motions"], search.here, search.there
     put_force(table, search, search.here)
     search.control[0]["holding"] = put_multipliers(search.here, view, search.balance)
-    add_balance(linear.totals[0]["rows"] - search.look.slopes.shape[0], search, search.here)
+    add_balance(linear.totals[0]["rows"] - search.leg_eval.slopes.shape[0], search, search.here)
     note_pulled(table, aim, search)
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])

@@ -15,7 +15,7 @@ from ..legs.frames import NOWHERE, put_pose_slope
 from ..legs.records import CARRIER, CRANK, CROSS, FOOT, FOOT_LINE, HEAD, HINGE, PIVOT, SLIDE, TRIPLE, Table
 from ..legs.rods import carried, carried_foot, mark
 from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
-from .equations import View, direction, main_of, put_arm_slopes, put_rate
+from .equations import LegEvaluation, direction, main_of, put_arm_slopes, put_rate
 
 AT_FOOT, AT_HEAD = 0, 1
 # Sine below which a line is straight along the axis of its cone: no direction leads in or out.
@@ -23,21 +23,21 @@ ALIGNED = 1e-12
 
 
 @routine
-def put_turning(table: Table, k: int, main: int, end: int, t: Vec, view: View) -> None:
-    """Derivative, into `view.slope`, of what changes by t . y at an end of a rod."""
-    u = direction(view.lines[k])
+def put_turning(table: Table, k: int, main: int, end: int, t: Vec, leg_eval: LegEvaluation) -> None:
+    """Derivative, into `leg_eval.slope`, of what changes by t . y at an end of a rod."""
+    u = direction(leg_eval.lines[k])
     flat = along(t, -dot(t, u), u)
-    a, spin = scale(1.0 / norm(vec(view.lines[k])), flat), scale(-1.0, cross(u, t))
+    a, spin = scale(1.0 / norm(vec(leg_eval.lines[k])), flat), scale(-1.0, cross(u, t))
     b, c = (spin, NOWHERE) if end == AT_FOOT else (NOWHERE, spin)
-    put_rate(table, k, main, a, b, c, view, view.slope)
+    put_rate(table, k, main, a, b, c, leg_eval, leg_eval.slope)
 
 
 @routine
-def seen(table: Table, k: int, main: int, end: int, v: Vec, view: View) -> Vec:
+def seen(table: Table, k: int, main: int, end: int, v: Vec, leg_eval: LegEvaluation) -> Vec:
     """A direction that goes with the body which an end of a rod is on, as it is now."""
     if end == AT_FOOT:
-        return carried(table.legs[main], view.values[main], v, 1.0)
-    return turn(view.frames[table.legs[k]["frame"]], v)
+        return carried(table.legs[main], leg_eval.values[main], v, 1.0)
+    return turn(leg_eval.frames[table.legs[k]["frame"]], v)
 
 
 @routine
@@ -47,46 +47,46 @@ def counts_turns(coordinate: Record) -> bool:
 
 
 @routine
-def coordinate_slope(table: Table, coordinate: Record, view: View) -> float:
-    """A coordinate's deviation from home, its derivative into `view.slope`."""
-    slope, k, spot = view.slope, coordinate["leg"], coordinate["place"]
+def coordinate_slope(table: Table, coordinate: Record, leg_eval: LegEvaluation) -> float:
+    """A coordinate's deviation from home, its derivative into `leg_eval.slope`."""
+    slope, k, spot = leg_eval.slope, coordinate["leg"], coordinate["place"]
     for j in range(slope.shape[0]):
         slope[j] = 0.0
     leg = table.legs[k]
     if leg["kind"] == PIVOT:
-        put_pivot_slope(leg, view.frames[leg["frame"]], view.values[k], spot, view.slope)
-        put_arm_slopes(table, k, view, view.slope)
+        put_pivot_slope(leg, leg_eval.frames[leg["frame"]], leg_eval.values[k], spot, leg_eval.slope)
+        put_arm_slopes(table, k, leg_eval, leg_eval.slope)
     elif spot == CARRIER:
         slope[table.columns[k]] = 1.0
     elif spot == SLIDE:
-        put_rate(table, k, main_of(table, k), direction(view.lines[k]), NOWHERE, NOWHERE, view, view.slope)
+        put_rate(table, k, main_of(table, k), direction(leg_eval.lines[k]), NOWHERE, NOWHERE, leg_eval, leg_eval.slope)
     else:
-        put_hinge_slope(table, k, spot, view)
+        put_hinge_slope(table, k, spot, leg_eval)
     for j in range(slope.shape[0]):
         slope[j] *= coordinate["sense"]
-    return deviation(coordinate, view.values)
+    return deviation(coordinate, leg_eval.values)
 
 
 @routine
-def put_hinge_slope(table: Table, k: int, spot: int, view: View) -> None:
+def put_hinge_slope(table: Table, k: int, spot: int, leg_eval: LegEvaluation) -> None:
     """Derivative of the angle of a hinge at an end of a rod.
 
     One hinge n: (n x u) . y / |n x u|^2. Two, a on the body and b on the rod: q1' = b . y / D, q2' = - a . y / D,
     D = (a x u) . b.
     """
-    leg, main, u = table.legs[k], main_of(table, k), direction(view.lines[k])
+    leg, main, u = table.legs[k], main_of(table, k), direction(leg_eval.lines[k])
     end = AT_FOOT if spot < HEAD else AT_HEAD
     ending, axes = (leg["foot"], leg["foot_axes"]) if end == AT_FOOT else (leg["head"], leg["head_axes"])
-    first = seen(table, k, main, end, vec(axes[0]), view)
+    first = seen(table, k, main, end, vec(axes[0]), leg_eval)
     if ending == HINGE:
         across = cross(first, u)
         t = scale(1.0 / dot(across, across), across)
     else:
         place = FOOT if end == AT_FOOT else HEAD
-        last = seen(table, k, main, end, mark(ending, axes, view.values[k, place:]), view)
+        last = seen(table, k, main, end, mark(ending, axes, leg_eval.values[k, place:]), leg_eval)
         D = dot(cross(first, u), last)
         t = scale(1.0 / D, last) if spot == place else scale(-1.0 / D, first)
-    put_turning(table, k, main, end, t, view)
+    put_turning(table, k, main, end, t, leg_eval)
 
 
 @routine
@@ -114,52 +114,52 @@ def put_pivot_slope(pivot: Record, frame: Floats, own: Floats, spot: int, slope:
 
 
 @routine
-def cone_slope(table: Table, cone: Record, view: View) -> float:
-    """The angle of a rod's line from the axis of its cone, its derivative into `view.slope`.
+def cone_slope(table: Table, cone: Record, leg_eval: LegEvaluation) -> float:
+    """The angle of a rod's line from the axis of its cone, its derivative into `leg_eval.slope`.
 
     Or that of a pivot's third hinge, which goes with the platform, from an axis that does not.
     """
-    slope, k = view.slope, cone["leg"]
+    slope, k = leg_eval.slope, cone["leg"]
     if table.legs[k]["kind"] == PIVOT:
-        return pivot_cone_slope(table, cone, view)
+        return pivot_cone_slope(table, cone, leg_eval)
     end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
     main = main_of(table, k)
-    axis, u = seen(table, k, main, end, vec(cone["axis"]), view), direction(view.lines[k])
+    axis, u = seen(table, k, main, end, vec(cone["axis"]), leg_eval), direction(leg_eval.lines[k])
     for j in range(slope.shape[0]):
         slope[j] = 0.0
     sine = norm(cross(axis, u))
     if sine > ALIGNED:
-        put_turning(table, k, main, end, scale(-1.0 / sine, axis), view)
+        put_turning(table, k, main, end, scale(-1.0 / sine, axis), leg_eval)
     return angle_between(axis, u)
 
 
 @routine
-def pivot_cone_slope(table: Table, cone: Record, view: View) -> float:
+def pivot_cone_slope(table: Table, cone: Record, leg_eval: LegEvaluation) -> float:
     """`cone_slope` of a pivot."""
-    slope, k = view.slope, cone["leg"]
-    leg, axis, line = table.legs[k], vec(cone["axis"]), vec(view.values[k, FOOT_LINE:])
+    slope, k = leg_eval.slope, cone["leg"]
+    leg, axis, line = table.legs[k], vec(cone["axis"]), vec(leg_eval.values[k, FOOT_LINE:])
     for j in range(slope.shape[0]):
         slope[j] = 0.0
     across = cross(axis, line)
     if norm(across) > ALIGNED:
-        put_pose_slope(leg, view.frames[leg["frame"]], NOWHERE, scale(1.0 / norm(across), across), slope)
-        put_arm_slopes(table, k, view, slope)
+        put_pose_slope(leg, leg_eval.frames[leg["frame"]], NOWHERE, scale(1.0 / norm(across), across), slope)
+        put_arm_slopes(table, k, leg_eval, slope)
     return angle_between(axis, line)
 
 
 @routine
-def dead_point_slope(table: Table, k: int, view: View) -> float:
+def dead_point_slope(table: Table, k: int, leg_eval: LegEvaluation) -> float:
     """The rate at which a carrier shortens its rod, zero where the rod is stretched out over it; its derivative into
-    `view.slope`.
+    `leg_eval.slope`.
 
     With the foot's rate f by the carrier, which goes with the carrier, and the rod's line u: f . u. Its sign tells the
     two solutions of the leg apart.
     """
-    slope, leg, own = view.slope, table.legs[k], view.values[k]
+    slope, leg, own = leg_eval.slope, table.legs[k], leg_eval.values[k]
     for j in range(slope.shape[0]):
         slope[j] = 0.0
     axis = vec(leg["carrier_axis"])
     if leg["carrier"] == CRANK:
         axis = cross(axis, sub(carried_foot(leg, leg, own), vec(leg["carrier_point"])))
-    put_turning(table, k, k, AT_FOOT, axis, view)
-    return dot(axis, direction(view.lines[k]))
+    put_turning(table, k, k, AT_FOOT, axis, leg_eval)
+    return dot(axis, direction(leg_eval.lines[k]))

@@ -92,16 +92,16 @@ open_plan, open_work = opener(_PLAN), opener(new_work(SAMPLE, _PLAN))
 @routine
 def write(table: Table, row: int, aim: PoseObjective, search: Search, best: PlatformState, found: Found) -> None:
     """Write a configuration, and what is measured of it."""
-    look, task, own = search.look, table.task[0], aim.targets[row]
+    leg_eval, task, own = search.leg_eval, table.task[0], aim.targets[row]
     pose, measures, length = found.poses[row], found.measures[row], task["length"]
     make_exact(best.pose)
-    measures[RESIDUAL] = place(table, best, look) * length
-    measures[LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, look.values), 0.0)
+    measures[RESIDUAL] = place(table, best, leg_eval) * length
+    measures[LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, leg_eval.values), 0.0)
     copy_row(best.q, found.q[row])
     copy_row(best.sides, found.sides[row])
     for i in range(table.driven.shape[0]):
         driven = table.driven[i]
-        found.actuators[row, driven["column"]] = driven["home"] + deviation(driven, look.values) * driven["unit"]
+        found.actuators[row, driven["column"]] = driven["home"] + deviation(driven, leg_eval.values) * driven["unit"]
     copy_table(best.pose, pose)
     away = 0.0
     for i in range(3):
@@ -195,7 +195,7 @@ def search_from(
     distance = descend(table, row, aim, met["least"], best, search)
     is_lost = distance == math.inf and (met["least"] == math.inf or search.control[0]["steps"] == 0)
     if distance < math.inf:
-        put_sides(table, search.best, search.look)
+        put_sides(table, search.best, search.leg_eval)
         if stays == 0 or not is_other_mode(table.legs, sides, search.best.sides):
             take_nearer(distance, met, search, best)
             met["sure"] = max(met["sure"], 1 - search.control[0]["recovered"])
@@ -242,7 +242,7 @@ def search_row(
         in_place = (start <= n) == at_once
         fix(aim.pose, in_place, search)
         if in_place:
-            put_held(table, aim.pose, target, search.look, search.best)
+            put_held(table, aim.pose, target, search.leg_eval, search.best)
         if search_from(table, row, aim, sides, stays, search, best, met) and toward.pose.max_iterations > 0:
             search.gradient.unit[0] = 1.0
             begun = own.poses[first] if place < 0 else others.poses[place]

@@ -17,20 +17,20 @@ from ..legs.records import Table
 from ..legs.table import SAMPLE, open_table
 from ..references import opener
 from ..vectors import copy_row
-from .equations import PlatformState, View, new_platform_state, new_view, place
+from .equations import LegEvaluation, PlatformState, new_leg_evaluation, new_platform_state, place
 
 
 class Reading(NamedTuple):
     """Scratch memory of one thread."""
 
     state: PlatformState
-    look: View
+    leg_eval: LegEvaluation
     follow: Floats  # (legs, 6): derivatives of carriers' coordinates
 
 
 def new_reading(table: Table) -> Reading:
     """Scratch memory of one thread."""
-    return Reading(new_platform_state(len(table.legs)), new_view(table), np.zeros((len(table.legs), 6)))
+    return Reading(new_platform_state(len(table.legs)), new_leg_evaluation(table), np.zeros((len(table.legs), 6)))
 
 
 open_reading = opener(new_reading(SAMPLE))
@@ -59,7 +59,7 @@ def read(
         arms, (n or 0, rows, 6 + arms) [L, rad]: NaN where a leg is at a dead point, or beyond.
     """
     table, work = open_table(machine), open_reading(scratch)
-    state, look, legs, known = work.state, work.look, table.legs, table.known
+    state, leg_eval, legs, known = work.state, work.leg_eval, table.legs, table.known
     for row in range(poses.shape[0]):
         load_pose(poses[row], table.task[0]["length"], state.pose)
         copy_row(sides[row if sides.shape[0] > 1 else 0], state.sides)
@@ -71,15 +71,15 @@ def read(
                 total += state.q[k]
         bearing = 1.0
         if abs(total) < math.inf:
-            place(table, state, look)
+            place(table, state, leg_eval)
         else:
-            set_frames(state.pose, table.task[0], look.frames)
-            _, bearing = place_legs(legs, look.frames, state.sides, look.values, look.lines)
+            set_frames(state.pose, table.task[0], leg_eval.frames)
+            _, bearing = place_legs(legs, leg_eval.frames, state.sides, leg_eval.values, leg_eval.lines)
         for i in range(known.shape[0] if found.shape[0] > 0 else 0):
-            found[row, known[i]["column"]] = deviation(known[i], look.values) * known[i]["unit"]
+            found[row, known[i]["column"]] = deviation(known[i], leg_eval.values) * known[i]["unit"]
         if rows.shape[0] > 0:
-            put_rows(legs, look.frames, look.values, look.lines, rows[row])
-            put_slopes(legs, look.frames, look.values, look.lines, work.follow, slopes[row])
+            put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
+            put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, work.follow, slopes[row])
             for i in range(rows.shape[1] if not bearing > SURE * SURE else 0):
                 for j in range(slopes.shape[2]):
                     slopes[row, i, j] = math.nan

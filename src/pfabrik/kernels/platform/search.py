@@ -17,7 +17,7 @@ from ..legs.records import Table
 from ..qp import QP, new_qp
 from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import copy_row, copy_table, wrap
-from .equations import PlatformState, View, count_unknowns, new_platform_state, new_view
+from .equations import LegEvaluation, PlatformState, count_unknowns, new_leg_evaluation, new_platform_state
 from .limits import coordinate_slope, counts_turns
 from .records import Aim
 
@@ -29,7 +29,7 @@ shorter, so are those farther away than so many of them, but for what is within 
 class Search(NamedTuple):
     """Scratch memory of one thread."""
 
-    look: View
+    leg_eval: LegEvaluation
     gradient: PoseGradient
     hessian: Hessian
     control: Records  # (1,): CONTROL
@@ -65,7 +65,7 @@ def new_search(table: Table, cones: int) -> Search:
         angle = table.cones[i]["half_angle"]
         half_angles[i, 0], half_angles[i, 1], half_angles[i, 2] = angle, math.cos(angle), math.sin(angle)
     return Search(
-        new_view(table),
+        new_leg_evaluation(table),
         PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
         new_hessian(n, limits),
         np.zeros(1, CONTROL),
@@ -132,7 +132,7 @@ def put_objective(table: Table, row: int, aim: Aim, state: PlatformState, search
 
     None are where what is held is in its place and does not move: see `fix`.
     """
-    force, slope = search.force, search.look.slope
+    force, slope = search.force, search.leg_eval.slope
     for j in range(6, force.shape[0]):
         force[j] = 0.0
     used = search.elimination.used
@@ -143,7 +143,7 @@ def put_objective(table: Table, row: int, aim: Aim, state: PlatformState, search
         force[j] = search.gradient.force[j]
     for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
         driven = table.driven[i]
-        off = coordinate_slope(table, driven, search.look) - aim.values[row, driven["column"]]
+        off = coordinate_slope(table, driven, search.leg_eval) - aim.values[row, driven["column"]]
         off = wrap(off, 0.0) if counts_turns(driven) else off
         value += 0.5 * search.gradient.unit[0] * off * off
         for j in range(force.shape[0]):

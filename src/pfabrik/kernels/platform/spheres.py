@@ -18,7 +18,7 @@ from ..legs.frames import AXES, place_arm, set_frames
 from ..legs.records import ARM, CARRIER, COSINE, FROM_BASE, HINGE, IDLE, NO_CARRIER, ROD, SINE, SLIDE, Table
 from ..legs.rods import carried_foot
 from ..vectors import add, cross, dot, put, scale, sub, turn, vec
-from .equations import PlatformState, View, is_carried, main_of
+from .equations import LegEvaluation, PlatformState, is_carried, main_of
 
 
 class Spheres(NamedTuple):
@@ -57,14 +57,14 @@ def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
 
 
 @routine
-def set_spheres(table: Table, values: Floats, state: PlatformState, look: View, spheres: Spheres) -> None:
+def set_spheres(table: Table, values: Floats, state: PlatformState, leg_eval: LegEvaluation, spheres: Spheres) -> None:
     """Fill centres and radii where carriers and arms are, actuators at values (n_a,), deviations from home [L]."""
-    legs, own, q, frames, pose = table.legs, look.values, state.q, look.frames, state.pose
+    legs, own, q, frames, pose = table.legs, leg_eval.values, state.q, leg_eval.frames, state.pose
     p = (pose[0, 3], pose[1, 3], pose[2, 3])
-    set_frames(state.pose, table.task[0], look.frames)
+    set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         if legs[k]["kind"] == ARM:
-            place_arm(legs[k], q[k], look.frames, own[k])
+            place_arm(legs[k], q[k], leg_eval.frames, own[k])
         elif is_carried(legs[k]):
             own[k, CARRIER], own[k, COSINE], own[k, SINE] = q[k], math.cos(q[k]), math.sin(q[k])
     for e in range(spheres.legs.shape[0]):

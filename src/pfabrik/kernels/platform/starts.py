@@ -14,7 +14,7 @@ from ..legs.records import ARM, CARRIER, CRANK, Table
 from ..legs.rods import carry
 from ..rotations import yaw_of
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, sub, vec, wrap
-from .equations import PlatformState, View, is_carried, side_of_arm
+from .equations import LegEvaluation, PlatformState, is_carried, side_of_arm
 from .records import STRETCHED, Starts
 from .search import Search
 
@@ -54,27 +54,27 @@ def begin(table: Table, starts: Starts, start: int, search: Search) -> None:
     if starts.q.shape[0] > 0:
         copy_row(starts.q[start], search.best.q)
     else:
-        put_carriers(table, search.best, search.look)
+        put_carriers(table, search.best, search.leg_eval)
 
 
 @routine
-def put_carriers(table: Table, state: PlatformState, look: View) -> None:
+def put_carriers(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> None:
     """Put carriers and arms where the pose and the sides have them.
 
     Rods that are stretched out over what carries them are bent a little to their sides: stretched out, nothing says to
     first order that they could bend, and a search would stay there.
     """
     q, sides = state.q, state.sides
-    set_frames(state.pose, table.task[0], look.frames)
+    set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
-        leg, own = table.legs[k], look.values[k]
+        leg, own = table.legs[k], leg_eval.values[k]
         q[k] = coordinate_of(table.legs, k, sides) if leg["kind"] == ARM else 0.0
         if leg["by_plane"] == 1:
-            q[k], _ = facing(leg, table.legs[k + 1], look.frames[leg["frame"]], sides[k])
+            q[k], _ = facing(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], sides[k])
         if leg["kind"] == ARM:
-            place_arm(leg, q[k], look.frames, own)
+            place_arm(leg, q[k], leg_eval.frames, own)
         if is_carried(leg):
-            head = move(look.frames[leg["frame"]], vec(leg["head_point"]))
+            head = move(leg_eval.frames[leg["frame"]], vec(leg["head_point"]))
             carry(leg, head, -sides[k], own)
             other = own[CARRIER]
             carry(leg, head, sides[k], own)
@@ -82,7 +82,7 @@ def put_carriers(table: Table, state: PlatformState, look: View) -> None:
 
 
 @routine
-def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, state: PlatformState) -> None:
+def put_held(table: Table, aim: PoseObjective, target: Floats, leg_eval: LegEvaluation, state: PlatformState) -> None:
     """Place the platform as it is to be held, and carriers where rods then put them.
 
     It turns about its middle, but where legs complete the position: they do so from where it was.
@@ -102,15 +102,15 @@ def put_held(table: Table, aim: PoseObjective, target: Floats, view: View, state
     off = sub(middle, middle_of(pose, table.task[0])) if table.task[0]["unset"] == 0 else NOWHERE
     for i in range(3):
         pose[i, 3] = target[i, 3] if aim.platform[i] == LOCKED else pose[i, 3] + off[i]
-    set_frames(state.pose, table.task[0], view.frames)
+    set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
         if leg["by_plane"] == 1:
-            q[k] = nearest_facing(leg, table.legs[k + 1], view.frames[leg["frame"]], q[k])
+            q[k] = nearest_facing(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
         if leg["kind"] == ARM:
-            place_arm(leg, coordinate_of(table.legs, k, q), view.frames, view.values[k])
+            place_arm(leg, coordinate_of(table.legs, k, q), leg_eval.frames, leg_eval.values[k])
         if is_carried(leg):
-            q[k] = nearest_carrier(leg, view.frames[leg["frame"]], q[k], view.values[k])
+            q[k] = nearest_carrier(leg, leg_eval.frames[leg["frame"]], q[k], leg_eval.values[k])
 
 
 @routine
@@ -139,9 +139,9 @@ def nearest_facing(arm: Record, rod: Record, frame: Floats, present: float) -> f
 
 
 @routine
-def put_sides(table: Table, state: PlatformState, look: View) -> None:
+def put_sides(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> None:
     """Tell which of their two solutions legs take, and where arms are."""
-    set_frames(state.pose, table.task[0], look.frames)
+    set_frames(state.pose, table.task[0], leg_eval.frames)
     sides, q = state.sides, state.q
     for k in range(q.shape[0]):
         leg = table.legs[k]
@@ -149,15 +149,15 @@ def put_sides(table: Table, state: PlatformState, look: View) -> None:
             if leg["by_plane"] == 0:
                 sides[k] = q[k]
             elif sides[k] != 0.0:
-                sides[k] = side_of_arm(leg, table.legs[k + 1], look.frames[leg["frame"]], q[k])
-            place_arm(leg, q[k], look.frames, look.values[k])
+                sides[k] = side_of_arm(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
+            place_arm(leg, q[k], leg_eval.frames, leg_eval.values[k])
         if is_carried(leg):
-            frame = look.frames[leg["frame"]]
+            frame = leg_eval.frames[leg["frame"]]
             head = move(frame, vec(leg["head_point"]))
             off = (0.0, 0.0)
             for side in (-1.0, 1.0):
-                carry(leg, head, side, look.values[k])
-                away = look.values[k, CARRIER] - q[k]
+                carry(leg, head, side, leg_eval.values[k])
+                away = leg_eval.values[k, CARRIER] - q[k]
                 off = (off[1], abs(wrap(away, 0.0) if leg["carrier"] == CRANK else away))
             if abs(off[1] - off[0]) > STRETCHED:
                 sides[k] = 1.0 if off[1] < off[0] else -1.0
