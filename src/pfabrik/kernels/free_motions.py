@@ -55,7 +55,7 @@ def new_elimination(n: int, rows: int) -> Elimination:
 
 
 @routine
-def eliminate(rows: int, scratch: Elimination, view: FreeMotions, first: int, implied: int) -> None:
+def eliminate(rows: int, scratch: Elimination, reduced: FreeMotions, first: int, implied: int) -> None:
     """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what meets the equations.
 
     An equation f = a f1 + b f2 that follows from others where these are met does so no more where they are open: what
@@ -67,38 +67,38 @@ def eliminate(rows: int, scratch: Elimination, view: FreeMotions, first: int, im
         follow from the others at this gap wait, and as many as do in general are left out.
     """
     A, taken, used = scratch.A, scratch.taken, scratch.used
-    basis, shift, pivots = view.basis, view.shift, view.pivots
+    basis, shift, pivots = reduced.basis, reduced.shift, reduced.pivots
     n, rank = used.shape[0], 0
     for j in range(n):
         shift[j] = 0.0
         taken[j] = 0.0 if used[j] > 0 else 1.0
     least, again = DEPENDENT, 0
     if implied > 0:
-        least, again = max(DEPENDENT, LOOSE * view.linear.totals[0]["gap"]), first
+        least, again = max(DEPENDENT, LOOSE * reduced.linear.totals[0]["gap"]), first
     for turn in range(rows + again):
         row = turn if turn < first else turn - first if turn < first + again else turn - again
         if not first <= turn < first + again or rank <= min(row, first - implied - 1):
-            rank += solve_row(row, rank, rows, least if turn < first else DEPENDENT, scratch, view)
+            rank += solve_row(row, rank, rows, least if turn < first else DEPENDENT, scratch, reduced)
     motions = 0
     for j in range(n):
         if taken[j] == 0.0:
             for i in range(n):
                 basis[i, motions] = 0.0
             basis[j, motions] = 1.0
-            view.free[motions] = j
+            reduced.free[motions] = j
             for r in range(rank):
                 basis[pivots[r], motions] = -A[r, j]
             motions += 1
     for r in range(rank):
         shift[pivots[r]] = A[r, n]
         for i in range(rows):
-            view.transform[r, i] = A[r, n + 1 + i]
-    totals = view.linear.totals[0]
+            reduced.transform[r, i] = A[r, n + 1 + i]
+    totals = reduced.linear.totals[0]
     totals["motions"], totals["rank"], totals["rows"] = motions, rank, rows
 
 
 @routine
-def solve_row(row: int, rank: int, rows: int, least: float, scratch: Elimination, view: FreeMotions) -> int:
+def solve_row(row: int, rank: int, rows: int, least: float, scratch: Elimination, reduced: FreeMotions) -> int:
     """Eliminate an unknown by a row, which becomes that of the `rank`; 0 where it follows from those before, else 1."""
     A, taken, filled_at, used = scratch.A, scratch.taken, scratch.filled, scratch.used
     n, largest, pivot = used.shape[0], 0.0, -1
@@ -123,14 +123,14 @@ def solve_row(row: int, rank: int, rows: int, least: float, scratch: Elimination
                 A[i, filled_at[k]] -= share * A[rank, filled_at[k]]
             A[i, pivot] = 0.0
     taken[pivot] = 1.0
-    view.pivots[rank] = pivot
+    reduced.pivots[rank] = pivot
     return 1
 
 
 @routine
-def put_multipliers(gradient: Floats, view: FreeMotions, multipliers: Floats) -> float:
+def put_multipliers(gradient: Floats, reduced: FreeMotions, multipliers: Floats) -> float:
     """Multipliers with which the equations balance a gradient at the pivot unknowns; the sum of their sizes."""
-    totals, pivots, transform, total = view.linear.totals[0], view.pivots, view.transform, 0.0
+    totals, pivots, transform, total = reduced.linear.totals[0], reduced.pivots, reduced.transform, 0.0
     for i in range(multipliers.shape[0]):
         multipliers[i] = 0.0
     for r in range(totals["rank"]):
@@ -142,9 +142,9 @@ def put_multipliers(gradient: Floats, view: FreeMotions, multipliers: Floats) ->
 
 
 @routine
-def project(gradient: Floats, view: FreeMotions, out: Floats) -> None:
+def project(gradient: Floats, reduced: FreeMotions, out: Floats) -> None:
     """A gradient in the free motions, (motions,), from that in the unknowns."""
-    basis, pivots, free, totals = view.basis, view.pivots, view.free, view.linear.totals[0]
+    basis, pivots, free, totals = reduced.basis, reduced.pivots, reduced.free, reduced.linear.totals[0]
     motions = totals["motions"]
     for a in range(motions):
         out[a] = gradient[free[a]]
@@ -156,11 +156,11 @@ def project(gradient: Floats, view: FreeMotions, out: Floats) -> None:
 
 
 @routine
-def project_gradient(force: Floats, view: FreeMotions) -> None:
+def project_gradient(force: Floats, reduced: FreeMotions) -> None:
     """The gradient of the objective in the free motions, from that in the unknowns, and the metric."""
-    basis, metric, pivots, totals = view.basis, view.linear.metric, view.pivots, view.linear.totals[0]
-    totals["closing"] = along_shift(force, view)
-    project(force, view, view.linear.g)
+    basis, metric, pivots, totals = reduced.basis, reduced.linear.metric, reduced.pivots, reduced.linear.totals[0]
+    totals["closing"] = along_shift(force, reduced)
+    project(force, reduced, reduced.linear.g)
     for a in range(totals["motions"]):
         for b in range(a + 1):
             metric[a, b] = 1.0 if a == b else 0.0
@@ -171,52 +171,52 @@ def project_gradient(force: Floats, view: FreeMotions) -> None:
 
 
 @routine
-def along_shift(gradient: Floats, view: FreeMotions) -> float:
+def along_shift(gradient: Floats, reduced: FreeMotions) -> float:
     """What meeting the equations does to something with a gradient in the unknowns."""
     total = 0.0
-    for r in range(view.linear.totals[0]["rank"]):
-        total += gradient[view.pivots[r]] * view.shift[view.pivots[r]]
+    for r in range(reduced.linear.totals[0]["rank"]):
+        total += gradient[reduced.pivots[r]] * reduced.shift[reduced.pivots[r]]
     return total
 
 
 @routine
-def put_step(x: Floats, view: FreeMotions, step: Floats) -> None:
+def put_step(x: Floats, reduced: FreeMotions, step: Floats) -> None:
     """A step of the unknowns, from one of the free motions, and with it one that meets the equations."""
-    basis, pivots, free, totals = view.basis, view.pivots, view.free, view.linear.totals[0]
+    basis, pivots, free, totals = reduced.basis, reduced.pivots, reduced.free, reduced.linear.totals[0]
     for j in range(step.shape[0]):
         step[j] = 0.0
     for a in range(totals["motions"]):
         step[free[a]] = x[a]
     for r in range(totals["rank"]):
         p = pivots[r]
-        step[p] = view.shift[p]
+        step[p] = reduced.shift[p]
         for a in range(totals["motions"]):
             step[p] += basis[p, a] * x[a]
 
 
 @routine
-def add_limit(k: int, h: float, number: int, slope: Floats, view: FreeMotions) -> int:
+def add_limit(k: int, h: float, number: int, slope: Floats, reduced: FreeMotions) -> int:
     """Note a limit by its excess, its number and its derivative by the unknowns; how many are noted then."""
-    linear = view.linear
-    linear.drift[k] = along_shift(slope, view)
-    project(slope, view, linear.G[k])
+    linear = reduced.linear
+    linear.drift[k] = along_shift(slope, reduced)
+    project(slope, reduced, linear.G[k])
     linear.h[k], linear.which[k] = h, number
     return k + 1
 
 
 @routine
-def restoring_step(view: FreeMotions, by_all: bool, p: QP) -> bool:
+def restoring_step(reduced: FreeMotions, by_all: bool, p: QP) -> bool:
     """The shortest step within all limits, into `p.x`, besides `shift`, which meets the equations; False where there is
     none.
 
     Shortest by itself; or, if equations are to be met by all unknowns and not by pivots alone, together with `shift`.
     """
-    linear = view.linear
+    linear = reduced.linear
     motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
     for a in range(motions):
         p.g[a] = 0.0
     if by_all:
-        project(view.shift, view, p.g)
+        project(reduced.shift, reduced, p.g)
     for c in range(k):
         p.h[c] = linear.h[c] + linear.drift[c]
         for a in range(motions):

@@ -72,18 +72,18 @@ def lagrangian_gradient(
 
 
 @routine
-def lagrangian_hessian(loops: Loops, row: int, objective: Objective, work: Workspace, view: FreeMotions) -> float:
+def lagrangian_hessian(loops: Loops, row: int, objective: Objective, work: Workspace, reduced: FreeMotions) -> float:
     """Curvature of the objective and of the active limits along the loops, at `work.best`; the largest on the diagonal.
 
     By differences of the gradient of the Lagrangian, whose multipliers of the loops balance it at pivot coordinates.
     """
-    n, linear, H, trial = len(loops.lo), view.linear, work.hessian.H, work.trial
+    n, linear, H, trial = len(loops.lo), reduced.linear, work.hessian.H, work.trial
     motions = linear.totals[0]["motions"]
-    basis, here, there, along = view.basis, work.here, work.there, work.row
+    basis, here, there, along = reduced.basis, work.here, work.there, work.row
     for i in range(work.balance.shape[0]):
         work.balance[i] = 0.0
     lagrangian_gradient(loops, row, objective, work.best, work, work.here)
-    work.control[0]["holding"] = put_multipliers(work.here, view, work.balance)
+    work.control[0]["holding"] = put_multipliers(work.here, reduced, work.balance)
     lagrangian_gradient(loops, row, objective, work.best, work, work.here)
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
@@ -94,7 +94,7 @@ def lagrangian_hessian(loops: Loops, row: int, objective: Objective, work: Works
         lagrangian_gradient(loops, row, objective, trial, work, work.there)
         for j in range(n):
             there[j] = (there[j] - here[j]) / probe
-        project(there, view, H[a])
+        project(there, reduced, H[a])
     return symmetrise(H, motions)
 
 
@@ -110,9 +110,9 @@ def move(loops: Loops, step: Floats, share: float, state: State) -> None:
 
 
 @routine
-def take(loops: Loops, view: FreeMotions, x: Floats, state: State, work: Workspace) -> float:
+def take(loops: Loops, reduced: FreeMotions, x: Floats, state: State, work: Workspace) -> float:
     """Take a step of the free motions, and with it one that closes the loops; the share of it that is not too long."""
-    put_step(x, view, work.row)
+    put_step(x, reduced, work.row)
     share = LONGEST_STEP / max(longest(work.row, len(loops.lo)), LONGEST_STEP)
     move(loops, work.row, share, state)
     return share
@@ -126,48 +126,48 @@ def restore_feasibility(
     state: State,
     tolerance: float,
     work: Workspace,
-    view: FreeMotions,
+    reduced: FreeMotions,
 ) -> bool:
-    """Bring a configuration, at which `view` is, onto its loops and within its limits, by the shortest way.
+    """Bring a configuration, at which `reduced` is, onto its loops and within its limits, by the shortest way.
 
     Both to a tolerance; where rounding keeps it from that, to what counts as closed.
     """
     for _step in range(RESTORING):
-        if is_closed(view.linear, tolerance):
+        if is_closed(reduced.linear, tolerance):
             return True
-        if not restoring_step(view, False, work.p):  # by all, steps leap over wrists' singularities
+        if not restoring_step(reduced, False, work.p):  # by all, steps leap over wrists' singularities
             return False
-        take(loops, view, work.p.x, state, work)
-        linearise(loops, row, objective, state, work, view)
-    return is_closed(view.linear, max(tolerance, NEARLY_CLOSED))
+        take(loops, reduced, work.p.x, state, work)
+        linearise(loops, row, objective, state, work, reduced)
+    return is_closed(reduced.linear, max(tolerance, NEARLY_CLOSED))
 
 
 @routine
 def descend(loops: Loops, row: int, objective: Objective, work: Workspace) -> int:
     """From a feasible `work.best`, at which `work.first` is, down to the nearest; how many steps it took."""
-    view, other, best, trial, p = work.first, work.second, work.best, work.trial, work.p
+    reduced, other, best, trial, p = work.first, work.second, work.best, work.trial, work.p
     hessian, control, most = work.hessian, work.control[0], objective.pose.max_iterations
-    work.gradient.unit[0] = scale_objective(view.linear)
-    begin_descent(view.linear, hessian, control)
+    work.gradient.unit[0] = scale_objective(reduced.linear)
+    begin_descent(reduced.linear, hessian, control)
     while control["done"] == 0:
-        control["largest"] = lagrangian_hessian(loops, row, objective, work, view)
+        control["largest"] = lagrangian_hessian(loops, row, objective, work, reduced)
         led_down = False
         while not led_down and control["done"] == 0:
-            if plan_step(view.linear, hessian, control, most, p):
+            if plan_step(reduced.linear, hessian, control, most, p):
                 copy_state(best, trial)
-                share = take(loops, view, p.x, trial, work)
+                share = take(loops, reduced, p.x, trial, work)
                 linearise(loops, row, objective, trial, work, other)
                 tolerance = on_the_way(control, share)
                 feasible = restore_feasibility(loops, row, objective, trial, tolerance, work, other)
-                led_down = judge_step(view.linear, other.linear, feasible, share, control)
+                led_down = judge_step(reduced.linear, other.linear, feasible, share, control)
                 if led_down:
                     copy_state(trial, best)
-                    view, other = other, view
-            if rests_open(view.linear, led_down, most, control):
-                if restore_feasibility(loops, row, objective, best, CLOSED, work, view):
+                    reduced, other = other, reduced
+            if rests_open(reduced.linear, led_down, most, control):
+                if restore_feasibility(loops, row, objective, best, CLOSED, work, reduced):
                     go_on(control)
                 led_down = True
-    restore_feasibility(loops, row, objective, best, CLOSED, work, view)
+    restore_feasibility(loops, row, objective, best, CLOSED, work, reduced)
     return int(control["steps"])
 
 

@@ -133,9 +133,11 @@ def add_anchors(row: int, objective: Objective, state: State, unit: float, out: 
 
 
 @routine
-def linearise(loops: Loops, row: int, objective: Objective, state: State, work: Workspace, view: FreeMotions) -> None:
+def linearise(
+    loops: Loops, row: int, objective: Objective, state: State, work: Workspace, reduced: FreeMotions
+) -> None:
     """Look at a configuration."""
-    linear, n, here = view.linear, len(loops.lo), work.here
+    linear, n, here = reduced.linear, len(loops.lo), work.here
     gap = walk_all(loops, state, work)
     value, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, work.gradient, True)
     for k in range(held):
@@ -146,9 +148,9 @@ def linearise(loops: Loops, row: int, objective: Objective, state: State, work: 
     add_force(loops, 0, work.gradient.force, work, work.here)
     linear.totals[0]["value"] = value + add_anchors(row, objective, state, work.gradient.unit[0], work.here)
     rows = lay_out(loops, held, work)
-    eliminate(rows, work.elimination, view, rows, 0)
-    project_gradient(work.here, view)
-    linearise_limits(loops, objective.pose.margin, state, work, view)
+    eliminate(rows, work.elimination, reduced, rows, 0)
+    project_gradient(work.here, reduced)
+    linearise_limits(loops, objective.pose.margin, state, work, reduced)
 
 
 @routine
@@ -177,10 +179,10 @@ def lay_out(loops: Loops, held: int, work: Workspace) -> int:
 
 
 @routine
-def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace, view: FreeMotions) -> None:
+def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace, reduced: FreeMotions) -> None:
     """Excess and gradient of every limit within reach."""
-    linear = view.linear
-    basis, shift, G, row = view.basis, view.shift, linear.G, work.row
+    linear = reduced.linear
+    basis, shift, G, row = reduced.basis, reduced.shift, linear.G, work.row
     n, k, excess = len(loops.lo), 0, -math.inf
     for j in range(n):
         for side in range(2):
@@ -199,7 +201,7 @@ def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace,
                 row[j] = 0.0
             add_cone(loops, cone, 1.0, work, work.row)
             excess = max(excess, h)
-            k = add_limit(k, h, 2 * n + cone, work.row, view)
+            k = add_limit(k, h, 2 * n + cone, work.row, reduced)
     linear.totals[0]["limits"] = k
     linear.totals[0]["excess"] = excess
 

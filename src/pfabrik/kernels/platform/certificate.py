@@ -64,7 +64,7 @@ L]."""
 @routine
 def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
     """Whether nothing feasible is nearer than `search.best`, as far as can be told; `search.leg_eval` is there then."""
-    pose, used, view = aim.pose, search.elimination.used, search.first
+    pose, used, reduced = aim.pose, search.elimination.used, search.first
     if pose.frame != BASE_AXES or aim.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
         return False
     for i in range(3):
@@ -74,9 +74,9 @@ def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
         place(table, search.best, search.leg_eval)
         put_objective(table, row, aim, search.best, search)
     else:
-        linearise(table, row, aim, search.best, search, view)
+        linearise(table, row, aim, search.best, search, reduced)
         put_force(table, search, search.here)
-        put_multipliers(search.here, view, search.balance)
+        put_multipliers(search.here, reduced, search.balance)
     unit, away = search.gradient.unit[0], vec(search.force)
     nearer = NEARER * dot(away, away) / unit
     total, pushing, shares = away, 0.0, 0.0
@@ -90,7 +90,7 @@ def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
 def share_of(table: Table, root: int, nearer: float, search: Search) -> tuple[Vec, float, float]:
     """How rods that reach the base by one leg, see `way_of`, hold the platform: with what force, how much they push,
     and what share their carriers need; infinite where these may bring something nearer."""
-    view, force, pushing, moved = search.leg_eval, NOWHERE, 0.0, NOWHERE
+    reduced, force, pushing, moved = search.leg_eval, NOWHERE, 0.0, NOWHERE
     A, B, b, push, lean, twist = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     hinge, slide = -1, -1
     for k in range(root, table.legs.shape[0]):
@@ -102,20 +102,20 @@ def share_of(table: Table, root: int, nearer: float, search: Search) -> tuple[Ve
             continue
         if (hinge >= 0 and on_hinge not in (-1, hinge)) or (slide >= 0 and on_slide not in (-1, slide)):
             return force, pushing, math.inf
-        axes = view.frames[table.legs[k]["frame"], AXES:]
-        line, at_foot, at_head = turn(axes, vec(view.lines[k])), turn(axes, at_foot), turn(axes, at_head)
+        axes = reduced.frames[table.legs[k]["frame"], AXES:]
+        line, at_foot, at_head = turn(axes, vec(reduced.lines[k])), turn(axes, at_foot), turn(axes, at_head)
         pull = along(scale(m, line), -1.0, at_head)
         force, pushing = add(force, sub(at_foot, pull)), pushing + m
         axis, arm, course = NOWHERE, NOWHERE, NOWHERE
         if on_hinge >= 0:
-            hinge, axis = on_hinge, axis_of(table, on_hinge, view)
-            arm = sub(head_from(table, k, on_hinge, view), line)
+            hinge, axis = on_hinge, axis_of(table, on_hinge, reduced)
+            arm = sub(head_from(table, k, on_hinge, reduced), line)
             spoke, turned, rod = flatten(arm, axis), flatten(at_foot, axis), add(line, arm)
             A += dot(pull, spoke) + m * dot(spoke, spoke) + dot(turned, rod)
             B += dot(pull, cross(axis, spoke)) + dot(cross(axis, turned), rod)
             moved = add(moved, along(turned, m, spoke))
         if on_slide >= 0:
-            slide, course = on_slide, axis_of(table, on_slide, view)
+            slide, course = on_slide, axis_of(table, on_slide, reduced)
             b, push = b + dot(sub(pull, at_foot), course), push + m
             turns = on_slide != root
             both = along(pull if turns else at_foot, m, arm)
@@ -156,17 +156,17 @@ def way_of(table: Table, k: int) -> tuple[int, int, int]:
 
 
 @routine
-def axis_of(table: Table, carrier: int, view: LegEvaluation) -> Vec:
+def axis_of(table: Table, carrier: int, reduced: LegEvaluation) -> Vec:
     """The axis of a carrier as it is now."""
     lead = table.legs[carrier]
-    return turn(view.frames[lead["frame"], AXES:], vec(lead["carrier_axis"]))
+    return turn(reduced.frames[lead["frame"], AXES:], vec(lead["carrier_axis"]))
 
 
 @routine
-def head_from(table: Table, k: int, hinge: int, view: LegEvaluation) -> Vec:
+def head_from(table: Table, k: int, hinge: int, reduced: LegEvaluation) -> Vec:
     """Where the head of a rod is, from a hinge that it is on."""
     lead = table.legs[hinge]
-    frame = view.frames[lead["frame"]]
+    frame = reduced.frames[lead["frame"]]
     return turn(frame[AXES:], sub(move(frame, vec(table.legs[k]["head_point"])), vec(lead["carrier_point"])))
 
 

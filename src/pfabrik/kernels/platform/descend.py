@@ -65,11 +65,11 @@ dead point a carrier tells where the platform is so steeply that the model is go
 
 
 @routine
-def take(table: Table, view: FreeMotions, x: Floats, state: PlatformState, search: Search) -> float:
+def take(table: Table, reduced: FreeMotions, x: Floats, state: PlatformState, search: Search) -> float:
     """Take a step of the free motions, and with it one that meets the equations; the share of it not too long."""
     step = search.step
     n = step.shape[0]
-    put_step(x, view, search.step)
+    put_step(x, reduced, search.step)
     most = 0.0
     for j in range(n):
         most = max(most, abs(step[j]) * (ALONE if n == 6 else 1.0 if j < 6 else OF_CARRIERS))
@@ -87,25 +87,25 @@ def restore_feasibility(
     state: PlatformState,
     tolerance: float,
     search: Search,
-    view: FreeMotions,
+    reduced: FreeMotions,
     steps: int,
 ) -> bool:
-    """Bring a configuration, at which `view` is, onto its equations and within its limits, by the shortest way.
+    """Bring a configuration, at which `reduced` is, onto its equations and within its limits, by the shortest way.
 
     Both to a tolerance; where rounding keeps it from that, to what counts as closed. Equations are met by all unknowns
     where arms have a say in them, or pivots alone do not close them: a rod that does not reach needs the platform.
     """
     before = math.inf
     for _step in range(steps):
-        if is_closed(view.linear, tolerance):
+        if is_closed(reduced.linear, tolerance):
             return True
-        gap = view.linear.totals[0]["gap"]
-        if not restoring_step(view, table.task[0]["arms"] > 0 or gap > STUCK * before, search.p):
+        gap = reduced.linear.totals[0]["gap"]
+        if not restoring_step(reduced, table.task[0]["arms"] > 0 or gap > STUCK * before, search.p):
             return False
         before = gap
-        take(table, view, search.p.x, state, search)
-        linearise(table, row, aim, state, search, view)
-    return is_closed(view.linear, max(tolerance, NEARLY_CLOSED))
+        take(table, reduced, search.p.x, state, search)
+        linearise(table, row, aim, state, search, reduced)
+    return is_closed(reduced.linear, max(tolerance, NEARLY_CLOSED))
 
 
 @routine
@@ -128,17 +128,17 @@ def is_by(legs: Records, state: PlatformState, met: PlatformState, holding: Ints
 
 
 @routine
-def has_same_curvature(view: FreeMotions, before: FreeMotions, control: Record) -> bool:
+def has_same_curvature(reduced: FreeMotions, before: FreeMotions, control: Record) -> bool:
     """Whether the last step was so short, and told so well what it would gain, that curvature is what it was before.
 
     It is told in the same free motions only where equations have the same pivots.
     """
-    totals, others = view.linear.totals[0], before.linear.totals[0]
+    totals, others = reduced.linear.totals[0], before.linear.totals[0]
     is_short = control["promise"] <= SHORT * totals["value"]
     if not is_short or control["exact"] == 0 or totals["rank"] != others["rank"]:
         return False
     for r in range(totals["rank"]):
-        if view.pivots[r] != before.pivots[r]:
+        if reduced.pivots[r] != before.pivots[r]:
             return False
     return True
 
@@ -159,23 +159,23 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: PlatformState, 
     configuration that is so near, that is where it ends. Where steps that leave something open are lost, it goes on
     from the last configuration that was closed, and closes each.
     """
-    view, unit = search.first, search.gradient.unit
+    reduced, unit = search.first, search.gradient.unit
     search.near[0] = NEAR
     unit[0], search.control[0]["steps"], search.control[0]["recovered"] = 1.0, 0, 0
-    linearise(table, row, aim, search.best, search, view)
-    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
+    linearise(table, row, aim, search.best, search, reduced)
+    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, reduced, RESTORING):
         return math.inf
-    unit[0] = scale_objective(view.linear)
+    unit[0] = scale_objective(reduced.linear)
     for j in range(search.force.shape[0]):
         search.force[j] *= unit[0]
-    if view.linear.totals[0]["value"] == 0.0:
+    if reduced.linear.totals[0]["value"] == 0.0:
         return 0.0
     copy_platform_state(search.best, search.closed)
     for closing in range(2):
         search.control[0]["recovered"] = closing
         if closing == 1:
             copy_platform_state(search.closed, search.best)
-            linearise(table, row, aim, search.best, search, view)
+            linearise(table, row, aim, search.best, search, reduced)
         distance = go_down(table, row, aim, least, met, closing, search)
         count_platform(2, search)
         if distance >= 0.0:
@@ -191,50 +191,50 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: PlatformState, 
     ----------
     closing : 1 to close each step before it is judged.
     """
-    view, other, hessian, control = search.first, search.second, search.hessian, search.control[0]
+    reduced, other, hessian, control = search.first, search.second, search.hessian, search.control[0]
     unit = search.gradient.unit
-    begin_descent(view.linear, hessian, control)
+    begin_descent(reduced.linear, hessian, control)
     missed = 0
     while control["done"] == 0:
-        if not has_same_curvature(view, other, control):
-            control["largest"] = lagrangian_hessian(table, row, aim, search, view)
+        if not has_same_curvature(reduced, other, control):
+            control["largest"] = lagrangian_hessian(table, row, aim, search, reduced)
         led_down = False
         while not led_down and control["done"] == 0:
-            if plan_step(view.linear, hessian, control, aim.pose.max_iterations, search.p):
+            if plan_step(reduced.linear, hessian, control, aim.pose.max_iterations, search.p):
                 copy_platform_state(search.best, search.trial)
-                share = take(table, view, search.p.x, search.trial, search)
+                share = take(table, reduced, search.p.x, search.trial, search)
                 search.near[0] = min(NEAR, max(NEARBY, STEPS_AWAY * share * longest(search.step, search.step.shape[0])))
                 linearise(table, row, aim, search.trial, search, other)
                 closes = True
                 if closing == 1:
                     closes = restore_feasibility(table, row, aim, search.trial, CLOSED, search, other, RESTORING)
-                elif is_to_close(view.linear, other.linear, share, control):
+                elif is_to_close(reduced.linear, other.linear, share, control):
                     tolerance = on_the_way(control, share)
                     closes = restore_feasibility(table, row, aim, search.trial, tolerance, search, other, CORRECTIONS)
-                    closes = closes or other.linear.totals[0]["gap"] <= max(CLOSED, openness(view.linear))
-                led_down = judge_step(view.linear, other.linear, closes, share, control)
+                    closes = closes or other.linear.totals[0]["gap"] <= max(CLOSED, openness(reduced.linear))
+                led_down = judge_step(reduced.linear, other.linear, closes, share, control)
                 if not led_down and not is_closed(other.linear, CLOSED):
                     missed += 1
                     if missed == MISSES:
                         count_platform(1, search)
                 if led_down:
                     copy_platform_state(search.trial, search.best)
-                    view, other = other, view
+                    reduced, other = other, reduced
                     if least < math.inf and is_by(table.legs, search.best, met, search.holding):
                         return least
-                    behind = view.linear.totals[0]["value"] - 0.5 * unit[0] * least * least
+                    behind = reduced.linear.totals[0]["value"] - 0.5 * unit[0] * least * least
                     if is_hopeless(behind, share, control):
                         return math.inf
-                    if is_closed(view.linear, CLOSED):
+                    if is_closed(reduced.linear, CLOSED):
                         copy_platform_state(search.best, search.closed)
-                        if view.linear.totals[0]["value"] <= 0.5 * unit[0] * THERE * THERE:
+                        if reduced.linear.totals[0]["value"] <= 0.5 * unit[0] * THERE * THERE:
                             control["done"] = 1
-            if rests_open(view.linear, led_down, aim.pose.max_iterations, control):
-                if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
+            if rests_open(reduced.linear, led_down, aim.pose.max_iterations, control):
+                if not restore_feasibility(table, row, aim, search.best, CLOSED, search, reduced, RESTORING):
                     return -1.0
                 go_on(control)
                 led_down = True
-    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, view, RESTORING):
+    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, reduced, RESTORING):
         return -1.0
-    distance = math.sqrt(2.0 * view.linear.totals[0]["value"] / unit[0])
+    distance = math.sqrt(2.0 * reduced.linear.totals[0]["value"] / unit[0])
     return distance if distance > THERE else 0.0

@@ -105,17 +105,17 @@ def lagrangian_gradient(table: Table, row: int, aim: Aim, state: PlatformState, 
 
 
 @routine
-def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: FreeMotions) -> float:
+def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, reduced: FreeMotions) -> float:
     """Curvature of the objective and of the active limits along free motions, into `hessian`; the largest on its
     diagonal.
 
     By differences of the gradient of the Lagrangian, whose multipliers of the equations balance it at pivot unknowns,
     from `best`, where `search.leg_eval` still is.
     """
-    linear, H, basis, step = view.linear, search.hessian.H, view.basis, search.step
+    linear, H, basis, step = reduced.linear, search.hessian.H, reduced.basis, search.step
     motions, here, there = linear.totals[0]["motions"], search.here, search.there
     put_force(table, search, search.here)
-    search.control[0]["holding"] = put_multipliers(search.here, view, search.balance)
+    search.control[0]["holding"] = put_multipliers(search.here, reduced, search.balance)
     add_balance(linear.totals[0]["rows"] - search.leg_eval.slopes.shape[0], search, search.here)
     note_pulled(table, aim, search)
     for a in range(motions):
@@ -127,5 +127,5 @@ def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, view: F
         lagrangian_gradient(table, row, aim, search.trial, search, search.there)
         for j in range(step.shape[0]):
             there[j] = (there[j] - here[j]) / probe
-        project(there, view, H[a])
+        project(there, reduced, H[a])
     return symmetrise(H, motions)

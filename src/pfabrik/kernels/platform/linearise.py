@@ -16,18 +16,18 @@ from .search import Search, put_objective
 
 
 @routine
-def linearise(table: Table, row: int, aim: Aim, state: PlatformState, search: Search, view: FreeMotions) -> None:
+def linearise(table: Table, row: int, aim: Aim, state: PlatformState, search: Search, reduced: FreeMotions) -> None:
     """Look at a configuration."""
-    totals, errors = view.linear.totals[0], search.gradient.errors
+    totals, errors = reduced.linear.totals[0], search.gradient.errors
     gap = place(table, state, search.leg_eval)
     put_slopes(table, search.leg_eval)
     totals["value"], held = put_objective(table, row, aim, state, search)
     for k in range(held):
         gap = max(gap, abs(errors[k]))
     totals["gap"] = gap
-    eliminate(lay_out(held, search), search.elimination, view, search.leg_eval.rows.shape[0], aim.implied)
-    project_gradient(search.force, view)
-    linearise_limits(table, aim.pose.margin, search, view)
+    eliminate(lay_out(held, search), search.elimination, reduced, search.leg_eval.rows.shape[0], aim.implied)
+    project_gradient(search.force, reduced)
+    linearise_limits(table, aim.pose.margin, search, reduced)
 
 
 @routine
@@ -52,7 +52,7 @@ def lay_out(held: int, search: Search) -> int:
 
 
 @routine
-def linearise_limits(table: Table, margin: float, search: Search, view: FreeMotions) -> None:
+def linearise_limits(table: Table, margin: float, search: Search, reduced: FreeMotions) -> None:
     """Excess and gradient of every limit within reach, and of dead points that are not to be passed."""
     slope, values, kept, k, excess = search.leg_eval.slope, search.leg_eval.values, search.kept, 0, -math.inf
     near, halves = search.near[0], search.half_angles
@@ -66,18 +66,18 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
         excess = max(excess, max(below, above))
         coordinate_slope(table, limited, search.leg_eval)
         if above > -near:
-            k = add_limit(k, above, 2 * i + 1, search.leg_eval.slope, view)
+            k = add_limit(k, above, 2 * i + 1, search.leg_eval.slope, reduced)
         if below > -near:
             for j in range(slope.shape[0]):
                 slope[j] = -slope[j]
-            k = add_limit(k, below, 2 * i, search.leg_eval.slope, view)
+            k = add_limit(k, below, 2 * i, search.leg_eval.slope, reduced)
     for i in range(halves.shape[0]):
         cone = table.cones[i]
         line = vec(values[cone["leg"], cone["place"] :])
         if halves[i, 0] <= near or dot(vec(cone["axis"]), line) <= halves[i, 1] * cosine + halves[i, 2] * sine:
             over = cone_slope(table, cone, search.leg_eval) - cone["half_angle"] + margin
             excess = max(excess, over)
-            k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.leg_eval.slope, view)
+            k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.leg_eval.slope, reduced)
     first = 2 * table.limited.shape[0] + table.cones.shape[0]
     for leg in range(kept.shape[0]):
         if kept[leg] != 0.0:
@@ -86,6 +86,6 @@ def linearise_limits(table: Table, margin: float, search: Search, view: FreeMoti
                 excess = max(excess, over)
                 for j in range(slope.shape[0]):
                     slope[j] *= kept[leg]
-                k = add_limit(k, over, first + leg, search.leg_eval.slope, view)
-    view.linear.totals[0]["limits"] = k
-    view.linear.totals[0]["excess"] = excess
+                k = add_limit(k, over, first + leg, search.leg_eval.slope, reduced)
+    reduced.linear.totals[0]["limits"] = k
+    reduced.linear.totals[0]["excess"] = excess
