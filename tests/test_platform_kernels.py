@@ -20,7 +20,7 @@ from pfabrik.kernels.platform import equations as E
 from pfabrik.kernels.platform import forward as F
 from pfabrik.kernels.platform import limits
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
-from pfabrik.kernels.platform.nearest import new_work
+from pfabrik.kernels.platform.nearest import new_nearest_scratch
 from pfabrik.kernels.platform.records import SETTINGS, Aim, Plan
 from pfabrik.kernels.platform.search import new_search
 from pfabrik.platform.table import kernel_table
@@ -146,23 +146,23 @@ def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> 
     """Equation by equation, in another order and the sense of the actuator."""
     mechanism, described, table = described_by_name(name)
     rng = np.random.default_rng(2)
-    work = F.new_newton(table, not mechanism.end_effector_is_joint)
-    assert (len(work.spheres.legs) > 0) == (name in ON_SPHERES)
+    scratch = F.new_newton(table, not mechanism.end_effector_is_joint)
+    assert (len(scratch.spheres.legs) > 0) == (name in ON_SPHERES)
     if name not in ON_SPHERES:
         return
-    no_spheres = work.spheres._replace(legs=np.zeros(0, np.int64))
-    by_leg = work._replace(spheres=no_spheres, equations=np.zeros_like(work.equations))
+    no_spheres = scratch.spheres._replace(legs=np.zeros(0, np.int64))
+    by_leg = scratch._replace(spheres=no_spheres, equations=np.zeros_like(scratch.equations))
     for _ in range(3):
         state = somewhere(mechanism, described, rng)
-        for to, source in zip(work.state, state, strict=True):
+        for to, source in zip(scratch.state, state, strict=True):
             to[:] = source
-        work.values[:] = rng.uniform(-0.3, 0.3, len(work.values))
-        F.put_drivers(table, work)
-        F.set_spheres(table, work.values, work.state, work.leg_eval, work.spheres)
-        worst = F.put_residuals(table, work)
+        scratch.values[:] = rng.uniform(-0.3, 0.3, len(scratch.values))
+        F.put_drivers(table, scratch)
+        F.set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
+        worst = F.put_residuals(table, scratch)
         assert worst == pytest.approx(F.put_residuals(table, by_leg), abs=1e-12)
         F.put_equations(table, by_leg)
-        own, others = work.equations[:, None], by_leg.equations[None]
+        own, others = scratch.equations[:, None], by_leg.equations[None]
         apart = np.minimum(np.abs(own - others).max(axis=2), np.abs(own + others).max(axis=2))
         assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-12
 
@@ -173,12 +173,12 @@ def test_limits_are_weighed_in_more_motions_than_there_are_limits() -> None:
     assert isinstance(table, LegTable)
     settings = np.zeros(1, SETTINGS)  # no steps: limits are weighed
     plan = Plan(np.zeros(6), settings, np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
-    work = new_work(kernel_table(table), plan)
-    linear = work.search.first.linear
+    scratch = new_nearest_scratch(kernel_table(table), plan)
+    linear = scratch.search.first.linear
     n = len(linear.g)
     assert len(linear.h) < n
     linear.metric[:] = np.eye(n)
     linear.totals["motions"], linear.totals["limits"] = n, 1
     linear.g[:], linear.G[0], linear.h[0] = -3.0, np.eye(n)[0], 0.0
-    assert balance(linear, 1e-6, work.p, work.pulls) == 1
-    assert work.p.x[0] == pytest.approx(3.0)
+    assert balance(linear, 1e-6, scratch.p, scratch.pulls) == 1
+    assert scratch.p.x[0] == pytest.approx(3.0)

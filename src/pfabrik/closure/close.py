@@ -25,7 +25,7 @@ from ..tolerances import TOLERANCES
 from .loops import loops_of
 
 if TYPE_CHECKING:
-    from ..kernels.closure.close import Work
+    from ..kernels.closure.close import ClosingScratch
 
 EVERYTHING_FREE = (0.0,) * 6
 HELD = (K.LOCKED,) * 6
@@ -107,9 +107,11 @@ def closure_of(mechanism: Mechanism, whole: bool = True) -> Closure:
 
 
 @lru_cache(maxsize=256)
-def _locking(mechanism: Mechanism, whole: bool, locked: frozenset[int]) -> tuple[Handle[K.Layout], Scratch[Work]]:
+def _locking(
+    mechanism: Mechanism, whole: bool, locked: frozenset[int]
+) -> tuple[Handle[K.Layout], Scratch[ClosingScratch]]:
     """The layout in which the coordinates of some columns do not move, and memory to close loops in it."""
-    from ..kernels.closure.close import new_work
+    from ..kernels.closure.close import new_closing_scratch
 
     loops = closure_of(mechanism, whole).loops
     free = column_moves(mechanism) > 0.0
@@ -121,7 +123,7 @@ def _locking(mechanism: Mechanism, whole: bool, locked: frozenset[int]) -> tuple
         slots[j] = sizes[group]
         sizes[group] += 1
     layout = K.Layout(slots, sizes)
-    return Handle(layout), Scratch(new_work, loops, layout)
+    return Handle(layout), Scratch(new_closing_scratch, loops, layout)
 
 
 def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:

@@ -18,7 +18,7 @@ from .effort import steps_within
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
-    from ..kernels.closure.linearise import Workspace
+    from ..kernels.closure.linearise import DescentScratch
 
 
 MOST_STEPS = 200
@@ -120,10 +120,10 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
 
 
 @lru_cache(maxsize=64)
-def _scratch(mechanism: Mechanism, whole: bool) -> Scratch[Workspace]:
-    from ..kernels.closure.linearise import new_workspace
+def _scratch(mechanism: Mechanism, whole: bool) -> Scratch[DescentScratch]:
+    from ..kernels.closure.linearise import new_descent_scratch
 
-    return Scratch(new_workspace, closure_of(mechanism, whole).loops)
+    return Scratch(new_descent_scratch, closure_of(mechanism, whole).loops)
 
 
 def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> Objective:

@@ -55,7 +55,7 @@ def new_elimination(n: int, rows: int) -> Elimination:
 
 
 @routine
-def eliminate(rows: int, scratch: Elimination, reduced: FreeMotions, first: int, implied: int) -> None:
+def eliminate(rows: int, elimination: Elimination, reduced: FreeMotions, first: int, implied: int) -> None:
     """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what meets the equations.
 
     An equation f = a f1 + b f2 that follows from others where these are met does so no more where they are open: what
@@ -66,7 +66,7 @@ def eliminate(rows: int, scratch: Elimination, reduced: FreeMotions, first: int,
     first, implied : so many of the first equations follow from others in general. Of these equations those that seem to
         follow from the others at this gap wait, and as many as do in general are left out.
     """
-    A, taken, used = scratch.A, scratch.taken, scratch.used
+    A, taken, used = elimination.A, elimination.taken, elimination.used
     basis, shift, pivots = reduced.basis, reduced.shift, reduced.pivots
     n, rank = used.shape[0], 0
     for j in range(n):
@@ -78,7 +78,7 @@ def eliminate(rows: int, scratch: Elimination, reduced: FreeMotions, first: int,
     for turn in range(rows + again):
         row = turn if turn < first else turn - first if turn < first + again else turn - again
         if not first <= turn < first + again or rank <= min(row, first - implied - 1):
-            rank += solve_row(row, rank, rows, least if turn < first else DEPENDENT, scratch, reduced)
+            rank += solve_row(row, rank, rows, least if turn < first else DEPENDENT, elimination, reduced)
     motions = 0
     for j in range(n):
         if taken[j] == 0.0:
@@ -98,9 +98,9 @@ def eliminate(rows: int, scratch: Elimination, reduced: FreeMotions, first: int,
 
 
 @routine
-def solve_row(row: int, rank: int, rows: int, least: float, scratch: Elimination, reduced: FreeMotions) -> int:
+def solve_row(row: int, rank: int, rows: int, least: float, elimination: Elimination, reduced: FreeMotions) -> int:
     """Eliminate an unknown by a row, which becomes that of the `rank`; 0 where it follows from those before, else 1."""
-    A, taken, filled_at, used = scratch.A, scratch.taken, scratch.filled, scratch.used
+    A, taken, filled_at, used = elimination.A, elimination.taken, elimination.filled, elimination.used
     n, largest, pivot = used.shape[0], 0.0, -1
     for j in range(n):
         size = abs(A[row, j])

@@ -24,7 +24,7 @@ from .rotation import implied_rows, keeps_rotation, without_idle_legs
 from .table import OF_AIMS, machine_searched
 
 if TYPE_CHECKING:
-    from ..kernels.platform.nearest import Work
+    from ..kernels.platform.nearest import NearestScratch
 
 HITS, HITS_OF_STRUTS, HITS_OF_VALUES = 4, 3, 8
 """How many searches must end at the nearest configuration, and one more for each that ends elsewhere: fewer where
@@ -95,10 +95,10 @@ class Approach:
         return approach
 
     @cached_property
-    def _scratch(self) -> Scratch[Work]:
-        from ..kernels.platform.nearest import new_work
+    def _scratch(self) -> Scratch[NearestScratch]:
+        from ..kernels.platform.nearest import new_nearest_scratch
 
-        return Scratch(new_work, self._legs.record, self._plan.record)
+        return Scratch(new_nearest_scratch, self._legs.record, self._plan.record)
 
     def find(self, targets: Floats, own: Starts, values: Floats | None = None) -> Found:
         """Where searches for targets (n, 4, 4) [length] end; see `fill`."""

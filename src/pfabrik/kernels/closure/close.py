@@ -58,7 +58,7 @@ FEW = 100
 cube of their number: six equations leave all but six of its pivots to damping."""
 
 
-class Work(NamedTuple):
+class ClosingScratch(NamedTuple):
     """Scratch memory of one thread."""
 
     best: State
@@ -66,12 +66,12 @@ class Work(NamedTuple):
     eq: Equations
 
 
-def new_work(loops: Loops, layout: Layout) -> Work:
+def new_closing_scratch(loops: Loops, layout: Layout) -> ClosingScratch:
     """Scratch memory of one thread."""
-    return Work(new_state(loops), new_state(loops), new_equations(loops, layout))
+    return ClosingScratch(new_state(loops), new_state(loops), new_equations(loops, layout))
 
 
-open_work = opener(new_work(LOOPS, LAYOUT))
+open_scratch = opener(new_closing_scratch(LOOPS, LAYOUT))
 
 
 @inlined
@@ -251,9 +251,11 @@ def least_damping(layout: Layout) -> float:
 
 
 @routine
-def close_row(loops: Loops, layout: Layout, problem: ClosureProblem, row: int, work: Work, closed: Closed) -> int:
-    """Close the loops of a row, from `work.trial`, into `work.best`; how many steps it took."""
-    best, trial, eq = work.best, work.trial, work.eq
+def close_row(
+    loops: Loops, layout: Layout, problem: ClosureProblem, row: int, scratch: ClosingScratch, closed: Closed
+) -> int:
+    """Close the loops of a row, from `scratch.trial`, into `scratch.best`; how many steps it took."""
+    best, trial, eq = scratch.best, scratch.trial, scratch.eq
     least = least_damping(layout)
     plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
     copy_state(trial, best)
@@ -309,7 +311,7 @@ def close_row(loops: Loops, layout: Layout, problem: ClosureProblem, row: int, w
 
 
 @search
-def close(machine: int, locked: int, scratch: int, problem: ClosureProblem, closed: Closed) -> None:
+def close(machine: int, locked: int, scratch_address: int, problem: ClosureProblem, closed: Closed) -> None:
     """Close the loops of every row, nearest to what is wished.
 
     A row ends when all that must hold is within `problem.closeness`, when its steps or gains vanish, or after
@@ -317,10 +319,10 @@ def close(machine: int, locked: int, scratch: int, problem: ClosureProblem, clos
 
     Parameters
     ----------
-    machine, locked, scratch : see `open_loops`, `open_layout` and `new_work`.
+    machine, locked, scratch : see `open_loops`, `open_layout` and `new_closing_scratch`.
     """
-    loops, layout, work = open_loops(machine), open_layout(locked), open_work(scratch)
+    loops, layout, scratch = open_loops(machine), open_layout(locked), open_scratch(scratch_address)
     for row in range(len(closed.coordinates)):
-        load_row(loops, row, closed, work.trial)
-        closed.iterations[row] = close_row(loops, layout, problem, row, work, closed)
-        store_row(loops, row, work.best, closed)
+        load_row(loops, row, closed, scratch.trial)
+        closed.iterations[row] = close_row(loops, layout, problem, row, scratch, closed)
+        store_row(loops, row, scratch.best, closed)

@@ -61,16 +61,18 @@ open_tables = opener(new_tables(LOOPS, PLAN))
 
 
 @search
-def first_order(machine: int, scratch: int, plan: FirstOrderPlan, coordinates: Floats, found: FirstOrder) -> None:
+def first_order(
+    machine: int, scratch_address: int, plan: FirstOrderPlan, coordinates: Floats, found: FirstOrder
+) -> None:
     """Fill what is told of dimensionless joint coordinates (n, columns); NaN where these are not numbers.
 
     Parameters
     ----------
     machine, scratch : see `open_loops` and `new_tables`.
     """
-    loops, work = open_loops(machine), open_tables(scratch)
-    state, eq, screws, table = work.state, work.eq, work.screws, work.table
-    motions, pairs, conditions, sizes = work.motions, work.pairs, work.conditions, work.sizes
+    loops, scratch = open_loops(machine), open_tables(scratch_address)
+    state, eq, screws, table = scratch.state, scratch.eq, scratch.screws, scratch.table
+    motions, pairs, conditions, sizes = scratch.motions, scratch.pairs, scratch.conditions, scratch.sizes
     n, m, shown = coordinates.shape[1], 6 * plan.loops.shape[0], plan.shown
     width = plan.twists + plan.actuated.shape[0]
     for row in range(coordinates.shape[0]):

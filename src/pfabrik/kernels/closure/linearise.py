@@ -37,7 +37,7 @@ from .path_kinematics import (
 from .pose_objective import PoseGradient, pose_gradient
 
 
-class Workspace(NamedTuple):
+class DescentScratch(NamedTuple):
     """Scratch memory of one thread."""
 
     best: State
@@ -59,7 +59,7 @@ class Workspace(NamedTuple):
     there: Floats  # (columns,)
 
 
-def new_workspace(loops: Loops) -> Workspace:
+def new_descent_scratch(loops: Loops) -> DescentScratch:
     """Scratch memory of one thread."""
     n, paths, rows = len(loops.lo), len(loops.paths) - 1, 6 * len(loops.paths)
     limits = 2 * n + len(loops.cone_angles)
@@ -67,7 +67,7 @@ def new_workspace(loops: Loops) -> Workspace:
     for r in range(len(loops.row_columns)):
         is_first = r < loops.visit_rows[loops.paths[1]]  # which is in all equations
         elimination.used[loops.row_columns[r]] += 2 if is_first else 1
-    return Workspace(
+    return DescentScratch(
         new_state(loops),
         new_state(loops),
         new_free_motions(n, rows, limits),
@@ -88,13 +88,13 @@ def new_workspace(loops: Loops) -> Workspace:
     )
 
 
-open_workspace = opener(new_workspace(LOOPS))
+open_scratch = opener(new_descent_scratch(LOOPS))
 
 
 @routine
-def walk_all(loops: Loops, state: State, work: Workspace) -> float:
+def walk_all(loops: Loops, state: State, scratch: DescentScratch) -> float:
     """Pose the end effector by the first path, and compare the ends of the others with it; the largest gap."""
-    eq, gap = work.eq, 0.0
+    eq, gap = scratch.eq, 0.0
     for path in range(len(loops.paths) - 1):
         last = loops.paths[path + 1]
         walk_path(loops, path, last, state, eq)
@@ -106,14 +106,14 @@ def walk_all(loops: Loops, state: State, work: Workspace) -> float:
         else:
             gap = max(gap, compare_end(loops, state, eq))
             for i in range(6):
-                work.gaps[path, i] = eq.e[i]
+                scratch.gaps[path, i] = eq.e[i]
     return gap
 
 
 @routine
-def add_force(loops: Loops, path: int, force: Floats, work: Workspace, out: Floats) -> None:
+def add_force(loops: Loops, path: int, force: Floats, scratch: DescentScratch, out: Floats) -> None:
     """What a force and moment at the end of a path do at every coordinate, added to `out`."""
-    rows, columns = work.eq.rows, loops.row_columns
+    rows, columns = scratch.eq.rows, loops.row_columns
     for r in range(loops.visit_rows[loops.paths[path]], loops.visit_rows[loops.paths[path + 1]]):
         a = rows[r]
         share = a[0] * force[0] + a[1] * force[1] + a[2] * force[2]
@@ -134,35 +134,35 @@ def add_anchors(row: int, objective: Objective, state: State, unit: float, out: 
 
 @routine
 def linearise(
-    loops: Loops, row: int, objective: Objective, state: State, work: Workspace, reduced: FreeMotions
+    loops: Loops, row: int, objective: Objective, state: State, scratch: DescentScratch, reduced: FreeMotions
 ) -> None:
     """Look at a configuration."""
-    linear, n, here = reduced.linear, len(loops.lo), work.here
-    gap = walk_all(loops, state, work)
-    value, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, work.gradient, True)
+    linear, n, here = reduced.linear, len(loops.lo), scratch.here
+    gap = walk_all(loops, state, scratch)
+    value, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, scratch.gradient, True)
     for k in range(held):
-        gap = max(gap, abs(work.gradient.errors[k]))
+        gap = max(gap, abs(scratch.gradient.errors[k]))
     linear.totals[0]["gap"] = gap
     for j in range(n):
         here[j] = 0.0
-    add_force(loops, 0, work.gradient.force, work, work.here)
-    linear.totals[0]["value"] = value + add_anchors(row, objective, state, work.gradient.unit[0], work.here)
-    rows = lay_out(loops, held, work)
-    eliminate(rows, work.elimination, reduced, rows, 0)
-    project_gradient(work.here, reduced)
-    linearise_limits(loops, objective.pose.margin, state, work, reduced)
+    add_force(loops, 0, scratch.gradient.force, scratch, scratch.here)
+    linear.totals[0]["value"] = value + add_anchors(row, objective, state, scratch.gradient.unit[0], scratch.here)
+    rows = lay_out(loops, held, scratch)
+    eliminate(rows, scratch.elimination, reduced, rows, 0)
+    project_gradient(scratch.here, reduced)
+    linearise_limits(loops, objective.pose.margin, state, scratch, reduced)
 
 
 @routine
-def lay_out(loops: Loops, held: int, work: Workspace) -> int:
+def lay_out(loops: Loops, held: int, scratch: DescentScratch) -> int:
     """The equations of the loops and of what is held, with an identity beside them; how many."""
-    paths, n, A, eq = len(loops.paths) - 1, len(loops.lo), work.elimination.A, work.eq
+    paths, n, A, eq = len(loops.paths) - 1, len(loops.lo), scratch.elimination.A, scratch.eq
     first = 6 * (paths - 1)
-    rows, holds = eq.rows, work.gradient.holds
+    rows, holds = eq.rows, scratch.gradient.holds
     for r in range(first + held):
         for j in range(A.shape[1]):
             A[r, j] = 0.0
-        A[r, n] = -work.gaps[1 + r // 6, r % 6] if r < first else -work.gradient.errors[r - first]
+        A[r, n] = -scratch.gaps[1 + r // 6, r % 6] if r < first else -scratch.gradient.errors[r - first]
         A[r, n + 1 + r] = 1.0
     for path in range(paths):
         for r in range(loops.visit_rows[loops.paths[path]], loops.visit_rows[loops.paths[path + 1]]):
@@ -179,15 +179,15 @@ def lay_out(loops: Loops, held: int, work: Workspace) -> int:
 
 
 @routine
-def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace, reduced: FreeMotions) -> None:
+def linearise_limits(loops: Loops, margin: float, state: State, scratch: DescentScratch, reduced: FreeMotions) -> None:
     """Excess and gradient of every limit within reach."""
     linear = reduced.linear
-    basis, shift, G, row = reduced.basis, reduced.shift, linear.G, work.row
+    basis, shift, G, row = reduced.basis, reduced.shift, linear.G, scratch.row
     n, k, excess = len(loops.lo), 0, -math.inf
     for j in range(n):
         for side in range(2):
             h = loops.lo[j] + margin - state.q[j] if side == 0 else state.q[j] - loops.hi[j] + margin
-            if h > -REACH and work.elimination.used[j] > 0:
+            if h > -REACH and scratch.elimination.used[j] > 0:
                 for a in range(linear.totals[0]["motions"]):
                     G[k, a] = -basis[j, a] if side == 0 else basis[j, a]
                 linear.drift[k] = -shift[j] if side == 0 else shift[j]
@@ -195,22 +195,22 @@ def linearise_limits(loops: Loops, margin: float, state: State, work: Workspace,
                 excess = max(excess, h)
                 k += 1
     for cone in range(len(loops.cone_angles)):
-        h = cone_excess(loops, cone, margin, state, work)
-        if h > -REACH and work.elimination.used[loops.columns[loops.cone_units[cone, 0]]] > 0:
+        h = cone_excess(loops, cone, margin, state, scratch)
+        if h > -REACH and scratch.elimination.used[loops.columns[loops.cone_units[cone, 0]]] > 0:
             for j in range(n):
                 row[j] = 0.0
-            add_cone(loops, cone, 1.0, work, work.row)
+            add_cone(loops, cone, 1.0, scratch, scratch.row)
             excess = max(excess, h)
-            k = add_limit(k, h, 2 * n + cone, work.row, reduced)
+            k = add_limit(k, h, 2 * n + cone, scratch.row, reduced)
     linear.totals[0]["limits"] = k
     linear.totals[0]["excess"] = excess
 
 
 @routine
-def cone_excess(loops: Loops, cone: int, margin: float, state: State, work: Workspace) -> float:
+def cone_excess(loops: Loops, cone: int, margin: float, state: State, scratch: DescentScratch) -> float:
     """Excess over a cone; its joint is posed for `add_cone`."""
-    pose_cone(loops, cone, state, work.eq)
-    moved, stayed = work.eq.twist[:3], work.eq.twist[3:]
+    pose_cone(loops, cone, state, scratch.eq)
+    moved, stayed = scratch.eq.twist[:3], scratch.eq.twist[3:]
     x = moved[1] * stayed[2] - moved[2] * stayed[1]
     y = moved[2] * stayed[0] - moved[0] * stayed[2]
     z = moved[0] * stayed[1] - moved[1] * stayed[0]
@@ -219,9 +219,9 @@ def cone_excess(loops: Loops, cone: int, margin: float, state: State, work: Work
 
 
 @routine
-def add_cone(loops: Loops, cone: int, factor: float, work: Workspace, out: Floats) -> None:
+def add_cone(loops: Loops, cone: int, factor: float, scratch: DescentScratch, out: Floats) -> None:
     """The gradient of a cone's excess, times a factor, added to `out`."""
-    eq = work.eq
+    eq = scratch.eq
     a, b = eq.twist[:3], eq.twist[3:]
     x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     sine = math.sqrt(x * x + y * y + z * z)

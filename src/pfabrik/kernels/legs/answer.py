@@ -168,11 +168,11 @@ def put_motions(task: Record, pose: Floats, motions: Floats) -> None:
 
 
 @routine
-def newton_step(table: Table, work: Completion) -> float:
+def newton_step(table: Table, scratch: Completion) -> float:
     """Move what is not set, and arms that bear, so that the constraints vanish, by least squares; how far, infinite
     where it cannot be."""
-    task, pose, rows, slopes = table.task[0], work.pose, work.rows, work.slopes
-    motions, normal, unset = work.motions, work.normal, task["unset"]
+    task, pose, rows, slopes = table.task[0], scratch.pose, scratch.rows, scratch.slopes
+    motions, normal, unset = scratch.motions, scratch.normal, task["unset"]
     n = unset + task["arms"]
     put_motions(task, pose, motions)
     for i in range(n):
@@ -212,7 +212,7 @@ def newton_step(table: Table, work: Completion) -> float:
     for k in range(table.legs.shape[0] if task["led"] == 1 else 0):
         leg = table.legs[k]
         if leg["kind"] == ARM and leg["by_plane"] == 0 and leg["twin"] < 0:
-            work.sides[k] += share * normal[unset + leg["column"], n]
+            scratch.sides[k] += share * normal[unset + leg["column"], n]
     return share * step
 
 
@@ -268,35 +268,35 @@ def answer(
     How many are PENDING.
     """
     table, left = open_table(machine), 0
-    work = new_completion(table)
+    scratch = new_completion(table)
     for row in range(targets.shape[0]):
         status[row] = PENDING
         begin = begins[row if begins.shape[0] > 1 else 0]
         side = sides[row if sides.shape[0] > 1 else 0]
-        if load(targets[row], begin, table.task[0], work.pose) and complete(table, side, work):
-            status[row] = write_answer(table, work, poses[row], actuators[row], measures[row])
+        if load(targets[row], begin, table.task[0], scratch.pose) and complete(table, side, scratch):
+            status[row] = write_answer(table, scratch, poses[row], actuators[row], measures[row])
             if table.task[0]["led"] == 1 and status[row] == REACHED:
-                copy_row(work.sides, side)
+                copy_row(scratch.sides, side)
         left += status[row]
     return left // PENDING
 
 
 @routine
-def write_answer(table: Table, work: Completion, pose: Floats, actuators: Floats, measures: Floats) -> int:
+def write_answer(table: Table, scratch: Completion, pose: Floats, actuators: Floats, measures: Floats) -> int:
     """Write a completed pose and what is measured of it, if all limits are kept; its status."""
-    excess, task = excess_of(table.limited, table.cones, work.values), table.task[0]
+    excess, task = excess_of(table.limited, table.cones, scratch.values), table.task[0]
     if not excess <= KEPT:
         return PENDING
     for i in range(3):
-        pose[i, 3] = work.pose[i, 3] * task["length"]
+        pose[i, 3] = scratch.pose[i, 3] * task["length"]
         pose[3, i] = 0.0
         for j in range(3):
-            pose[i, j] = work.pose[i, j]
+            pose[i, j] = scratch.pose[i, j]
     pose[3, 3] = 1.0
     for i in range(table.driven.shape[0]):
         driven = table.driven[i]
-        actuators[driven["column"]] = driven["home"] + deviation(driven, work.values) * driven["unit"]
-    measures[RESIDUAL] = worst_of(work.rows) * task["length"]
+        actuators[driven["column"]] = driven["home"] + deviation(driven, scratch.values) * driven["unit"]
+    measures[RESIDUAL] = worst_of(scratch.rows) * task["length"]
     measures[LIMIT_EXCESS] = max(excess, 0.0)
     return REACHED
 
@@ -310,26 +310,26 @@ def worst_of(rows: Floats) -> float:
 
 
 @routine
-def complete(table: Table, sides: Floats, work: Completion) -> bool:
+def complete(table: Table, sides: Floats, scratch: Completion) -> bool:
     """Move what is not set of a pose until all legs close; whether they do, none of them near a dead point.
 
     On the way legs that bear no constraint may be beyond one.
     """
-    legs, task, frames, values, lines = table.legs, table.task[0], work.frames, work.values, work.lines
+    legs, task, frames, values, lines = table.legs, table.task[0], scratch.frames, scratch.values, scratch.lines
     gone, before, is_set = 0.0, math.inf, task["unset"] == 0
-    copy_row(sides, work.sides)
+    copy_row(sides, scratch.sides)
     for _ in range(MOST_OF_ARMS if task["led"] == 1 else MOST_STEPS):
-        set_frames(work.pose, task, frames)
-        sure, bearing = place_legs(legs, frames, work.sides, values, lines)
+        set_frames(scratch.pose, task, frames)
+        sure, bearing = place_legs(legs, frames, scratch.sides, values, lines)
         if not bearing > SURE * SURE:
             return False
-        worst = put_rows(legs, frames, values, lines, work.rows)
+        worst = put_rows(legs, frames, values, lines, scratch.rows)
         if worst <= CLOSED or (is_set and worst <= CLOSE and (task["led"] == 0 or worst > 0.5 * before)):
             return sure > SURE * SURE
         if is_set and task["led"] == 0:
             return False
-        put_slopes(legs, frames, values, lines, work.follow, work.slopes)
-        gone += newton_step(table, work)
+        put_slopes(legs, frames, values, lines, scratch.follow, scratch.slopes)
+        gone += newton_step(table, scratch)
         if not gone <= task["farthest"]:
             return False
         before = worst

@@ -66,7 +66,7 @@ def feasibility(
     where they should). NaN and -1 where a target is no pose.
     """
     table = open_table(machine)
-    work, legs, task, limited, cones = new_completion(table), table.legs, table.task, table.limited, table.cones
+    scratch, legs, task, limited, cones = new_completion(table), table.legs, table.task, table.limited, table.cones
     before, toward, n_legs = np.zeros((4, 4)), np.zeros((4, 4)), legs.shape[0]
     own, turn = np.zeros(n_legs), np.zeros(3)
     n_limits = 2 * limited.shape[0] + cones.shape[0]
@@ -82,24 +82,24 @@ def feasibility(
             copy_row(sides[0], own)
             for part in range(1, parts + 1):
                 aim(targets[row], begins[0], part / parts, task[0], toward, turn)
-                is_pose = load(toward, before, task[0], work.pose)
-                closed = is_pose and complete(table, own, work)
+                is_pose = load(toward, before, task[0], scratch.pose)
+                closed = is_pose and complete(table, own, scratch)
                 if not closed:
                     break
-                put_pose(work.pose, task[0]["length"], before)
-                copy_row(work.sides, own)
+                put_pose(scratch.pose, task[0]["length"], before)
+                copy_row(scratch.sides, own)
             if not is_pose:
                 break
             if parts > 1 and not closed:
                 continue
-            least, binding = least_margin(limited, cones, work.values)
+            least, binding = least_margin(limited, cones, scratch.values)
             if not closed:
-                put_rows(legs, work.frames, work.values, work.lines, work.rows)
+                put_rows(legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
                 for k in range(n_legs):
-                    share = reach_of(legs[k], work.values[k])
+                    share = reach_of(legs[k], scratch.values[k])
                     if share < -CLOSE and share < least:
                         least, binding = share, n_limits + k
-                    share = -max(largest_row(legs, work.rows, k), missed_by_ends(legs[k], work.values[k]))
+                    share = -max(largest_row(legs, scratch.rows, k), missed_by_ends(legs[k], scratch.values[k]))
                     if share < -CLOSE and share < least:
                         least, binding = share, n_limits + n_legs + k
             if parts == 1 or least > margins[row]:

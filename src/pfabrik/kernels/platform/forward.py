@@ -111,74 +111,74 @@ def drives_carrier(table: Table, i: int) -> bool:
 
 
 @routine
-def put_drivers(table: Table, work: Newton) -> None:
+def put_drivers(table: Table, scratch: Newton) -> None:
     """Put driven carriers where their values say."""
-    q = work.state.q
+    q = scratch.state.q
     for i in range(table.driven.shape[0]):
         if drives_carrier(table, i):
-            q[table.driven[i]["leg"]] = table.driven[i]["sense"] * work.values[table.driven[i]["column"]]
+            q[table.driven[i]["leg"]] = table.driven[i]["sense"] * scratch.values[table.driven[i]["column"]]
 
 
 @routine
-def put_slope(e: int, slope: Floats, work: Newton) -> None:
-    free, own = work.free, work.equations[e]
+def put_slope(e: int, slope: Floats, scratch: Newton) -> None:
+    free, own = scratch.free, scratch.equations[e]
     for a in range(free.shape[0]):
         own[a] = slope[free[a]]
 
 
 @routine
-def off_by(driven: Record, value: float, work: Newton) -> float:
+def off_by(driven: Record, value: float, scratch: Newton) -> float:
     """By how much a coordinate that is no carrier's deviates from what it is to be."""
-    off = value - work.values[driven["column"]]
+    off = value - scratch.values[driven["column"]]
     return wrap(off, 0.0) if counts_turns(driven) else off
 
 
 @routine
-def has_spheres(work: Newton) -> bool:
-    return work.spheres.legs.shape[0] > 0
+def has_spheres(scratch: Newton) -> bool:
+    return scratch.spheres.legs.shape[0] > 0
 
 
 @routine
-def put_residuals(table: Table, work: Newton) -> float:
+def put_residuals(table: Table, scratch: Newton) -> float:
     """Read the legs at the present configuration, and fill the right-hand sides; the largest residual.
 
     Spheres are all that there is to read, and fill the left-hand sides too.
     """
-    if has_spheres(work):
-        return put_spheres(work.state.pose, work.spheres, work.equations)
-    worst, rows, equations = place(table, work.state, work.leg_eval), work.leg_eval.rows, work.equations
-    m, e = work.free.shape[0], rows.shape[0]
+    if has_spheres(scratch):
+        return put_spheres(scratch.state.pose, scratch.spheres, scratch.equations)
+    worst, rows, equations = place(table, scratch.state, scratch.leg_eval), scratch.leg_eval.rows, scratch.equations
+    m, e = scratch.free.shape[0], rows.shape[0]
     for r in range(e):
         equations[r, m] = -rows[r]
     for i in range(table.driven.shape[0]):
         if not drives_carrier(table, i):
             driven = table.driven[i]
-            off = off_by(driven, deviation(driven, work.leg_eval.values), work)
+            off = off_by(driven, deviation(driven, scratch.leg_eval.values), scratch)
             worst, equations[e, m] = max(worst, abs(off)), -off
             e += 1
     return worst
 
 
 @routine
-def put_equations(table: Table, work: Newton) -> None:
+def put_equations(table: Table, scratch: Newton) -> None:
     """Fill the left-hand sides where the legs have been read."""
-    slopes, leg_eval = work.leg_eval.slopes, work.leg_eval
+    slopes, leg_eval = scratch.leg_eval.slopes, scratch.leg_eval
     put_slopes(table, leg_eval)
     e = slopes.shape[0]
     for r in range(e):
-        put_slope(r, slopes[r], work)
+        put_slope(r, slopes[r], scratch)
     for i in range(table.driven.shape[0]):
         if not drives_carrier(table, i):
             coordinate_slope(table, table.driven[i], leg_eval)
-            put_slope(e, leg_eval.slope, work)
+            put_slope(e, leg_eval.slope, scratch)
             e += 1
 
 
 @routine
-def solve(work: Newton) -> bool:
+def solve(scratch: Newton) -> bool:
     """Solve the equations, by least squares if they are not as many as the unknowns, into the last column of `normal`;
     whether they have a solution."""
-    equations, normal = work.equations, work.normal
+    equations, normal = scratch.equations, scratch.normal
     m = normal.shape[0]
     if equations.shape[0] == m:
         copy_table(equations, normal)
@@ -192,82 +192,82 @@ def solve(work: Newton) -> bool:
 
 
 @routine
-def newton(table: Table, steps: int, work: Newton) -> float:
+def newton(table: Table, steps: int, scratch: Newton) -> float:
     """Solve for the actuators' values from the present configuration; the largest residual left."""
-    free, normal, step = work.free, work.normal, work.step
+    free, normal, step = scratch.free, scratch.normal, scratch.step
     m, before = free.shape[0], math.inf
-    put_drivers(table, work)
-    if has_spheres(work):
-        set_spheres(table, work.values, work.state, work.leg_eval, work.spheres)
+    put_drivers(table, scratch)
+    if has_spheres(scratch):
+        set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
     for taken in range(steps):
-        worst = put_residuals(table, work)
+        worst = put_residuals(table, scratch)
         if not worst < math.inf or worst <= ASSEMBLED or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * before):
             return worst
         is_near = taken > 0 and worst * worst <= ASSEMBLED * before  # the same slopes, once more, leave less
-        if not is_near and not has_spheres(work):
-            put_equations(table, work)
-        if not solve(work):
+        if not is_near and not has_spheres(scratch):
+            put_equations(table, scratch)
+        if not solve(scratch):
             return math.inf
         before = worst
         for a in range(m):
             step[free[a]] = normal[a, m]
-        take_step(table, work)
-    return put_residuals(table, work)
+        take_step(table, scratch)
+    return put_residuals(table, scratch)
 
 
 @routine
-def take_step(table: Table, work: Newton) -> None:
+def take_step(table: Table, scratch: Newton) -> None:
     """Take a step, no longer than it tells anything: of how the platform's middle moves, and how it turns about that.
 
     The reference point may be far away.
     """
-    pose, step, middle = work.state.pose, work.step, middle_of(work.state.pose, table.task[0])
+    pose, step, middle = scratch.state.pose, scratch.step, middle_of(scratch.state.pose, table.task[0])
     put(step, add(vec(step), cross(vec(step[3:]), middle)))
-    move(table, step, min(1.0, FAR_STEP / max(longest(step, step.shape[0]), FAR_STEP)), work.state)
+    move(table, step, min(1.0, FAR_STEP / max(longest(step, step.shape[0]), FAR_STEP)), scratch.state)
     off = sub(middle, middle_of(pose, table.task[0]))
     for i in range(3):
         pose[i, 3] += off[i]
 
 
 @routine
-def lead(table: Table, values: Floats, work: Newton) -> float:
+def lead(table: Table, values: Floats, scratch: Newton) -> float:
     """The same, with the actuators led to their values from those of the present configuration."""
-    begin, state = work.begin, work.values
-    place(table, work.state, work.leg_eval)
+    begin, state = scratch.begin, scratch.values
+    place(table, scratch.state, scratch.leg_eval)
     for i in range(table.driven.shape[0]):
         column = table.driven[i]["column"]
-        begin[column] = deviation(table.driven[i], work.leg_eval.values)
+        begin[column] = deviation(table.driven[i], scratch.leg_eval.values)
         if table.driven[i]["turns"] == 1:
             begin[column] = wrap(begin[column], values[column])
     worst = math.inf
     for stride in range(1, STRIDES + 1):
         for column in range(state.shape[0]):
             state[column] = begin[column] + (values[column] - begin[column]) * stride / STRIDES
-        worst = newton(table, STEPS if stride == STRIDES else LED_STEPS, work)
+        worst = newton(table, STEPS if stride == STRIDES else LED_STEPS, scratch)
     return worst
 
 
 @routine
-def is_feasible(table: Table, values: Floats, work: Newton) -> bool:
+def is_feasible(table: Table, values: Floats, scratch: Newton) -> bool:
     """Whether the present configuration, assembled, keeps all limits, and its actuators those of theirs."""
-    if has_spheres(work):
-        place(table, work.state, work.leg_eval)
+    if has_spheres(scratch):
+        place(table, scratch.state, scratch.leg_eval)
     for i in range(table.driven.shape[0]):
         value = values[table.driven[i]["column"]]
         if not max(table.driven[i]["lo"] - value, value - table.driven[i]["hi"]) <= KEPT:
             return False
-    return bool(excess_of(table.limited, table.cones, work.leg_eval.values) <= KEPT)
+    return bool(excess_of(table.limited, table.cones, scratch.leg_eval.values) <= KEPT)
 
 
 @routine
-def load_start(table: Table, starts: Starts, start: int, work: Newton) -> None:
-    state = work.state
+def load_start(table: Table, starts: Starts, start: int, scratch: Newton) -> None:
+    state = scratch.state
     copy_table(starts.poses[start], state.pose)
     copy_row(starts.sides[start], state.sides)
     if starts.q.shape[0] > 0:
         copy_row(starts.q[start], state.q)
     else:
-        put_carriers(table, work.state, work.leg_eval)
+        put_carriers(table, scratch.state, scratch.leg_eval)
 
 
 @routine
@@ -296,49 +296,49 @@ def put_deviations(table: Table, values: Floats, wanted: Floats) -> None:
 
 @routine
 def assemble_row(
-    table: Table, given: Floats, own: Starts, row: int, others: Starts, wanted: Floats, work: Newton
+    table: Table, given: Floats, own: Starts, row: int, others: Starts, wanted: Floats, scratch: Newton
 ) -> int:
-    """Assemble one row, into `work.state`, within all limits, and read the legs there; its status, see `assemble`."""
+    """Assemble one row, into `scratch.state`, within all limits, and read the legs there; its status, see `assemble`."""
     first, values, status = row if own.poses.shape[0] > 1 else 0, wanted[row], PENDING
     put_deviations(table, given[row], values)
     for attempt in range(2):
-        load_start(table, own, first, work)
-        copy_row(values, work.values)
-        worst = newton(table, STEPS, work) if attempt == 0 else lead(table, values, work)
+        load_start(table, own, first, scratch)
+        copy_row(values, scratch.values)
+        worst = newton(table, STEPS, scratch) if attempt == 0 else lead(table, values, scratch)
         if worst <= NEARLY_ASSEMBLED:
-            if is_feasible(table, values, work):
+            if is_feasible(table, values, scratch):
                 return REACHED
             status = EXCEEDED
             break
     nearest = math.inf
     for start in range(others.poses.shape[0]):
-        load_start(table, others, start, work)
-        copy_row(values, work.values)
-        if newton(table, STEPS, work) <= NEARLY_ASSEMBLED and is_feasible(table, values, work):
-            distance = apart(work.state.pose, own.poses[first])
+        load_start(table, others, start, scratch)
+        copy_row(values, scratch.values)
+        if newton(table, STEPS, scratch) <= NEARLY_ASSEMBLED and is_feasible(table, values, scratch):
+            distance = apart(scratch.state.pose, own.poses[first])
             if distance < nearest:
                 nearest = distance
-                copy_platform_state(work.state, work.first)
+                copy_platform_state(scratch.state, scratch.first)
     if nearest < math.inf:
-        copy_platform_state(work.first, work.state)
-        place(table, work.state, work.leg_eval)
+        copy_platform_state(scratch.first, scratch.state)
+        place(table, scratch.state, scratch.leg_eval)
         return REACHED
     return status
 
 
 @routine
-def write_assembled(table: Table, row: int, work: Newton, ends: Starts, measures: Floats) -> None:
+def write_assembled(table: Table, row: int, scratch: Newton, ends: Starts, measures: Floats) -> None:
     """Write a configuration that is assembled, its pose in [length], and what is measured of it."""
     length, pose = table.task[0]["length"], ends.poses[row]
-    make_exact(work.state.pose)
-    measures[row, RESIDUAL] = worst_of(work.leg_eval.rows) * length
-    measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, work.leg_eval.values), 0.0)
-    copy_table(work.state.pose, pose)
+    make_exact(scratch.state.pose)
+    measures[row, RESIDUAL] = worst_of(scratch.leg_eval.rows) * length
+    measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, scratch.leg_eval.values), 0.0)
+    copy_table(scratch.state.pose, pose)
     for i in range(3):
         pose[i, 3] *= length
-    put_sides(table, work.state, work.leg_eval)
-    copy_row(work.state.q, ends.q[row])
-    copy_row(work.state.sides, ends.sides[row])
+    put_sides(table, scratch.state, scratch.leg_eval)
+    copy_row(scratch.state.q, ends.q[row])
+    copy_row(scratch.state.sides, ends.sides[row])
 
 
 open_starts = opener(Starts(np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0))))
@@ -349,7 +349,7 @@ open_newton = opener(new_newton(SAMPLE, True))
 @kernel
 def assemble(
     machine: int,
-    scratch: int,
+    scratch_address: int,
     values: Floats,
     own: int,
     others: int,
@@ -382,11 +382,11 @@ def assemble(
     How many are not REACHED.
     """
     table, first, rest, left = open_table(machine), open_starts(own), open_starts(others), 0
-    work = open_newton(scratch)
+    scratch = open_newton(scratch_address)
     for row in range(values.shape[0]):
-        status[row] = assemble_row(table, values, first, row, rest, wanted, work)
+        status[row] = assemble_row(table, values, first, row, rest, wanted, scratch)
         if status[row] == REACHED:
-            write_assembled(table, row, work, Starts(poses, q, sides), measures)
+            write_assembled(table, row, scratch, Starts(poses, q, sides), measures)
         else:
             left += 1
     return left

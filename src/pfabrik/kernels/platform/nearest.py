@@ -61,7 +61,7 @@ TALLY = np.dtype(
 """Where searches for a row have ended."""
 
 
-class Work(NamedTuple):
+class NearestScratch(NamedTuple):
     """Scratch memory of one thread."""
 
     search: Search
@@ -74,18 +74,20 @@ class Work(NamedTuple):
     pulls: Floats  # (limits, n)
 
 
-def new_work(table: Table, plan: Plan) -> Work:
+def new_nearest_scratch(table: Table, plan: Plan) -> NearestScratch:
     """Scratch memory of one thread."""
     setting, starts = plan.settings[0], plan.poses.shape[0]
     search, best = new_search(table, setting["cones"]), new_platform_state(table.legs.shape[0])
     k, n = search.first.linear.G.shape
     k, n = (k, n) if setting["steps"] == 0 else (0, 0)
     tallies = np.zeros(1, TALLY), np.zeros(1, TALLY)
-    return Work(search, best, *tallies, np.zeros(1 + starts), np.zeros(6), new_qp(max(k, n), k), np.zeros((k, n)))
+    return NearestScratch(
+        search, best, *tallies, np.zeros(1 + starts), np.zeros(6), new_qp(max(k, n), k), np.zeros((k, n))
+    )
 
 
 _PLAN = Plan(np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
-open_plan, open_work = opener(_PLAN), opener(new_work(SAMPLE, _PLAN))
+open_plan, open_scratch = opener(_PLAN), opener(new_nearest_scratch(SAMPLE, _PLAN))
 """What `approach` is asked, and its scratch memory: it is given the addresses of their handles."""
 
 
@@ -210,16 +212,24 @@ def search_from(
 
 @routine
 def search_row(
-    table: Table, row: int, aim: Aim, toward: Aim, own: Starts, others: Starts, hits: int, stays: int, work: Work
+    table: Table,
+    row: int,
+    aim: Aim,
+    toward: Aim,
+    own: Starts,
+    others: Starts,
+    hits: int,
+    stays: int,
+    scratch: NearestScratch,
 ) -> float:
-    """The nearest configuration of a row, into `work.best`, and how far it is [L]; see `approach`.
+    """The nearest configuration of a row, into `scratch.best`, and how far it is [L]; see `approach`.
 
     What is held is put in its place at once where searches may start anywhere, and no arms would be left behind, or
     nothing else has a place; and else brought there step by step. The other way too, where that finds nothing, or only
     after it was lost on the way. Where too few agree, searches from starts that were lost go for what is held alone,
     and then on with it held: from a feasible configuration there are more ways to it than the shortest.
     """
-    search, best, met, away, lost = work.search, work.best, work.met[0], work.away[0], work.lost
+    search, best, met, away, lost = scratch.search, scratch.best, scratch.met[0], scratch.away[0], scratch.lost
     target, n = search.target, others.poses.shape[0]
     near = -1
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
@@ -281,23 +291,23 @@ def judge(own: Record, row: int, found: Found) -> None:
 
 
 @routine
-def weigh(table: Table, row: int, aim: Aim, own: Starts, work: Work, weights: Floats) -> None:
+def weigh(table: Table, row: int, aim: Aim, own: Starts, scratch: NearestScratch, weights: Floats) -> None:
     """Fill how hard every limit holds a row back where it starts, see `approach`."""
-    search, linear = work.search, work.search.first.linear
+    search, linear = scratch.search, scratch.search.first.linear
     begin(table, own, row, search)
     fix(aim.pose, True, search)
     search.gradient.unit[0] = 1.0
     linearise(table, row, aim, search.best, search, search.first)
     scale_objective(linear)
-    for c in range(balance(linear, aim.pose.near, work.p, work.pulls)):
-        weights[linear.which[c]] = work.p.x[c]
+    for c in range(balance(linear, aim.pose.near, scratch.p, scratch.pulls)):
+        weights[linear.which[c]] = scratch.p.x[c]
 
 
 @search
 def approach(
     machine: int,
     plan: int,
-    scratch: int,
+    scratch_address: int,
     targets: Floats,
     values: Floats,
     begins: Floats,
@@ -322,7 +332,7 @@ def approach(
     ----------
     machine : see `open_table`.
     plan : the address of a `Plan`.
-    scratch : that of `Work`, made for both.
+    scratch : that of `NearestScratch`, made for both.
     targets, values : see `Aim`.
     begins, q, sides : the first start of each row, or one for all, as of `Starts`; the others follow until the nearest
         configuration has been met often enough: `is_enough`.
@@ -338,8 +348,8 @@ def approach(
         Starts(asked.poses, asked.q, asked.sides),
         Found(distances, ends, ends_q, ends_sides, counters, actuators, measures, status),
     )
-    work = open_work(scratch)
-    search, best, held = work.search, work.best, work.held
+    scratch = open_scratch(scratch_address)
+    search, best, held = scratch.search, scratch.best, scratch.held
     frame, margin, near, weighs = setting["frame"], setting["margin"], setting["near"], setting["steps"] == 0
     pose = PoseObjective(targets, asked.weights, frame, margin, near, setting["steps"])
     aim = Aim(pose, values, setting["implied"])
@@ -351,15 +361,15 @@ def approach(
             left += 1
             continue
         if weighs:
-            weigh(table, row, aim, own, work, weights[row])
+            weigh(table, row, aim, own, scratch, weights[row])
             continue
-        least = search_row(table, row, aim, toward, own, others, setting["hits"], setting["stays"], work)
+        least = search_row(table, row, aim, toward, own, others, setting["hits"], setting["stays"], scratch)
         distances[row] = least
         if least < math.inf:
             counters[row, ITERATIONS] = search.control[0]["steps"]
             write(table, row, pose, search, best, found)
             judge(setting, row, found)
-            counters[row, HOLD] += CERTAIN if work.met[0]["hits"] == math.inf else 0
+            counters[row, HOLD] += CERTAIN if scratch.met[0]["hits"] == math.inf else 0
         else:
             left += 1
     return left

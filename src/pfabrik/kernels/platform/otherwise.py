@@ -57,14 +57,14 @@ def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) ->
 
 
 @routine
-def is_unsure(table: Table, sides: Floats, work: Completion) -> bool:
+def is_unsure(table: Table, sides: Floats, scratch: Completion) -> bool:
     """Whether legs on these sides reach a pose, as far as can be told where one of them is at a dead point."""
-    set_frames(work.pose, table.task[0], work.frames)
-    sure, _ = place_legs(table.legs, work.frames, sides, work.values, work.lines)
+    set_frames(scratch.pose, table.task[0], scratch.frames)
+    sure, _ = place_legs(table.legs, scratch.frames, sides, scratch.values, scratch.lines)
     if sure > SURE * SURE or sure < -NEARLY * NEARLY:
         return False
-    worst = put_rows(table.legs, work.frames, work.values, work.lines, work.rows)
-    return bool(worst <= NEARLY and excess_of(table.limited, table.cones, work.values) <= NEARLY)
+    worst = put_rows(table.legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
+    return bool(worst <= NEARLY and excess_of(table.limited, table.cones, scratch.values) <= NEARLY)
 
 
 @routine
@@ -105,7 +105,7 @@ def answer_otherwise(
     How many are not reached.
     """
     table = open_table(machine)
-    work, legs, n_legs, own, left = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
+    scratch, legs, n_legs, own, left = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
     misfits, choosing, alone = np.zeros(n_legs), np.zeros(n_legs, np.int64), 1
     for k in range(n_legs):
         alone = 3 if legs[k]["by_plane"] == 1 else alone
@@ -115,25 +115,25 @@ def answer_otherwise(
     for row in range(targets.shape[0]):
         status[row], begin = PENDING, begins[row if begins.shape[0] > 1 else 0]
         for attempt in range(1, tries + 1):
-            if not together and load(targets[row], begin, own, work.pose):
-                set_frames(work.pose, own, work.frames)
-                place_legs(legs, work.frames, sides[row], work.values, work.lines)
-                put_rows(legs, work.frames, work.values, work.lines, work.rows)
-                note_misfits(table, work.values, work.rows, misfits)
+            if not together and load(targets[row], begin, own, scratch.pose):
+                set_frames(scratch.pose, own, scratch.frames)
+                place_legs(legs, scratch.frames, sides[row], scratch.values, scratch.lines)
+                put_rows(legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
+                note_misfits(table, scratch.values, scratch.rows, misfits)
             for c in range(n_choices):
                 k = choosing[c]
                 flips = (attempt ^ (attempt - 1)) >> c & 1 == 1
                 if not together:  # a rod first, then the arm that it is on, then the rod again
                     flips = misfits[k] == 1.0 and (legs[k]["by_plane"] == 1) == (attempt == 2)
                 sides[row, k] = -sides[row, k] if flips else sides[row, k]
-            if not load(targets[row], begin, own, work.pose):
+            if not load(targets[row], begin, own, scratch.pose):
                 break
-            if complete(table, sides[row], work):
-                if write_answer(table, work, poses[row], actuators[row], measures[row]) == REACHED:
+            if complete(table, sides[row], scratch):
+                if write_answer(table, scratch, poses[row], actuators[row], measures[row]) == REACHED:
                     status[row] = REACHED
-                    copy_row(work.sides, sides[row])
+                    copy_row(scratch.sides, sides[row])
                     break
-            elif own["unset"] == 0 and is_unsure(table, sides[row], work):
+            elif own["unset"] == 0 and is_unsure(table, sides[row], scratch):
                 status[row] = UNSURE
         left += 0 if status[row] == REACHED else 1
     return left

@@ -39,7 +39,7 @@ open_reading = opener(new_reading(SAMPLE))
 @search
 def read(
     machine: int,
-    scratch: int,
+    scratch_address: int,
     poses: Floats,
     sides: Floats,
     carriers: Floats,
@@ -58,8 +58,8 @@ def read(
     rows, slopes : filled with the constraints of all legs, (n or 0, rows), and their derivatives by the pose and by
         arms, (n or 0, rows, 6 + arms) [L, rad]: NaN where a leg is at a dead point, or beyond.
     """
-    table, work = open_table(machine), open_reading(scratch)
-    state, leg_eval, legs, known = work.state, work.leg_eval, table.legs, table.known
+    table, scratch = open_table(machine), open_reading(scratch_address)
+    state, leg_eval, legs, known = scratch.state, scratch.leg_eval, table.legs, table.known
     for row in range(poses.shape[0]):
         load_pose(poses[row], table.task[0]["length"], state.pose)
         copy_row(sides[row if sides.shape[0] > 1 else 0], state.sides)
@@ -79,7 +79,7 @@ def read(
             found[row, known[i]["column"]] = deviation(known[i], leg_eval.values) * known[i]["unit"]
         if rows.shape[0] > 0:
             put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
-            put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, work.follow, slopes[row])
+            put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.follow, slopes[row])
             for i in range(rows.shape[1] if not bearing > SURE * SURE else 0):
                 for j in range(slopes.shape[2]):
                     slopes[row, i, j] = math.nan
