@@ -21,7 +21,7 @@ from pfabrik.kernels.platform import forward as F
 from pfabrik.kernels.platform import limits
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
 from pfabrik.kernels.platform.nearest import new_nearest_scratch
-from pfabrik.kernels.platform.records import SETTINGS, Aim, Plan
+from pfabrik.kernels.platform.records import SETTINGS, Plan, PlatformObjective
 from pfabrik.kernels.platform.search import new_search
 from pfabrik.platform.table import kernel_table
 
@@ -118,7 +118,7 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
     rng = np.random.default_rng(1)
     search, n = new_search(table, table.cones.shape[0]), E.count_unknowns(table)
     objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
-    aim = Aim(objective, np.zeros((0, len(table.driven))), 0)
+    objective = PlatformObjective(objective, np.zeros((0, len(table.driven))), 0)
     search.target[:] = somewhere(mechanism, described, rng).pose
     search.gradient.unit[0] = 1.0
     limits, rows = 2 * len(table.limited) + len(table.cones), len(search.leg_eval.rows)
@@ -132,11 +132,11 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
         else:
             search.balance[which - limits] = 1.0
         state, own, every = somewhere(mechanism, described, rng), np.zeros(n), np.zeros(n)
-        note_pulled(table, aim, search)
+        note_pulled(table, objective, search)
         seen.add(int(search.pulled.sum()))
-        lagrangian_gradient(table, 0, aim, state, search, own)
+        lagrangian_gradient(table, 0, objective, state, search, own)
         search.pulled[:] = 1
-        lagrangian_gradient(table, 0, aim, state, search, every)
+        lagrangian_gradient(table, 0, objective, state, search, every)
         np.testing.assert_allclose(own, every, rtol=0, atol=1e-12)
     assert min(seen) < len(table.legs)
 

@@ -50,7 +50,7 @@ from .equations import LegEvaluation, direction, is_carried, main_of, own_row, p
 from .lagrangian import put_force
 from .limits import AT_FOOT, AT_HEAD, cone_slope, seen
 from .linearise import linearise
-from .records import Aim
+from .records import PlatformObjective
 from .search import Search, put_objective
 
 NEARER = 1e-7
@@ -62,19 +62,19 @@ L]."""
 
 
 @routine
-def is_global(table: Table, row: int, aim: Aim, search: Search) -> bool:
+def is_global(table: Table, row: int, objective: PlatformObjective, search: Search) -> bool:
     """Whether nothing feasible is nearer than `search.best`, as far as can be told; `search.leg_eval` is there then."""
-    pose, used, reduced = aim.pose, search.elimination.used, search.first
-    if pose.frame != BASE_AXES or aim.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
+    pose, used, reduced = objective.pose, search.elimination.used, search.first
+    if pose.frame != BASE_AXES or objective.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
         return False
     for i in range(3):
         if pose.platform[i] != 1.0:
             return False
     if search.leg_eval.rows.shape[0] == 0:
         place(table, search.best, search.leg_eval)
-        put_objective(table, row, aim, search.best, search)
+        put_objective(table, row, objective, search.best, search)
     else:
-        linearise(table, row, aim, search.best, search, reduced)
+        linearise(table, row, objective, search.best, search, reduced)
         put_force(table, search, search.here)
         put_multipliers(search.here, reduced, search.balance)
     unit, away = search.gradient.unit[0], vec(search.force)

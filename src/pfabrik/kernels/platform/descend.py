@@ -35,7 +35,7 @@ from ..vectors import wrap
 from .equations import PlatformState, close_rods
 from .lagrangian import lagrangian_hessian
 from .linearise import linearise
-from .records import Aim
+from .records import PlatformObjective
 from .search import NEAR, NEARBY, STEPS_AWAY, Search, copy_platform_state, count_platform, move
 
 HOPELESS = 8.0
@@ -83,7 +83,7 @@ def take(table: Table, reduced: FreeMotions, x: Floats, state: PlatformState, se
 def restore_feasibility(
     table: Table,
     row: int,
-    aim: Aim,
+    objective: PlatformObjective,
     state: PlatformState,
     tolerance: float,
     search: Search,
@@ -104,7 +104,7 @@ def restore_feasibility(
             return False
         before = gap
         take(table, reduced, search.p.x, state, search)
-        linearise(table, row, aim, state, search, reduced)
+        linearise(table, row, objective, state, search, reduced)
     return is_closed(reduced.linear, max(tolerance, NEARLY_CLOSED))
 
 
@@ -152,7 +152,9 @@ def is_hopeless(behind: float, share: float, control: Record) -> bool:
 
 
 @routine
-def descend(table: Table, row: int, aim: Aim, least: float, met: PlatformState, search: Search) -> float:
+def descend(
+    table: Table, row: int, objective: PlatformObjective, least: float, met: PlatformState, search: Search
+) -> float:
     """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible.
 
     And infinite where what steps promise says that it will not come as near as `least`; where it comes by the
@@ -162,8 +164,8 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: PlatformState, 
     reduced, unit = search.first, search.gradient.unit
     search.near[0] = NEAR
     unit[0], search.control[0]["steps"], search.control[0]["recovered"] = 1.0, 0, 0
-    linearise(table, row, aim, search.best, search, reduced)
-    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, reduced, RESTORING):
+    linearise(table, row, objective, search.best, search, reduced)
+    if not restore_feasibility(table, row, objective, search.best, CLOSED, search, reduced, RESTORING):
         return math.inf
     unit[0] = scale_objective(reduced.linear)
     for j in range(search.force.shape[0]):
@@ -175,8 +177,8 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: PlatformState, 
         search.control[0]["recovered"] = closing
         if closing == 1:
             copy_platform_state(search.closed, search.best)
-            linearise(table, row, aim, search.best, search, reduced)
-        distance = go_down(table, row, aim, least, met, closing, search)
+            linearise(table, row, objective, search.best, search, reduced)
+        distance = go_down(table, row, objective, least, met, closing, search)
         count_platform(2, search)
         if distance >= 0.0:
             return distance
@@ -184,7 +186,9 @@ def descend(table: Table, row: int, aim: Aim, least: float, met: PlatformState, 
 
 
 @routine
-def go_down(table: Table, row: int, aim: Aim, least: float, met: PlatformState, closing: int, search: Search) -> float:
+def go_down(
+    table: Table, row: int, objective: PlatformObjective, least: float, met: PlatformState, closing: int, search: Search
+) -> float:
     """Steps from `best`, at which `search.first` is, as of `descend`; negative if what they left open does not close.
 
     Parameters
@@ -197,20 +201,22 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: PlatformState, 
     missed = 0
     while control["done"] == 0:
         if not has_same_curvature(reduced, other, control):
-            control["largest"] = lagrangian_hessian(table, row, aim, search, reduced)
+            control["largest"] = lagrangian_hessian(table, row, objective, search, reduced)
         led_down = False
         while not led_down and control["done"] == 0:
-            if plan_step(reduced.linear, hessian, control, aim.pose.max_iterations, search.p):
+            if plan_step(reduced.linear, hessian, control, objective.pose.max_iterations, search.p):
                 copy_platform_state(search.best, search.trial)
                 share = take(table, reduced, search.p.x, search.trial, search)
                 search.near[0] = min(NEAR, max(NEARBY, STEPS_AWAY * share * longest(search.step, search.step.shape[0])))
-                linearise(table, row, aim, search.trial, search, other)
+                linearise(table, row, objective, search.trial, search, other)
                 closes = True
                 if closing == 1:
-                    closes = restore_feasibility(table, row, aim, search.trial, CLOSED, search, other, RESTORING)
+                    closes = restore_feasibility(table, row, objective, search.trial, CLOSED, search, other, RESTORING)
                 elif is_to_close(reduced.linear, other.linear, share, control):
                     tolerance = on_the_way(control, share)
-                    closes = restore_feasibility(table, row, aim, search.trial, tolerance, search, other, CORRECTIONS)
+                    closes = restore_feasibility(
+                        table, row, objective, search.trial, tolerance, search, other, CORRECTIONS
+                    )
                     closes = closes or other.linear.totals[0]["gap"] <= max(CLOSED, openness(reduced.linear))
                 led_down = judge_step(reduced.linear, other.linear, closes, share, control)
                 if not led_down and not is_closed(other.linear, CLOSED):
@@ -229,12 +235,12 @@ def go_down(table: Table, row: int, aim: Aim, least: float, met: PlatformState, 
                         copy_platform_state(search.best, search.closed)
                         if reduced.linear.totals[0]["value"] <= 0.5 * unit[0] * THERE * THERE:
                             control["done"] = 1
-            if rests_open(reduced.linear, led_down, aim.pose.max_iterations, control):
-                if not restore_feasibility(table, row, aim, search.best, CLOSED, search, reduced, RESTORING):
+            if rests_open(reduced.linear, led_down, objective.pose.max_iterations, control):
+                if not restore_feasibility(table, row, objective, search.best, CLOSED, search, reduced, RESTORING):
                     return -1.0
                 go_on(control)
                 led_down = True
-    if not restore_feasibility(table, row, aim, search.best, CLOSED, search, reduced, RESTORING):
+    if not restore_feasibility(table, row, objective, search.best, CLOSED, search, reduced, RESTORING):
         return -1.0
     distance = math.sqrt(2.0 * reduced.linear.totals[0]["value"] / unit[0])
     return distance if distance > THERE else 0.0

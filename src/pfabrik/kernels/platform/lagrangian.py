@@ -13,7 +13,7 @@ from ..legs.records import SHARED, Table
 from ..sqp import PROBE, symmetrise
 from .equations import PlatformState, is_carried, own_row, place_leg, put_leg_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
-from .records import Aim
+from .records import PlatformObjective
 from .search import Search, copy_platform_state, move, put_objective
 
 
@@ -60,7 +60,7 @@ def add_balance(held: int, search: Search, out: Floats) -> None:
 
 
 @routine
-def note_pulled(table: Table, aim: Aim, search: Search) -> None:
+def note_pulled(table: Table, objective: PlatformObjective, search: Search) -> None:
     """Note the legs that the Lagrangian asks for: those of limits and equations with multipliers, and what carries
     them."""
     legs, multipliers, balance, pulled = table.legs, search.hessian.multipliers, search.balance, search.pulled
@@ -79,7 +79,7 @@ def note_pulled(table: Table, aim: Aim, search: Search) -> None:
     for i in range(table.cones.shape[0]):
         if multipliers[2 * ranges + i] > 0.0:
             pulled[table.cones[i]["leg"]] = 1
-    for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
+    for i in range(table.driven.shape[0] if objective.values.shape[0] > 0 else 0):
         pulled[table.driven[i]["leg"]] = 1
     for k in range(n - 1, 0, -1):
         if pulled[k] == 1:
@@ -90,7 +90,9 @@ def note_pulled(table: Table, aim: Aim, search: Search) -> None:
 
 
 @routine
-def lagrangian_gradient(table: Table, row: int, aim: Aim, state: PlatformState, search: Search, out: Floats) -> None:
+def lagrangian_gradient(
+    table: Table, row: int, objective: PlatformObjective, state: PlatformState, search: Search, out: Floats
+) -> None:
     """Gradient of the Lagrangian at a configuration, from the legs that are `pulled`."""
     pulled, main = search.pulled, 0
     set_frames(state.pose, table.task[0], search.leg_eval.frames)
@@ -99,13 +101,15 @@ def lagrangian_gradient(table: Table, row: int, aim: Aim, state: PlatformState, 
         if pulled[k] == 1:
             place_leg(table, k, main, state, search.leg_eval)
             put_leg_slopes(table, k, main, search.leg_eval)
-    _, held = put_objective(table, row, aim, state, search)
+    _, held = put_objective(table, row, objective, state, search)
     put_force(table, search, out)
     add_balance(held, search, out)
 
 
 @routine
-def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, reduced: FreeMotions) -> float:
+def lagrangian_hessian(
+    table: Table, row: int, objective: PlatformObjective, search: Search, reduced: FreeMotions
+) -> float:
     """Curvature of the objective and of the active limits along free motions, into `hessian`; the largest on its
     diagonal.
 
@@ -117,14 +121,14 @@ def lagrangian_hessian(table: Table, row: int, aim: Aim, search: Search, reduced
     put_force(table, search, search.here)
     search.control[0]["holding"] = put_multipliers(search.here, reduced, search.balance)
     add_balance(linear.totals[0]["rows"] - search.leg_eval.slopes.shape[0], search, search.here)
-    note_pulled(table, aim, search)
+    note_pulled(table, objective, search)
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
         for j in range(step.shape[0]):
             step[j] = basis[j, a]
         copy_platform_state(search.best, search.trial)
         move(table, search.step, probe, search.trial)
-        lagrangian_gradient(table, row, aim, search.trial, search, search.there)
+        lagrangian_gradient(table, row, objective, search.trial, search, search.there)
         for j in range(step.shape[0]):
             there[j] = (there[j] - here[j]) / probe
         project(there, reduced, H[a])

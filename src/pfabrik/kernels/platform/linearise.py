@@ -11,23 +11,25 @@ from ..legs.records import Table
 from ..vectors import dot, vec
 from .equations import PlatformState, place, put_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
-from .records import Aim
+from .records import PlatformObjective
 from .search import Search, put_objective
 
 
 @routine
-def linearise(table: Table, row: int, aim: Aim, state: PlatformState, search: Search, reduced: FreeMotions) -> None:
+def linearise(
+    table: Table, row: int, objective: PlatformObjective, state: PlatformState, search: Search, reduced: FreeMotions
+) -> None:
     """Look at a configuration."""
     totals, errors = reduced.linear.totals[0], search.gradient.errors
     gap = place(table, state, search.leg_eval)
     put_slopes(table, search.leg_eval)
-    totals["value"], held = put_objective(table, row, aim, state, search)
+    totals["value"], held = put_objective(table, row, objective, state, search)
     for k in range(held):
         gap = max(gap, abs(errors[k]))
     totals["gap"] = gap
-    eliminate(lay_out(held, search), search.elimination, reduced, search.leg_eval.rows.shape[0], aim.implied)
+    eliminate(lay_out(held, search), search.elimination, reduced, search.leg_eval.rows.shape[0], objective.implied)
     project_gradient(search.force, reduced)
-    linearise_limits(table, aim.pose.margin, search, reduced)
+    linearise_limits(table, objective.pose.margin, search, reduced)
 
 
 @routine

@@ -37,7 +37,7 @@ from .certificate import is_global
 from .descend import descend
 from .equations import PlatformState, is_carried, new_platform_state, place
 from .linearise import linearise
-from .records import SETTINGS, Aim, Found, Plan, Starts
+from .records import SETTINGS, Found, Plan, PlatformObjective, Starts
 from .search import Search, copy_platform_state, fix, new_search
 from .starts import begin, load_target, nearest_start, put_held, put_sides
 
@@ -92,9 +92,9 @@ open_plan, open_scratch = opener(_PLAN), opener(new_nearest_scratch(SAMPLE, _PLA
 
 
 @routine
-def write(table: Table, row: int, aim: PoseObjective, search: Search, best: PlatformState, found: Found) -> None:
+def write(table: Table, row: int, objective: PoseObjective, search: Search, best: PlatformState, found: Found) -> None:
     """Write a configuration, and what is measured of it."""
-    leg_eval, task, own = search.leg_eval, table.task[0], aim.targets[row]
+    leg_eval, task, own = search.leg_eval, table.task[0], objective.targets[row]
     pose, measures, length = found.poses[row], found.measures[row], task["length"]
     make_exact(best.pose)
     measures[RESIDUAL] = place(table, best, leg_eval) * length
@@ -128,12 +128,12 @@ def turned_by(rotations: int, pose: Floats, search: Search) -> float:
 
 
 @routine
-def holds_all(aim: PoseObjective) -> bool:
+def holds_all(objective: PoseObjective) -> bool:
     """Whether the whole pose is held."""
     free = 0
     for i in range(6):
-        free += 0 if aim.platform[i] == LOCKED else 1
-    return aim.frame == BASE_AXES and free == 0
+        free += 0 if objective.platform[i] == LOCKED else 1
+    return objective.frame == BASE_AXES and free == 0
 
 
 @routine
@@ -146,14 +146,14 @@ def is_other_mode(legs: Records, first: Floats, sides: Floats) -> bool:
 
 
 @routine
-def holds_some(table: Table, aim: Aim, weights: Floats) -> bool:
+def holds_some(table: Table, objective: PlatformObjective, weights: Floats) -> bool:
     """Whether some of what a target sets is to be held; what is held, alone, as the weights (6,) of an objective."""
     held, turns = 0, table.task[0]["rotations"] > 0
     for i in range(6):
-        is_held = aim.pose.platform[i] == LOCKED and (i < 3 or turns)
+        is_held = objective.pose.platform[i] == LOCKED and (i < 3 or turns)
         weights[i] = 1.0 if is_held else 0.0
         held += 1 if is_held else 0
-    return held > 0 and aim.values.shape[0] == 0
+    return held > 0 and objective.values.shape[0] == 0
 
 
 @routine
@@ -186,7 +186,14 @@ def is_enough(tally: Record, hits: int) -> bool:
 
 @routine
 def search_from(
-    table: Table, row: int, aim: Aim, sides: Floats, stays: int, search: Search, best: PlatformState, met: Record
+    table: Table,
+    row: int,
+    objective: PlatformObjective,
+    sides: Floats,
+    stays: int,
+    search: Search,
+    best: PlatformState,
+    met: Record,
 ) -> bool:
     """Search from where `search.best` is, and take it over if it is nearer; whether it is lost.
 
@@ -194,7 +201,7 @@ def search_from(
     ----------
     sides : of the working mode that is to be kept, if one is.
     """
-    distance = descend(table, row, aim, met["least"], best, search)
+    distance = descend(table, row, objective, met["least"], best, search)
     is_lost = distance == math.inf and (met["least"] == math.inf or search.control[0]["steps"] == 0)
     if distance < math.inf:
         put_sides(table, search.best, search.leg_eval)
@@ -204,7 +211,7 @@ def search_from(
             if (
                 met["hits"] == 1.0
                 and distance == met["least"]
-                and (distance == 0.0 or is_global(table, row, aim, search))
+                and (distance == 0.0 or is_global(table, row, objective, search))
             ):
                 met["hits"] = math.inf
     return is_lost
@@ -214,8 +221,8 @@ def search_from(
 def search_row(
     table: Table,
     row: int,
-    aim: Aim,
-    toward: Aim,
+    objective: PlatformObjective,
+    phase1_objective: PlatformObjective,
     own: Starts,
     others: Starts,
     hits: int,
@@ -236,7 +243,7 @@ def search_row(
     sides = own.sides[first]
     for k in range(kept.shape[0]):
         kept[k] = sides[k] if stays == 1 and is_carried(table.legs[k]) else 0.0
-    at_once = holds_all(aim.pose) or (n > 0 and table.task[0]["led"] == 0)
+    at_once = holds_all(objective.pose) or (n > 0 and table.task[0]["led"] == 0)
     clear(met)
     clear(away)
     for i in range(n + 1):
@@ -244,22 +251,25 @@ def search_row(
     for start in range(n + 2):
         if is_enough(met, hits) or (start == n + 1 and met["sure"] == 1):
             break
-        near = nearest_start(aim.pose, target, others, search.gradient) if start == 1 else near
+        near = nearest_start(objective.pose, target, others, search.gradient) if start == 1 else near
         place = -1 if start == 0 or start == n + 1 else near if start == 1 else start - 2 + int(start - 2 >= near)
         begin(table, own if place < 0 else others, first if place < 0 else place, search)
         if stays == 1 and is_other_mode(table.legs, sides, search.best.sides):
             continue
         in_place = (start <= n) == at_once
-        fix(aim.pose, in_place, search)
+        fix(objective.pose, in_place, search)
         if in_place:
-            put_held(table, aim.pose, target, search.leg_eval, search.best)
-        if search_from(table, row, aim, sides, stays, search, best, met) and toward.pose.max_iterations > 0:
+            put_held(table, objective.pose, target, search.leg_eval, search.best)
+        if (
+            search_from(table, row, objective, sides, stays, search, best, met)
+            and phase1_objective.pose.max_iterations > 0
+        ):
             search.gradient.unit[0] = 1.0
             begun = own.poses[first] if place < 0 else others.poses[place]
-            lost[place + 1], _ = pose_gradient(toward.pose, target, begun, search.gradient, True)
-    fix(toward.pose, False, search)
+            lost[place + 1], _ = pose_gradient(phase1_objective.pose, target, begun, search.gradient, True)
+    fix(phase1_objective.pose, False, search)
     while (
-        toward.pose.max_iterations > 0
+        phase1_objective.pose.max_iterations > 0
         and not is_enough(met, hits)
         and (met["least"] < math.inf or not is_enough(away, hits))
     ):
@@ -270,9 +280,11 @@ def search_row(
             break
         lost[place + 1] = math.inf
         begin(table, own if place < 0 else others, first if place < 0 else place, search)
-        distance = descend(table, row, toward, away["least"] if met["least"] == math.inf else math.inf, best, search)
+        distance = descend(
+            table, row, phase1_objective, away["least"] if met["least"] == math.inf else math.inf, best, search
+        )
         if distance <= HOLDABLE:
-            search_from(table, row, aim, sides, stays, search, best, met)
+            search_from(table, row, objective, sides, stays, search, best, met)
         elif met["least"] == math.inf and search.control[0]["steps"] > 1:
             take_nearer(distance, away, search, best)
     least: float = met["least"]
@@ -291,15 +303,17 @@ def judge(own: Record, row: int, found: Found) -> None:
 
 
 @routine
-def weigh(table: Table, row: int, aim: Aim, own: Starts, scratch: NearestScratch, weights: Floats) -> None:
+def weigh(
+    table: Table, row: int, objective: PlatformObjective, own: Starts, scratch: NearestScratch, weights: Floats
+) -> None:
     """Fill how hard every limit holds a row back where it starts, see `approach`."""
     search, linear = scratch.search, scratch.search.first.linear
     begin(table, own, row, search)
-    fix(aim.pose, True, search)
+    fix(objective.pose, True, search)
     search.gradient.unit[0] = 1.0
-    linearise(table, row, aim, search.best, search, search.first)
+    linearise(table, row, objective, search.best, search, search.first)
     scale_objective(linear)
-    for c in range(balance(linear, aim.pose.near, scratch.p, scratch.pulls)):
+    for c in range(balance(linear, objective.pose.near, scratch.p, scratch.pulls)):
         weights[linear.which[c]] = scratch.p.x[c]
 
 
@@ -333,7 +347,7 @@ def approach(
     machine : see `open_table`.
     plan : the address of a `Plan`.
     scratch : that of `NearestScratch`, made for both.
-    targets, values : see `Aim`.
+    targets, values : see `PlatformObjective`.
     begins, q, sides : the first start of each row, or one for all, as of `Starts`; the others follow until the nearest
         configuration has been met often enough: `is_enough`.
     distances, ends, ends_q, ends_sides, counters, actuators, measures, status : `Found`.
@@ -352,18 +366,22 @@ def approach(
     search, best, held = scratch.search, scratch.best, scratch.held
     frame, margin, near, weighs = setting["frame"], setting["margin"], setting["near"], setting["steps"] == 0
     pose = PoseObjective(targets, asked.weights, frame, margin, near, setting["steps"])
-    aim = Aim(pose, values, setting["implied"])
-    steps = setting["steps"] if holds_some(table, aim, held) else 0
-    toward = Aim(PoseObjective(targets, held, frame, margin, near, steps), values, setting["implied"])
+    objective = PlatformObjective(pose, values, setting["implied"])
+    steps = setting["steps"] if holds_some(table, objective, held) else 0
+    phase1_objective = PlatformObjective(
+        PoseObjective(targets, held, frame, margin, near, steps), values, setting["implied"]
+    )
     for row in range(distances.shape[0]):
         distances[row] = math.inf
         if not load_target(table, pose, row, search):
             left += 1
             continue
         if weighs:
-            weigh(table, row, aim, own, scratch, weights[row])
+            weigh(table, row, objective, own, scratch, weights[row])
             continue
-        least = search_row(table, row, aim, toward, own, others, setting["hits"], setting["stays"], scratch)
+        least = search_row(
+            table, row, objective, phase1_objective, own, others, setting["hits"], setting["stays"], scratch
+        )
         distances[row] = least
         if least < math.inf:
             counters[row, ITERATIONS] = search.control[0]["steps"]

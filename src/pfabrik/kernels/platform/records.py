@@ -14,7 +14,7 @@ STRETCHED = 1e-4
 """Difference of a carrier's two solutions below which it is at a dead point, and its side is the start's [L or rad]."""
 
 
-class Aim(NamedTuple):
+class PlatformObjective(NamedTuple):
     """What is to come near: the pose of the platform, or the values of actuators."""
 
     pose: PoseObjective  # its targets in [length]
@@ -44,7 +44,7 @@ SETTINGS = np.dtype(
         ("margin", "f8"),
         ("near", "f8"),
         ("steps", "i8"),  # of a search at most; 0 to weigh limits alone
-        ("implied", "i8"),  # as of `Aim`
+        ("implied", "i8"),  # as of `PlatformObjective`
         ("hits", "i8"),  # how often the nearest configuration is to be met: see `is_enough`
         ("stays", "i8"),  # 1 for configurations in the working mode of a row's first start alone
         ("cones", "i8"),  # how many of the cones searches mind, the first ones; excesses over all of them are told

@@ -19,7 +19,7 @@ from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import copy_row, copy_table, wrap
 from .equations import LegEvaluation, PlatformState, count_unknowns, new_leg_evaluation, new_platform_state
 from .limits import coordinate_slope, counts_turns
-from .records import Aim
+from .records import PlatformObjective
 
 NEAR, NEARBY, STEPS_AWAY = 0.3, 0.02, 3.0
 """Limits farther away than the first are left out of a programme [rad or L]: no step comes near them. As steps get
@@ -98,11 +98,11 @@ def copy_platform_state(source: PlatformState, to: PlatformState) -> None:
 
 
 @routine
-def fix(aim: PoseObjective, in_place: bool, search: Search) -> None:
+def fix(objective: PoseObjective, in_place: bool, search: Search) -> None:
     """Leave out the components of the twist that are held, if the platform is in place and they are its velocities."""
     used = search.elimination.used
     for j in range(6):
-        used[j] = 0 if in_place and aim.frame == BASE_AXES and aim.platform[j] == LOCKED else 2
+        used[j] = 0 if in_place and objective.frame == BASE_AXES and objective.platform[j] == LOCKED else 2
 
 
 @routine
@@ -127,7 +127,9 @@ def move(table: Table, step: Floats, share: float, state: PlatformState) -> None
 
 
 @routine
-def put_objective(table: Table, row: int, aim: Aim, state: PlatformState, search: Search) -> tuple[float, int]:
+def put_objective(
+    table: Table, row: int, objective: PlatformObjective, state: PlatformState, search: Search
+) -> tuple[float, int]:
     """The objective, its gradient into `search.force`; how many components of the twist are held by equations.
 
     None are where what is held is in its place and does not move: see `fix`.
@@ -137,13 +139,13 @@ def put_objective(table: Table, row: int, aim: Aim, state: PlatformState, search
         force[j] = 0.0
     used = search.elimination.used
     turns = used[3] + used[4] + used[5] > 0
-    value, held = pose_gradient(aim.pose, search.target, state.pose, search.gradient, turns)
+    value, held = pose_gradient(objective.pose, search.target, state.pose, search.gradient, turns)
     held = held if used[3] > 0 and used[0] > 0 else 0
     for j in range(6):
         force[j] = search.gradient.force[j]
-    for i in range(table.driven.shape[0] if aim.values.shape[0] > 0 else 0):
+    for i in range(table.driven.shape[0] if objective.values.shape[0] > 0 else 0):
         driven = table.driven[i]
-        off = coordinate_slope(table, driven, search.leg_eval) - aim.values[row, driven["column"]]
+        off = coordinate_slope(table, driven, search.leg_eval) - objective.values[row, driven["column"]]
         off = wrap(off, 0.0) if counts_turns(driven) else off
         value += 0.5 * search.gradient.unit[0] * off * off
         for j in range(force.shape[0]):

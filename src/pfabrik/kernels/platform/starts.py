@@ -23,12 +23,12 @@ BENT = 1e-2
 
 
 @routine
-def load_target(table: Table, aim: PoseObjective, row: int, search: Search) -> bool:
+def load_target(table: Table, objective: PoseObjective, row: int, search: Search) -> bool:
     """Put the target of a row into `search.target`, near enough to be told from others there; False if it is no pose.
 
     Of a platform that cannot turn, and is not asked to, the rotation is home's.
     """
-    own, target, task = aim.targets[row], search.target, table.task[0]
+    own, target, task = objective.targets[row], search.target, table.task[0]
     if not is_pose(own):
         return False
     most = 0.0
@@ -36,7 +36,7 @@ def load_target(table: Table, aim: PoseObjective, row: int, search: Search) -> b
         most = max(most, abs(own[i, 3] / task["length"] - task["reference"][i]))
         for j in range(3):
             target[i, j] = own[i, j]
-    if task["rotations"] == 0 and aim.platform[3] == LOCKED:
+    if task["rotations"] == 0 and objective.platform[3] == LOCKED:
         for i in range(9):
             target[i // 3, i % 3] = 1.0 if i % 4 == 0 else 0.0
     for i in range(3):
@@ -82,7 +82,9 @@ def put_carriers(table: Table, state: PlatformState, leg_eval: LegEvaluation) ->
 
 
 @routine
-def put_held(table: Table, aim: PoseObjective, target: Floats, leg_eval: LegEvaluation, state: PlatformState) -> None:
+def put_held(
+    table: Table, objective: PoseObjective, target: Floats, leg_eval: LegEvaluation, state: PlatformState
+) -> None:
     """Place the platform as it is to be held, and carriers where rods then put them.
 
     It turns about its middle, but where legs complete the position: they do so from where it was.
@@ -90,18 +92,18 @@ def put_held(table: Table, aim: PoseObjective, target: Floats, leg_eval: LegEval
     pose, q, middle = state.pose, state.q, middle_of(state.pose, table.task[0])
     for i in range(3):
         for j in range(3):
-            if aim.frame == BASE_AXES and aim.platform[3] == LOCKED:
+            if objective.frame == BASE_AXES and objective.platform[3] == LOCKED:
                 pose[i, j] = target[i, j]
-    if aim.frame == TARGET_AXES and aim.platform[3] == LOCKED:
+    if objective.frame == TARGET_AXES and objective.platform[3] == LOCKED:
         axis = cross(column(state.pose, 2), column(target, 2))
         sine = norm(axis)
         if sine > 0.0:
             turn_pose(state.pose, scale(math.atan2(sine, dot(column(state.pose, 2), column(target, 2))) / sine, axis))
-    if aim.frame == HALF_WAY and aim.platform[5] == LOCKED:
+    if objective.frame == HALF_WAY and objective.platform[5] == LOCKED:
         bring_yaw(state.pose, yaw_of(target))
     off = sub(middle, middle_of(pose, table.task[0])) if table.task[0]["unset"] == 0 else NOWHERE
     for i in range(3):
-        pose[i, 3] = target[i, 3] if aim.platform[i] == LOCKED else pose[i, 3] + off[i]
+        pose[i, 3] = target[i, 3] if objective.platform[i] == LOCKED else pose[i, 3] + off[i]
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
@@ -164,12 +166,12 @@ def put_sides(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> No
 
 
 @routine
-def nearest_start(aim: PoseObjective, target: Floats, starts: Starts, gradient: PoseGradient) -> int:
+def nearest_start(objective: PoseObjective, target: Floats, starts: Starts, gradient: PoseGradient) -> int:
     """The start whose pose is nearest to a target; -1 where there is none."""
     nearest, least = -1, math.inf
     gradient.unit[0] = 1.0
     for start in range(starts.poses.shape[0]):
-        value, _ = pose_gradient(aim, target, starts.poses[start], gradient, True)
+        value, _ = pose_gradient(objective, target, starts.poses[start], gradient, True)
         if value < least:
             nearest, least = start, value
     return nearest
