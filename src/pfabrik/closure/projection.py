@@ -25,7 +25,7 @@ from .parasitic import strays
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
 
-HITS = 7
+AGREEMENTS = 7
 """How many searches must end at the nearest configuration found before no other is looked for."""
 
 
@@ -125,15 +125,15 @@ def project(
         starts = [_nearest_at_rest(closure, targets, starts, ways[-1])]
     everywhere = [*starts, *(np.where(closure.idle, starts[0], corner) for corner in elsewhere)]
     for way in ways if steps else ():
-        open_to_it, hits = np.isinf(best.distances), np.zeros(n, np.int64)
+        open_to_it, agreements = np.isinf(best.distances), np.zeros(n, np.int64)
         for place, start in enumerate(everywhere):
-            waiting = np.flatnonzero(open_to_it & (hits < HITS))
+            waiting = np.flatnonzero(open_to_it & (agreements < AGREEMENTS))
             if len(waiting):
                 begin = start[waiting]
                 if place >= len(starts):
                     begin = _placed(closure, begin, targets[waiting], way)
                 found = approached(closure, begin, targets[waiting], platform=way.weights, frame=frame, steps=steps)
-                hits[waiting] = _take_nearer(closure, best, waiting, found, targets, way, hits[waiting])
+                agreements[waiting] = _take_nearer(closure, best, waiting, found, targets, way, agreements[waiting])
         lost = np.flatnonzero(np.isinf(best.distances))
         if len(lost) and LOCKED in way.weights and not is_long:
             begin = _placed(closure, starts[0][lost], targets[lost], way)
@@ -187,7 +187,7 @@ def _take_nearer(
     found: Closing,
     targets: Floats,
     way: Way,
-    hits: Ints,
+    agreements: Ints,
 ) -> Ints:
     """Take over the rows that are feasible, and nearer than the best so far; how often each best was found by now."""
     counts = found.feasible & ~strays(closure.mechanism, found.poses)
@@ -197,7 +197,7 @@ def _take_nearer(
     again = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)
     best.distances[rows[better]], best.holds[rows[better]] = distances[better], way.hold
     best.closing.take(rows[better], found, better)
-    return np.where(better, 1, hits + again)
+    return np.where(better, 1, agreements + again)
 
 
 def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Floats:

@@ -49,7 +49,7 @@ STRANGE = 0.1
 STARTS = 80
 """Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
 
-HITS, SAME = 16, 1e-3
+AGREEMENTS, SAME = 16, 1e-3
 """How many of them must end at the least gap or excess found before a leg is given up, and the share by which two may
 differ and still be the same. A branch that is met half as often was by then met too, but for one time in 600."""
 
@@ -265,26 +265,26 @@ def _search(
     A row whose platform rests is given up where one of its legs keeps ending where it came nearest.
     """
     rng = np.random.default_rng(0)
-    hits = np.zeros(found.gaps.shape, np.int64)
+    agreements = np.zeros(found.gaps.shape, np.int64)
     for _ in range(starts_within(closure, STARTS, STEPS)):
-        rest = rows[~found.feasible[rows] & (hits[rows].max(axis=1) < HITS)]
+        rest = rows[~found.feasible[rows] & (agreements[rows].max(axis=1) < AGREEMENTS)]
         if not len(rest):
             break
         stays = _legs_reached(closure, found, rest) | closure.idle if at_rest else closure.idle
         scattered = np.where(stays, found.coordinates[rest], random_coordinates(closure, 1, rng))
         tried = _close_below(closure, scattered, wanted[rest], held, STEPS)
         if at_rest:
-            hits[rest] = _hits(found.off[rest], tried.off, hits[rest])
+            agreements[rest] = _agreements(found.off[rest], tried.off, agreements[rest])
             _take_legs(closure, found, rest, tried)
         else:
             found.improve(rest, tried)
 
 
-def _hits(best: Floats, tried: Floats, hits: Ints) -> Ints:
+def _agreements(best: Floats, tried: Floats, agreements: Ints) -> Ints:
     """How often each leg has ended where it came nearest, (n, groups); 0 for those that reached."""
     with np.errstate(invalid="ignore", over="ignore"):  # what is endlessly far off is neither nearer nor the same
         nearer, again = tried < (1.0 - SAME) * best, np.abs(tried - best) <= SAME * best
-    counted = np.where(nearer, 1, hits + again)
+    counted = np.where(nearer, 1, agreements + again)
     return np.where(np.minimum(best, tried) <= TOLERANCES.limit, 0, counted)
 
 

@@ -26,7 +26,7 @@ from .table import OF_AIMS, machine_searched
 if TYPE_CHECKING:
     from ..kernels.platform.nearest import NearestScratch
 
-HITS, HITS_OF_STRUTS, HITS_OF_VALUES = 4, 3, 8
+AGREEMENTS, AGREEMENTS_OF_STRUTS, AGREEMENTS_OF_VALUES = 4, 3, 8
 """How many searches must end at the nearest configuration, and one more for each that ends elsewhere: fewer where
 struts leave the platform all its freedoms, and have no two ways to bend; more where actuators have values, which a
 platform nearly has in many poses."""
@@ -35,7 +35,7 @@ HITS_OF_RAILS = 6
 """The same where rods on carriages leave the platform all its freedoms: each may go on to the other side of its
 carriage, and ends there at the limit of another leg. With 4, of 1,200 targets 14 have a nearer pose, with 6 three."""
 
-HITS_OF_MANY = 8
+AGREEMENTS_OF_MANY = 8
 """The same where arms are led, or task and legs do not tell all of a pose: there are many more configurations."""
 
 ROWS_A_BLOCK = 16
@@ -78,7 +78,7 @@ class Approach:
         own = np.zeros(1, SETTINGS)
         own["margin"], own["near"], own["cones"] = TOLERANCES.inside, TOLERANCES.active, minded
         own["implied"] = 0 if len(table.arms) else implied_rows(mechanism)
-        own["hits"] = _hits(table) if driven is None else HITS_OF_VALUES
+        own["agreements"] = _agreements(table) if driven is None else AGREEMENTS_OF_VALUES
         for name, value in {"frame": task_of(mechanism).frame, **settings}.items():
             own[name] = value
         own["frame"] = BASE_AXES if rests else own["frame"]
@@ -146,14 +146,16 @@ class Approach:
 
 
 @lru_cache(maxsize=64)
-def _hits(table: LegTable) -> int:
+def _agreements(table: LegTable) -> int:
     task = table.task[0]
     if table.leaves_open:
-        return HITS_OF_MANY
+        return AGREEMENTS_OF_MANY
     if task["rows"] > 0 or len(table.arms):
-        return HITS
+        return AGREEMENTS
     carriers = table.legs["carrier"][carriers_of(table)["leg"]]
-    return HITS_OF_STRUTS if not len(carriers) else HITS_OF_RAILS if (carriers == K.CARRIAGE).any() else HITS
+    return (
+        AGREEMENTS_OF_STRUTS if not len(carriers) else HITS_OF_RAILS if (carriers == K.CARRIAGE).any() else AGREEMENTS
+    )
 
 
 def carriers_of(table: LegTable) -> Records:

@@ -56,7 +56,7 @@ SHORT = 1e-6
 """Share of the objective that a step promised after which curvature is not felt for again: it has changed by about a
 thousandth."""
 
-BY = 0.01
+NEAR_INCUMBENT = 0.01
 """A search that comes so near to the nearest configuration met yet [rad or L] would end there."""
 
 MISSES = 4
@@ -109,20 +109,20 @@ def restore_feasibility(
 
 
 @routine
-def is_by(legs: Records, state: PlatformState, met: PlatformState, holding: Ints) -> bool:
+def is_near(legs: Records, state: PlatformState, incumbent: PlatformState, holding: Ints) -> bool:
     """Whether a configuration is so near to another that a descent would end there.
 
     Parameters
     ----------
     holding : (legs,): 1 for those that hold the other where it is; arms of others may be anywhere.
     """
-    pose, other, q = state.pose, met.pose, state.q
+    pose, other, q = state.pose, incumbent.pose, state.q
     for i in range(3):
         for j in range(4):
-            if abs(pose[i, j] - other[i, j]) > BY:
+            if abs(pose[i, j] - other[i, j]) > NEAR_INCUMBENT:
                 return False
     for k in range(q.shape[0]):
-        if (holding[k] == 1 or legs[k]["kind"] != ARM) and abs(wrap(q[k] - met.q[k], 0.0)) > BY:
+        if (holding[k] == 1 or legs[k]["kind"] != ARM) and abs(wrap(q[k] - incumbent.q[k], 0.0)) > NEAR_INCUMBENT:
             return False
     return True
 
@@ -153,11 +153,11 @@ def is_hopeless(behind: float, share: float, control: Record) -> bool:
 
 @routine
 def descend(
-    table: Table, row: int, objective: PlatformObjective, least: float, met: PlatformState, search: Search
+    table: Table, row: int, objective: PlatformObjective, best_distance: float, incumbent: PlatformState, search: Search
 ) -> float:
     """From `best`, brought onto its equations, down to the nearest; the distance there, infinite if not feasible.
 
-    And infinite where what steps promise says that it will not come as near as `least`; where it comes by the
+    And infinite where what steps promise says that it will not come as near as `best_distance`; where it comes by the
     configuration that is so near, that is where it ends. Where steps that leave something open are lost, it goes on
     from the last configuration that was closed, and closes each.
     """
@@ -178,7 +178,7 @@ def descend(
         if closing == 1:
             copy_platform_state(search.closed, search.best)
             linearise(table, row, objective, search.best, search, reduced)
-        distance = go_down(table, row, objective, least, met, closing, search)
+        distance = go_down(table, row, objective, best_distance, incumbent, closing, search)
         count_platform(2, search)
         if distance >= 0.0:
             return distance
@@ -187,7 +187,13 @@ def descend(
 
 @routine
 def go_down(
-    table: Table, row: int, objective: PlatformObjective, least: float, met: PlatformState, closing: int, search: Search
+    table: Table,
+    row: int,
+    objective: PlatformObjective,
+    best_distance: float,
+    incumbent: PlatformState,
+    closing: int,
+    search: Search,
 ) -> float:
     """Steps from `best`, at which `search.first` is, as of `descend`; negative if what they left open does not close.
 
@@ -226,9 +232,9 @@ def go_down(
                 if led_down:
                     copy_platform_state(search.trial, search.best)
                     reduced, other = other, reduced
-                    if least < math.inf and is_by(table.legs, search.best, met, search.holding):
-                        return least
-                    behind = reduced.linear.totals[0]["value"] - 0.5 * unit[0] * least * least
+                    if best_distance < math.inf and is_near(table.legs, search.best, incumbent, search.holding):
+                        return best_distance
+                    behind = reduced.linear.totals[0]["value"] - 0.5 * unit[0] * best_distance * best_distance
                     if is_hopeless(behind, share, control):
                         return math.inf
                     if is_closed(reduced.linear, CLOSED):

@@ -53,9 +53,9 @@ SAME = 1e-7
 TALLY = np.dtype(
     [
         ("least", "f8"),  # distance met [L]
-        ("hits", "f8"),  # how often it was; infinite where none is nearer
-        ("others", "f8"),  # how often a search ended farther away
-        ("sure", "i8"),  # 1 where a search was not lost on its way
+        ("agreements", "f8"),  # how often it was; infinite where none is nearer
+        ("disagreements", "f8"),  # how often a search ended farther away
+        ("is_unbroken", "i8"),  # 1 where a search was not lost on its way
     ]
 )
 """Where searches for a row have ended."""
@@ -66,9 +66,11 @@ class NearestScratch(NamedTuple):
 
     search: Search
     best: PlatformState
-    met: Records  # (1,): TALLY
-    away: Records  # (1,): TALLY of searches that did not come to what is held
-    lost: Floats  # (1 + starts,): how far the first start, and each other, is from that; infinite where one is not lost
+    best_tally: Records  # (1,): TALLY
+    phase1_tally: Records  # (1,): TALLY of searches that did not come to what is held
+    distances_to_held: (
+        Floats  # (1 + starts,): how far the first start, and each other, is from that; infinite where one is not lost
+    )
     held: Floats  # (6,): what is held, alone, as the weights of an objective
     p: QP  # to weigh limits
     pulls: Floats  # (limits, n)
@@ -105,13 +107,13 @@ def write(table: Table, row: int, objective: PoseObjective, search: Search, best
         driven = table.driven[i]
         found.actuators[row, driven["column"]] = driven["home"] + deviation(driven, leg_eval.values) * driven["unit"]
     copy_table(best.pose, pose)
-    away = 0.0
+    phase1_tally = 0.0
     for i in range(3):
         pose[i, 3] *= length
         pose[3, i] = 0.0
-        away = math.hypot(away, pose[i, 3] - own[i, 3] if task["axes"][i] == 1 else 0.0)
+        phase1_tally = math.hypot(phase1_tally, pose[i, 3] - own[i, 3] if task["axes"][i] == 1 else 0.0)
     pose[3, 3] = 1.0
-    measures[POSITION_ERROR] = min(away, LARGEST_NUMBER)
+    measures[POSITION_ERROR] = min(phase1_tally, LARGEST_NUMBER)
     measures[ROTATION_ERROR] = turned_by(task["rotations"], best.pose, search)
 
 
@@ -159,29 +161,29 @@ def holds_some(table: Table, objective: PlatformObjective, weights: Floats) -> b
 @routine
 def clear(tally: Record) -> None:
     """Begin a tally."""
-    tally["least"], tally["hits"], tally["others"], tally["sure"] = math.inf, 0.0, 0.0, 0
+    tally["least"], tally["agreements"], tally["disagreements"], tally["is_unbroken"] = math.inf, 0.0, 0.0, 0
 
 
 @routine
-def take_nearer(distance: float, tally: Record, search: Search, best: PlatformState) -> None:
+def count_ending(distance: float, tally: Record, search: Search, best: PlatformState) -> None:
     """Take over where a search has ended if it is nearer, and count it."""
     least = tally["least"]
     if distance < (1.0 - SAME) * least:
-        tally["others"] += tally["hits"]
-        tally["least"], tally["hits"] = distance, 1.0
+        tally["disagreements"] += tally["agreements"]
+        tally["least"], tally["agreements"] = distance, 1.0
         copy_platform_state(search.best, best)
         for k in range(search.holding.shape[0]):
             search.holding[k] = search.pulled[k]
     elif distance <= (1.0 + SAME) * least and least < math.inf:
-        tally["hits"] += 1.0
+        tally["agreements"] += 1.0
     else:
-        tally["others"] += 1.0
+        tally["disagreements"] += 1.0
 
 
 @routine
-def is_enough(tally: Record, hits: int) -> bool:
+def is_enough(tally: Record, agreements: int) -> bool:
     """Whether searches agree often enough: as often as asked for, and once more for each that ended elsewhere."""
-    return bool(tally["hits"] >= hits + tally["others"])
+    return bool(tally["agreements"] >= agreements + tally["disagreements"])
 
 
 @routine
@@ -193,7 +195,7 @@ def search_from(
     stays: int,
     search: Search,
     best: PlatformState,
-    met: Record,
+    best_tally: Record,
 ) -> bool:
     """Search from where `search.best` is, and take it over if it is nearer; whether it is lost.
 
@@ -201,20 +203,20 @@ def search_from(
     ----------
     sides : of the working mode that is to be kept, if one is.
     """
-    distance = descend(table, row, objective, met["least"], best, search)
-    is_lost = distance == math.inf and (met["least"] == math.inf or search.control[0]["steps"] == 0)
+    distance = descend(table, row, objective, best_tally["least"], best, search)
+    is_infeasible = distance == math.inf and (best_tally["least"] == math.inf or search.control[0]["steps"] == 0)
     if distance < math.inf:
         put_sides(table, search.best, search.leg_eval)
         if stays == 0 or not is_other_mode(table.legs, sides, search.best.sides):
-            take_nearer(distance, met, search, best)
-            met["sure"] = max(met["sure"], 1 - search.control[0]["recovered"])
+            count_ending(distance, best_tally, search, best)
+            best_tally["is_unbroken"] = max(best_tally["is_unbroken"], 1 - search.control[0]["recovered"])
             if (
-                met["hits"] == 1.0
-                and distance == met["least"]
+                best_tally["agreements"] == 1.0
+                and distance == best_tally["least"]
                 and (distance == 0.0 or is_global(table, row, objective, search))
             ):
-                met["hits"] = math.inf
-    return is_lost
+                best_tally["agreements"] = math.inf
+    return is_infeasible
 
 
 @routine
@@ -225,7 +227,7 @@ def search_row(
     phase1_objective: PlatformObjective,
     own: Starts,
     others: Starts,
-    hits: int,
+    agreements: int,
     stays: int,
     scratch: NearestScratch,
 ) -> float:
@@ -236,7 +238,13 @@ def search_row(
     after it was lost on the way. Where too few agree, searches from starts that were lost go for what is held alone,
     and then on with it held: from a feasible configuration there are more ways to it than the shortest.
     """
-    search, best, met, away, lost = scratch.search, scratch.best, scratch.met[0], scratch.away[0], scratch.lost
+    search, best, best_tally, phase1_tally, distances_to_held = (
+        scratch.search,
+        scratch.best,
+        scratch.best_tally[0],
+        scratch.phase1_tally[0],
+        scratch.distances_to_held,
+    )
     target, n = search.target, others.poses.shape[0]
     near = -1
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
@@ -244,12 +252,12 @@ def search_row(
     for k in range(kept.shape[0]):
         kept[k] = sides[k] if stays == 1 and is_carried(table.legs[k]) else 0.0
     at_once = holds_all(objective.pose) or (n > 0 and table.task[0]["led"] == 0)
-    clear(met)
-    clear(away)
+    clear(best_tally)
+    clear(phase1_tally)
     for i in range(n + 1):
-        lost[i] = math.inf
+        distances_to_held[i] = math.inf
     for start in range(n + 2):
-        if is_enough(met, hits) or (start == n + 1 and met["sure"] == 1):
+        if is_enough(best_tally, agreements) or (start == n + 1 and best_tally["is_unbroken"] == 1):
             break
         near = nearest_start(objective.pose, target, others, search.gradient) if start == 1 else near
         place = -1 if start == 0 or start == n + 1 else near if start == 1 else start - 2 + int(start - 2 >= near)
@@ -261,33 +269,38 @@ def search_row(
         if in_place:
             put_held(table, objective.pose, target, search.leg_eval, search.best)
         if (
-            search_from(table, row, objective, sides, stays, search, best, met)
+            search_from(table, row, objective, sides, stays, search, best, best_tally)
             and phase1_objective.pose.max_iterations > 0
         ):
             search.gradient.unit[0] = 1.0
             begun = own.poses[first] if place < 0 else others.poses[place]
-            lost[place + 1], _ = pose_gradient(phase1_objective.pose, target, begun, search.gradient, True)
+            distances_to_held[place + 1], _ = pose_gradient(phase1_objective.pose, target, begun, search.gradient, True)
     fix(phase1_objective.pose, False, search)
     while (
         phase1_objective.pose.max_iterations > 0
-        and not is_enough(met, hits)
-        and (met["least"] < math.inf or not is_enough(away, hits))
+        and not is_enough(best_tally, agreements)
+        and (best_tally["least"] < math.inf or not is_enough(phase1_tally, agreements))
     ):
         place = -1
         for i in range(n):
-            place = i if lost[i + 1] < lost[place + 1] else place
-        if lost[place + 1] == math.inf:
+            place = i if distances_to_held[i + 1] < distances_to_held[place + 1] else place
+        if distances_to_held[place + 1] == math.inf:
             break
-        lost[place + 1] = math.inf
+        distances_to_held[place + 1] = math.inf
         begin(table, own if place < 0 else others, first if place < 0 else place, search)
         distance = descend(
-            table, row, phase1_objective, away["least"] if met["least"] == math.inf else math.inf, best, search
+            table,
+            row,
+            phase1_objective,
+            phase1_tally["least"] if best_tally["least"] == math.inf else math.inf,
+            best,
+            search,
         )
         if distance <= HOLDABLE:
-            search_from(table, row, objective, sides, stays, search, best, met)
-        elif met["least"] == math.inf and search.control[0]["steps"] > 1:
-            take_nearer(distance, away, search, best)
-    least: float = met["least"]
+            search_from(table, row, objective, sides, stays, search, best, best_tally)
+        elif best_tally["least"] == math.inf and search.control[0]["steps"] > 1:
+            count_ending(distance, phase1_tally, search, best)
+    least: float = best_tally["least"]
     return least
 
 
@@ -380,14 +393,14 @@ def approach(
             weigh(table, row, objective, own, scratch, weights[row])
             continue
         least = search_row(
-            table, row, objective, phase1_objective, own, others, setting["hits"], setting["stays"], scratch
+            table, row, objective, phase1_objective, own, others, setting["agreements"], setting["stays"], scratch
         )
         distances[row] = least
         if least < math.inf:
             counters[row, ITERATIONS] = search.control[0]["steps"]
             write(table, row, pose, search, best, found)
             judge(setting, row, found)
-            counters[row, HOLD] += CERTAIN if scratch.met[0]["hits"] == math.inf else 0
+            counters[row, HOLD] += CERTAIN if scratch.best_tally[0]["agreements"] == math.inf else 0
         else:
             left += 1
     return left

@@ -45,7 +45,7 @@ SETTINGS = np.dtype(
         ("near", "f8"),
         ("steps", "i8"),  # of a search at most; 0 to weigh limits alone
         ("implied", "i8"),  # as of `PlatformObjective`
-        ("hits", "i8"),  # how often the nearest configuration is to be met: see `is_enough`
+        ("agreements", "i8"),  # how often the nearest configuration is to be met: see `is_enough`
         ("stays", "i8"),  # 1 for configurations in the working mode of a row's first start alone
         ("cones", "i8"),  # how many of the cones searches mind, the first ones; excesses over all of them are told
         ("position", "f8"),  # what is REACHED [length]
