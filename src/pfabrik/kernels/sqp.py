@@ -89,15 +89,15 @@ CONTROL = np.dtype(
     [
         ("damping", "f8"),
         ("largest", "f8"),  # curvature
-        ("promise", "f8"),  # what the last step promised
-        ("before", "f8"),  # and the one before
-        ("holding", "f8"),  # sum of the multipliers of the equations
+        ("predicted", "f8"),  # what the last step promised
+        ("predicted_before", "f8"),  # and the one before
+        ("equation_multipliers", "f8"),  # sum of the multipliers of the equations
         ("weight", "f8"),  # what the penalty counts the largest gap or excess
         ("steps", "i8"),  # taken
-        ("done", "i8"),  # 1 where none is worth taking any more
-        ("rejected", "i8"),  # 1 where the last did not lead down
-        ("exact", "i8"),  # 1 where it gained what it promised
-        ("recovered", "i8"),  # 1 where steps that left something open were lost
+        ("is_done", "i8"),  # 1 where none is worth taking any more
+        ("is_rejected", "i8"),  # 1 where the last did not lead down
+        ("is_exact", "i8"),  # 1 where it gained what it promised
+        ("is_restoring", "i8"),  # 1 where steps that left something open were lost
     ]
 )
 """Step control: how long the next step may be, and whether there is one."""
@@ -169,13 +169,13 @@ def sum_of(multipliers: Floats, k: int) -> float:
 
 
 @routine
-def on_the_way(control: Record, share: float) -> float:
+def allowed_violation(control: Record, share: float) -> float:
     """How far loops may be open after a share of the step planned."""
-    return max(CLOSED, OPEN * share * control["promise"])
+    return max(CLOSED, OPEN * share * control["predicted"])
 
 
 @routine
-def openness(linear: Linearisation) -> float:
+def violation(linear: Linearisation) -> float:
     """How far loops are open, or limits exceeded; nothing where that counts as closed."""
     return 0.0 if is_closed(linear, CLOSED) else max(linear.totals[0]["gap"], linear.totals[0]["excess"])
 
@@ -201,7 +201,9 @@ def solve_within(linear: Linearisation, closed: bool, p: QP) -> bool:
 
 
 @routine
-def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: float, p: QP) -> tuple[float, float]:
+def solve_subproblem(
+    linear: Linearisation, hessian: Hessian, damping: float, largest: float, p: QP
+) -> tuple[float, float]:
     """The step that the damped programme asks for, into `p.x`: what it takes from the objective, and the damping.
 
     Where curvature is not positive, that across active limits counts more: there is no room to move there. Where that
@@ -234,40 +236,40 @@ def propose(linear: Linearisation, hessian: Hessian, damping: float, largest: fl
             damping = max(2.0 * damping, 1e-3 * largest)
     if not is_solved:
         return -math.inf, damping
-    promise = 0.0 if closed else -linear.totals[0]["closing"]
+    predicted = 0.0 if closed else -linear.totals[0]["closing"]
     for a in range(motions):
-        promise -= linear.g[a] * p.x[a]
+        predicted -= linear.g[a] * p.x[a]
         for b in range(motions):
-            promise -= 0.5 * p.x[a] * hessian.H[max(a, b), min(a, b)] * p.x[b]
-    return promise, damping
+            predicted -= 0.5 * p.x[a] * hessian.H[max(a, b), min(a, b)] * p.x[b]
+    return predicted, damping
 
 
 @routine
-def is_last(linear: Linearisation, other: Linearisation, promise: float, before: float) -> bool:
+def is_last(linear: Linearisation, other: Linearisation, predicted: float, before: float) -> bool:
     """Whether a step from one linear to another promised so little that none is worth taking after it.
 
     Where it left nothing open, the next is taken to promise less by the factor by which this one promised less than the
-    one `before`.
+    one `predicted_before`.
     """
     value = linear.totals[0]["value"]
-    if promise <= LAST * value or (before <= FINE * value and promise > CONVERGING * before):
+    if predicted <= LAST * value or (before <= FINE * value and predicted > CONVERGING * before):
         return True
-    return before < math.inf and promise * promise <= NEXT * value * before and is_closed(other, CLOSED)
+    return before < math.inf and predicted * predicted <= NEXT * value * before and is_closed(other, CLOSED)
 
 
 @routine
 def merit(linear: Linearisation, weight: float) -> float:
     """The objective, and what it would cost to close what is open: an exact penalty, whose weight is more than the sum
     of all multipliers."""
-    return linear.totals[0]["value"] + weight * openness(linear)
+    return linear.totals[0]["value"] + weight * violation(linear)
 
 
 @routine
-def leads_down(linear: Linearisation, gain: float, promise: float, weight: float) -> bool:
+def is_sufficient(linear: Linearisation, actual: float, predicted: float, weight: float) -> bool:
     """Whether a step that promised so much gained enough."""
-    if promise <= FINE * linear.totals[0]["value"]:
-        return gain >= -ROUNDING * linear.totals[0]["value"] - weight * CLOSED
-    return gain > ENOUGH * promise
+    if predicted <= FINE * linear.totals[0]["value"]:
+        return actual >= -ROUNDING * linear.totals[0]["value"] - weight * CLOSED
+    return actual > ENOUGH * predicted
 
 
 @routine
@@ -296,68 +298,73 @@ def begin_descent(linear: Linearisation, hessian: Hessian, control: Record) -> N
     for c in range(len(hessian.multipliers)):
         hessian.multipliers[c] = 0.0
     control["damping"] = AT_FIRST * longest(linear.g, linear.totals[0]["motions"]) / LONGEST_STEP
-    control["promise"], control["weight"] = math.inf, 0.0
-    control["steps"] = control["done"] = control["rejected"] = control["exact"] = 0
+    control["predicted"], control["weight"] = math.inf, 0.0
+    control["steps"] = control["is_done"] = control["is_rejected"] = control["is_exact"] = 0
 
 
 @routine
-def rests_open(linear: Linearisation, led_down: bool, most_steps: int, control: Record) -> bool:
+def is_stuck_infeasible(linear: Linearisation, is_accepted: bool, most_steps: int, control: Record) -> bool:
     """Whether no step leads down where something is open."""
-    return not led_down and not is_closed(linear, NEARLY_CLOSED) and control["steps"] <= most_steps
+    return not is_accepted and not is_closed(linear, NEARLY_CLOSED) and control["steps"] <= most_steps
 
 
 @routine
-def go_on(control: Record) -> None:
+def resume(control: Record) -> None:
     """Ask anew whether a step is worth taking, now that what was open is closed."""
-    control["promise"] = math.inf
-    control["done"] = 0
+    control["predicted"] = math.inf
+    control["is_done"] = 0
 
 
 @routine
 def plan_step(linear: Linearisation, hessian: Hessian, control: Record, most_steps: int, p: QP) -> bool:
     """The next step to try, into `p.x`; False where none is worth trying."""
     control["steps"] += 1
-    control["before"] = control["promise"]
-    promise, damping = propose(linear, hessian, control["damping"], control["largest"], p)
-    multipliers = control["holding"] + sum_of(p.multipliers, linear.totals[0]["limits"])
+    control["predicted_before"] = control["predicted"]
+    predicted, damping = solve_subproblem(linear, hessian, control["damping"], control["largest"], p)
+    multipliers = control["equation_multipliers"] + sum_of(p.multipliers, linear.totals[0]["limits"])
     control["weight"] = max(LEAST_WEIGHT, 2.0 * multipliers)
-    promise += control["weight"] * openness(linear)
-    control["promise"], control["damping"] = promise, damping
-    if promise <= 0.0 or damping > STEEPEST * control["largest"] or control["steps"] > most_steps:
-        control["done"] = 1
+    predicted += control["weight"] * violation(linear)
+    control["predicted"], control["damping"] = predicted, damping
+    if predicted <= 0.0 or damping > STEEPEST * control["largest"] or control["steps"] > most_steps:
+        control["is_done"] = 1
         return False
     note_multipliers(linear, p, hessian)
     return True
 
 
 @routine
-def gained(linear: Linearisation, other: Linearisation, control: Record) -> float:
+def actual_reduction(linear: Linearisation, other: Linearisation, control: Record) -> float:
     """By how much the penalty is less at another configuration."""
     weight = control["weight"]
     return merit(linear, weight) - merit(other, weight)
 
 
 @routine
-def is_to_close(linear: Linearisation, other: Linearisation, share: float, control: Record) -> bool:
+def needs_correction(linear: Linearisation, other: Linearisation, share: float, control: Record) -> bool:
     """Whether a share of the step planned did not lead down, perhaps for what it left open."""
-    promise = share * control["promise"]
-    gain = gained(linear, other, control)
-    return not leads_down(linear, gain, promise, control["weight"]) and not is_closed(other, on_the_way(control, share))
+    predicted = share * control["predicted"]
+    actual = actual_reduction(linear, other, control)
+    return not is_sufficient(linear, actual, predicted, control["weight"]) and not is_closed(
+        other, allowed_violation(control, share)
+    )
 
 
 @routine
 def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, share: float, control: Record) -> bool:
     """Whether a share of the step planned led from one linear down to another; damping follows how well it did."""
-    promise, gain = share * control["promise"], gained(linear, other, control)
-    led_down = feasible and leads_down(linear, gain, promise, control["weight"])
-    if is_last(linear, other, promise, control["before"]):
-        control["done"] = 1
-    control["promise"], control["exact"] = promise, int(led_down and abs(gain - promise) < EXACT * promise)
+    predicted, actual = share * control["predicted"], actual_reduction(linear, other, control)
+    is_accepted = feasible and is_sufficient(linear, actual, predicted, control["weight"])
+    if is_last(linear, other, predicted, control["predicted_before"]):
+        control["is_done"] = 1
+    control["predicted"], control["is_exact"] = (
+        predicted,
+        int(is_accepted and abs(actual - predicted) < EXACT * predicted),
+    )
     damping, largest = control["damping"], control["largest"]
-    if not led_down:
+    if not is_accepted:
         control["damping"] = max(4.0 * damping, WORTH * largest)
-    elif gain > GOOD * promise and control["rejected"] == 0:
-        damping *= 0.01 if damping < MUCH * largest and share == 1.0 and control["exact"] == 1 else 0.1
+    elif actual > GOOD * predicted and control["is_rejected"] == 0:
+        damping *= 0.01 if damping < MUCH * largest and share == 1.0 and control["is_exact"] == 1 else 0.1
         control["damping"] = damping if damping > 1e-8 * largest else 0.0
-    control["rejected"] = 0 if led_down else 1
-    return led_down
+    control["is_rejected"] = 0 if is_accepted else 1
+    return is_accepted

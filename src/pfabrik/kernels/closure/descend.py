@@ -19,14 +19,14 @@ from ..sqp import (
     NEARLY_CLOSED,
     PROBE,
     RESTORING,
+    allowed_violation,
     begin_descent,
-    go_on,
     is_closed,
+    is_stuck_infeasible,
     judge_step,
     longest,
-    on_the_way,
     plan_step,
-    rests_open,
+    resume,
     scale_objective,
     symmetrise,
 )
@@ -85,7 +85,7 @@ def lagrangian_hessian(
     for i in range(scratch.balance.shape[0]):
         scratch.balance[i] = 0.0
     lagrangian_gradient(loops, row, objective, scratch.best, scratch, scratch.here)
-    scratch.control[0]["holding"] = put_multipliers(scratch.here, reduced, scratch.balance)
+    scratch.control[0]["equation_multipliers"] = put_multipliers(scratch.here, reduced, scratch.balance)
     lagrangian_gradient(loops, row, objective, scratch.best, scratch, scratch.here)
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
@@ -151,24 +151,24 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
     hessian, control, most = scratch.hessian, scratch.control[0], objective.pose.max_iterations
     scratch.gradient.unit[0] = scale_objective(reduced.linear)
     begin_descent(reduced.linear, hessian, control)
-    while control["done"] == 0:
+    while control["is_done"] == 0:
         control["largest"] = lagrangian_hessian(loops, row, objective, scratch, reduced)
-        led_down = False
-        while not led_down and control["done"] == 0:
+        is_accepted = False
+        while not is_accepted and control["is_done"] == 0:
             if plan_step(reduced.linear, hessian, control, most, p):
                 copy_state(best, trial)
                 share = take(loops, reduced, p.x, trial, scratch)
                 linearise(loops, row, objective, trial, scratch, other)
-                tolerance = on_the_way(control, share)
+                tolerance = allowed_violation(control, share)
                 feasible = restore_feasibility(loops, row, objective, trial, tolerance, scratch, other)
-                led_down = judge_step(reduced.linear, other.linear, feasible, share, control)
-                if led_down:
+                is_accepted = judge_step(reduced.linear, other.linear, feasible, share, control)
+                if is_accepted:
                     copy_state(trial, best)
                     reduced, other = other, reduced
-            if rests_open(reduced.linear, led_down, most, control):
+            if is_stuck_infeasible(reduced.linear, is_accepted, most, control):
                 if restore_feasibility(loops, row, objective, best, CLOSED, scratch, reduced):
-                    go_on(control)
-                led_down = True
+                    resume(control)
+                is_accepted = True
     restore_feasibility(loops, row, objective, best, CLOSED, scratch, reduced)
     return int(control["steps"])
 

@@ -19,17 +19,17 @@ from ..sqp import (
     MUCH,
     NEARLY_CLOSED,
     RESTORING,
+    allowed_violation,
     begin_descent,
-    go_on,
     is_closed,
-    is_to_close,
+    is_stuck_infeasible,
     judge_step,
     longest,
-    on_the_way,
-    openness,
+    needs_correction,
     plan_step,
-    rests_open,
+    resume,
     scale_objective,
+    violation,
 )
 from ..vectors import wrap
 from .equations import PlatformState, close_rods
@@ -134,8 +134,8 @@ def has_same_curvature(reduced: FreeMotions, before: FreeMotions, control: Recor
     It is told in the same free motions only where equations have the same pivots.
     """
     totals, others = reduced.linear.totals[0], before.linear.totals[0]
-    is_short = control["promise"] <= SHORT * totals["value"]
-    if not is_short or control["exact"] == 0 or totals["rank"] != others["rank"]:
+    is_short = control["predicted"] <= SHORT * totals["value"]
+    if not is_short or control["is_exact"] == 0 or totals["rank"] != others["rank"]:
         return False
     for r in range(totals["rank"]):
         if reduced.pivots[r] != before.pivots[r]:
@@ -148,7 +148,7 @@ def is_hopeless(behind: float, share: float, control: Record) -> bool:
     """Whether a search that is so far behind the nearest yet, in the objective, will not come as near; `share` of the
     last step was taken."""
     is_damped = control["damping"] > MUCH * control["largest"]
-    return bool(not is_damped and HOPELESS * control["promise"] < share * behind)
+    return bool(not is_damped and HOPELESS * control["predicted"] < share * behind)
 
 
 @routine
@@ -163,7 +163,7 @@ def descend(
     """
     reduced, unit = search.first, search.gradient.unit
     search.near[0] = NEAR
-    unit[0], search.control[0]["steps"], search.control[0]["recovered"] = 1.0, 0, 0
+    unit[0], search.control[0]["steps"], search.control[0]["is_restoring"] = 1.0, 0, 0
     linearise(table, row, objective, search.best, search, reduced)
     if not restore_feasibility(table, row, objective, search.best, CLOSED, search, reduced, RESTORING):
         return math.inf
@@ -174,11 +174,11 @@ def descend(
         return 0.0
     copy_platform_state(search.best, search.closed)
     for closing in range(2):
-        search.control[0]["recovered"] = closing
+        search.control[0]["is_restoring"] = closing
         if closing == 1:
             copy_platform_state(search.closed, search.best)
             linearise(table, row, objective, search.best, search, reduced)
-        distance = go_down(table, row, objective, best_distance, incumbent, closing, search)
+        distance = take_steps(table, row, objective, best_distance, incumbent, closing, search)
         count_platform(2, search)
         if distance >= 0.0:
             return distance
@@ -186,7 +186,7 @@ def descend(
 
 
 @routine
-def go_down(
+def take_steps(
     table: Table,
     row: int,
     objective: PlatformObjective,
@@ -205,11 +205,11 @@ def go_down(
     unit = search.gradient.unit
     begin_descent(reduced.linear, hessian, control)
     missed = 0
-    while control["done"] == 0:
+    while control["is_done"] == 0:
         if not has_same_curvature(reduced, other, control):
             control["largest"] = lagrangian_hessian(table, row, objective, search, reduced)
-        led_down = False
-        while not led_down and control["done"] == 0:
+        is_accepted = False
+        while not is_accepted and control["is_done"] == 0:
             if plan_step(reduced.linear, hessian, control, objective.pose.max_iterations, search.p):
                 copy_platform_state(search.best, search.trial)
                 share = take(table, reduced, search.p.x, search.trial, search)
@@ -218,18 +218,18 @@ def go_down(
                 closes = True
                 if closing == 1:
                     closes = restore_feasibility(table, row, objective, search.trial, CLOSED, search, other, RESTORING)
-                elif is_to_close(reduced.linear, other.linear, share, control):
-                    tolerance = on_the_way(control, share)
+                elif needs_correction(reduced.linear, other.linear, share, control):
+                    tolerance = allowed_violation(control, share)
                     closes = restore_feasibility(
                         table, row, objective, search.trial, tolerance, search, other, CORRECTIONS
                     )
-                    closes = closes or other.linear.totals[0]["gap"] <= max(CLOSED, openness(reduced.linear))
-                led_down = judge_step(reduced.linear, other.linear, closes, share, control)
-                if not led_down and not is_closed(other.linear, CLOSED):
+                    closes = closes or other.linear.totals[0]["gap"] <= max(CLOSED, violation(reduced.linear))
+                is_accepted = judge_step(reduced.linear, other.linear, closes, share, control)
+                if not is_accepted and not is_closed(other.linear, CLOSED):
                     missed += 1
                     if missed == MISSES:
                         count_platform(1, search)
-                if led_down:
+                if is_accepted:
                     copy_platform_state(search.trial, search.best)
                     reduced, other = other, reduced
                     if best_distance < math.inf and is_near(table.legs, search.best, incumbent, search.holding):
@@ -240,12 +240,12 @@ def go_down(
                     if is_closed(reduced.linear, CLOSED):
                         copy_platform_state(search.best, search.closed)
                         if reduced.linear.totals[0]["value"] <= 0.5 * unit[0] * THERE * THERE:
-                            control["done"] = 1
-            if rests_open(reduced.linear, led_down, objective.pose.max_iterations, control):
+                            control["is_done"] = 1
+            if is_stuck_infeasible(reduced.linear, is_accepted, objective.pose.max_iterations, control):
                 if not restore_feasibility(table, row, objective, search.best, CLOSED, search, reduced, RESTORING):
                     return -1.0
-                go_on(control)
-                led_down = True
+                resume(control)
+                is_accepted = True
     if not restore_feasibility(table, row, objective, search.best, CLOSED, search, reduced, RESTORING):
         return -1.0
     distance = math.sqrt(2.0 * reduced.linear.totals[0]["value"] / unit[0])

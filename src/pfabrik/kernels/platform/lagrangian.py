@@ -119,7 +119,7 @@ def lagrangian_hessian(
     linear, H, basis, step = reduced.linear, search.hessian.H, reduced.basis, search.step
     motions, here, there = linear.totals[0]["motions"], search.here, search.there
     put_force(table, search, search.here)
-    search.control[0]["holding"] = put_multipliers(search.here, reduced, search.balance)
+    search.control[0]["equation_multipliers"] = put_multipliers(search.here, reduced, search.balance)
     add_balance(linear.totals[0]["rows"] - search.leg_eval.slopes.shape[0], search, search.here)
     note_pulled(table, objective, search)
     for a in range(motions):

@@ -209,7 +209,7 @@ def search_from(
         put_sides(table, search.best, search.leg_eval)
         if stays == 0 or not is_other_mode(table.legs, sides, search.best.sides):
             count_ending(distance, best_tally, search, best)
-            best_tally["is_unbroken"] = max(best_tally["is_unbroken"], 1 - search.control[0]["recovered"])
+            best_tally["is_unbroken"] = max(best_tally["is_unbroken"], 1 - search.control[0]["is_restoring"])
             if (
                 best_tally["agreements"] == 1.0
                 and distance == best_tally["least"]
