@@ -34,7 +34,9 @@ print(double(float(sys.argv[1])))
 def test_every_kernel_is_compiled_for_the_types_that_questions_have() -> None:
     reported: list[str] = []
     ahead.compile_all(lambda name, seconds: reported.append(name))
-    assert {"reaching.solve_by_passes", "legs.answer", "closure.close", "closure.approach"} <= set(reported)
+    assert {"reaching.solve_by_passes", "legs.answer", "closure.close", "closure.nearest_configuration"} <= set(
+        reported
+    )
     assert len(reported) == len(ahead.KERNELS)
     for name in ("stewart", "delta"):
         mechanism = pf.load(name)

@@ -25,7 +25,7 @@ MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
 
-def approached(
+def nearest_configurations(
     closure: Closure,
     coordinates: Floats,
     targets: Floats,
@@ -103,7 +103,7 @@ def within_sight(mechanism: Mechanism, targets: Floats) -> Floats:
 
 def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[Closed, Floats]:
     """The kernel over all rows, on all cores: where they ended, or what holds them where they are."""
-    from ..kernels.closure.descend import approach
+    from ..kernels.closure.descend import nearest_configuration
 
     closed = new_closed(closure, coordinates, np.tile(np.eye(4), (len(coordinates), 1, 1)), 0.0)
     scratch = _scratch(closure.mechanism, closure.whole)
@@ -113,7 +113,7 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
         own = Closed._make(array[block] for array in closed)
         pose = objective.pose._replace(targets=objective.pose.targets[block])
         asked = objective._replace(pose=pose, anchors=objective.anchors[block])
-        approach(closure.machine.address, scratch.address, asked, own, weights[block])
+        nearest_configuration(closure.machine.address, scratch.address, asked, own, weights[block])
 
     in_blocks(run, len(coordinates), rows_a_block=16)
     return closed, weights

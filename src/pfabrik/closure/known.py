@@ -13,7 +13,7 @@ from ..kernels.closure.loops import BASE_AXES
 from ..poses import pose
 from ..tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, close, closure_of
-from .descend import MOST_STEPS, approached
+from .descend import MOST_STEPS, nearest_configurations
 from .effort import descents_within, starts_within
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .starts import random_starts
@@ -45,7 +45,7 @@ def corners_of(mechanism: Mechanism) -> tuple[Floats, ...]:
     home = np.zeros((len(directions), len(closure.scale)))
     _, steps = descents_within(closure, CORNERS, MOST_STEPS)
     platform = (1.0, 1.0, 1.0, turning, turning, turning)
-    ends = approached(closure, home, np.array(poses), platform=platform, steps=max(steps, 1))
+    ends = nearest_configurations(closure, home, np.array(poses), platform=platform, steps=max(steps, 1))
     coordinates, places = chanced_upon(mechanism)
     kept = ends.feasible
     coordinates = np.concatenate([home[:1], ends.coordinates[kept], coordinates])

@@ -17,7 +17,7 @@ from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of, platform_poses
-from .descend import MOST_STEPS, approached, weighed_limits
+from .descend import MOST_STEPS, nearest_configurations, weighed_limits
 from .effort import descents_within
 from .known import CORNERS, corners_of
 from .parasitic import strays
@@ -132,12 +132,16 @@ def project(
                 begin = start[waiting]
                 if place >= len(starts):
                     begin = _placed(closure, begin, targets[waiting], way)
-                found = approached(closure, begin, targets[waiting], platform=way.weights, frame=frame, steps=steps)
+                found = nearest_configurations(
+                    closure, begin, targets[waiting], platform=way.weights, frame=frame, steps=steps
+                )
                 agreements[waiting] = _take_nearer(closure, best, waiting, found, targets, way, agreements[waiting])
         lost = np.flatnonzero(np.isinf(best.distances))
         if len(lost) and LOCKED in way.weights and not is_long:
             begin = _placed(closure, starts[0][lost], targets[lost], way)
-            found = approached(closure, begin, targets[lost], platform=way.weights, frame=frame, steps=steps)
+            found = nearest_configurations(
+                closure, begin, targets[lost], platform=way.weights, frame=frame, steps=steps
+            )
             _take_nearer(closure, best, lost, found, targets, way, np.zeros(len(lost), np.int64))
     lost = np.flatnonzero(np.isinf(best.distances))
     if len(lost):  # where a search starts is feasible, or nearly: better than no answer

@@ -11,7 +11,7 @@ import numpy as np
 
 from ._pipeline import name_of
 from .closure.close import close
-from .closure.descend import approach
+from .closure.descend import nearest_configuration
 from .closure.first_order import PLAN, first_order
 from .closure.loops import Closed, ClosureProblem, FirstOrder, Objective, PoseObjective
 from .lattice import join, number_points
@@ -20,7 +20,7 @@ from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
 from .legs.maps import margins_in_blocks
 from .platform.forward import assemble
-from .platform.nearest import approach as approach_by_pose
+from .platform.nearest import nearest_pose
 from .platform.otherwise import answer_otherwise
 from .platform.read import read
 from .reaching import plan as P
@@ -57,12 +57,12 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer, _ANSWERS),
     (close, (*_values("i i i"), ClosureProblem(*_values("f1 i f3 i f i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
-    (approach, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
+    (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
     (read, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
     (first_order, (*_values("i i"), PLAN, _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
     (answer_otherwise, _ANSWERS),
-    (approach_by_pose, tuple(_values("i i i f3 f2 f3 f2 f2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
+    (nearest_pose, tuple(_values("i i i f3 f2 f3 f2 f2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i f2 i i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i f3 f3 f2 i f1 i1"))),
     (number_points, (*_values("i1 i1 i1 i"), True, *_values("i1"))),

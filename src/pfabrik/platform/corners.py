@@ -19,7 +19,7 @@ from ..kernels.platform.records import Starts
 from ..kernels.rows import REACHED
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
-from .approach import Approach, carriers_of, home_start, no_starts
+from .nearest_pose import NearestPose, carriers_of, home_start, no_starts
 from .rotation import constraints_at, keeps_rotation
 from .table import machine
 
@@ -114,8 +114,8 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
     targets = in_lengths(poses, mechanism.characteristic_length)
     weights = (1.0, 1.0, 1.0, TURNING, TURNING, TURNING)
-    approach = Approach(mechanism, table, weights, {"frame": BASE_AXES, "steps": DRAWN_STEPS}, no_starts(table))
-    found = approach.find(targets, Starts(poses, q, sides))
+    nearest_pose = NearestPose(mechanism, table, weights, {"frame": BASE_AXES, "steps": DRAWN_STEPS}, no_starts(table))
+    found = nearest_pose.find(targets, Starts(poses, q, sides))
     counts = np.isfinite(found.distances) & ~strays(mechanism, found.poses)
     found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
     return Starts(*found[1:4]).at(np.flatnonzero(counts))

@@ -18,9 +18,9 @@ from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
 from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
-from .approach import home_start, no_starts, starts_at
 from .corners import corners_of
 from .nearest import nearest_actuators
+from .nearest_pose import home_start, no_starts, starts_at
 from .one import Ends, scratch_of
 from .table import machine_searched
 

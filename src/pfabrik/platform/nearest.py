@@ -24,8 +24,8 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION, PROJECTED, REACHED
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .approach import Approach, new_found, no_starts, starts_at
 from .corners import corners_of
+from .nearest_pose import NearestPose, new_found, no_starts, starts_at
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
@@ -76,8 +76,8 @@ class Asked(NamedTuple):
     mechanism: Mechanism
     length: float
     ways: tuple[Way, ...]
-    searches: tuple[Approach, ...]
-    otherwise: Approach | None  # another way, where legs reach only what they complete step by step
+    searches: tuple[NearestPose, ...]
+    otherwise: NearestPose | None  # another way, where legs reach only what they complete step by step
 
 
 @lru_cache(maxsize=256)
@@ -105,7 +105,9 @@ def _asked(
     return Asked(mechanism, length, ways, searches, otherwise)
 
 
-def _search(mechanism: Mechanism, table: LegTable, way: Way, settings: Mapping[str, float], starts: Starts) -> Approach:
+def _search(
+    mechanism: Mechanism, table: LegTable, way: Way, settings: Mapping[str, float], starts: Starts
+) -> NearestPose:
     """Searches of one way, from each row's own start and then from others."""
     length = mechanism.characteristic_length
     held = {
@@ -113,10 +115,10 @@ def _search(mechanism: Mechanism, table: LegTable, way: Way, settings: Mapping[s
         "held_position": TOLERANCES.held * length if way.hold == HOLD_POSITION else np.inf,
         "held_rotation": TOLERANCES.held if way.hold == HOLD_ORIENTATION else np.inf,
     }
-    return Approach(mechanism, table, way.weights, {**settings, **held}, starts)
+    return NearestPose(mechanism, table, way.weights, {**settings, **held}, starts)
 
 
-def _reach_otherwise(search: Approach, targets: Floats, own: Starts, found: Found) -> None:
+def _reach_otherwise(search: NearestPose, targets: Floats, own: Starts, found: Found) -> None:
     """Answer the rows that another way to project reaches: near singularities each misses others."""
     is_open = (found.status == PROJECTED) & (found.counters[:, HOLD] < CERTAIN)
     asked = (is_open & (found.distances < np.inf)).nonzero()[0]
@@ -176,9 +178,9 @@ def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, prese
 
 
 @lru_cache(maxsize=256)
-def _weighing(mechanism: Mechanism, table: LegTable, way: Way) -> Approach:
+def _weighing(mechanism: Mechanism, table: LegTable, way: Way) -> NearestPose:
     """What takes no steps, and weighs limits."""
-    return Approach(mechanism, table, way.weights, {"steps": 0}, no_starts(table))
+    return NearestPose(mechanism, table, way.weights, {"steps": 0}, no_starts(table))
 
 
 def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, corners: bool) -> Found:
@@ -189,13 +191,13 @@ def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, corn
 
 
 @lru_cache(maxsize=64)
-def _toward_values(mechanism: Mechanism, corners: bool) -> Approach:
+def _toward_values(mechanism: Mechanism, corners: bool) -> NearestPose:
     """Searches for actuators that have values; the pose does not count."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
     others = corners_of(mechanism) if corners else no_starts(table)
     settings = {"frame": BASE_AXES, "steps": MOST_STEPS}
-    return Approach(mechanism, table, (0.0,) * 6, settings, others, table.driven)
+    return NearestPose(mechanism, table, (0.0,) * 6, settings, others, table.driven)
 
 
 def move_arms(
@@ -238,11 +240,11 @@ def _nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: S
     best = new_found(len(targets), table)
     best.distances[:], best.sides[:] = 0.0, own.sides
     left = np.arange(len(targets))
-    for arms, legs, approach in _toward_arms(mechanism, table):
+    for arms, legs, nearest_pose in _toward_arms(mechanism, table):
         poses = own.poses if len(own.poses) == 1 else own.poses[left]
         begin = Starts(poses, np.ascontiguousarray(own.q[:, legs]), np.ascontiguousarray(own.sides[left][:, legs]))
         values = np.ascontiguousarray(arms["sense"] * begin.sides[:, arms["leg"]])
-        found = approach.find(targets[left], begin, values)
+        found = nearest_pose.find(targets[left], begin, values)
         best.distances[left] = np.maximum(best.distances[left], found.distances)
         best.poses[left], best.sides[left, legs] = found.poses, found.sides
         left = left[np.isfinite(found.distances)]
@@ -250,11 +252,11 @@ def _nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: S
 
 
 @lru_cache(maxsize=64)
-def _toward_arms(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, slice, Approach], ...]:
+def _toward_arms(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, slice, NearestPose], ...]:
     """Searches for each set of arms at poses that are held: the arms, and which legs these are."""
     held = task_of(mechanism).held
     return tuple(
-        (part.arms, legs, Approach(mechanism, part, held, {"steps": MOST_STEPS}, no_starts(part), part.arms))
+        (part.arms, legs, NearestPose(mechanism, part, held, {"steps": MOST_STEPS}, no_starts(part), part.arms))
         for part, legs in _apart_by_arms(table)
     )
 

@@ -16,7 +16,7 @@ from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle, Scratch
 from ..kernels.platform.records import Starts
 from ..kernels.rows import N_COUNTERS, Rows
-from .approach import home_start, no_starts
+from .nearest_pose import home_start, no_starts
 from .table import machine, machine_nearby, machine_searched, resting_at_home
 
 if TYPE_CHECKING:

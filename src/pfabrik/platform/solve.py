@@ -26,10 +26,10 @@ from ..options import Options
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
 from .answers import LegAnswers, begins_of, coordinates_of, sides_at
-from .approach import starts_at
 from .coordinates import settled
 from .forward import assembled
 from .nearest import move_arms, weighed_limits
+from .nearest_pose import starts_at
 from .one import Ends, OneAssembly, OneTarget, new_scratch
 from .table import Machine, machine, machine_nearby, resting_at_home
 from .unreached import Question, Unreached, answer_unreached

@@ -19,9 +19,9 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options
-from .approach import starts_at
 from .corners import assembled_otherwise
 from .nearest import project
+from .nearest_pose import starts_at
 from .table import Machine, machine, machine_nearby
 
 ROWS_A_BLOCK = 64

@@ -174,7 +174,9 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
 
 
 @search
-def approach(machine: int, scratch_address: int, objective: Objective, closed: Closed, weights: Floats) -> None:
+def nearest_configuration(
+    machine: int, scratch_address: int, objective: Objective, closed: Closed, weights: Floats
+) -> None:
     """Bring every row, from a configuration that is closed within its limits or nearly so, as near as it comes.
 
     With no steps to take, tell instead how hard every limit holds each row back where it is, (n, 2 columns + cones):

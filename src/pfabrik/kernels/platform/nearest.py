@@ -90,7 +90,7 @@ def new_nearest_scratch(table: Table, plan: Plan) -> NearestScratch:
 
 _PLAN = Plan(np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
 open_plan, open_scratch = opener(_PLAN), opener(new_nearest_scratch(SAMPLE, _PLAN))
-"""What `approach` is asked, and its scratch memory: it is given the addresses of their handles."""
+"""What `nearest_pose` is asked, and its scratch memory: it is given the addresses of their handles."""
 
 
 @routine
@@ -231,7 +231,7 @@ def search_row(
     stays: int,
     scratch: NearestScratch,
 ) -> float:
-    """The nearest configuration of a row, into `scratch.best`, and how far it is [L]; see `approach`.
+    """The nearest configuration of a row, into `scratch.best`, and how far it is [L]; see `nearest_pose`.
 
     What is held is put in its place at once where searches may start anywhere, and no arms would be left behind, or
     nothing else has a place; and else brought there step by step. The other way too, where that finds nothing, or only
@@ -319,7 +319,7 @@ def judge(own: Record, row: int, found: Found) -> None:
 def weigh(
     table: Table, row: int, objective: PlatformObjective, own: Starts, scratch: NearestScratch, weights: Floats
 ) -> None:
-    """Fill how hard every limit holds a row back where it starts, see `approach`."""
+    """Fill how hard every limit holds a row back where it starts, see `nearest_pose`."""
     search, linear = scratch.search, scratch.search.first.linear
     begin(table, own, row, search)
     fix(objective.pose, True, search)
@@ -331,7 +331,7 @@ def weigh(
 
 
 @search
-def approach(
+def nearest_pose(
     machine: int,
     plan: int,
     scratch_address: int,
@@ -353,7 +353,7 @@ def approach(
     """Fill the nearest feasible configuration of every row.
 
     With no steps to take, fill `weights` instead, (n, 2 ranges + cones + legs): how hard every limit holds each row
-    back where it starts, as of `closure.descend.approach`.
+    back where it starts, as of `closure.descend.nearest_pose`.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ ROWS_A_BLOCK = 16
 _NO_WEIGHTS = np.zeros((0, 0))
 
 
-class Approach:
+class NearestPose:
     """Searches of a machine for what is nearest in one way, prepared: what is left to do for a row is little.
 
     Parameters
@@ -84,15 +84,15 @@ class Approach:
         own["frame"] = BASE_AXES if rests else own["frame"]
         self._plan = Handle(Plan(counted, own, *others))
         self._no_values = np.zeros((0, len(self._legs.record.driven)))
-        self._minding: Approach | None = None
+        self._minding: NearestPose | None = None
         if minded < len(cones):
-            self._minding = Approach(mechanism, table, weights, settings, others, driven, minds_aims=True)
+            self._minding = NearestPose(mechanism, table, weights, settings, others, driven, minds_aims=True)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
-        from ..kernels.platform.nearest import approach
+        from ..kernels.platform.nearest import nearest_pose
 
-        return approach
+        return nearest_pose
 
     @cached_property
     def _scratch(self) -> Scratch[NearestScratch]:
