@@ -75,7 +75,7 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
     pivots = (table.legs["kind"] == K.PIVOT) & (table.legs["foot"] == K.CROSS)
     told = [each for each in (*table.limited, *table.driven) if not pivots[each["leg"]] or each["place"] >= K.HEAD]
 
-    on_carriers = [k for k, leg in enumerate(table.legs) if E.is_carried(leg)]
+    on_carriers = [k for k, leg in enumerate(table.legs) if E.has_proximal(leg)]
 
     def values(state: E.PlatformState) -> np.ndarray:
         E.place(table, state, leg_eval)

@@ -114,6 +114,6 @@ def _limits(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
 
 def _carrier(form: LegForm) -> str:
     """The joint that carries a leg, or its first one."""
-    carrier = form.carrier if isinstance(form, Rod) else None
-    items = (carrier,) if carrier is not None else form.items
+    proximal = form.proximal if isinstance(form, Rod) else None
+    items = (proximal,) if proximal is not None else form.items
     return items[0].joint.name if items else ""

@@ -36,7 +36,7 @@ class Rod:
         first one at the head.
     """
 
-    carrier: Item | None
+    proximal: Item | None
     foot_ending: Ending
     slide: Item | None
     twist: Item | None
@@ -50,7 +50,7 @@ class Rod:
 
     @property
     def items(self) -> tuple[Item, ...]:
-        between = tuple(item for item in (self.carrier, self.slide, self.twist) if item is not None)
+        between = tuple(item for item in (self.proximal, self.slide, self.twist) if item is not None)
         return (*between, *self.foot_ending.items, *self.head_ending.items)
 
 
@@ -126,15 +126,15 @@ def told_places(form: LegForm) -> Iterator[tuple[Item, int]]:
         return
     if isinstance(form, Arm):
         if form.twin is None:
-            yield form.item, K.CARRIER
+            yield form.item, K.Q_PROXIMAL
         return
     if isinstance(form, Pivot):
         yield from ((item, K.HEAD + place) for place, item in enumerate(form.slides))
         if form.ending.kind != "ball":
             yield from ((item, K.FOOT + place) for place, item in enumerate(form.ending.items))
         return
-    if form.carrier is not None:
-        yield form.carrier, K.CARRIER
+    if form.proximal is not None:
+        yield form.proximal, K.Q_PROXIMAL
     if form.slide is not None:
         yield form.slide, K.SLIDE
     if holds_spin(form.foot_ending):

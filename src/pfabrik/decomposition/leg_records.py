@@ -16,7 +16,7 @@ from .items import Item
 from .leg_forms import Arm, KeptAxis, LegForm, Pivot, Rod, keeps_from_spinning
 
 _ENDINGS = {"weld": K.WELD, "hinge": K.HINGE, "cross": K.CROSS, "triple": K.TRIPLE, "ball": K.BALL}
-_CARRIERS = {"R": K.CRANK, "P": K.CARRIAGE}
+_PROXIMAL = {"R": K.CRANK, "P": K.CARRIAGE}
 
 
 def leg_records(mechanism: Mechanism, forms: Sequence[LegForm]) -> Records:
@@ -40,7 +40,7 @@ def row_counts(legs: Records) -> list[int]:
         if leg["kind"] == K.ARM:
             counts.append(0)
             continue
-        is_rigid = not leg["slides"] and leg["carrier"] in (K.NO_CARRIER, K.SHARED)
+        is_rigid = not leg["slides"] and leg["proximal"] in (K.NO_PROXIMAL, K.SHARED)
         hinges = int(leg["foot"] == K.HINGE) + int(leg["head"] == K.HINGE)
         counts.append(int(is_rigid) + hinges + int(leg["twists"]))
     return counts
@@ -49,7 +49,7 @@ def row_counts(legs: Records) -> list[int]:
 def _bear(legs: Records, counts: Sequence[int]) -> list[bool]:
     """Whether each leg, or a rod on its carrier, leaves a constraint: these follow the leg that has the carrier. Of an
     arm, whether a leg on it does."""
-    mains = np.maximum.accumulate(np.where(legs["carrier"] != K.SHARED, np.arange(len(legs)), 0))
+    mains = np.maximum.accumulate(np.where(legs["proximal"] != K.SHARED, np.arange(len(legs)), 0))
     bear = [bool(np.sum(np.array(counts)[mains == main])) for main in mains]
     for k in range(len(legs) - 1, -1, -1):
         for arm in (legs["arm"][k], legs["twin"][k]):
@@ -139,8 +139,8 @@ def _kept_axis_record(form: KeptAxis) -> Records:
 def _arm_record(mechanism: Mechanism, arm: Arm) -> Records:
     record, point = np.zeros((), K.LEG), arm.item.point
     record["kind"], record["reversed"], record["at_head"] = K.ARM, arm.is_reversed, arm.at_head
-    record["carrier"], record["carrier_axis"] = _CARRIERS[arm.item.kind], arm.item.axis
-    record["carrier_point"] = _head_point(mechanism, point, arm.is_reversed) if arm.at_head else point
+    record["proximal"], record["proximal_axis"] = _PROXIMAL[arm.item.kind], arm.item.axis
+    record["proximal_point"] = _head_point(mechanism, point, arm.is_reversed) if arm.at_head else point
     return record
 
 
@@ -183,20 +183,20 @@ def _rod_record(mechanism: Mechanism, rod: Rod) -> Records:
     foot_mark, head_mark = rod.foot_ending.items[-1].axis, rod.head_ending.items[0].axis
     flat = foot_mark @ head_mark - (line @ foot_mark) * (line @ head_mark)
     record["twist"] = math.atan2(line @ np.cross(foot_mark, head_mark), flat)
-    record["carrier"] = K.SHARED if rod.is_shared else K.NO_CARRIER
-    if rod.carrier is not None:
-        _put_carrier(record, rod.carrier, rod.foot, line)
+    record["proximal"] = K.SHARED if rod.is_shared else K.NO_PROXIMAL
+    if rod.proximal is not None:
+        _put_proximal(record, rod.proximal, rod.foot, line)
     return record
 
 
-def _put_carrier(record: Records, carrier: Item, foot: Floats, line: Floats) -> None:
-    axis = carrier.axis
-    record["carrier"], record["carrier_axis"] = _CARRIERS[carrier.kind], axis
+def _put_proximal(record: Records, proximal: Item, foot: Floats, line: Floats) -> None:
+    axis = proximal.axis
+    record["proximal"], record["proximal_axis"] = _PROXIMAL[proximal.kind], axis
     motion = axis
-    if carrier.kind == "R":
-        point = carrier.point + axis * (axis @ (foot - carrier.point))
-        record["carrier_point"], record["spoke"] = point, foot - point
-        record["spoke_across"] = motion = np.cross(axis, foot - point)
+    if proximal.kind == "R":
+        point = proximal.point + axis * (axis @ (foot - proximal.point))
+        record["proximal_point"], record["crank"] = point, foot - point
+        record["crank_across"] = motion = np.cross(axis, foot - point)
     # home's solution, of a carriage q = middle +- root, of a crank q = atan2(B, A) +- acos: the foot leaves the line
     # forward, or backward
     record["side"] = -1.0 if line @ motion >= 0.0 else 1.0

@@ -78,7 +78,7 @@ def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
     if _are_alike((main, *rods)):
         return (main, *(replace(rod, is_shared=True) for rod in rods))
     arm = Arm(trunk[0], is_reversed=False)
-    return (arm, *put_on(arm, (replace(main, carrier=None), *rods)))
+    return (arm, *put_on(arm, (replace(main, proximal=None), *rods)))
 
 
 def _are_alike(rods: Sequence[Rod]) -> bool:
@@ -144,16 +144,16 @@ def _parallelogram_rod(
     before, after : what carries its inner body, and the platform on its outer one.
     inner, outer : the pins of one of its rods.
     """
-    *carriers, first = before or (inner,)
+    *q_proximal, first = before or (inner,)
     if (
         len(after) != 1
-        or len(carriers) > 1
+        or len(q_proximal) > 1
         or {first.kind, after[0].kind} != {"R"}
         or not are_parallel(first, after[0])
     ):
         raise NoLeg("a parallelogram that is not between two parallel hinges")
-    last, carrier = after[0], carriers[0] if carriers else None
-    if carrier is not None and carrier.kind == "R" and not are_parallel(carrier, first):
+    last, proximal = after[0], q_proximal[0] if q_proximal else None
+    if proximal is not None and proximal.kind == "R" and not are_parallel(proximal, first):
         raise NoLeg("a crank whose axis is not parallel to the hinges beside its parallelogram")
     way = outer.point - inner.point
     way = way - inner.axis * (inner.axis @ way)
@@ -163,7 +163,7 @@ def _parallelogram_rod(
     head = Ending("cross", (outer, last), first.point + way)
     if are_parallel(first, inner):
         raise NoLeg("a parallelogram whose pins are parallel to the hinges beside it")
-    return _checked_rod(carrier, foot, (), head, is_reversed)
+    return _checked_rod(proximal, foot, (), head, is_reversed)
 
 
 def _leg(items: list[Item]) -> tuple[LegForm, ...]:
@@ -211,14 +211,14 @@ def _readings(items: list[Item]) -> Iterator[Callable[[], tuple[LegForm, ...]]]:
 def _facing(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm, ...]:
     """A rod on an arm that turns, or shifts, the plane across the hinge at its foot to where the head is."""
     arm, rod = items[0], _rod_on(items[1:], n_carriers, is_reversed)
-    if arm.kind == "S" or rod.foot_ending.kind != "hinge" or (rod.carrier is None and rod.slide is None):
+    if arm.kind == "S" or rod.foot_ending.kind != "hinge" or (rod.proximal is None and rod.slide is None):
         raise NoLeg("several joints carry its rod")
     axis = rod.foot_ending.items[0].axis
     lean = abs(arm.axis @ axis) if arm.kind == "P" else area(arm.axis, axis)
     if lean <= TOLERANCES.alignment:
         raise NoLeg("several joints carry its rod")
-    if rod.carrier is not None:
-        off = area(rod.carrier.axis, axis) if rod.carrier.kind == "R" else abs(rod.carrier.axis @ axis)
+    if rod.proximal is not None:
+        off = area(rod.proximal.axis, axis) if rod.proximal.kind == "R" else abs(rod.proximal.axis @ axis)
         if off > TOLERANCES.implied:
             raise NoLeg("several joints carry its rod")
     under = Arm(arm, is_reversed, faces=True)
@@ -264,9 +264,9 @@ def _rod_on(items: list[Item], n_carriers: int, is_reversed: bool) -> Rod:
     return _rod(items[0] if n_carriers else None, items[n_carriers:], is_reversed)
 
 
-def _rod(carrier: Item | None, items: list[Item], is_reversed: bool) -> Rod:
+def _rod(proximal: Item | None, items: list[Item], is_reversed: bool) -> Rod:
     """A rod of items in series on a carrier, with the largest endings that fit."""
-    if carrier is not None and carrier.kind == "S":
+    if proximal is not None and proximal.kind == "S":
         raise NoLeg("a ball carries the rod")
     sizes = range(MOST_HINGES, 0, -1)
     reason = "its joints do not meet in two points"
@@ -277,7 +277,7 @@ def _rod(carrier: Item | None, items: list[Item], is_reversed: bool) -> Rod:
         if foot is None or head is None:
             continue
         try:
-            return _checked_rod(carrier, foot, items[foot_size : len(items) - head_size], head, is_reversed)
+            return _checked_rod(proximal, foot, items[foot_size : len(items) - head_size], head, is_reversed)
         except NoLeg as found:
             reason = str(found)
     raise NoLeg(reason)
@@ -308,7 +308,7 @@ def _crossing(first: Item, second: Item) -> Floats:
     return np.asarray(first.point + along * first.axis)
 
 
-def _checked_rod(carrier: Item | None, foot: Ending, middle: Sequence[Item], head: Ending, is_reversed: bool) -> Rod:
+def _checked_rod(proximal: Item | None, foot: Ending, middle: Sequence[Item], head: Ending, is_reversed: bool) -> Rod:
     start, end = _ends(foot, head)
     line = end - start
     if np.linalg.norm(line) <= TOLERANCES.alignment:
@@ -324,13 +324,13 @@ def _checked_rod(carrier: Item | None, foot: Ending, middle: Sequence[Item], hea
             raise NoLeg("a hinge along its rod")
         if ending.kind == "triple" and any(abs(a.axis @ b.axis) > TOLERANCES.alignment for a, b in pairwise(axes)):
             raise NoLeg("three hinges through a point that are not square to each other")
-    if carrier is not None:
+    if proximal is not None:
         if slides:
             raise NoLeg("a carrier below a sliding rod")
-        if carrier.kind == "R" and area(carrier.axis, start - carrier.point) <= TOLERANCES.alignment:
+        if proximal.kind == "R" and area(proximal.axis, start - proximal.point) <= TOLERANCES.alignment:
             raise NoLeg("a crank of no length")
     slide, twist = (found[0] if found else None for found in (slides, twists))
-    return Rod(carrier, foot, slide, twist, head, start, end, is_reversed)
+    return Rod(proximal, foot, slide, twist, head, start, end, is_reversed)
 
 
 def _along(item: Item, line: Floats) -> Item:

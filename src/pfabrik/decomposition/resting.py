@@ -68,11 +68,11 @@ def _moved(legs: Records, sides: Floats) -> Floats:
     moved = np.repeat(np.eye(4)[None], len(legs), axis=0)
     for k, leg in enumerate(legs):
         own = np.eye(4)
-        if leg["kind"] == K.ARM and leg["carrier"] == K.CRANK:
-            own[:3, :3] = from_rotvec(sides[k] * leg["carrier_axis"])
-            own[:3, 3] = leg["carrier_point"] - own[:3, :3] @ leg["carrier_point"]
+        if leg["kind"] == K.ARM and leg["proximal"] == K.CRANK:
+            own[:3, :3] = from_rotvec(sides[k] * leg["proximal_axis"])
+            own[:3, 3] = leg["proximal_point"] - own[:3, :3] @ leg["proximal_point"]
         elif leg["kind"] == K.ARM:
-            own[:3, 3] = sides[k] * leg["carrier_axis"]
+            own[:3, 3] = sides[k] * leg["proximal_axis"]
         moved[k] = moved[leg["arm"]] @ own if leg["arm"] >= 0 else own
     return moved
 
@@ -80,9 +80,9 @@ def _moved(legs: Records, sides: Floats) -> Floats:
 def _standing(legs: Records, moved: Floats) -> Records:
     """Legs with what they stand on as displaced."""
     legs, rotations = legs.copy(), moved[:, :3, :3]
-    for name in ("foot_point", "carrier_point"):
+    for name in ("foot_point", "proximal_point"):
         legs[name] = np.einsum("nij,nj->ni", rotations, legs[name]) + moved[:, :3, 3]
-    for name in ("carrier_axis", "spoke", "spoke_across", "line"):
+    for name in ("proximal_axis", "crank", "crank_across", "line"):
         legs[name] = np.einsum("nij,nj->ni", rotations, legs[name])
     legs["foot_axes"] = np.einsum("nij,nkj->nki", rotations, legs["foot_axes"])
     legs["arm"], legs["frame"] = -1, K.FROM_BASE

@@ -55,7 +55,7 @@ def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
     if not whole or len(machine.legs) != 6 or machine.equations:
         return None
     legs = [machine.legs[each.leg] for each in machine.driven]
-    rods = [leg.record["kind"] == K.ROD and leg.record["carrier"] == K.NO_CARRIER for leg in legs]
+    rods = [leg.record["kind"] == K.ROD and leg.record["proximal"] == K.NO_PROXIMAL for leg in legs]
     if [each.place for each in machine.driven] != [K.SLIDE] * 6 or not all(rods):
         return None
     if any(leg.record["reversed"] for leg in legs):
@@ -69,10 +69,10 @@ def _length(leg: Leg) -> float:
     return float(np.asarray(leg.numbers["length"]))
 
 
-def _pair(machine: Machine, driven: Coordinate, carrier: int) -> tuple[Leg, Leg] | None:
+def _pair(machine: Machine, driven: Coordinate, proximal: int) -> tuple[Leg, Leg] | None:
     """The two rods on what an actuator carries, if that is a crank, or a carriage."""
     pair = [leg for leg in machine.legs if leg.main == driven.leg]
-    return (pair[0], pair[1]) if len(pair) == 2 and pair[0].record["carrier"] == carrier else None
+    return (pair[0], pair[1]) if len(pair) == 2 and pair[0].record["proximal"] == proximal else None
 
 
 def towers_of(machine: Machine) -> list[Tower] | None:
@@ -122,13 +122,13 @@ def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
     pair = _pair(machine, driven, K.CRANK)
     if pair is None:
         return None
-    axis, spoke = (np.asarray(pair[0].numbers[name]) for name in ("axis", "spoke"))
+    axis, crank = (np.asarray(pair[0].numbers[name]) for name in ("axis", "crank"))
     knees = [np.asarray(leg.numbers["foot"]) for leg in pair]
     ankles = [np.asarray(leg.numbers["head"]) for leg in pair]
     aside = np.cross(axis, knees[1] - knees[0])
     off = max(np.abs((knees[1] - knees[0]) - (ankles[1] - ankles[0])).max(), np.linalg.norm(aside)) / size
     knee, ankle = 0.5 * (knees[0] + knees[1]), 0.5 * (ankles[0] + ankles[1])
-    hip = knee - spoke
+    hip = knee - crank
     outward = np.append(hip[:2], 0.0) / max(float(np.linalg.norm(hip[:2])), near * size)
     if off > near or max(abs(axis[2]), abs(axis @ outward)) > near:
         return None
@@ -136,9 +136,9 @@ def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
     if np.cross(axis * driven.sense, outward) @ down < 0.0:
         return None
     way = ankle + np.asarray(machine.mechanism.reference_point) - hip
-    is_outside = (way @ down) * (spoke @ outward) + (spoke @ down) * -(way @ outward) > 0.0
+    is_outside = (way @ down) * (crank @ outward) + (crank @ down) * -(way @ outward) > 0.0
     if way @ down <= 0.0 or not is_outside:
         return None
-    hangs = math.atan2(spoke @ down, spoke @ outward)
+    hangs = math.atan2(crank @ down, crank @ outward)
     shin = _length(pair[0])
-    return Thigh(hip, ankle, float(np.linalg.norm(spoke)), shin, driven.home - hangs, hangs + driven.lo)
+    return Thigh(hip, ankle, float(np.linalg.norm(crank)), shin, driven.home - hangs, hangs + driven.lo)

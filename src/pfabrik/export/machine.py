@@ -63,8 +63,8 @@ class Leg(NamedTuple):
     @property
     def keeps_its_length(self) -> bool:
         """Whether it is a rigid rod on a carrier of its own: it has an equation for its length where that is held."""
-        is_carried = self.record["kind"] == K.ROD and self.record["carrier"] in (K.CRANK, K.CARRIAGE)
-        return bool(is_carried and not self.record["slides"])
+        has_proximal = self.record["kind"] == K.ROD and self.record["proximal"] in (K.CRANK, K.CARRIAGE)
+        return bool(has_proximal and not self.record["slides"])
 
 
 class Machine:
@@ -110,7 +110,7 @@ class Machine:
     @property
     def drive_equations(self) -> int:
         """How many equations there are more where actuators are given: of all but what carries rods."""
-        return sum(each.place != K.CARRIER for each in self.driven)
+        return sum(each.place != K.Q_PROXIMAL for each in self.driven)
 
     @property
     def uncontrolled(self) -> int:
@@ -143,7 +143,7 @@ def _legs(mechanism: Mechanism, table: LegTable) -> list[Leg]:
     legs: list[Leg] = []
     main, length = 0, mechanism.characteristic_length
     for place, (form, record) in enumerate(zip(table.forms, table.legs, strict=True)):
-        main = main if record["carrier"] == K.SHARED else place
+        main = main if record["proximal"] == K.SHARED else place
         if isinstance(form, Rod):
             numbers = _rod_numbers(form, record, length)
         else:
@@ -158,16 +158,16 @@ def _rod_numbers(rod: Rod, record: Record, length: float) -> dict[str, Number]:
     numbers |= {name: record[name] for name in ("line", "foot_side", "head_side", "twist")}
     numbers |= {f"{end}_axes": record[f"{end}_axes"] for end in ("foot", "head") if record[end] in (K.HINGE, K.CROSS)}
     numbers["length"] = record["length"] * length
-    if rod.carrier is not None:
-        begin = record["carrier_point"] if record["carrier"] == K.CRANK else rod.foot
-        numbers |= {"axis": record["carrier_axis"], "side": record["side"], "reach": (rod.head - begin) * length}
-        fields = {"centre": "carrier_point", "spoke": "spoke", "across": "spoke_across"}
+    if rod.proximal is not None:
+        begin = record["proximal_point"] if record["proximal"] == K.CRANK else rod.foot
+        numbers |= {"axis": record["proximal_axis"], "side": record["side"], "reach": (rod.head - begin) * length}
+        fields = {"centre": "proximal_point", "crank": "crank", "across": "crank_across"}
         numbers |= {name: record[field] * length for name, field in fields.items()}
     return numbers
 
 
 def _arm_numbers(record: Record, length: float) -> dict[str, Number]:
-    return {"axis": record["carrier_axis"], "centre": record["carrier_point"] * length, "side": record["side"]}
+    return {"axis": record["proximal_axis"], "centre": record["proximal_point"] * length, "side": record["side"]}
 
 
 def _pivot_numbers(record: Record, length: float) -> dict[str, Number]:

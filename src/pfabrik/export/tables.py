@@ -144,7 +144,7 @@ def _members(routines: str, struct: str) -> dict[str, str]:
 def _leg(leg: Leg, members: Mapping[str, str]) -> str:
     """A leg, member by member in their order: C++ knows other ways only since 2020."""
     record = leg.record
-    told = {"kind": KINDS[int(record["kind"])], "carrier": CARRIERS.get(int(record["carrier"]), "")}
+    told = {"kind": KINDS[int(record["kind"])], "proximal": CARRIERS.get(int(record["proximal"]), "")}
     told["frame"] = FRAMES.get(int(record["frame"]), str(record["frame"]))
     if record["kind"] != K.ARM:
         told["foot_end"] = ENDINGS[int(record["foot"])]

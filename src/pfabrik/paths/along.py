@@ -43,8 +43,8 @@ def largest_tilts(solution: Solution) -> Extremes | None:
         return None
     bodies = displacements(solution.mechanism, solution.q - home_coordinates(solution.mechanism))
     tilts = []
-    for rod, line, carrier, motion in rods:
-        now, pushed = bodies[rod][:, :3, :3] @ line, bodies[carrier][:, :3, :3] @ motion
+    for rod, line, proximal, motion in rods:
+        now, pushed = bodies[rod][:, :3, :3] @ line, bodies[proximal][:, :3, :3] @ motion
         across = np.linalg.norm(np.cross(now, pushed), axis=-1)
         tilts.append(np.arctan2(across, np.abs((now * pushed).sum(axis=-1))))
     found = _extremes(-np.stack(tilts, axis=-1), [rod for rod, *_ in rods])
@@ -55,16 +55,16 @@ def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
     """Of every rod on a carrier its body and its line at home, and the carrier's body and how it moves the foot."""
     table = leg_table(mechanism)
     found: list[tuple[str, Floats, str, Floats]] = []
-    carrier: Item | None = None
+    proximal: Item | None = None
     for form in table.forms if isinstance(table, LegTable) else ():
         if not isinstance(form, Rod):
             continue
-        carrier = carrier if form.is_shared else form.carrier
-        if carrier is None or form.slide is not None or not form.foot_ending.items:
+        proximal = proximal if form.is_shared else form.proximal
+        if proximal is None or form.slide is not None or not form.foot_ending.items:
             continue
-        turns = carrier.kind == "R"
-        motion = np.cross(carrier.axis, form.foot - carrier.point) if turns else carrier.axis
-        found.append((form.foot_ending.items[-1].outward, form.head - form.foot, carrier.outward, motion))
+        turns = proximal.kind == "R"
+        motion = np.cross(proximal.axis, form.foot - proximal.point) if turns else proximal.axis
+        found.append((form.foot_ending.items[-1].outward, form.head - form.foot, proximal.outward, motion))
     return found
 
 

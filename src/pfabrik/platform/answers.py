@@ -34,13 +34,13 @@ class LegAnswers(Configurations):
         rows: Rows,
         coordinates: Floats | Callable[[Places], Floats],
         sides: Floats,
-        carriers: Floats | None = None,
+        q_proximal: Floats | None = None,
     ) -> None:
         super().__init__(rows, coordinates)
-        self._sides, self.carriers = sides, carriers
+        self._sides, self.q_proximal = sides, q_proximal
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return LegAnswers, (self.rows, self.coordinates, self._sides, self.carriers)
+        return LegAnswers, (self.rows, self.coordinates, self._sides, self.q_proximal)
 
     @cached_property
     def sides(self) -> Floats:
@@ -50,8 +50,8 @@ class LegAnswers(Configurations):
     def at(self, places: NDArray[np.intp]) -> Configurations:
         """The configurations at some places, copied."""
         rows = super().at(places).rows
-        carriers = None if self.carriers is None else self.carriers[places]
-        return LegAnswers(rows, lambda own: self.coordinates_at(places[own]), self.sides[places], carriers)
+        q_proximal = None if self.q_proximal is None else self.q_proximal[places]
+        return LegAnswers(rows, lambda own: self.coordinates_at(places[own]), self.sides[places], q_proximal)
 
     def with_others(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
         """These configurations with as many others at some places; coordinates stay to be found where they are."""
@@ -60,8 +60,8 @@ class LegAnswers(Configurations):
         rows, sides = rows_at(self.rows, np.arange(len(self))), self.sides.copy()
         put_rows(rows, places, others.rows)
         sides[places] = others.sides
-        carriers = np.full(sides.shape, np.nan) if self.carriers is None else self.carriers.copy()
-        carriers[places] = np.nan if others.carriers is None else others.carriers
+        q_proximal = np.full(sides.shape, np.nan) if self.q_proximal is None else self.q_proximal.copy()
+        q_proximal[places] = np.nan if others.q_proximal is None else others.q_proximal
         which = np.full(len(self), -1)
         which[places] = np.arange(len(places))
 
@@ -71,7 +71,7 @@ class LegAnswers(Configurations):
             found[is_other] = others.coordinates_at(which[at[is_other]])
             return found
 
-        return LegAnswers(rows, coordinates, sides, carriers)
+        return LegAnswers(rows, coordinates, sides, q_proximal)
 
 
 def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Floats:
@@ -88,7 +88,7 @@ def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Fl
     if not len(choosing):
         return sides
     closure = closure_of(mechanism, whole=False)
-    places = np.where(table.legs["kind"] == K.PIVOT, K.FOOT, K.CARRIER)
+    places = np.where(table.legs["kind"] == K.PIVOT, K.FOOT, K.Q_PROXIMAL)
     own = [table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in choosing]
     if set(own) <= set(closure.actuated.tolist()):
         present = np.zeros((len(start), len(closure.scale)))
@@ -136,7 +136,7 @@ def coordinates_of(
     table: LegTable,
     rows: Rows,
     sides: Floats,
-    carriers: Floats | None,
+    q_proximal: Floats | None,
     begins: Callable[[Places], Floats | None],
     rest: NDArray[np.intp],
     others: Configurations | None,
@@ -156,7 +156,7 @@ def coordinates_of(
         rows.actuators[own],
         sides if len(sides) == 1 else sides[own],
         begins(own),
-        None if carriers is None else carriers[own],
+        None if q_proximal is None else q_proximal[own],
     )
     if others is None:
         return found

@@ -25,7 +25,7 @@ def settled(
     actuators: Floats,
     sides: Floats,
     begin: Floats | None,
-    carriers: Floats | None = None,
+    q_proximal: Floats | None = None,
 ) -> Floats:
     """All joint coordinates, as deviations from home, (n, columns), of platforms and actuators at rest.
 
@@ -44,7 +44,7 @@ def settled(
         found[:] = begin
     if not len(poses):
         return found
-    read_into(table, poses, sides, found, carriers)
+    read_into(table, poses, sides, found, q_proximal)
     closure.put_actuators(found, actuators)
     found = _closed(mechanism, poses, actuators, found)
     if begin is not None:
@@ -73,7 +73,7 @@ def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, found: Float
     return closing.coordinates
 
 
-def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats, carriers: Floats | None = None) -> None:
+def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats, q_proximal: Floats | None = None) -> None:
     """Write the coordinates that legs tell at poses (n, 4, 4) [length] into joint coordinates (n, columns).
 
     Parameters
@@ -82,6 +82,6 @@ def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats, carr
     """
     from ..kernels.platform.read import read
 
-    legs, given = machine_aimed(table), NO_ROWS if carriers is None else carriers
+    legs, given = machine_aimed(table), NO_ROWS if q_proximal is None else q_proximal
     own = np.require(poses, requirements=["C", "W"])
     read(legs.address, reading_of(table).address, own, sides, given, found, NO_ROWS, NO_SLOPES)

@@ -19,7 +19,7 @@ from ..kernels.platform.records import Starts
 from ..kernels.rows import REACHED
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
-from .nearest_pose import NearestPose, carriers_of, home_start, no_starts
+from .nearest_pose import NearestPose, home_start, no_starts, proximal_coordinates
 from .rotation import constraints_at, keeps_rotation
 from .table import machine
 
@@ -104,11 +104,11 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     if not keeps_rotation(mechanism):
         poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
     q = np.zeros((n, len(table.legs)))
-    carriers = np.concatenate([carriers_of(table), table.arms])
-    for carrier in carriers[_by_place(table, carriers["leg"])]:
-        way = _way(table, carrier["leg"])
-        ends = way * carrier["sense"] * np.clip([carrier["lo"], carrier["hi"]], -np.pi, np.pi)
-        q[:, carrier["leg"]] = way * rng.uniform(ends.min(), ends.max(), n)
+    q_proximal = np.concatenate([proximal_coordinates(table), table.arms])
+    for proximal in q_proximal[_by_place(table, q_proximal["leg"])]:
+        way = _way(table, proximal["leg"])
+        ends = way * proximal["sense"] * np.clip([proximal["lo"], proximal["hi"]], -np.pi, np.pi)
+        q[:, proximal["leg"]] = way * rng.uniform(ends.min(), ends.max(), n)
     sides = np.repeat(home.sides, n, axis=0)
     pivots = _sided_pivots(table)
     sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
@@ -152,12 +152,12 @@ def _sided_pivots(table: LegTable) -> NDArray[np.intp]:
 def _by_place(table: LegTable, legs: NDArray[np.intp]) -> NDArray[np.intp]:
     """Legs in an order that depends on where they are at home: what is drawn is theirs however they are described."""
     own = table.legs[legs]
-    places = np.concatenate([own[end] for end in ("head_point", "foot_point", "carrier_point")], axis=1)
+    places = np.concatenate([own[end] for end in ("head_point", "foot_point", "proximal_point")], axis=1)
     return np.lexsort(np.round(places, PLACES).T[::-1])
 
 
 def _way(table: LegTable, leg: int) -> float:
     """Which way the axis of what carries a leg points, 1 or -1, along the first axis of the base that is not across it:
     it may be described either way."""
-    axis = np.round(table.legs[leg]["carrier_axis"], PLACES)
+    axis = np.round(table.legs[leg]["proximal_axis"], PLACES)
     return float(np.sign(axis[np.flatnonzero(axis)[0]]))

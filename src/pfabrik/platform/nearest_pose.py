@@ -152,16 +152,20 @@ def _agreements(table: LegTable) -> int:
         return AGREEMENTS_OF_MANY
     if task["rows"] > 0 or len(table.arms):
         return AGREEMENTS
-    carriers = table.legs["carrier"][carriers_of(table)["leg"]]
+    q_proximal = table.legs["proximal"][proximal_coordinates(table)["leg"]]
     return (
-        AGREEMENTS_OF_STRUTS if not len(carriers) else HITS_OF_RAILS if (carriers == K.CARRIAGE).any() else AGREEMENTS
+        AGREEMENTS_OF_STRUTS
+        if not len(q_proximal)
+        else HITS_OF_RAILS
+        if (q_proximal == K.CARRIAGE).any()
+        else AGREEMENTS
     )
 
 
-def carriers_of(table: LegTable) -> Records:
+def proximal_coordinates(table: LegTable) -> Records:
     """The coordinates of carriers among those known."""
     on_rods = table.legs["kind"][table.known["leg"]] == K.ROD
-    return np.asarray(table.known[on_rods & (table.known["place"] == K.CARRIER)])
+    return np.asarray(table.known[on_rods & (table.known["place"] == K.Q_PROXIMAL)])
 
 
 def new_found(n: int, table: LegTable) -> Found:

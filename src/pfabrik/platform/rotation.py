@@ -80,7 +80,7 @@ def without_idle_legs(table: LegTable) -> Machine:
     limited = np.concatenate([table.limited["leg"], table.driven["leg"]])
     cones, main = table.cones.copy(), 0
     for k in range(len(legs)):
-        is_second = legs["carrier"][k] == K.SHARED
+        is_second = legs["proximal"][k] == K.SHARED
         main = main if is_second else k
         has_first = is_second and legs["kind"][main] == K.ROD
         own = quiet[legs["first_row"][k] : ends[k]]

@@ -80,21 +80,21 @@ class LegsEngine:
             begins, told = begins_of(mechanism, table, start, first), (rows.poses, rows.actuators, ends)
             return LegAnswers(rows, lambda own: settled(mechanism, table, *told, begins(slice(None)))[own], ends)
         left, sides = self._reach(targets, start, first, keep_mode, rows, tried=is_one)
-        carriers, others = None, None
+        q_proximal, others = None, None
         if left and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
-            carriers = np.empty_like(sides)
-            carriers[:] = np.nan
+            q_proximal = np.empty_like(sides)
+            q_proximal[:] = np.nan
             poses = self._one.home if start is None else start.rows.poses
             question = Question(self.mechanism, self._table, options, keep_mode, nearby)
-            unreached = Unreached(targets, poses, sides, carriers, rows)
+            unreached = Unreached(targets, poses, sides, q_proximal, rows)
             away = rows.status != REACHED
             if start is not None and self._table.has_sides:
                 away &= ~self._starts_there(targets, start.rows.poses)
             unreached.answer(away, partial(answer_unreached, question))
             if start is not None:
                 self._count_turns(start.rows.actuators, rows)
-        waits = (rows.status == PENDING) | (rows.status == UNSURE) if carriers is not None else rows.status != REACHED
+        waits = (rows.status == PENDING) | (rows.status == UNSURE) if q_proximal is not None else rows.status != REACHED
         rest = waits.nonzero()[0]
         if len(rest):
             begin = start if start is None or len(start) == 1 or len(rest) == len(start) else start.at(rest)
@@ -107,9 +107,9 @@ class LegsEngine:
             put_rows(rows, rest, others.rows)
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides
             sides[rest] = sides_at(self.mechanism, self._table, others)
-            if carriers is not None:
-                carriers[rest] = np.nan
-        return self._answers(rows, sides, carriers, start, first, rest, others)
+            if q_proximal is not None:
+                q_proximal[rest] = np.nan
+        return self._answers(rows, sides, q_proximal, start, first, rest, others)
 
     def _stay(self, rows: Rows, others: Rows, options: Options) -> Mask:
         """Which projections that are UNSURE stay: others of their targets are not reached, and no nearer."""
@@ -157,25 +157,25 @@ class LegsEngine:
     def _joined(self, found: Sequence[Configurations], start: Configurations | None) -> Configurations:
         """Single answers as a batch; `start` is where the first began."""
         rows, legs = new_rows(self.mechanism, len(found)), len(self._table.legs)
-        sides, carriers = np.repeat(self._table.home_sides, len(found), axis=0), np.full((len(found), legs), np.nan)
+        sides, q_proximal = np.repeat(self._table.home_sides, len(found), axis=0), np.full((len(found), legs), np.nan)
         rest = np.array([i for i, each in enumerate(found) if not isinstance(each, LegAnswers)], dtype=np.intp)
         for i, each in enumerate(found):
             own = slice(i, i + 1)
             put_rows(rows, own, each.rows)
             if isinstance(each, LegAnswers):
                 sides[i] = each.sides
-                if each.carriers is not None:
-                    carriers[i] = each.carriers
+                if each.q_proximal is not None:
+                    q_proximal[i] = each.q_proximal
         others = None
         if len(rest):
             others = Configurations(rows_at(rows, rest), np.concatenate([found[i].coordinates for i in rest]))
-        return self._answers(rows, sides, carriers, start, self._sides_of(start), rest, others)
+        return self._answers(rows, sides, q_proximal, start, self._sides_of(start), rest, others)
 
     def _answers(
         self,
         rows: Rows,
         sides: Floats,
-        carriers: Floats | None,
+        q_proximal: Floats | None,
         start: Configurations | None,
         first: Floats,
         rest: NDArray[np.intp],
@@ -183,8 +183,10 @@ class LegsEngine:
     ) -> LegAnswers:
         """Rows as answers, from a start on sides `first`; those at `rest` are the other engine's."""
         begins = begins_of(self.mechanism, self._table, start, first)
-        coordinates = partial(coordinates_of, self.mechanism, self._table, rows, sides, carriers, begins, rest, others)
-        return LegAnswers(rows, coordinates, sides, carriers)
+        coordinates = partial(
+            coordinates_of, self.mechanism, self._table, rows, sides, q_proximal, begins, rest, others
+        )
+        return LegAnswers(rows, coordinates, sides, q_proximal)
 
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Go on to targets (n, 4, 4) in the working mode of as many configurations; PENDING where not reached.
@@ -225,12 +227,12 @@ class LegsEngine:
 
     def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
         """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""
-        if not isinstance(found, LegAnswers) or found.carriers is None:
+        if not isinstance(found, LegAnswers) or found.q_proximal is None:
             return self._inner.weighed_limits(found, targets, way)
-        own = np.isfinite(found.carriers).all(axis=1)
+        own = np.isfinite(found.q_proximal).all(axis=1)
         mine, others = np.flatnonzero(own), np.flatnonzero(~own)
         scale = 1.0 / self.mechanism.characteristic_length
-        present = Starts(in_lengths(found.rows.poses[mine], scale), found.carriers[mine], found.sides[mine])
+        present = Starts(in_lengths(found.rows.poses[mine], scale), found.q_proximal[mine], found.sides[mine])
         weights = weighed_limits(self.mechanism, self._table, targets[mine], present, way)
         every = np.empty((len(targets), weights.shape[1]))
         every[mine] = weights
@@ -246,7 +248,7 @@ class LegsEngine:
             rows.actuators[:] = values
             if self._one_forward.assemble(self._forward_start(start, first), rows, ends):
                 return self._answer_one(rows, ends, start, first)
-        rows, carriers, sides = assembled(self.mechanism, self._table, values, start, first, tolerance, tried)
+        rows, q_proximal, sides = assembled(self.mechanism, self._table, values, start, first, tolerance, tried)
         rest, others = np.flatnonzero(rows.status == PENDING), None
         if len(rest) == len(values):
             return self._inner.forward(values, start, tolerance)
@@ -254,7 +256,7 @@ class LegsEngine:
             begin = start if start is None or len(start) == 1 else start.at(rest)
             others = self._inner.forward(values[rest], begin, tolerance)
             put_rows(rows, rest, others.rows)
-        return self._answers(rows, sides, carriers, start, first, rest, others)
+        return self._answers(rows, sides, q_proximal, start, first, rest, others)
 
     def prepared_forward(self, start: Configurations | None, rows: Rows) -> tuple[Callable[[], int], object]:
         """A call that answers `rows.actuators` into the rest of one row, and what is to be kept for it: where it starts

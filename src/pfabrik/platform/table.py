@@ -28,9 +28,9 @@ OF_AIMS = -1
 def kernel_table(table: LegTable) -> K.Table:
     """The same records, with the unknown that the coordinate of each carrier, then of each arm, is."""
     columns = np.full(len(table.legs), -1)
-    carried = (table.legs["kind"] == K.ROD) & np.isin(table.legs["carrier"], (K.CRANK, K.CARRIAGE))
+    turned_by_proximal = (table.legs["kind"] == K.ROD) & np.isin(table.legs["proximal"], (K.CRANK, K.CARRIAGE))
     arms, twins = ((table.legs["kind"] == K.ARM) & own for own in (table.legs["twin"] < 0, table.legs["twin"] >= 0))
-    own = np.concatenate([np.flatnonzero(carried), np.flatnonzero(arms)])
+    own = np.concatenate([np.flatnonzero(turned_by_proximal), np.flatnonzero(arms)])
     columns[own] = 6 + np.arange(len(own))
     columns[twins] = columns[table.legs["twin"][twins]]
     return K.Table(table.legs, table.limited, table.cones, table.driven, table.known, table.task, columns)

@@ -49,18 +49,18 @@ class Unreached(NamedTuple):
     targets: Floats  # (n, 4, 4) [length]
     begins: Floats  # (n or 1, 4, 4) [length]: poses that they are to be reached from
     sides: Floats  # (n, legs): which of its two solutions each leg starts on; of an answer, which it takes
-    carriers: Floats  # (n, legs) [L or rad]: of an answer, where closed forms tell them less exactly; else NaN
+    q_proximal: Floats  # (n, legs) [L or rad]: of an answer, where closed forms tell them less exactly; else NaN
     rows: Rows
 
     def at(self, places: Mask | NDArray[np.intp] | slice) -> Unreached:
         """Those at some places, copied but for those of a slice."""
         begins = self.begins if len(self.begins) == 1 else self.begins[places]
-        arrays = self.targets[places], begins, self.sides[places], self.carriers[places]
+        arrays = self.targets[places], begins, self.sides[places], self.q_proximal[places]
         return Unreached(*arrays, rows_at(self.rows, places))
 
     def put(self, places: Mask | NDArray[np.intp], others: Unreached) -> None:
         """Write what is told of others at some places."""
-        self.sides[places], self.carriers[places] = others.sides, others.carriers
+        self.sides[places], self.q_proximal[places] = others.sides, others.q_proximal
         put_rows(self.rows, places, others.rows)
 
     def answer(self, which: Mask, answer: Callable[[Unreached], None]) -> None:
@@ -162,15 +162,15 @@ def _project(question: Question, some: Unreached) -> None:
     leaves some of the pose open. Those as good as reached that are not, and not certain to be the nearest, are UNSURE.
     """
     mechanism, table, options, keep_mode, nearby = question
-    targets, begins, sides, carriers, rows = some
+    targets, begins, sides, q_proximal, rows = some
     n, own = len(targets), starts_at(mechanism, table, begins, sides[: len(begins)])
-    ends = rows.poses, np.empty_like(carriers), np.empty_like(sides)
+    ends = rows.poses, np.empty_like(q_proximal), np.empty_like(sides)
     found = Found(np.empty(n), *ends, rows.counters, rows.actuators, rows.measures, rows.status)
     left = project(mechanism, options, targets, own, found, corners=not nearby, stays=keep_mode)
     if left == n:
         return
     placed = slice(None) if left == 0 else found.distances < np.inf
-    sides[placed], carriers[placed] = found.sides[placed], found.q[placed]
+    sides[placed], q_proximal[placed] = found.sides[placed], found.q[placed]
     is_near = (found.distances <= NEARLY) & ~(rows.certain & (rows.status == PROJECTED))
     if np.count_nonzero(is_near):
         rows.status[is_near] = UNSURE
@@ -185,10 +185,10 @@ def _reach_again(asked: Machine, some: Unreached) -> None:
 
 def _complete(asked: Machine, begins: Floats, ends: Floats, some: Unreached) -> None:
     """Answer rows from as many poses (n, 4, 4) [length], on sides (n, legs); others stay as they are."""
-    targets, _, sides, carriers, rows = some
+    targets, _, sides, q_proximal, rows = some
     status = np.empty_like(rows.status)
     told = status, rows.poses, rows.actuators, rows.measures
     if _answer()(asked.address, targets, begins, ends, *told) < len(targets):
         reached = status == REACHED
-        rows.status[reached], sides[reached], carriers[reached] = REACHED, ends[reached], np.nan
+        rows.status[reached], sides[reached], q_proximal[reached] = REACHED, ends[reached], np.nan
         rows.measures[reached, POSITION_ERROR] = rows.measures[reached, ROTATION_ERROR] = 0.0

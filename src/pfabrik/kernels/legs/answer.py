@@ -42,7 +42,7 @@ class Completion(NamedTuple):
     frames: Floats  # (n, 7, 4): see `frames`
     values: Floats  # (legs, N_VALUES)
     lines: Floats  # (legs, 3): of a rod, from foot to head
-    follow: Floats  # (legs, 6): derivatives of carriers' coordinates
+    proximal_slopes: Floats  # (legs, 6): derivatives of carriers' coordinates
     rows: Floats  # (m,): the constraints
     slopes: Floats  # (m, 6 + arms): their derivatives by the pose, then by arms
     motions: Floats  # (7, 6)
@@ -74,7 +74,7 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
     for k in range(legs.shape[0]):
         leg = legs[k]
         frame, found = frames[leg["frame"]], 1.0
-        main = main if leg["carrier"] == SHARED else k
+        main = main if leg["proximal"] == SHARED else k
         if leg["kind"] == PIVOT:
             found = place_pivot(leg, frame, sides[k], values[k])
         elif leg["kind"] == ARM:
@@ -95,7 +95,7 @@ def put_rows(legs: Records, frames: Floats, values: Floats, lines: Floats, rows:
     main = 0
     for k in range(legs.shape[0]):
         leg = legs[k]
-        main = main if leg["carrier"] == SHARED else k
+        main = main if leg["proximal"] == SHARED else k
         if leg["kind"] == PIVOT:
             pivot_rows(leg, frames[leg["frame"]], rows)
         elif leg["kind"] == ROD:
@@ -107,19 +107,21 @@ def put_rows(legs: Records, frames: Floats, values: Floats, lines: Floats, rows:
 
 
 @routine
-def put_slopes(legs: Records, frames: Floats, values: Floats, lines: Floats, follow: Floats, slopes: Floats) -> None:
+def put_slopes(
+    legs: Records, frames: Floats, values: Floats, lines: Floats, proximal_slopes: Floats, slopes: Floats
+) -> None:
     """Fill the derivatives of the constraints of all legs."""
     main = 0
     for k in range(legs.shape[0]):
         leg = legs[k]
-        main = main if leg["carrier"] == SHARED else k
+        main = main if leg["proximal"] == SHARED else k
         if leg["bears"] == 0:
             continue
         frame = frames[leg["frame"]]
         if leg["kind"] == PIVOT:
             pivot_slopes(leg, frame, slopes)
         elif leg["kind"] == ROD:
-            rod_slopes(leg, legs[main], frame, values[main], values[k], lines[k], follow[main], slopes)
+            rod_slopes(leg, legs[main], frame, values[main], values[k], lines[k], proximal_slopes[main], slopes)
         for row in range(leg["first_row"], end_of_rows(legs, k, slopes.shape[0])):
             put_arm_slopes(legs, k, values, slopes[row])
 
@@ -328,7 +330,7 @@ def complete(table: Table, sides: Floats, scratch: Completion) -> bool:
             return sure > SURE * SURE
         if is_set and task["led"] == 0:
             return False
-        put_slopes(legs, frames, values, lines, scratch.follow, scratch.slopes)
+        put_slopes(legs, frames, values, lines, scratch.proximal_slopes, scratch.slopes)
         gone += newton_step(table, scratch)
         if not gone <= task["farthest"]:
             return False

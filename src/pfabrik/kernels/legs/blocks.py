@@ -47,48 +47,48 @@ from .columns import (
 )
 from .endings import SURE
 from .poses import ROUNDED
-from .records import CARRIAGE, CARRIER, CRANK, FOOT, FOOT_LINE, HEAD, HINGE, NO_CARRIER, SHARED, SLIDE
+from .records import CARRIAGE, CRANK, FOOT, FOOT_LINE, HEAD, HINGE, NO_PROXIMAL, Q_PROXIMAL, SHARED, SLIDE
 from .table import open_table
 
 TURN = 2.0 * math.pi
 
 
 @routine
-def lay_rod(rod: Record, carrier: Record, n: int, S: Floats) -> None:
+def lay_rod(rod: Record, proximal: Record, n: int, S: Floats) -> None:
     """Columns of a rod: its line, its values, and what its constraints add to ROW.
 
     Parameters
     ----------
     carrier : the rod whose carrier it is on, laid before; itself if it shares none.
     """
-    head, point = vec(rod["head_point"]), vec(carrier["carrier_point"])
-    if carrier["carrier"] == CRANK:
-        axis, arm = vec(carrier["carrier_axis"]), sub(vec(rod["foot_point"]), point)
+    head, point = vec(rod["head_point"]), vec(proximal["proximal_point"])
+    if proximal["proximal"] == CRANK:
+        axis, arm = vec(proximal["proximal_axis"]), sub(vec(rod["foot_point"]), point)
         rest = scale(dot(axis, arm), axis)
         lay_moved(head, add(point, rest), n, S)
-        if rod["carrier"] == CRANK:
+        if rod["proximal"] == CRANK:
             lay_crank(rod, n, S)
         leave_arm(sub(arm, rest), cross(axis, arm), n, S)
     else:
         lay_moved(head, vec(rod["foot_point"]), n, S)
-        if rod["carrier"] == CARRIAGE:
+        if rod["proximal"] == CARRIAGE:
             lay_carriage(rod, n, S)
-        if carrier["carrier"] == CARRIAGE:
-            leave_slide(vec(carrier["carrier_axis"]), n, S)
+        if proximal["proximal"] == CARRIAGE:
+            leave_slide(vec(proximal["proximal_axis"]), n, S)
     lay_length(rod["length"], n, S)
-    if rod["slides"] == 0 and (rod["carrier"] == NO_CARRIER or rod["carrier"] == SHARED):
+    if rod["slides"] == 0 and (rod["proximal"] == NO_PROXIMAL or rod["proximal"] == SHARED):
         note_row(VALUES + SLIDE, n, S)
-    lay_hinges(rod, carrier, n, S)
+    lay_hinges(rod, proximal, n, S)
 
 
 @routine
 def lay_crank(rod: Record, n: int, S: Floats) -> None:
-    """Turn a crank until its rod reaches the head; see `rods.carry`."""
-    spoke, across = vec(rod["spoke"]), vec(rod["spoke_across"])
-    more = dot(spoke, spoke) - rod["length"] * rod["length"]
+    """Turn a crank until its rod reaches the head; see `rods.solve_proximal`."""
+    crank, across = vec(rod["crank"]), vec(rod["crank_across"])
+    more = dot(crank, crank) - rod["length"] * rod["length"]
     for i in range(n):
         x, y, z = S[X, i], S[Y, i], S[Z, i]
-        A = spoke[0] * x + spoke[1] * y + spoke[2] * z
+        A = crank[0] * x + crank[1] * y + crank[2] * z
         B = across[0] * x + across[1] * y + across[2] * z
         C = 0.5 * (x * x + y * y + z * z + more)
         square = A * A + B * B
@@ -99,7 +99,7 @@ def lay_crank(rod: Record, n: int, S: Floats) -> None:
         cosine, sine = (A * C - B * root) * inverse, (B * C + A * root) * inverse
         S[IS_SURE, i] = S[IS_SURE, i] if rest > SURE * SURE * square else 0.0
         S[COS, i], S[SIN, i] = cosine, sine
-        S[VALUES + CARRIER, i] = arctangent(sine, cosine)
+        S[VALUES + Q_PROXIMAL, i] = arctangent(sine, cosine)
 
 
 @routine
@@ -114,21 +114,21 @@ def leave_arm(plain: Vec, across: Vec, n: int, S: Floats) -> None:
 
 @routine
 def lay_carriage(rod: Record, n: int, S: Floats) -> None:
-    """Move a carriage until its rod reaches the head; see `rods.carry`."""
-    axis, square = vec(rod["carrier_axis"]), rod["length"] * rod["length"]
+    """Move a carriage until its rod reaches the head; see `rods.solve_proximal`."""
+    axis, square = vec(rod["proximal_axis"]), rod["length"] * rod["length"]
     for i in range(n):
         x, y, z = S[X, i], S[Y, i], S[Z, i]
         middle = x * axis[0] + y * axis[1] + z * axis[2]
         rest = square - (x * x + y * y + z * z) + middle * middle
         S[IS_SURE, i] = S[IS_SURE, i] if rest > SURE * SURE * square else 0.0
-        S[VALUES + CARRIER, i] = middle + S[SIDE, i] * math.sqrt(rest if rest > 0.0 else 0.0)
+        S[VALUES + Q_PROXIMAL, i] = middle + S[SIDE, i] * math.sqrt(rest if rest > 0.0 else 0.0)
 
 
 @routine
 def leave_slide(axis: Vec, n: int, S: Floats) -> None:
     """Take the way of a carriage from the line."""
     for i in range(n):
-        way = S[VALUES + CARRIER, i]
+        way = S[VALUES + Q_PROXIMAL, i]
         S[X, i] -= way * axis[0]
         S[Y, i] -= way * axis[1]
         S[Z, i] -= way * axis[2]
@@ -142,24 +142,24 @@ def lay_length(length: float, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_hinges(rod: Record, carrier: Record, n: int, S: Floats) -> None:
+def lay_hinges(rod: Record, proximal: Record, n: int, S: Floats) -> None:
     """Constraints and angles of single hinges at the ends of a rod, and that they do not twist."""
     foot, head, home = vec(rod["foot_axes"][0]), vec(rod["head_axes"][0]), vec(rod["line"])
     if rod["foot"] == HINGE:
-        lay_along_carried(foot, carrier, VALUE, n, S)
+        lay_along_carried(foot, proximal, VALUE, n, S)
         note_row(VALUE, n, S)
     if rod["head"] == HINGE:
         lay_along_turned(head, VALUE, n, S)
         note_row(VALUE, n, S)
     if rod["twists"] == 1:
-        lay_carried(foot, carrier, n, S)
+        lay_carried(foot, proximal, n, S)
         lay_turned(head, n, S)
         lay_inverse(n, S)
         lay_twist(rod["twist"], n, S)
         note_row(VALUE, n, S)
     if rod["foot_aimed"] == 1:
-        lay_along_carried(cross(foot, home), carrier, AY, n, S)
-        lay_along_carried(along(home, -dot(foot, home), foot), carrier, AX, n, S)
+        lay_along_carried(cross(foot, home), proximal, AY, n, S)
+        lay_along_carried(along(home, -dot(foot, home), foot), proximal, AX, n, S)
         lay_angle(VALUES + FOOT, n, S)
     if rod["head_aimed"] == 1:
         lay_along_turned(cross(head, home), AY, n, S)
@@ -228,19 +228,19 @@ def note_range(coordinate: Record, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_along_cone(cone: Record, carrier: Record, n: int, S: Floats) -> None:
+def lay_along_cone(cone: Record, proximal: Record, n: int, S: Floats) -> None:
     """Fill VALUE with the share of the rod's line along the axis of a cone."""
     if cone["place"] == FOOT_LINE:
-        lay_along_carried(vec(cone["axis"]), carrier, VALUE, n, S)
+        lay_along_carried(vec(cone["axis"]), proximal, VALUE, n, S)
     else:
         lay_along_turned(vec(cone["axis"]), VALUE, n, S)
 
 
 @routine
-def note_cone(cone: Record, carrier: Record, n: int, S: Floats) -> None:
+def note_cone(cone: Record, proximal: Record, n: int, S: Floats) -> None:
     """The excess of a rod over a cone at one of its ends: only that it is more than is kept."""
     least = cone["least_cosine"]
-    lay_along_cone(cone, carrier, n, S)
+    lay_along_cone(cone, proximal, n, S)
     for i in range(n):
         length, before = S[LENGTH, i], S[EXCESS, i]
         is_kept = (S[VALUE, i] >= least * length) & (length > 0.0)
@@ -272,9 +272,9 @@ def answer_blocks(
         lay_out(targets, begins, task[0], first, n, pose, S)
         main, a, b, c = 0, 0, 0, 0
         for k in range(legs.shape[0]):
-            if legs[k]["carrier"] != SHARED:
+            if legs[k]["proximal"] != SHARED:
                 main = k
-            if legs[k]["carrier"] == CRANK or legs[k]["carrier"] == CARRIAGE:
+            if legs[k]["proximal"] == CRANK or legs[k]["proximal"] == CARRIAGE:
                 lay_sides(sides, k, first, n, S)
             lay_rod(legs[k], legs[main], n, S)
             while a < limited.shape[0] and limited[a]["leg"] == k:

@@ -162,13 +162,13 @@ def lay_along_turned(direction: Vec, to: int, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_carried(direction: Vec, carrier: Record, n: int, S: Floats) -> None:
+def lay_carried(direction: Vec, proximal: Record, n: int, S: Floats) -> None:
     """Fill BX, BY, BZ with a direction of the body that the foot is on."""
-    if carrier["carrier"] != CRANK:
+    if proximal["proximal"] != CRANK:
         for i in range(n):
             S[BX, i], S[BY, i], S[BZ, i] = direction[0], direction[1], direction[2]
         return
-    rest, plain, across = split(direction, vec(carrier["carrier_axis"]))
+    rest, plain, across = split(direction, vec(proximal["proximal_axis"]))
     for i in range(n):
         cosine, sine = S[COS, i], S[SIN, i]
         S[BX, i] = rest[0] + cosine * plain[0] + sine * across[0]
@@ -177,13 +177,13 @@ def lay_carried(direction: Vec, carrier: Record, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_along_carried(direction: Vec, carrier: Record, to: int, n: int, S: Floats) -> None:
+def lay_along_carried(direction: Vec, proximal: Record, to: int, n: int, S: Floats) -> None:
     """Fill a column with the share of the rod's line along a direction of the body that the foot is on."""
-    if carrier["carrier"] != CRANK:
+    if proximal["proximal"] != CRANK:
         for i in range(n):
             S[to, i] = direction[0] * S[X, i] + direction[1] * S[Y, i] + direction[2] * S[Z, i]
         return
-    rest, plain, across = split(direction, vec(carrier["carrier_axis"]))
+    rest, plain, across = split(direction, vec(proximal["proximal_axis"]))
     for i in range(n):
         cosine, sine = S[COS, i], S[SIN, i]
         x = rest[0] + cosine * plain[0] + sine * across[0]

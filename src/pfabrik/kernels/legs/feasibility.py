@@ -130,7 +130,7 @@ def aim(target: Floats, begin: Floats, share: float, task: Record, toward: Float
 @routine
 def reach_of(leg: Record, own: Floats) -> float:
     """Minus the gap that a leg leaves where its carrier does not reach, as a share of its rod."""
-    if leg["kind"] == ROD and (leg["carrier"] == CRANK or leg["carrier"] == CARRIAGE):
+    if leg["kind"] == ROD and (leg["proximal"] == CRANK or leg["proximal"] == CARRIAGE):
         return -abs(own[SLIDE]) / leg["length"]
     return 0.0
 

@@ -22,7 +22,7 @@ from ...arrays import Floats, Record, Records
 from .._jit import allocator, routine
 from ..vectors import Vec, add, cross, dot, move, put, scale, sub, turn, vec
 from .endings import either_angle, turned
-from .records import ARM, CARRIER, CRANK, FIXED, FROM_BASE, FROM_ITSELF, FROM_PLATFORM, RATE
+from .records import ARM, CRANK, FIXED, FROM_BASE, FROM_ITSELF, FROM_PLATFORM, Q_PROXIMAL, RATE
 
 NOWHERE: Vec = (0.0, 0.0, 0.0)
 # Rows of a frame.
@@ -61,9 +61,9 @@ def facing(arm: Record, rod: Record, frame: Floats, side: float) -> tuple[float,
     The second number is as of `endings.either_angle`. With the hinge n through F, which the arm turns about a through
     o, or shifts along a, and the head H: (Rot n) . (H - o) = n . (F - o), or n . (H - F - q a) = 0.
     """
-    axis, at, n = vec(arm["carrier_axis"]), vec(arm["carrier_point"]), vec(rod["foot_axes"][0])
+    axis, at, n = vec(arm["proximal_axis"]), vec(arm["proximal_point"]), vec(rod["foot_axes"][0])
     head, foot, lean = move(frame, vec(rod["head_point"])), vec(rod["foot_point"]), dot(axis, n)
-    if arm["carrier"] != CRANK:
+    if arm["proximal"] != CRANK:
         return dot(n, sub(head, foot)) / lean, 1.0
     x = sub(head, at)
     rest = lean * dot(axis, x)
@@ -75,9 +75,9 @@ def facing(arm: Record, rod: Record, frame: Floats, side: float) -> tuple[float,
 def place_arm(arm: Record, q: float, frames: Floats, own: Floats) -> None:
     """Fill the frame that an arm makes, and its values, its coordinate given."""
     before, after = frames[arm["frame"]], frames[arm["makes"]]
-    axis, at, is_hinge = vec(arm["carrier_axis"]), vec(arm["carrier_point"]), arm["carrier"] == CRANK
+    axis, at, is_hinge = vec(arm["proximal_axis"]), vec(arm["proximal_point"]), arm["proximal"] == CRANK
     cosine, sine = (math.cos(q), math.sin(q)) if is_hinge else (1.0, 0.0)
-    own[CARRIER] = q
+    own[Q_PROXIMAL] = q
     put_rate_of_arm(arm, before, own)
     for j in range(3):
         heads = (before[0, j], before[1, j], before[2, j])
@@ -109,11 +109,11 @@ def place_arm(arm: Record, q: float, frames: Floats, own: Floats) -> None:
 def put_rate_of_arm(arm: Record, before: Floats, own: Floats) -> None:
     """Fill the velocity, at its reference point, and the angular velocity with which the platform would change all in
     an arm's frame as the arm does."""
-    axis, at = vec(arm["carrier_axis"]), vec(arm["carrier_point"])
+    axis, at = vec(arm["proximal_axis"]), vec(arm["proximal_point"])
     if arm["at_head"] == 1:
         axis, at = turn(before, axis), move(before, at)
     velocity, spin = axis, NOWHERE
-    if arm["carrier"] == CRANK:
+    if arm["proximal"] == CRANK:
         velocity, spin = cross(axis, sub(vec(before[ABOUT]), at)), axis
     sense = 1.0 if arm["at_head"] != arm["reversed"] else -1.0
     put(own[RATE : RATE + 3], scale(sense, turn(before[AXES:], velocity)))

@@ -28,7 +28,7 @@ from .columns import (
     lay_out,
 )
 from .feasibility import share_of
-from .records import CARRIAGE, CRANK, HINGE, NO_CARRIER, SHARED, SLIDE
+from .records import CARRIAGE, CRANK, HINGE, NO_PROXIMAL, SHARED, SLIDE
 from .table import open_table
 
 # Of a row whose margin blocks do not tell: its pose is still to be completed, or a leg has no direction there.
@@ -76,9 +76,9 @@ def note_bounds(coordinate: Record, limit: int, n: int, S: Floats) -> None:
 
 
 @routine
-def note_cosine(cone: Record, carrier: Record, limit: int, n: int, S: Floats) -> None:
+def note_cosine(cone: Record, proximal: Record, limit: int, n: int, S: Floats) -> None:
     """The cosine of a rod's angle to the axis of a cone, if it is the least of those with the same half angle."""
-    lay_along_cone(cone, carrier, n, S)
+    lay_along_cone(cone, proximal, n, S)
     least = CONES + 2 * cone["leader"]
     for i in range(n):
         before, whose = S[least, i], S[least + 1, i]
@@ -106,7 +106,7 @@ def note_leg(rod: Record, reach: int, closed: int, n: int, S: Floats) -> None:
     """Whether a rod reaches, and whether it closes; `reach` and `closed` are what these limits are called."""
     for i in range(n):
         S[IS_KNOWN, i] = S[IS_KNOWN, i] if (S[LENGTH, i] > 0.0) & (S[LENGTH, i] < math.inf) else 0.0
-    if rod["carrier"] == CRANK or rod["carrier"] == CARRIAGE:
+    if rod["proximal"] == CRANK or rod["proximal"] == CARRIAGE:
         for i in range(n):
             share = -abs(S[VALUES + SLIDE, i]) / rod["length"]
             S[VALUE, i] = share if share < -CLOSE else math.inf
@@ -123,7 +123,7 @@ def note_leg(rod: Record, reach: int, closed: int, n: int, S: Floats) -> None:
 @routine
 def has_rows(rod: Record) -> bool:
     """Whether a rod leaves any constraint on the pose."""
-    is_rigid = rod["slides"] == 0 and (rod["carrier"] == NO_CARRIER or rod["carrier"] == SHARED)
+    is_rigid = rod["slides"] == 0 and (rod["proximal"] == NO_PROXIMAL or rod["proximal"] == SHARED)
     return bool(is_rigid or rod["foot"] == HINGE or rod["head"] == HINGE or rod["twists"] == 1)
 
 
@@ -157,9 +157,9 @@ def margins_in_blocks(
         begin_margins(cones.shape[0], n, S)
         main, a, c = 0, 0, 0
         for k in range(n_legs):
-            if legs[k]["carrier"] != SHARED:
+            if legs[k]["proximal"] != SHARED:
                 main = k
-            if legs[k]["carrier"] == CRANK or legs[k]["carrier"] == CARRIAGE:
+            if legs[k]["proximal"] == CRANK or legs[k]["proximal"] == CARRIAGE:
                 lay_sides(sides, k, 0, n, S)
             lay_rod(legs[k], legs[main], n, S)
             while a < limited.shape[0] and limited[a]["leg"] == k:

@@ -21,7 +21,7 @@ from ...arrays import Ints, Records
 ROD, PIVOT, ARM, IDLE = 0, 1, 2, 3
 # What carries the foot: nothing, a hinge, a slide; or what carries the rod before (a second forearm). Of an arm, what
 # it is.
-NO_CARRIER, CRANK, CARRIAGE, SHARED = 0, 1, 2, 3
+NO_PROXIMAL, CRANK, CARRIAGE, SHARED = 0, 1, 2, 3
 # Endings: a weld, a hinge, two hinges that cross, three hinges through one point, a ball.
 WELD, HINGE, CROSS, TRIPLE, BALL = 0, 1, 2, 3, 4
 # Frames that legs are read in, see `frames`, and how many there are without arms.
@@ -41,17 +41,17 @@ LEG = np.dtype(
         ("inner", "i8"),  # 1: it is between bodies that arms on the platform place, and says nothing of the pose
         ("at_head", "i8"),  # of an arm, 1: it moves the body that heads are on
         ("by_plane", "i8"),  # of an arm, 1: it brings the hinge at the foot of the rod after it to face the head
-        ("carrier", "i8"),
+        ("proximal", "i8"),
         ("slides", "i8"),  # 1: a rod that changes its length; of a pivot, how many slides there are
         ("twists", "i8"),  # 1: both endings hold the rod against spinning about itself
         ("foot", "i8"),  # ending of a rod's foot, or of a pivot
         ("head", "i8"),
         ("foot_aimed", "i8"),  # 1: the angles of this ending are asked for
         ("head_aimed", "i8"),
-        ("carrier_axis", *_vector),
-        ("carrier_point", *_vector),  # of a crank: where on its axis the spoke stands
-        ("spoke", *_vector),  # from there to the foot
-        ("spoke_across", *_vector),  # the spoke a quarter turn on
+        ("proximal_axis", *_vector),
+        ("proximal_point", *_vector),  # of a crank: where on its axis the spoke stands
+        ("crank", *_vector),  # from there to the foot
+        ("crank_across", *_vector),  # the spoke a quarter turn on
         ("side", "f8"),  # which of two solutions is home's: of carrier, arm, or a pivot's three hinges
         ("foot_point", *_vector),
         ("head_point", *_vector),  # as `frames` map it: seen from the reference point, if not reversed
@@ -75,7 +75,7 @@ LEG = np.dtype(
 )
 
 # What is told of a leg at a pose: places in its row of `values`.
-CARRIER, FOOT, SLIDE, HEAD = 0, 1, 4, 5  # three angles at FOOT and at HEAD; the slides of a pivot at HEAD
+Q_PROXIMAL, FOOT, SLIDE, HEAD = 0, 1, 4, 5  # three angles at FOOT and at HEAD; the slides of a pivot at HEAD
 # The rod's direction as seen by the body its foot, or its head, is on; the third hinge of a pivot by that of its foot.
 FOOT_LINE, HEAD_LINE = 8, 11
 COSINE, SINE = 14, 15  # of the crank's angle

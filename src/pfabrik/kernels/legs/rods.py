@@ -22,7 +22,6 @@ from .endings import aim, angle_to, either_angle, turned, turned_back
 from .frames import NOWHERE, put_pose_slope
 from .records import (
     CARRIAGE,
-    CARRIER,
     COSINE,
     CRANK,
     CROSS,
@@ -31,7 +30,8 @@ from .records import (
     HEAD,
     HEAD_LINE,
     HINGE,
-    NO_CARRIER,
+    NO_PROXIMAL,
+    Q_PROXIMAL,
     SHARED,
     SINE,
     SLIDE,
@@ -39,53 +39,53 @@ from .records import (
 
 
 @routine
-def carry(rod: Record, head: Vec, side: float, own: Floats) -> float:
+def solve_proximal(rod: Record, head: Vec, side: float, own: Floats) -> float:
     """Turn the crank, or move the carriage, until the rod reaches the head; how far from a dead point, see `SURE`.
 
     A crank: |o + spoke cos q + across sin q - H| = length; a carriage: |F + q a - H| = length. Where none reaches, it
     stays where it comes nearest.
     """
-    if rod["carrier"] == CRANK:
-        x, spoke = sub(head, vec(rod["carrier_point"])), vec(rod["spoke"])
-        C = 0.5 * (dot(x, x) + dot(spoke, spoke) - rod["length"] * rod["length"])
-        cosine, sine, sure = either_angle(dot(spoke, x), dot(vec(rod["spoke_across"]), x), C, side)
+    if rod["proximal"] == CRANK:
+        x, crank = sub(head, vec(rod["proximal_point"])), vec(rod["crank"])
+        C = 0.5 * (dot(x, x) + dot(crank, crank) - rod["length"] * rod["length"])
+        cosine, sine, sure = either_angle(dot(crank, x), dot(vec(rod["crank_across"]), x), C, side)
         own[COSINE], own[SINE] = cosine, sine
-        own[CARRIER] = math.atan2(sine, cosine)
+        own[Q_PROXIMAL] = math.atan2(sine, cosine)
         return sure
     x = sub(head, vec(rod["foot_point"]))
-    middle = dot(x, vec(rod["carrier_axis"]))
+    middle = dot(x, vec(rod["proximal_axis"]))
     square = rod["length"] * rod["length"]
     rest = square - dot(x, x) + middle * middle
-    own[CARRIER] = middle + side * math.sqrt(max(rest, 0.0))
+    own[Q_PROXIMAL] = middle + side * math.sqrt(max(rest, 0.0))
     return rest / square
 
 
 @routine
-def carried_foot(rod: Record, carrier: Record, own: Floats) -> Vec:
+def base_end_of(rod: Record, proximal: Record, own: Floats) -> Vec:
     """Where the foot is, with the carrier (the rod's, or the one it shares) as `own` says."""
-    if carrier["carrier"] == NO_CARRIER:
+    if proximal["proximal"] == NO_PROXIMAL:
         return vec(rod["foot_point"])
-    if carrier["carrier"] == CARRIAGE:
-        return along(vec(rod["foot_point"]), own[CARRIER], vec(carrier["carrier_axis"]))
-    if rod["carrier"] == SHARED:
-        point = vec(carrier["carrier_point"])
-        arm = turned(sub(vec(rod["foot_point"]), point), vec(carrier["carrier_axis"]), own[COSINE], own[SINE])
+    if proximal["proximal"] == CARRIAGE:
+        return along(vec(rod["foot_point"]), own[Q_PROXIMAL], vec(proximal["proximal_axis"]))
+    if rod["proximal"] == SHARED:
+        point = vec(proximal["proximal_point"])
+        arm = turned(sub(vec(rod["foot_point"]), point), vec(proximal["proximal_axis"]), own[COSINE], own[SINE])
         return add(point, arm)
-    arm = along(scale(own[COSINE], vec(rod["spoke"])), own[SINE], vec(rod["spoke_across"]))
-    return add(vec(rod["carrier_point"]), arm)
+    arm = along(scale(own[COSINE], vec(rod["crank"])), own[SINE], vec(rod["crank_across"]))
+    return add(vec(rod["proximal_point"]), arm)
 
 
 @routine
-def carried(carrier: Record, own: Floats, v: Vec, sense: float) -> Vec:
+def turned_by_proximal(proximal: Record, own: Floats, v: Vec, sense: float) -> Vec:
     """A direction turned with the crank, or back (sense -1)."""
-    if carrier["carrier"] != CRANK:
+    if proximal["proximal"] != CRANK:
         return v
-    return turned(v, vec(carrier["carrier_axis"]), own[COSINE], sense * own[SINE])
+    return turned(v, vec(proximal["proximal_axis"]), own[COSINE], sense * own[SINE])
 
 
 @routine
 def place_rod(
-    rod: Record, carrier: Record, frame: Floats, side: float, lead: Floats, own: Floats, line: Floats
+    rod: Record, proximal: Record, frame: Floats, side: float, lead: Floats, own: Floats, line: Floats
 ) -> float:
     """Fill a rod's values, and the present `line` from foot to head; how sure they are, see `SURE`.
 
@@ -94,22 +94,22 @@ def place_rod(
     carrier, lead : the rod whose carrier it is on and that rod's values; its own if it shares none.
     """
     sure = 1.0
-    if rod["carrier"] == CRANK or rod["carrier"] == CARRIAGE:
-        sure = carry(rod, move(frame, vec(rod["head_point"])), side, own)
-    return min(sure, read_rod(rod, carrier, frame, lead, own, line))
+    if rod["proximal"] == CRANK or rod["proximal"] == CARRIAGE:
+        sure = solve_proximal(rod, move(frame, vec(rod["head_point"])), side, own)
+    return min(sure, read_rod(rod, proximal, frame, lead, own, line))
 
 
 @routine
-def read_rod(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, line: Floats) -> float:
+def read_rod(rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Floats, line: Floats) -> float:
     """The same, with the carrier where its values say.
 
     Two crossed hinges aim a rod in either of two ways, half a turn about it apart: those of home, unless the two ends
     then hold the rod the other way around.
     """
-    span = sub(move(frame, vec(rod["head_point"])), carried_foot(rod, carrier, lead))
+    span = sub(move(frame, vec(rod["head_point"])), base_end_of(rod, proximal, lead))
     length, sure = norm(span), 1.0
     u, home = scale(1.0 / length, span), vec(rod["line"])
-    foot_line, head_line = carried(carrier, lead, u, -1.0), turned_back(frame, u)
+    foot_line, head_line = turned_by_proximal(proximal, lead, u, -1.0), turned_back(frame, u)
     put(line, span)
     put(own[FOOT_LINE:HEAD_LINE], foot_line)
     put(own[HEAD_LINE:COSINE], head_line)
@@ -119,7 +119,7 @@ def read_rod(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Flo
     if rod["head_aimed"] == 1:
         sure = min(sure, aim_end(rod["head"], rod["head_axes"], home, head_line, rod["head_side"], own[HEAD:FOOT_LINE]))
     is_crossed = rod["foot"] == CROSS or rod["head"] == CROSS
-    if rod["twists"] == 1 and is_crossed and abs(twist_of(rod, carrier, frame, lead, own, u)) > 0.5 * math.pi:
+    if rod["twists"] == 1 and is_crossed and abs(twist_of(rod, proximal, frame, lead, own, u)) > 0.5 * math.pi:
         if rod["head"] == CROSS:
             aim_end(CROSS, rod["head_axes"], home, head_line, -rod["head_side"], own[HEAD:FOOT_LINE])
         else:
@@ -146,9 +146,9 @@ def mark(ending: int, axes: Floats, angles: Floats) -> Vec:
 
 
 @routine
-def twist_of(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, u: Vec) -> float:
+def twist_of(rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Floats, u: Vec) -> float:
     """The angle about a rod's line between marks that go with its ends, less home's."""
-    foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
+    foot = turned_by_proximal(proximal, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
     head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
     return wrap(angle_to(u, foot, head) - rod["twist"], 0.0)
 
@@ -171,11 +171,11 @@ def spin_rate(ending: int, first: Vec, last: Vec, u: Vec) -> tuple[Vec, Vec]:
 
 
 @routine
-def twist_rate(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, u: Vec) -> tuple[Vec, Vec, Vec]:
+def twist_rate(rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Floats, u: Vec) -> tuple[Vec, Vec, Vec]:
     """Derivative of the twist of a rod by du, W and w."""
-    foot = carried(carrier, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
+    foot = turned_by_proximal(proximal, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
     head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
-    first_foot = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
+    first_foot = turned_by_proximal(proximal, lead, vec(rod["foot_axes"][0]), 1.0)
     first_head = turn(frame, vec(rod["head_axes"][0]))
     foot_line, foot_body = spin_rate(rod["foot"], first_foot, foot, u)
     head_line, head_body = spin_rate(rod["head"], first_head, head, u)
@@ -184,7 +184,15 @@ def twist_rate(rod: Record, carrier: Record, frame: Floats, lead: Floats, own: F
 
 @routine
 def put_slope(
-    rod: Record, carrier: Record, frame: Floats, lead: Floats, follow: Floats, a: Vec, b: Vec, c: Vec, slope: Floats
+    rod: Record,
+    proximal: Record,
+    frame: Floats,
+    lead: Floats,
+    proximal_slopes: Floats,
+    a: Vec,
+    b: Vec,
+    c: Vec,
+    slope: Floats,
 ) -> None:
     """Derivative (6,) of a . (dH - dF) + b . W + c . w by the platform's velocity and angular velocity.
 
@@ -193,37 +201,37 @@ def put_slope(
     follow : derivative of the carrier's coordinate (6,).
     """
     put_pose_slope(rod, frame, a, c, slope)
-    if carrier["carrier"] != NO_CARRIER:
-        by_carrier = carrier_rate(carrier, carried_foot(rod, carrier, lead), a, b)
+    if proximal["proximal"] != NO_PROXIMAL:
+        by_carrier = proximal_rate(proximal, base_end_of(rod, proximal, lead), a, b)
         for i in range(6):
-            slope[i] += by_carrier * follow[i]
+            slope[i] += by_carrier * proximal_slopes[i]
 
 
 @routine
-def carrier_rate(carrier: Record, foot: Vec, a: Vec, b: Vec) -> float:
+def proximal_rate(proximal: Record, foot: Vec, a: Vec, b: Vec) -> float:
     """Derivative of - a . F + b . W by the coordinate of a carrier, with the foot F on it."""
-    axis = vec(carrier["carrier_axis"])
-    if carrier["carrier"] == CARRIAGE:
+    axis = vec(proximal["proximal_axis"])
+    if proximal["proximal"] == CARRIAGE:
         return -dot(a, axis)
-    return dot(b, axis) - dot(a, cross(axis, sub(foot, vec(carrier["carrier_point"]))))
+    return dot(b, axis) - dot(a, cross(axis, sub(foot, vec(proximal["proximal_point"]))))
 
 
 @routine
-def put_follow(rod: Record, frame: Floats, own: Floats, u: Vec, follow: Floats) -> None:
+def put_proximal_slope(rod: Record, frame: Floats, own: Floats, u: Vec, proximal_slopes: Floats) -> None:
     """Derivative (6,) of the coordinate of a carrier that keeps the rod's length."""
-    put_pose_slope(rod, frame, u, NOWHERE, follow)
-    rate = carrier_rate(rod, carried_foot(rod, rod, own), u, NOWHERE)
+    put_pose_slope(rod, frame, u, NOWHERE, proximal_slopes)
+    rate = proximal_rate(rod, base_end_of(rod, rod, own), u, NOWHERE)
     for i in range(6):
-        follow[i] /= -rate
+        proximal_slopes[i] /= -rate
 
 
 @routine
 def rod_rows(
-    rod: Record, carrier: Record, frame: Floats, lead: Floats, own: Floats, line: Floats, rows: Floats
+    rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Floats, line: Floats, rows: Floats
 ) -> None:
     """Fill a rod's constraints."""
     n, span = rod["first_row"], vec(line)
-    if rod["slides"] == 0 and (rod["carrier"] == NO_CARRIER or rod["carrier"] == SHARED):
+    if rod["slides"] == 0 and (rod["proximal"] == NO_PROXIMAL or rod["proximal"] == SHARED):
         rows[n] = own[SLIDE]
         n += 1
     if rod["foot"] == HINGE:
@@ -233,37 +241,37 @@ def rod_rows(
         rows[n] = norm(span) * dot(vec(rod["head_axes"][0]), vec(own[HEAD_LINE:COSINE]))
         n += 1
     if rod["twists"] == 1:
-        rows[n] = twist_of(rod, carrier, frame, lead, own, scale(1.0 / norm(span), span))
+        rows[n] = twist_of(rod, proximal, frame, lead, own, scale(1.0 / norm(span), span))
 
 
 @routine
 def rod_slopes(
     rod: Record,
-    carrier: Record,
+    proximal: Record,
     frame: Floats,
     lead: Floats,
     own: Floats,
     line: Floats,
-    follow: Floats,
+    proximal_slopes: Floats,
     slopes: Floats,
 ) -> None:
-    """Fill the derivatives of a rod's constraints, and of its carrier's coordinate (`follow`)."""
+    """Fill the derivatives of a rod's constraints, and of its carrier's coordinate (`proximal_slopes`)."""
     n, span = rod["first_row"], vec(line)
     u = scale(1.0 / norm(span), span)
-    if rod["carrier"] == CRANK or rod["carrier"] == CARRIAGE:
-        put_follow(rod, frame, own, u, follow)
+    if rod["proximal"] == CRANK or rod["proximal"] == CARRIAGE:
+        put_proximal_slope(rod, frame, own, u, proximal_slopes)
     elif rod["slides"] == 0:
-        put_slope(rod, carrier, frame, lead, follow, u, NOWHERE, NOWHERE, slopes[n])
+        put_slope(rod, proximal, frame, lead, proximal_slopes, u, NOWHERE, NOWHERE, slopes[n])
         n += 1
     if rod["foot"] == HINGE:
-        axis = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
-        put_slope(rod, carrier, frame, lead, follow, axis, cross(axis, span), NOWHERE, slopes[n])
+        axis = turned_by_proximal(proximal, lead, vec(rod["foot_axes"][0]), 1.0)
+        put_slope(rod, proximal, frame, lead, proximal_slopes, axis, cross(axis, span), NOWHERE, slopes[n])
         n += 1
     if rod["head"] == HINGE:
         axis = turn(frame, vec(rod["head_axes"][0]))
-        put_slope(rod, carrier, frame, lead, follow, axis, NOWHERE, cross(axis, span), slopes[n])
+        put_slope(rod, proximal, frame, lead, proximal_slopes, axis, NOWHERE, cross(axis, span), slopes[n])
         n += 1
     if rod["twists"] == 1:
-        by_line, b, c = twist_rate(rod, carrier, frame, lead, own, u)
+        by_line, b, c = twist_rate(rod, proximal, frame, lead, own, u)
         by_line = scale(1.0 / norm(span), along(by_line, -dot(by_line, u), u))
-        put_slope(rod, carrier, frame, lead, follow, by_line, b, c, slopes[n])
+        put_slope(rod, proximal, frame, lead, proximal_slopes, by_line, b, c, slopes[n])

@@ -33,20 +33,20 @@ from ..legs.answer import deviation
 from ..legs.frames import AXES, NOWHERE
 from ..legs.records import (
     CARRIAGE,
-    CARRIER,
     CRANK,
     FOOT,
     FOOT_LINE,
     FROM_BASE,
     HEAD,
     HINGE,
-    NO_CARRIER,
+    NO_PROXIMAL,
+    Q_PROXIMAL,
     ROD,
     SLIDE,
     Table,
 )
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
-from .equations import LegEvaluation, direction, is_carried, main_of, own_row, place
+from .equations import LegEvaluation, direction, has_proximal, main_of, own_row, place
 from .lagrangian import put_force
 from .limits import AT_FOOT, AT_HEAD, cone_slope, seen
 from .linearise import linearise
@@ -110,10 +110,10 @@ def share_of(table: Table, root: int, nearer: float, search: Search) -> tuple[Ve
         if on_hinge >= 0:
             hinge, axis = on_hinge, axis_of(table, on_hinge, reduced)
             arm = sub(head_from(table, k, on_hinge, reduced), line)
-            spoke, turned, rod = flatten(arm, axis), flatten(at_foot, axis), add(line, arm)
-            A += dot(pull, spoke) + m * dot(spoke, spoke) + dot(turned, rod)
-            B += dot(pull, cross(axis, spoke)) + dot(cross(axis, turned), rod)
-            moved = add(moved, along(turned, m, spoke))
+            crank, turned, rod = flatten(arm, axis), flatten(at_foot, axis), add(line, arm)
+            A += dot(pull, crank) + m * dot(crank, crank) + dot(turned, rod)
+            B += dot(pull, cross(axis, crank)) + dot(cross(axis, turned), rod)
+            moved = add(moved, along(turned, m, crank))
         if on_slide >= 0:
             slide, course = on_slide, axis_of(table, on_slide, reduced)
             b, push = b + dot(sub(pull, at_foot), course), push + m
@@ -145,21 +145,21 @@ def way_of(table: Table, k: int) -> tuple[int, int, int]:
         lead = table.legs[at]
         if lead["at_head"] == 1 or lead["twin"] >= 0 or (lead["arm"] < 0 and lead["frame"] != FROM_BASE):
             return -1, -1, -1
-        if lead["carrier"] == CRANK and hinge < 0:
+        if lead["proximal"] == CRANK and hinge < 0:
             hinge = at
-        elif lead["carrier"] == CARRIAGE and slide < 0:
+        elif lead["proximal"] == CARRIAGE and slide < 0:
             slide = at
-        elif lead["carrier"] != NO_CARRIER:
+        elif lead["proximal"] != NO_PROXIMAL:
             return -1, -1, -1
         first, at = at, lead["arm"]
     return first, hinge, slide
 
 
 @routine
-def axis_of(table: Table, carrier: int, reduced: LegEvaluation) -> Vec:
+def axis_of(table: Table, proximal: int, reduced: LegEvaluation) -> Vec:
     """The axis of a carrier as it is now."""
-    lead = table.legs[carrier]
-    return turn(reduced.frames[lead["frame"], AXES:], vec(lead["carrier_axis"]))
+    lead = table.legs[proximal]
+    return turn(reduced.frames[lead["frame"], AXES:], vec(lead["proximal_axis"]))
 
 
 @routine
@@ -167,7 +167,7 @@ def head_from(table: Table, k: int, hinge: int, reduced: LegEvaluation) -> Vec:
     """Where the head of a rod is, from a hinge that it is on."""
     lead = table.legs[hinge]
     frame = reduced.frames[lead["frame"]]
-    return turn(frame[AXES:], sub(move(frame, vec(table.legs[k]["head_point"])), vec(lead["carrier_point"])))
+    return turn(frame[AXES:], sub(move(frame, vec(table.legs[k]["head_point"])), vec(lead["proximal_point"])))
 
 
 @routine
@@ -177,7 +177,7 @@ def hold_of(table: Table, k: int, search: Search) -> tuple[float, Vec, Vec]:
     leg, main, leg_eval, multipliers = table.legs[k], main_of(table, k), search.leg_eval, search.hessian.multipliers
     length, ranges, row, pull = norm(vec(leg_eval.lines[k])), table.limited.shape[0], leg["first_row"], 0.0
     at_foot, at_head = NOWHERE, NOWHERE
-    if is_carried(leg):
+    if has_proximal(leg):
         pull = search.balance[own_row(table, k)]
     elif leg["slides"] == 0:
         pull = search.balance[row]
@@ -233,7 +233,7 @@ def bound_by(leg: Record, push: float, half_angle: float) -> tuple[float, float,
 @routine
 def most_of(table: Table, k: int, B: float, nearer: float, search: Search) -> float:
     """The largest A for which a carrier's limits keep f_g from being negative, by more than counts as nothing."""
-    most, is_crank = math.inf, table.legs[k]["carrier"] == CRANK
+    most, is_crank = math.inf, table.legs[k]["proximal"] == CRANK
     for end in room_of(table, k, search):
         if B * end < -nearer:
             return -math.inf
@@ -247,11 +247,11 @@ def most_of(table: Table, k: int, B: float, nearer: float, search: Search) -> fl
 @routine
 def room_of(table: Table, k: int, search: Search) -> tuple[float, float]:
     """How far a carrier may go on from where it is, either way."""
-    is_crank = table.legs[k]["carrier"] == CRANK
+    is_crank = table.legs[k]["proximal"] == CRANK
     least, most = (-math.pi, math.pi) if is_crank else (-math.inf, math.inf)
     for i in range(table.limited.shape[0]):
         limited = table.limited[i]
-        if limited["leg"] == k and limited["place"] == CARRIER:
+        if limited["leg"] == k and limited["place"] == Q_PROXIMAL:
             state = deviation(limited, search.leg_eval.values)
             lo, hi = limited["lo"] - state, limited["hi"] - state
             if not is_crank or hi - lo < 2.0 * math.pi:

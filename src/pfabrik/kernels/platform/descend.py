@@ -45,7 +45,7 @@ step was short for damping."""
 THERE = 1e-12
 """Distance at which a search has arrived, and which counts as none [L]."""
 
-OF_CARRIERS, ALONE = 0.6, 0.5
+OF_PROXIMAL, ALONE = 0.6, 0.5
 """What the steps of carriers count beside those of the platform: they end where rods have their lengths. And those of
 the platform where it alone has unknowns: the squares of rods' lengths are then quadratic in its position."""
 
@@ -72,7 +72,7 @@ def take(table: Table, reduced: FreeMotions, x: Floats, state: PlatformState, se
     put_step(x, reduced, search.step)
     most = 0.0
     for j in range(n):
-        most = max(most, abs(step[j]) * (ALONE if n == 6 else 1.0 if j < 6 else OF_CARRIERS))
+        most = max(most, abs(step[j]) * (ALONE if n == 6 else 1.0 if j < 6 else OF_PROXIMAL))
     share = LONGEST_STEP / max(most, LONGEST_STEP)
     move(table, search.step, share, state)
     close_rods(table, state, search.leg_eval)

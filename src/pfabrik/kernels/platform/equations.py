@@ -22,12 +22,12 @@ from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
 from ..legs.records import (
     ARM,
     CARRIAGE,
-    CARRIER,
     COSINE,
     CRANK,
     HINGE,
     N_VALUES,
     PIVOT,
+    Q_PROXIMAL,
     ROD,
     SHARED,
     SINE,
@@ -35,17 +35,17 @@ from ..legs.records import (
     Table,
 )
 from ..legs.rods import (
-    carried,
-    carried_foot,
-    carrier_rate,
-    carry,
+    base_end_of,
+    proximal_rate,
     read_rod,
     rod_rows,
+    solve_proximal,
+    turned_by_proximal,
     twist_rate,
 )
 from ..vectors import Vec, along, cross, dot, move, norm, scale, sub, turn, vec, wrap
 
-# How far from a dead point, as `carry` says, a carrier must be to be put where its rod has its length.
+# How far from a dead point, as `solve_proximal` says, a carrier must be to be put where its rod has its length.
 SURELY = 1e-2
 
 
@@ -76,7 +76,7 @@ def new_platform_state(legs: int) -> PlatformState:
 def new_leg_evaluation(table: Table) -> LegEvaluation:
     """Memory for what is told of it."""
     legs, n = table.legs.shape[0], count_unknowns(table)
-    m = table.task[0]["rows"] + count_carried(table)
+    m = table.task[0]["rows"] + count_proximal(table)
     values, lines = np.zeros((legs, N_VALUES)), np.zeros((legs, 3))
     return LegEvaluation(new_frames(table.legs), values, lines, np.zeros(m), np.zeros((m, n)), np.zeros(n))
 
@@ -90,24 +90,24 @@ def count_unknowns(table: Table) -> int:
 
 
 @routine
-def count_carried(table: Table) -> int:
+def count_proximal(table: Table) -> int:
     """How many rods have a carrier of their own."""
     n = 0
     for k in range(table.legs.shape[0]):
-        n += 1 if is_carried(table.legs[k]) else 0
+        n += 1 if has_proximal(table.legs[k]) else 0
     return n
 
 
 @routine
-def is_carried(leg: Record) -> bool:
+def has_proximal(leg: Record) -> bool:
     """Whether a leg is a rod with a carrier of its own."""
-    return bool(leg["kind"] == ROD and (leg["carrier"] == CRANK or leg["carrier"] == CARRIAGE))
+    return bool(leg["kind"] == ROD and (leg["proximal"] == CRANK or leg["proximal"] == CARRIAGE))
 
 
 @routine
 def main_of(table: Table, k: int) -> int:
     """The leg whose carrier a leg is on; itself if it is on none but its own."""
-    while table.legs[k]["carrier"] == SHARED:
+    while table.legs[k]["proximal"] == SHARED:
         k -= 1
     return k
 
@@ -118,7 +118,7 @@ def place(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> float:
     legs, rows, main = table.legs, leg_eval.rows, 0
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(legs.shape[0]):
-        main = main if legs[k]["carrier"] == SHARED else k
+        main = main if legs[k]["proximal"] == SHARED else k
         place_leg(table, k, main, state, leg_eval)
     worst = 0.0
     for i in range(rows.shape[0]):
@@ -144,12 +144,12 @@ def place_leg(table: Table, k: int, main: int, state: PlatformState, leg_eval: L
     elif leg["kind"] == ARM:
         place_arm(leg, coordinate_of(legs, k, state.q), leg_eval.frames, values[k])
     elif leg["kind"] == ROD:
-        if is_carried(leg):
-            values[k, CARRIER] = state.q[k]
+        if has_proximal(leg):
+            values[k, Q_PROXIMAL] = state.q[k]
             values[k, COSINE], values[k, SINE] = math.cos(state.q[k]), math.sin(state.q[k])
         read_rod(leg, lead, frame, values[main], values[k], lines[k])
         rod_rows(leg, lead, frame, values[main], values[k], lines[k], leg_eval.rows)
-        if is_carried(leg):
+        if has_proximal(leg):
             rows[own_row(table, k)] = values[k, SLIDE]
 
 
@@ -165,31 +165,31 @@ def close_rods(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> N
             frame, rod = leg_eval.frames[leg["frame"]], table.legs[k + 1]
             found, sure = facing(leg, rod, frame, side_of_arm(leg, rod, frame, q[k]))
             if sure > SURELY:
-                q[k] = wrap(found, q[k]) if leg["carrier"] == CRANK else found
+                q[k] = wrap(found, q[k]) if leg["proximal"] == CRANK else found
         if leg["kind"] == ARM:
             place_arm(leg, coordinate_of(table.legs, k, q), leg_eval.frames, own[k])
-        if is_carried(leg):
+        if has_proximal(leg):
             head = move(leg_eval.frames[leg["frame"]], vec(leg["head_point"]))
-            if carry(leg, head, side_of(leg, head, q[k]), own[k]) > SURELY:
-                q[k] = wrap(own[k, CARRIER], q[k]) if leg["carrier"] == CRANK else own[k, CARRIER]
+            if solve_proximal(leg, head, side_of(leg, head, q[k]), own[k]) > SURELY:
+                q[k] = wrap(own[k, Q_PROXIMAL], q[k]) if leg["proximal"] == CRANK else own[k, Q_PROXIMAL]
 
 
 @routine
 def side_of(rod: Record, head: Vec, q: float) -> float:
     """The side of a carrier: of its dead point, where the rod comes nearest to the head."""
-    if rod["carrier"] == CRANK:
-        x = sub(head, vec(rod["carrier_point"]))
+    if rod["proximal"] == CRANK:
+        x = sub(head, vec(rod["proximal_point"]))
         return math.copysign(
-            1.0, dot(vec(rod["spoke"]), x) * math.sin(q) - dot(vec(rod["spoke_across"]), x) * math.cos(q)
+            1.0, dot(vec(rod["crank"]), x) * math.sin(q) - dot(vec(rod["crank_across"]), x) * math.cos(q)
         )
-    return math.copysign(1.0, q - dot(sub(head, vec(rod["foot_point"])), vec(rod["carrier_axis"])))
+    return math.copysign(1.0, q - dot(sub(head, vec(rod["foot_point"])), vec(rod["proximal_axis"])))
 
 
 @routine
 def side_of_arm(arm: Record, rod: Record, frame: Floats, q: float) -> float:
     """The same of an arm that `facing` places: by which way the plane turns away from the head."""
-    axis, n = vec(arm["carrier_axis"]), vec(rod["foot_axes"][0])
-    x = sub(move(frame, vec(rod["head_point"])), vec(arm["carrier_point"]))
+    axis, n = vec(arm["proximal_axis"]), vec(rod["foot_axes"][0])
+    x = sub(move(frame, vec(rod["head_point"])), vec(arm["proximal_point"]))
     return math.copysign(1.0, dot(cross(turned(n, axis, math.cos(q), math.sin(q)), axis), x))
 
 
@@ -207,7 +207,7 @@ def put_slopes(table: Table, leg_eval: LegEvaluation) -> None:
         for j in range(6, slopes.shape[1]):
             slopes[i, j] = 0.0
     for k in range(legs.shape[0]):
-        main = main if legs[k]["carrier"] == SHARED else k
+        main = main if legs[k]["proximal"] == SHARED else k
         put_leg_slopes(table, k, main, leg_eval)
 
 
@@ -220,7 +220,7 @@ def put_leg_slopes(table: Table, k: int, main: int, leg_eval: LegEvaluation) -> 
         for row in range(leg["first_row"], end_of_rows(table.legs, k, table.task[0]["rows"])):
             put_arm_slopes(table, k, leg_eval, slopes[row])
     elif leg["kind"] == ROD:
-        if is_carried(leg):
+        if has_proximal(leg):
             put_rate(table, k, k, direction(leg_eval.lines[k]), NOWHERE, NOWHERE, leg_eval, slopes[own_row(table, k)])
         put_rod_slopes(table, k, main, leg_eval)
 
@@ -238,10 +238,10 @@ def put_rate(table: Table, k: int, main: int, a: Vec, b: Vec, c: Vec, leg_eval: 
     ----------
     main : the leg whose carrier it is on; itself if on none.
     """
-    rod, carrier, column = table.legs[k], table.legs[main], table.columns[main]
+    rod, proximal, column = table.legs[k], table.legs[main], table.columns[main]
     put_pose_slope(rod, leg_eval.frames[rod["frame"]], a, c, slope)
     if column >= 0:
-        slope[column] = carrier_rate(carrier, carried_foot(rod, carrier, leg_eval.values[main]), a, b)
+        slope[column] = proximal_rate(proximal, base_end_of(rod, proximal, leg_eval.values[main]), a, b)
     put_arm_slopes(table, k, leg_eval, slope)
 
 
@@ -264,18 +264,18 @@ def put_arm_slopes(table: Table, k: int, leg_eval: LegEvaluation, slope: Floats)
 @routine
 def put_rod_slopes(table: Table, k: int, main: int, leg_eval: LegEvaluation) -> None:
     """Fill the derivatives of the equations that `rod_rows` fills."""
-    rod, carrier, lead, slopes = table.legs[k], table.legs[main], leg_eval.values[main], leg_eval.slopes
+    rod, proximal, lead, slopes = table.legs[k], table.legs[main], leg_eval.values[main], leg_eval.slopes
     frame, n, span, u = (
         leg_eval.frames[rod["frame"]],
         rod["first_row"],
         vec(leg_eval.lines[k]),
         direction(leg_eval.lines[k]),
     )
-    if rod["slides"] == 0 and not is_carried(rod):
+    if rod["slides"] == 0 and not has_proximal(rod):
         put_rate(table, k, main, u, NOWHERE, NOWHERE, leg_eval, slopes[n])
         n += 1
     if rod["foot"] == HINGE:
-        axis = carried(carrier, lead, vec(rod["foot_axes"][0]), 1.0)
+        axis = turned_by_proximal(proximal, lead, vec(rod["foot_axes"][0]), 1.0)
         put_rate(table, k, main, axis, cross(axis, span), NOWHERE, leg_eval, slopes[n])
         n += 1
     if rod["head"] == HINGE:
@@ -283,6 +283,6 @@ def put_rod_slopes(table: Table, k: int, main: int, leg_eval: LegEvaluation) -> 
         put_rate(table, k, main, axis, NOWHERE, cross(axis, span), leg_eval, slopes[n])
         n += 1
     if rod["twists"] == 1:
-        by_line, b, c = twist_rate(rod, carrier, frame, lead, leg_eval.values[k], u)
+        by_line, b, c = twist_rate(rod, proximal, frame, lead, leg_eval.values[k], u)
         by_line = scale(1.0 / norm(span), along(by_line, -dot(by_line, u), u))
         put_rate(table, k, main, by_line, b, c, leg_eval, slopes[n])

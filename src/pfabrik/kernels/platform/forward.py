@@ -16,7 +16,7 @@ from ...arrays import Floats, Ints, Record
 from .._jit import kernel, routine
 from ..legs.answer import KEPT, deviation, excess_of, worst_of
 from ..legs.poses import make_exact, middle_of
-from ..legs.records import CARRIER, PIVOT, Table
+from ..legs.records import PIVOT, Q_PROXIMAL, Table
 from ..legs.table import SAMPLE, open_table
 from ..linear import solve_spd, solve_square
 from ..references import opener
@@ -36,7 +36,7 @@ from .limits import coordinate_slope, counts_turns
 from .records import Starts
 from .search import copy_platform_state, move
 from .spheres import Spheres, new_spheres, put_spheres, set_spheres
-from .starts import put_carriers, put_sides
+from .starts import place_proximal, put_sides
 
 ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
 """Largest equation of an assembled configuration, and of one that no step makes more so [L or rad]: more actuators than
@@ -83,7 +83,7 @@ def new_newton(table: Table, turns: bool) -> Newton:
     for j in range(3, 6):
         kept[j] = 0 if turns else 1
     for i in range(n_driven):
-        if drives_carrier(table, i):
+        if drives_proximal(table, i):
             kept[table.columns[table.driven[i]["leg"]]] = 1
         else:
             equations += 1
@@ -104,10 +104,10 @@ def new_newton(table: Table, turns: bool) -> Newton:
 
 
 @routine
-def drives_carrier(table: Table, i: int) -> bool:
+def drives_proximal(table: Table, i: int) -> bool:
     """Whether an actuator is what carries a rod."""
     driven = table.driven[i]
-    return bool(driven["place"] == CARRIER and table.legs[driven["leg"]]["kind"] != PIVOT)
+    return bool(driven["place"] == Q_PROXIMAL and table.legs[driven["leg"]]["kind"] != PIVOT)
 
 
 @routine
@@ -115,7 +115,7 @@ def put_drivers(table: Table, scratch: Newton) -> None:
     """Put driven carriers where their values say."""
     q = scratch.state.q
     for i in range(table.driven.shape[0]):
-        if drives_carrier(table, i):
+        if drives_proximal(table, i):
             q[table.driven[i]["leg"]] = table.driven[i]["sense"] * scratch.values[table.driven[i]["column"]]
 
 
@@ -151,7 +151,7 @@ def put_residuals(table: Table, scratch: Newton) -> float:
     for r in range(e):
         equations[r, m] = -rows[r]
     for i in range(table.driven.shape[0]):
-        if not drives_carrier(table, i):
+        if not drives_proximal(table, i):
             driven = table.driven[i]
             off = off_by(driven, deviation(driven, scratch.leg_eval.values), scratch)
             worst, equations[e, m] = max(worst, abs(off)), -off
@@ -168,7 +168,7 @@ def put_equations(table: Table, scratch: Newton) -> None:
     for r in range(e):
         put_slope(r, slopes[r], scratch)
     for i in range(table.driven.shape[0]):
-        if not drives_carrier(table, i):
+        if not drives_proximal(table, i):
             coordinate_slope(table, table.driven[i], leg_eval)
             put_slope(e, leg_eval.slope, scratch)
             e += 1
@@ -267,7 +267,7 @@ def load_start(table: Table, starts: Starts, start: int, scratch: Newton) -> Non
     if starts.q.shape[0] > 0:
         copy_row(starts.q[start], state.q)
     else:
-        put_carriers(table, scratch.state, scratch.leg_eval)
+        place_proximal(table, scratch.state, scratch.leg_eval)
 
 
 @routine

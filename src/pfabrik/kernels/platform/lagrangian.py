@@ -11,7 +11,7 @@ from ..legs.answer import end_of_rows
 from ..legs.frames import set_frames
 from ..legs.records import SHARED, Table
 from ..sqp import PROBE, symmetrise
-from .equations import PlatformState, is_carried, own_row, place_leg, put_leg_slopes
+from .equations import PlatformState, has_proximal, own_row, place_leg, put_leg_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .records import PlatformObjective
 from .search import Search, copy_platform_state, move, put_objective
@@ -70,7 +70,7 @@ def note_pulled(table: Table, objective: PlatformObjective, search: Search) -> N
         most = multipliers[first + k]
         for r in range(legs[k]["first_row"], end_of_rows(legs, k, table.task[0]["rows"])):
             most = max(most, abs(balance[r]))
-        if is_carried(legs[k]):
+        if has_proximal(legs[k]):
             most = max(most, abs(balance[own_row(table, k)]))
         pulled[k] = 1 if most > 0.0 else 0
     for i in range(ranges):
@@ -83,7 +83,7 @@ def note_pulled(table: Table, objective: PlatformObjective, search: Search) -> N
         pulled[table.driven[i]["leg"]] = 1
     for k in range(n - 1, 0, -1):
         if pulled[k] == 1:
-            if legs[k]["carrier"] == SHARED:
+            if legs[k]["proximal"] == SHARED:
                 pulled[k - 1] = 1
             if legs[k]["arm"] >= 0:
                 pulled[legs[k]["arm"]] = 1
@@ -97,7 +97,7 @@ def lagrangian_gradient(
     pulled, main = search.pulled, 0
     set_frames(state.pose, table.task[0], search.leg_eval.frames)
     for k in range(pulled.shape[0]):
-        main = main if table.legs[k]["carrier"] == SHARED else k
+        main = main if table.legs[k]["proximal"] == SHARED else k
         if pulled[k] == 1:
             place_leg(table, k, main, state, search.leg_eval)
             put_leg_slopes(table, k, main, search.leg_eval)

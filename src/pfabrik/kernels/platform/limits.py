@@ -12,8 +12,8 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..legs.answer import deviation
 from ..legs.frames import NOWHERE, put_pose_slope
-from ..legs.records import CARRIER, CRANK, CROSS, FOOT, FOOT_LINE, HEAD, HINGE, PIVOT, SLIDE, TRIPLE, Table
-from ..legs.rods import carried, carried_foot, mark
+from ..legs.records import CRANK, CROSS, FOOT, FOOT_LINE, HEAD, HINGE, PIVOT, Q_PROXIMAL, SLIDE, TRIPLE, Table
+from ..legs.rods import base_end_of, mark, turned_by_proximal
 from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
 from .equations import LegEvaluation, direction, main_of, put_arm_slopes, put_rate
 
@@ -36,7 +36,7 @@ def put_turning(table: Table, k: int, main: int, end: int, t: Vec, leg_eval: Leg
 def seen(table: Table, k: int, main: int, end: int, v: Vec, leg_eval: LegEvaluation) -> Vec:
     """A direction that goes with the body which an end of a rod is on, as it is now."""
     if end == AT_FOOT:
-        return carried(table.legs[main], leg_eval.values[main], v, 1.0)
+        return turned_by_proximal(table.legs[main], leg_eval.values[main], v, 1.0)
     return turn(leg_eval.frames[table.legs[k]["frame"]], v)
 
 
@@ -56,7 +56,7 @@ def coordinate_slope(table: Table, coordinate: Record, leg_eval: LegEvaluation) 
     if leg["kind"] == PIVOT:
         put_pivot_slope(leg, leg_eval.frames[leg["frame"]], leg_eval.values[k], spot, leg_eval.slope)
         put_arm_slopes(table, k, leg_eval, leg_eval.slope)
-    elif spot == CARRIER:
+    elif spot == Q_PROXIMAL:
         slope[table.columns[k]] = 1.0
     elif spot == SLIDE:
         put_rate(table, k, main_of(table, k), direction(leg_eval.lines[k]), NOWHERE, NOWHERE, leg_eval, leg_eval.slope)
@@ -158,8 +158,8 @@ def dead_point_slope(table: Table, k: int, leg_eval: LegEvaluation) -> float:
     slope, leg, own = leg_eval.slope, table.legs[k], leg_eval.values[k]
     for j in range(slope.shape[0]):
         slope[j] = 0.0
-    axis = vec(leg["carrier_axis"])
-    if leg["carrier"] == CRANK:
-        axis = cross(axis, sub(carried_foot(leg, leg, own), vec(leg["carrier_point"])))
+    axis = vec(leg["proximal_axis"])
+    if leg["proximal"] == CRANK:
+        axis = cross(axis, sub(base_end_of(leg, leg, own), vec(leg["proximal_point"])))
     put_turning(table, k, k, AT_FOOT, axis, leg_eval)
     return dot(axis, direction(leg_eval.lines[k]))

@@ -35,7 +35,7 @@ from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global
 from .descend import descend
-from .equations import PlatformState, is_carried, new_platform_state, place
+from .equations import PlatformState, has_proximal, new_platform_state, place
 from .linearise import linearise
 from .records import SETTINGS, Found, Plan, PlatformObjective, Starts
 from .search import Search, copy_platform_state, fix, new_search
@@ -250,7 +250,7 @@ def search_row(
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
     sides = own.sides[first]
     for k in range(kept.shape[0]):
-        kept[k] = sides[k] if stays == 1 and is_carried(table.legs[k]) else 0.0
+        kept[k] = sides[k] if stays == 1 and has_proximal(table.legs[k]) else 0.0
     at_once = holds_all(objective.pose) or (n > 0 and table.task[0]["led"] == 0)
     clear(best_tally)
     clear(phase1_tally)

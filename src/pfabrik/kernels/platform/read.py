@@ -25,7 +25,7 @@ class Reading(NamedTuple):
 
     state: PlatformState
     leg_eval: LegEvaluation
-    follow: Floats  # (legs, 6): derivatives of carriers' coordinates
+    proximal_slopes: Floats  # (legs, 6): derivatives of carriers' coordinates
 
 
 def new_reading(table: Table) -> Reading:
@@ -42,7 +42,7 @@ def read(
     scratch_address: int,
     poses: Floats,
     sides: Floats,
-    carriers: Floats,
+    q_proximal: Floats,
     found: Floats,
     rows: Floats,
     slopes: Floats,
@@ -64,9 +64,9 @@ def read(
         load_pose(poses[row], table.task[0]["length"], state.pose)
         copy_row(sides[row if sides.shape[0] > 1 else 0], state.sides)
         total = math.nan
-        if carriers.shape[0] > 0:
+        if q_proximal.shape[0] > 0:
             total = 0.0
-            copy_row(carriers[row], state.q)
+            copy_row(q_proximal[row], state.q)
             for k in range(state.q.shape[0]):
                 total += state.q[k]
         bearing = 1.0
@@ -79,7 +79,7 @@ def read(
             found[row, known[i]["column"]] = deviation(known[i], leg_eval.values) * known[i]["unit"]
         if rows.shape[0] > 0:
             put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
-            put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.follow, slopes[row])
+            put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.proximal_slopes, slopes[row])
             for i in range(rows.shape[1] if not bearing > SURE * SURE else 0):
                 for j in range(slopes.shape[2]):
                     slopes[row, i, j] = math.nan

@@ -15,10 +15,10 @@ import numpy as np
 from ...arrays import Floats, Ints
 from .._jit import routine
 from ..legs.frames import AXES, place_arm, set_frames
-from ..legs.records import ARM, CARRIER, COSINE, FROM_BASE, HINGE, IDLE, NO_CARRIER, ROD, SINE, SLIDE, Table
-from ..legs.rods import carried_foot
+from ..legs.records import ARM, COSINE, FROM_BASE, HINGE, IDLE, NO_PROXIMAL, Q_PROXIMAL, ROD, SINE, SLIDE, Table
+from ..legs.rods import base_end_of
 from ..vectors import add, cross, dot, put, scale, sub, turn, vec
-from .equations import LegEvaluation, PlatformState, is_carried, main_of
+from .equations import LegEvaluation, PlatformState, has_proximal, main_of
 
 
 class Spheres(NamedTuple):
@@ -47,13 +47,13 @@ def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
     """Whether legs leave the platform nothing but points at distances, and all that carries them is driven, on the
     base."""
     for k, leg in enumerate(table.legs):
-        is_loose = leg["carrier"] != NO_CARRIER and (main_of(table, k), CARRIER) not in driven
+        is_loose = leg["proximal"] != NO_PROXIMAL and (main_of(table, k), Q_PROXIMAL) not in driven
         turns = leg["kind"] != ARM and (leg["foot"] == HINGE or leg["head"] == HINGE or leg["twists"] == 1)
         is_on_base = leg["frame"] == FROM_BASE or leg["arm"] >= 0
         is_read = leg["kind"] in (ROD, ARM) and is_on_base and leg["at_head"] == leg["reversed"] == leg["inner"] == 0
         if leg["kind"] != IDLE and (is_loose or turns or not is_read):
             return False
-    return all(place in (CARRIER, SLIDE) for _, place in driven)
+    return all(place in (Q_PROXIMAL, SLIDE) for _, place in driven)
 
 
 @routine
@@ -65,12 +65,12 @@ def set_spheres(table: Table, values: Floats, state: PlatformState, leg_eval: Le
     for k in range(q.shape[0]):
         if legs[k]["kind"] == ARM:
             place_arm(legs[k], q[k], leg_eval.frames, own[k])
-        elif is_carried(legs[k]):
-            own[k, CARRIER], own[k, COSINE], own[k, SINE] = q[k], math.cos(q[k]), math.sin(q[k])
+        elif has_proximal(legs[k]):
+            own[k, Q_PROXIMAL], own[k, COSINE], own[k, SINE] = q[k], math.cos(q[k]), math.sin(q[k])
     for e in range(spheres.legs.shape[0]):
         k, i = spheres.legs[e], spheres.drivers[e]
         leg, main = legs[k], main_of(table, k)
-        foot = carried_foot(leg, legs[main], own[main])
+        foot = base_end_of(leg, legs[main], own[main])
         if leg["arm"] >= 0:
             frame = frames[leg["frame"]]
             foot = add(p, turn(frame[AXES:], sub(foot, (frame[0, 3], frame[1, 3], frame[2, 3]))))

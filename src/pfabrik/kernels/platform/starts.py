@@ -10,11 +10,11 @@ from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, Pos
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..legs.frames import NOWHERE, coordinate_of, facing, place_arm, set_frames
 from ..legs.poses import bring_yaw, column, is_pose, make_exact, middle_of, turn_pose
-from ..legs.records import ARM, CARRIER, CRANK, Table
-from ..legs.rods import carry
+from ..legs.records import ARM, CRANK, Q_PROXIMAL, Table
+from ..legs.rods import solve_proximal
 from ..rotations import yaw_of
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, sub, vec, wrap
-from .equations import LegEvaluation, PlatformState, is_carried, side_of_arm
+from .equations import LegEvaluation, PlatformState, has_proximal, side_of_arm
 from .records import STRETCHED, Starts
 from .search import Search
 
@@ -54,11 +54,11 @@ def begin(table: Table, starts: Starts, start: int, search: Search) -> None:
     if starts.q.shape[0] > 0:
         copy_row(starts.q[start], search.best.q)
     else:
-        put_carriers(table, search.best, search.leg_eval)
+        place_proximal(table, search.best, search.leg_eval)
 
 
 @routine
-def put_carriers(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> None:
+def place_proximal(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> None:
     """Put carriers and arms where the pose and the sides have them.
 
     Rods that are stretched out over what carries them are bent a little to their sides: stretched out, nothing says to
@@ -73,12 +73,12 @@ def put_carriers(table: Table, state: PlatformState, leg_eval: LegEvaluation) ->
             q[k], _ = facing(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], sides[k])
         if leg["kind"] == ARM:
             place_arm(leg, q[k], leg_eval.frames, own)
-        if is_carried(leg):
+        if has_proximal(leg):
             head = move(leg_eval.frames[leg["frame"]], vec(leg["head_point"]))
-            carry(leg, head, -sides[k], own)
-            other = own[CARRIER]
-            carry(leg, head, sides[k], own)
-            q[k] = own[CARRIER] if abs(own[CARRIER] - other) >= STRETCHED else own[CARRIER] + BENT * sides[k]
+            solve_proximal(leg, head, -sides[k], own)
+            other = own[Q_PROXIMAL]
+            solve_proximal(leg, head, sides[k], own)
+            q[k] = own[Q_PROXIMAL] if abs(own[Q_PROXIMAL] - other) >= STRETCHED else own[Q_PROXIMAL] + BENT * sides[k]
 
 
 @routine
@@ -111,18 +111,18 @@ def put_held(
             q[k] = nearest_facing(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
         if leg["kind"] == ARM:
             place_arm(leg, coordinate_of(table.legs, k, q), leg_eval.frames, leg_eval.values[k])
-        if is_carried(leg):
-            q[k] = nearest_carrier(leg, leg_eval.frames[leg["frame"]], q[k], leg_eval.values[k])
+        if has_proximal(leg):
+            q[k] = nearest_q_proximal(leg, leg_eval.frames[leg["frame"]], q[k], leg_eval.values[k])
 
 
 @routine
-def nearest_carrier(leg: Record, frame: Floats, present: float, own: Floats) -> float:
+def nearest_q_proximal(leg: Record, frame: Floats, present: float, own: Floats) -> float:
     """Of the two coordinates at which a carrier's rod reaches its head, or comes nearest, the one nearer to this."""
     head, best = move(frame, vec(leg["head_point"])), math.inf
     for i in range(2):
-        carry(leg, head, 2.0 * i - 1.0, own)
-        found: float = own[CARRIER]
-        if leg["carrier"] == CRANK:
+        solve_proximal(leg, head, 2.0 * i - 1.0, own)
+        found: float = own[Q_PROXIMAL]
+        if leg["proximal"] == CRANK:
             found = wrap(found, present)
         if abs(found - present) < abs(best - present):
             best = found
@@ -133,7 +133,7 @@ def nearest_carrier(leg: Record, frame: Floats, present: float, own: Floats) -> 
 def nearest_facing(arm: Record, rod: Record, frame: Floats, present: float) -> float:
     """Of the coordinates at which an arm has its rod's plane hold the head, the one nearer to this."""
     found, _ = facing(arm, rod, frame, 1.0)
-    if arm["carrier"] != CRANK:
+    if arm["proximal"] != CRANK:
         return found
     other, _ = facing(arm, rod, frame, -1.0)
     found, other = wrap(found, present), wrap(other, present)
@@ -153,14 +153,14 @@ def put_sides(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> No
             elif sides[k] != 0.0:
                 sides[k] = side_of_arm(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
             place_arm(leg, q[k], leg_eval.frames, leg_eval.values[k])
-        if is_carried(leg):
+        if has_proximal(leg):
             frame = leg_eval.frames[leg["frame"]]
             head = move(frame, vec(leg["head_point"]))
             off = (0.0, 0.0)
             for side in (-1.0, 1.0):
-                carry(leg, head, side, leg_eval.values[k])
-                away = leg_eval.values[k, CARRIER] - q[k]
-                off = (off[1], abs(wrap(away, 0.0) if leg["carrier"] == CRANK else away))
+                solve_proximal(leg, head, side, leg_eval.values[k])
+                away = leg_eval.values[k, Q_PROXIMAL] - q[k]
+                off = (off[1], abs(wrap(away, 0.0) if leg["proximal"] == CRANK else away))
             if abs(off[1] - off[0]) > STRETCHED:
                 sides[k] = 1.0 if off[1] < off[0] else -1.0
 
