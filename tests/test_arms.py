@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import oracles
 import pfabrik as pf
 from pfabrik.closure.solve import ClosureEngine
-from pfabrik.decomposition.leg_forms import Arm
+from pfabrik.decomposition.leg_forms import RedundantJoint
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.engine import engine_of
 from pfabrik.errors import UnsupportedMechanism
@@ -81,11 +81,11 @@ def machine(name: str) -> pf.Mechanism:
 NAMES = ("nrpm", "rails", "rails_above")
 
 
-def arms(mechanism: pf.Mechanism) -> list[int]:
+def redundant(mechanism: pf.Mechanism) -> list[int]:
     """Places of the arms' actuators."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    own = [form.items[0].joint.name for form in table.forms if isinstance(form, Arm)]
+    own = [form.items[0].joint.name for form in table.forms if isinstance(form, RedundantJoint)]
     return [mechanism.actuator_names.index(name) for name in own]
 
 
@@ -99,7 +99,7 @@ def targets(mechanism: pf.Mechanism, n: int, shift: float, turn: float) -> np.nd
 
 def moved(mechanism: pf.Mechanism, actuators: np.ndarray, begin: np.ndarray) -> np.ndarray:
     """How far arms are from where they began, (n,) [L and rad, squares summed]."""
-    own = arms(mechanism)
+    own = redundant(mechanism)
     slides = np.array([mechanism.joint(mechanism.actuator_names[k]).type == "prismatic" for k in own])
     off = (actuators - begin)[..., own] / np.where(slides, mechanism.characteristic_length, 1.0)
     return np.linalg.norm(off, axis=-1)

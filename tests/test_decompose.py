@@ -640,12 +640,12 @@ def test_the_leg_of_an_orthoglide_is_written_as_its_inventors_do() -> None:
         assert chain.parallelograms[0].length == pytest.approx(310.582854123025)
 
 
-HIP, ARM, FOREARM, TURN = 100.0, 80.0, 220.0, 2 * np.pi / 3
+HIP, REDUNDANT, FOREARM, TURN = 100.0, 80.0, 220.0, 2 * np.pi / 3
 
 
 def pinned_delta(offset: float) -> str:
     """The file of a rotary delta with parallelograms of pins; these are `offset` from the hinges at either end."""
-    elbow = np.array([HIP + ARM, 0, 0])
+    elbow = np.array([HIP + REDUNDANT, 0, 0])
     along = np.array([-3, 0, -4]) / 5
     wrist = elbow + FOREARM * along
     normal, inner, outer = np.array([-4, 0, 3]) / 5, elbow + offset * along, wrist - offset * along
@@ -696,8 +696,8 @@ def test_a_delta_with_parallelograms_of_pins_is_described_and_solved(offset: flo
     for leg in range(3):
         turned = Rotation.from_rotvec([0, 0, -leg * TURN]).apply(answer.pose[:, :3, 3] - mechanism.home_pose[:3, 3])
         lowered = answer.actuators[:, leg]
-        elbow = np.array([HIP, 0, 0]) + ARM * np.stack([np.cos(lowered), 0 * lowered, -np.sin(lowered)], axis=1)
-        forearm = turned + (HIP + ARM - 0.6 * FOREARM, 0, -0.8 * FOREARM) - elbow
+        elbow = np.array([HIP, 0, 0]) + REDUNDANT * np.stack([np.cos(lowered), 0 * lowered, -np.sin(lowered)], axis=1)
+        forearm = turned + (HIP + REDUNDANT - 0.6 * FOREARM, 0, -0.8 * FOREARM) - elbow
         expected = 2 * offset + np.sqrt((FOREARM - 2 * offset) ** 2 - forearm[:, 1] ** 2)
         np.testing.assert_allclose(np.hypot(forearm[:, 0], forearm[:, 2]), expected, rtol=1e-9)
     back = pf.solve_fk(mechanism, answer.actuators, start=answer)

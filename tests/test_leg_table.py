@@ -90,7 +90,7 @@ def off(name: str, actuators: np.ndarray, others: np.ndarray) -> np.ndarray:
 def constraints(name: str, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     own = table(name)
     rows = np.zeros((len(poses), own.task["rows"][0]))
-    slopes = np.zeros((*rows.shape, 6 + len(own.arms)))
+    slopes = np.zeros((*rows.shape, 6 + len(own.redundant)))
     none = np.zeros((0, 0))
     read(legs_of(own).address, reading_of(own).address, poses, own.home_sides, none, none, rows, slopes)
     return rows, slopes[:, :, :6]
@@ -130,7 +130,7 @@ def test_coordinates_told_by_legs_are_those_of_closed_loops(name: str) -> None:
     assert np.abs(away).max(initial=0.0) <= 1e-9
 
 
-CONSTRAINED = [name for name in SERVED if table(name).task["rows"][0] and not len(table(name).arms)]
+CONSTRAINED = [name for name in SERVED if table(name).task["rows"][0] and not len(table(name).redundant)]
 
 
 @pytest.mark.parametrize("name", CONSTRAINED)

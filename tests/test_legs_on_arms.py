@@ -133,7 +133,7 @@ def test_legs_with_two_carriers_answer_in_all_four_of_their_ways() -> None:
     joints = [dataclasses.replace(each, range=None, cone=None) for each in closure.rrrs().joints]
     mechanism = pf.Mechanism("3-RRRS", joints, "platform", (0, 0, 190))
     table = leg_table(mechanism)
-    assert isinstance(table, LegTable) and not table.has_free_arms and not table.leads_arms
+    assert isinstance(table, LegTable) and not table.has_free_redundant and not table.has_implicit_joints
     wanted = targets(mechanism, 1, 0.05, 0.1, (1, 1, 1))[0]
     modes = pf.working_modes(mechanism, wanted)
     assert modes.total == 4**3

@@ -634,7 +634,7 @@ def test_a_pose_that_is_answered_is_reached_when_it_is_asked_for(name: str, coun
     But now and then where arms are to be searched for, which at a border have but one place.
     """
     mechanism, table = EVERY[name](), leg_table(EVERY[name]())
-    count, has_arms = (1 + count // 20, False) if isinstance(table, str) else (count, len(table.arms) > 0)
+    count, has_arms = (1 + count // 20, False) if isinstance(table, str) else (count, len(table.redundant) > 0)
     targets = drawn(mechanism, np.random.default_rng(2), count, *SIZES[-1])
     answers = pf.solve_ik(mechanism, targets, options=Options(hold=None))
     again = pf.solve_ik(mechanism, answers.pose)
@@ -728,7 +728,7 @@ def test_a_platform_that_never_turns_is_not_looked_for_turned(
 
 AGAIN = {f"catalogue {name}": partial(pf.load, name) for name in pf.catalog()} | {
     f"{kind} {name}": make
-    for kind, made in (("positions", positions.MACHINES), ("closure", closure.MACHINES), ("arms", closure.ON_ARMS))
+    for kind, made in (("positions", positions.MACHINES), ("closure", closure.MACHINES), ("redundant", closure.ON_ARMS))
     for name, make in made.items()
 }
 """Every machine of the catalogue and of the tests."""

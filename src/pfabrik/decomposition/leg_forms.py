@@ -46,7 +46,7 @@ class Rod:
     is_reversed: bool
     is_shared: bool = False
     beside: tuple[Item, ...] = ()
-    on: Arm | None = None
+    on: RedundantJoint | None = None
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -61,7 +61,7 @@ class Pivot:
     slides: tuple[Item, ...]
     ending: Ending
     is_reversed: bool
-    on: Arm | None = None
+    on: RedundantJoint | None = None
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -74,7 +74,7 @@ class KeptAxis:
 
     ending: Ending
     is_reversed: bool = False
-    on: Arm | None = None
+    on: RedundantJoint | None = None
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -82,7 +82,7 @@ class KeptAxis:
 
 
 @dataclass(frozen=True, eq=False)
-class Arm:
+class RedundantJoint:
     """A hinge or slide that legs are on.
 
     Attributes
@@ -97,9 +97,9 @@ class Arm:
     item: Item
     is_reversed: bool
     at_head: bool = False
-    on: Arm | None = None
+    on: RedundantJoint | None = None
     faces: bool = False
-    twin: Arm | None = None
+    mirror_of: RedundantJoint | None = None
     is_inner: bool = False
 
     @property
@@ -107,7 +107,7 @@ class Arm:
         return (self.item,)
 
 
-LegForm = Rod | Pivot | KeptAxis | Arm
+LegForm = Rod | Pivot | KeptAxis | RedundantJoint
 
 
 def keeps_from_spinning(rod: Rod) -> bool:
@@ -124,8 +124,8 @@ def told_places(form: LegForm) -> Iterator[tuple[Item, int]]:
     """Items whose coordinates a leg tells, each with its place in the leg's values."""
     if isinstance(form, KeptAxis):
         return
-    if isinstance(form, Arm):
-        if form.twin is None:
+    if isinstance(form, RedundantJoint):
+        if form.mirror_of is None:
             yield form.item, K.Q_PROXIMAL
         return
     if isinstance(form, Pivot):

@@ -13,7 +13,7 @@ from ..description.mechanism import Mechanism
 from ..kernels.legs import records as K
 from ..rotations import square_to
 from .items import Item
-from .leg_forms import Arm, KeptAxis, LegForm, Pivot, Rod, keeps_from_spinning
+from .leg_forms import KeptAxis, LegForm, Pivot, RedundantJoint, Rod, keeps_from_spinning
 
 _ENDINGS = {"weld": K.WELD, "hinge": K.HINGE, "cross": K.CROSS, "triple": K.TRIPLE, "ball": K.BALL}
 _PROXIMAL = {"R": K.CRANK, "P": K.CARRIAGE}
@@ -23,10 +23,10 @@ def leg_records(mechanism: Mechanism, forms: Sequence[LegForm]) -> Records:
     """A record of `LEG` for each leg."""
     legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
     _put_frames(legs, forms)
-    _put_facing(legs, forms)
+    _put_orienting(legs, forms)
     counts = row_counts(legs)
     legs["first_row"] = [0, *accumulate(counts)][:-1]
-    legs["bears"] = _bear(legs, counts)
+    legs["has_rows"] = _note_rows(legs, counts)
     return legs
 
 
@@ -37,7 +37,7 @@ def row_counts(legs: Records) -> list[int]:
         if leg["kind"] == K.PIVOT:
             counts.append(int(3 - leg["slides"] + leg["axis_rows"]))
             continue
-        if leg["kind"] == K.ARM:
+        if leg["kind"] == K.REDUNDANT:
             counts.append(0)
             continue
         is_rigid = not leg["slides"] and leg["proximal"] in (K.NO_PROXIMAL, K.SHARED)
@@ -46,13 +46,13 @@ def row_counts(legs: Records) -> list[int]:
     return counts
 
 
-def _bear(legs: Records, counts: Sequence[int]) -> list[bool]:
+def _note_rows(legs: Records, counts: Sequence[int]) -> list[bool]:
     """Whether each leg, or a rod on its carrier, leaves a constraint: these follow the leg that has the carrier. Of an
     arm, whether a leg on it does."""
     mains = np.maximum.accumulate(np.where(legs["proximal"] != K.SHARED, np.arange(len(legs)), 0))
     bear = [bool(np.sum(np.array(counts)[mains == main])) for main in mains]
     for k in range(len(legs) - 1, -1, -1):
-        for arm in (legs["arm"][k], legs["twin"][k]):
+        for arm in (legs["redundant"][k], legs["mirror_of"][k]):
             if arm >= 0:
                 bear[arm] |= bear[k]
     return bear
@@ -61,27 +61,29 @@ def _bear(legs: Records, counts: Sequence[int]) -> list[bool]:
 def _put_frames(legs: Records, forms: Sequence[LegForm]) -> None:
     """Number the frames, see `kernels.legs.frames`, and the coordinates of arms."""
     numbers = {id(form): k for k, form in enumerate(forms)}
-    legs["arm"] = [-1 if form.on is None else numbers[id(form.on)] for form in forms]
-    twins = [form.twin if isinstance(form, Arm) else None for form in forms]
-    legs["twin"] = [-1 if twin is None else numbers[id(twin)] for twin in twins]
-    arms = legs["kind"] == K.ARM
-    own = arms & (legs["twin"] < 0)
-    legs["makes"][arms], legs["column"][own] = K.FIXED + np.arange(arms.sum()), np.arange(own.sum())
-    legs["column"][arms & ~own] = legs["column"][legs["twin"][arms & ~own]]
+    legs["redundant"] = [-1 if form.on is None else numbers[id(form.on)] for form in forms]
+    mirrors = [form.mirror_of if isinstance(form, RedundantJoint) else None for form in forms]
+    legs["mirror_of"] = [-1 if mirror_of is None else numbers[id(mirror_of)] for mirror_of in mirrors]
+    redundant = legs["kind"] == K.REDUNDANT
+    own = redundant & (legs["mirror_of"] < 0)
+    legs["makes"][redundant], legs["column"][own] = K.FIXED + np.arange(redundant.sum()), np.arange(own.sum())
+    legs["column"][redundant & ~own] = legs["column"][legs["mirror_of"][redundant & ~own]]
     for leg, form in zip(legs, forms, strict=True):
-        own = isinstance(form, Arm) and form.is_inner
-        leg["inner"] = own or (leg["arm"] >= 0 and legs["inner"][leg["arm"]])
+        own = isinstance(form, RedundantJoint) and form.is_inner
+        leg["inner"] = own or (leg["redundant"] >= 0 and legs["inner"][leg["redundant"]])
     legs["frame"] = np.where(
-        legs["arm"] >= 0, legs["makes"][legs["arm"]], np.where(legs["inner"], K.FROM_ITSELF, legs["reversed"])
+        legs["redundant"] >= 0,
+        legs["makes"][legs["redundant"]],
+        np.where(legs["inner"], K.FROM_ITSELF, legs["reversed"]),
     )
 
 
-def _put_facing(legs: Records, forms: Sequence[LegForm]) -> None:
+def _put_orienting(legs: Records, forms: Sequence[LegForm]) -> None:
     """Which arms have the rod after them face its head, and which of two solutions is home's."""
     for k, (form, after) in enumerate(pairwise(forms)):
-        if isinstance(form, Arm) and form.faces and isinstance(after, Rod):
+        if isinstance(form, RedundantJoint) and form.faces and isinstance(after, Rod):
             across = np.cross(form.item.axis, after.foot_ending.items[0].axis)
-            legs["by_plane"][k] = 1
+            legs["orients"][k] = 1
             if form.item.kind == "R":
                 legs["side"][k] = -math.copysign(1.0, across @ (after.head - form.item.point))
 
@@ -89,8 +91,8 @@ def _put_facing(legs: Records, forms: Sequence[LegForm]) -> None:
 def _record(mechanism: Mechanism, form: LegForm) -> Records:
     if isinstance(form, Rod):
         return _rod_record(mechanism, form)
-    if isinstance(form, Arm):
-        return _arm_record(mechanism, form)
+    if isinstance(form, RedundantJoint):
+        return _redundant_record(mechanism, form)
     return _pivot_record(mechanism, form) if isinstance(form, Pivot) else _kept_axis_record(form)
 
 
@@ -136,9 +138,9 @@ def _kept_axis_record(form: KeptAxis) -> Records:
     return record
 
 
-def _arm_record(mechanism: Mechanism, arm: Arm) -> Records:
+def _redundant_record(mechanism: Mechanism, arm: RedundantJoint) -> Records:
     record, point = np.zeros((), K.LEG), arm.item.point
-    record["kind"], record["reversed"], record["at_head"] = K.ARM, arm.is_reversed, arm.at_head
+    record["kind"], record["reversed"], record["at_head"] = K.REDUNDANT, arm.is_reversed, arm.at_head
     record["proximal"], record["proximal_axis"] = _PROXIMAL[arm.item.kind], arm.item.axis
     record["proximal_point"] = _head_point(mechanism, point, arm.is_reversed) if arm.at_head else point
     return record

@@ -18,7 +18,7 @@ from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
 from .decompose import decompose
 from .items import Item, NoLeg
-from .leg_forms import Arm, LegForm, Rod, told_places
+from .leg_forms import LegForm, RedundantJoint, Rod, told_places
 from .leg_records import leg_records, row_counts
 from .stations import legs_of_sub_chain
 
@@ -60,26 +60,28 @@ class LegTable:
         return np.array(self.legs["side"], dtype=float)[None]
 
     @cached_property
-    def arms(self) -> Records:
+    def redundant(self) -> Records:
         """The coordinates of arms; their columns count them."""
-        arms: Records = self.known[self.legs["kind"][self.known["leg"]] == K.ARM]
-        arms["column"] = np.arange(len(arms))
-        return arms
+        redundant: Records = self.known[self.legs["kind"][self.known["leg"]] == K.REDUNDANT]
+        redundant["column"] = np.arange(len(redundant))
+        return redundant
 
     @property
-    def arm_joints(self) -> tuple[str, ...]:
+    def redundant_joints(self) -> tuple[str, ...]:
         """Names of the joints that are arms."""
-        return tuple(form.item.joint.name for form in self.forms if isinstance(form, Arm) and form.twin is None)
+        return tuple(
+            form.item.joint.name for form in self.forms if isinstance(form, RedundantJoint) and form.mirror_of is None
+        )
 
     @cached_property
-    def led_arms(self) -> Records:
+    def implicit_joints(self) -> Records:
         """The coordinates of those arms that stand in the place of a side."""
-        return np.asarray(self.arms[self.legs["by_plane"][self.arms["leg"]] == 0])
+        return np.asarray(self.redundant[self.legs["orients"][self.redundant["leg"]] == 0])
 
     @cached_property
-    def has_free_arms(self) -> bool:
+    def has_free_redundant(self) -> bool:
         """Whether poses leave arms open; else they follow by what the legs on them ask for."""
-        return len(self.arms) > 0 and not self.task["arms"][0]
+        return len(self.redundant) > 0 and not self.task["redundant"][0]
 
     @cached_property
     def has_sides(self) -> bool:
@@ -94,17 +96,17 @@ class LegTable:
     @cached_property
     def is_completed(self) -> bool:
         """Whether some of the pose, or of the arms, follows from where it was."""
-        return self.is_partial or self.leads_arms
+        return self.is_partial or self.has_implicit_joints
 
     @cached_property
-    def leads_arms(self) -> bool:
+    def has_implicit_joints(self) -> bool:
         """Whether some arms follow from where they were."""
-        return bool(self.task["led"][0])
+        return bool(self.task["implicit"][0])
 
     @cached_property
     def leaves_open(self) -> bool:
         """Whether task and legs do not tell all of a pose, or arms are led."""
-        return self.leads_arms or bool((self.task["unset"] + self.task["arms"] > self.task["rows"])[0])
+        return self.has_implicit_joints or bool((self.task["unset"] + self.task["redundant"] > self.task["rows"])[0])
 
     @cached_property
     def is_for_blocks(self) -> bool:
@@ -134,9 +136,9 @@ def leg_table(mechanism: Mechanism) -> LegTable | str:
 def table_of_poses(mechanism: Mechanism) -> LegTable | str:
     """A mechanism's table of legs if a pose leaves none of their limits open, or the reason why it has none."""
     table = leg_table(mechanism)
-    if isinstance(table, str) or not table.has_free_arms:
+    if isinstance(table, str) or not table.has_free_redundant:
         return table
-    return f"poses leave joints {', '.join(table.arm_joints)} open"
+    return f"poses leave joints {', '.join(table.redundant_joints)} open"
 
 
 def legs_answer(mechanism: Mechanism) -> bool:
@@ -263,7 +265,7 @@ def _task(mechanism: Mechanism, legs: Records) -> Records:
     if mechanism.end_effector_is_joint:  # it has no orientation: home's
         task["rotations"] = 0
     task["rows"], task["farthest"] = sum(row_counts(legs)), COMPLETED_WITHIN
-    arms = legs[(legs["kind"] == K.ARM) & (legs["twin"] < 0)]
-    task["arms"] = len(arms) if arms["bears"].any() else 0
-    task["led"] = bool((arms["bears"] & (arms["by_plane"] == 0)).any())
+    redundant = legs[(legs["kind"] == K.REDUNDANT) & (legs["mirror_of"] < 0)]
+    task["redundant"] = len(redundant) if redundant["has_rows"].any() else 0
+    task["implicit"] = bool((redundant["has_rows"] & (redundant["orients"] == 0)).any())
     return task

@@ -29,9 +29,19 @@ from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .decompose import Part, Split, SubChain
 from .items import HAS_LOOP, NO_AXIS, Item, NoLeg, are_parallel, area, items_of
-from .leg_forms import Arm, Ending, EndingKind, KeptAxis, LegForm, Pivot, Rod, keeps_from_spinning, told_places
+from .leg_forms import (
+    Ending,
+    EndingKind,
+    KeptAxis,
+    LegForm,
+    Pivot,
+    RedundantJoint,
+    Rod,
+    keeps_from_spinning,
+    told_places,
+)
 
-MOST_HINGES, MOST_ARMS = 3, 3
+MOST_HINGES, MOST_REDUNDANT = 3, 3
 """Hinges of the largest ending, and arms of a chain."""
 
 
@@ -55,12 +65,12 @@ def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
     raise NoLeg(HAS_LOOP)
 
 
-def put_on(arm: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
+def put_on(arm: RedundantJoint | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
     """Legs that are on an arm, those of them that are on none yet."""
     placed: dict[int, LegForm] = {}
     for leg in legs:
         on = arm if leg.on is None else placed[id(leg.on)]
-        assert on is None or isinstance(on, Arm)
+        assert on is None or isinstance(on, RedundantJoint)
         placed[id(leg)] = replace(leg, on=on)
     return tuple(placed.values())
 
@@ -70,14 +80,14 @@ def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
     trunk = items_of(mechanism, chain.trunk)
     first, *others = (items_of(mechanism, branch) for branch in chain.branches)
     if any(item.kind == "P" for item in first):
-        return _on_arms(trunk, (first, *others), is_reversed=False)
+        return _on_redundant(trunk, (first, *others), is_reversed=False)
     if len(trunk) != 1:
         raise NoLeg("several joints carry its branches")
     main = _rod(trunk[0], first, is_reversed=False)
     rods = [_rod(None, other, is_reversed=False) for other in others]
     if _are_alike((main, *rods)):
         return (main, *(replace(rod, is_shared=True) for rod in rods))
-    arm = Arm(trunk[0], is_reversed=False)
+    arm = RedundantJoint(trunk[0], is_reversed=False)
     return (arm, *put_on(arm, (replace(main, proximal=None), *rods)))
 
 
@@ -91,19 +101,19 @@ def _are_alike(rods: Sequence[Rod]) -> bool:
     return bool(np.ptp(lines, axis=0).max() <= TOLERANCES.nearly_implied)
 
 
-def _on_arms(trunk: Sequence[Item], branches: Sequence[list[Item]], is_reversed: bool) -> tuple[LegForm, ...]:
+def _on_redundant(trunk: Sequence[Item], branches: Sequence[list[Item]], is_reversed: bool) -> tuple[LegForm, ...]:
     """Sliding rods on arms: the platform is anywhere, wherever those are."""
-    if len(trunk) > MOST_ARMS or any(item.kind == "S" for item in trunk):
+    if len(trunk) > MOST_REDUNDANT or any(item.kind == "S" for item in trunk):
         raise NoLeg("several joints carry its branches")
     rods = [_rod(None, branch, is_reversed) for branch in branches]
     for rod in rods:
         ends = rod.foot_ending, rod.head_ending
         if rod.slide is None or any(end.kind == "hinge" for end in ends) or keeps_from_spinning(rod):
             raise NoLeg("arms carry rods that do not let the platform go wherever it may be wanted")
-    arms: list[Arm] = []
+    redundant: list[RedundantJoint] = []
     for item in trunk:
-        arms.append(Arm(item, is_reversed, on=arms[-1] if arms else None))
-    return (*arms, *put_on(arms[-1], rods))
+        redundant.append(RedundantJoint(item, is_reversed, on=redundant[-1] if redundant else None))
+    return (*redundant, *put_on(redundant[-1], rods))
 
 
 def _with_parallelogram(mechanism: Mechanism, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
@@ -189,11 +199,11 @@ def _leg(items: list[Item]) -> tuple[LegForm, ...]:
             return legs
         untold = untold or legs
     if untold is None:
-        raise NoLeg(reasons[WITHOUT_ARMS - 1])
+        raise NoLeg(reasons[WITHOUT_REDUNDANT - 1])
     return untold
 
 
-WITHOUT_ARMS = 8
+WITHOUT_REDUNDANT = 8
 """Readings without arms."""
 
 
@@ -202,13 +212,13 @@ def _readings(items: list[Item]) -> Iterator[Callable[[], tuple[LegForm, ...]]]:
     ways = (items, False), ([item.back for item in items[::-1]], True)
     for n_carriers, (own, is_reversed), make in product((0, 1), ways, (_pivot, _rod_alone)):
         yield partial(make, own, n_carriers, is_reversed)
-    for make_on, (own, is_reversed), n_carriers in product((_facing, _led), ways, (0, 1)):
+    for make_on, (own, is_reversed), n_carriers in product((_orienting, _led), ways, (0, 1)):
         yield partial(make_on, own, n_carriers, is_reversed)
-    for n_arms, (own, is_reversed) in product(range(1, MOST_ARMS + 1), ways):
-        yield partial(_on_arms, own[:n_arms], [own[n_arms:]], is_reversed)
+    for n_arms, (own, is_reversed) in product(range(1, MOST_REDUNDANT + 1), ways):
+        yield partial(_on_redundant, own[:n_arms], [own[n_arms:]], is_reversed)
 
 
-def _facing(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm, ...]:
+def _orienting(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm, ...]:
     """A rod on an arm that turns, or shifts, the plane across the hinge at its foot to where the head is."""
     arm, rod = items[0], _rod_on(items[1:], n_carriers, is_reversed)
     if arm.kind == "S" or rod.foot_ending.kind != "hinge" or (rod.proximal is None and rod.slide is None):
@@ -221,7 +231,7 @@ def _facing(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegF
         off = area(rod.proximal.axis, axis) if rod.proximal.kind == "R" else abs(rod.proximal.axis @ axis)
         if off > TOLERANCES.implied:
             raise NoLeg("several joints carry its rod")
-    under = Arm(arm, is_reversed, faces=True)
+    under = RedundantJoint(arm, is_reversed, faces=True)
     return under, *put_on(under, [rod])
 
 
@@ -236,7 +246,7 @@ def _led(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm
     asks = len(hinges) + keeps_from_spinning(rod)
     if items[0].kind == "S" or asks == 0 or (n_carriers == 1 and asks > 1):
         raise NoLeg("several joints carry its rod")
-    under = Arm(items[0], is_reversed)
+    under = RedundantJoint(items[0], is_reversed)
     return under, *put_on(under, [rod])
 
 

@@ -32,22 +32,22 @@ def at_rest(table: LegTable, sides: Floats) -> Resting | None:
     None if they are not all such legs, a task leaves something open, or an arm is beyond its range.
     """
     legs = table.legs
-    arms = legs["kind"] == K.ARM
-    is_otherwise = (legs["frame"] != K.FROM_BASE) & (legs["arm"] < 0) & ~arms
-    is_otherwise |= (legs["at_head"] == 1) | (legs["by_plane"] == 1) | (legs["reversed"] == 1) | (legs["inner"] == 1)
+    redundant = legs["kind"] == K.REDUNDANT
+    is_otherwise = (legs["frame"] != K.FROM_BASE) & (legs["redundant"] < 0) & ~redundant
+    is_otherwise |= (legs["at_head"] == 1) | (legs["orients"] == 1) | (legs["reversed"] == 1) | (legs["inner"] == 1)
     if table.task["unset"][0] or is_otherwise.any() or legs["head_aimed"].any() or not _are_within(table, sides):
         return None
     moved = _moved(legs, sides)
-    of_arms = {name: arms[getattr(table, name)["leg"]] for name in ("limited", "cones", "driven", "known")}
-    numbers = np.cumsum(~arms) - 1
+    of_arms = {name: redundant[getattr(table, name)["leg"]] for name in ("limited", "cones", "driven", "known")}
+    numbers = np.cumsum(~redundant) - 1
     parts = {name: getattr(table, name)[~own] for name, own in of_arms.items()}
     cones = parts["cones"]
     axes = np.einsum("nij,nj->ni", moved[cones["leg"], :3, :3], cones["axis"])
     cones["axis"] = np.where((cones["place"] == K.FOOT_LINE)[:, None], axes, cones["axis"])
     for part in parts.values():
         part["leg"] = numbers[part["leg"]]
-    standing = _standing(legs, moved)[~arms]
-    forms = tuple(form for form, is_arm in zip(table.forms, arms, strict=True) if not is_arm)
+    standing = _standing(legs, moved)[~redundant]
+    forms = tuple(form for form, is_arm in zip(table.forms, redundant, strict=True) if not is_arm)
     resting = replace(table, forms=forms, legs=standing, aimed=standing, limits=(), **parts)
     if not resting.is_for_blocks:
         return None
@@ -58,7 +58,7 @@ def at_rest(table: LegTable, sides: Floats) -> Resting | None:
 
 def _are_within(table: LegTable, sides: Floats) -> bool:
     """Whether arms are within their ranges."""
-    own = table.limited[table.legs["kind"][table.limited["leg"]] == K.ARM]
+    own = table.limited[table.legs["kind"][table.limited["leg"]] == K.REDUNDANT]
     values = own["sense"] * sides[own["leg"]]
     return bool(((own["lo"] <= values) & (values <= own["hi"])).all())
 
@@ -68,12 +68,12 @@ def _moved(legs: Records, sides: Floats) -> Floats:
     moved = np.repeat(np.eye(4)[None], len(legs), axis=0)
     for k, leg in enumerate(legs):
         own = np.eye(4)
-        if leg["kind"] == K.ARM and leg["proximal"] == K.CRANK:
+        if leg["kind"] == K.REDUNDANT and leg["proximal"] == K.CRANK:
             own[:3, :3] = from_rotvec(sides[k] * leg["proximal_axis"])
             own[:3, 3] = leg["proximal_point"] - own[:3, :3] @ leg["proximal_point"]
-        elif leg["kind"] == K.ARM:
+        elif leg["kind"] == K.REDUNDANT:
             own[:3, 3] = sides[k] * leg["proximal_axis"]
-        moved[k] = moved[leg["arm"]] @ own if leg["arm"] >= 0 else own
+        moved[k] = moved[leg["redundant"]] @ own if leg["redundant"] >= 0 else own
     return moved
 
 
@@ -85,5 +85,5 @@ def _standing(legs: Records, moved: Floats) -> Records:
     for name in ("proximal_axis", "crank", "crank_across", "line"):
         legs[name] = np.einsum("nij,nj->ni", rotations, legs[name])
     legs["foot_axes"] = np.einsum("nij,nkj->nki", rotations, legs["foot_axes"])
-    legs["arm"], legs["frame"] = -1, K.FROM_BASE
+    legs["redundant"], legs["frame"] = -1, K.FROM_BASE
     return legs

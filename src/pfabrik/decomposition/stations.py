@@ -15,11 +15,11 @@ from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism
 from .decompose import SubChain, parts_between
 from .items import HAS_LOOP, Item, NoLeg, items_of
-from .leg_forms import Arm, LegForm
+from .leg_forms import LegForm, RedundantJoint
 from .legs import legs_of_chain, put_on, rigid_rod
 from .stages import graph_of
 
-MEETING, MOST_ARMS = 3, 4
+MEETING, MOST_REDUNDANT = 3, 4
 """Joints of a body where legs meet, and arms of a sub-chain: one with more is a linkage, in which searches get lost."""
 
 
@@ -41,11 +41,11 @@ def legs_of_sub_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, .
 def _between_stations(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
     graph, names = graph_of(mechanism), frozenset(chain.joints)
     edges = [edge for edge in graph.edges if edge.joint.name in names]
-    below, base, edges = _arms_in_series(mechanism, edges, graph.base)
+    below, base, edges = _redundant_in_series(mechanism, edges, graph.base)
     above, edges = _stations(mechanism, edges, base, graph.end, below[-1] if below else None)
     if not below and not above:
         raise NoLeg(HAS_LOOP)
-    if len(below) + len(above) > MOST_ARMS:
+    if len(below) + len(above) > MOST_REDUNDANT:
         raise NoLeg("more arms carry its legs than are answered for")
     found: list[LegForm] = [*below, *above.values()]
     for group in components(edges, base, graph.end, *above):
@@ -67,45 +67,52 @@ def _between_stations(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, .
     return tuple(found)
 
 
-def _arms_in_series(mechanism: Mechanism, edges: Sequence[Edge], base: str) -> tuple[list[Arm], str, list[Edge]]:
+def _redundant_in_series(
+    mechanism: Mechanism, edges: Sequence[Edge], base: str
+) -> tuple[list[RedundantJoint], str, list[Edge]]:
     """The hinges and slides that all ways from the base pass first, the body beyond, and the edges that are left."""
-    arms: list[Arm] = []
+    redundant: list[RedundantJoint] = []
     left = list(edges)
     while True:
         own = [edge for edge in left if base in edge.bodies]
         items = _passed(mechanism, own[0], base) if len(own) == 1 else []
-        if not _is_arm(items):
-            return arms, base, left
-        arms.append(Arm(items[0], is_reversed=False, on=arms[-1] if arms else None))
+        if not _is_redundant(items):
+            return redundant, base, left
+        redundant.append(RedundantJoint(items[0], is_reversed=False, on=redundant[-1] if redundant else None))
         left.remove(own[0])
         base = own[0].other(base)
 
 
 def _stations(
-    mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str, below: Arm | None
-) -> tuple[dict[str, Arm], list[Edge]]:
+    mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str, below: RedundantJoint | None
+) -> tuple[dict[str, RedundantJoint], list[Edge]]:
     """The arms that place stations, and the bodies on the way to them, in order from the platform; the edges left."""
     ways: dict[str, tuple[tuple[Edge, str], ...]] = {end: ()}
     bodies = [end]
     for body in bodies:  # grows while it is looked through
         for edge in edges:
             other = edge.other(body)
-            if body in edge.bodies and other != base and other not in ways and _is_arm(_passed(mechanism, edge, body)):
+            if (
+                body in edge.bodies
+                and other != base
+                and other not in ways
+                and _is_redundant(_passed(mechanism, edge, body))
+            ):
                 ways[other] = (*ways[body], (edge, other))
                 bodies.append(other)
-    arms: dict[str, Arm] = {}
+    redundant: dict[str, RedundantJoint] = {}
     left = list(edges)
     for body in bodies[1:]:
         if sum(body in edge.bodies for edge in edges) < MEETING:
             continue
         before, on = end, below
         for edge, other in ways[body]:
-            if other not in arms:
+            if other not in redundant:
                 item = _passed(mechanism, edge, before)[0]
-                arms[other] = Arm(item, is_reversed=False, at_head=True, on=on)
+                redundant[other] = RedundantJoint(item, is_reversed=False, at_head=True, on=on)
                 left.remove(edge)
-            before, on = other, arms[other]
-    return arms, left
+            before, on = other, redundant[other]
+    return redundant, left
 
 
 def _passed(mechanism: Mechanism, edge: Edge, body: str) -> list[Item]:
@@ -113,34 +120,38 @@ def _passed(mechanism: Mechanism, edge: Edge, body: str) -> list[Item]:
     return items_of(mechanism, [Step(edge.joint, edge.bodies[0] == body)])
 
 
-def _is_arm(items: Sequence[Item]) -> bool:
+def _is_redundant(items: Sequence[Item]) -> bool:
     return len(items) == 1 and items[0].kind != "S"
 
 
-def _from_platform(below: Sequence[Arm], outer: Arm | None, legs: Sequence[LegForm]) -> tuple[LegForm, ...]:
+def _from_platform(
+    below: Sequence[RedundantJoint], outer: RedundantJoint | None, legs: Sequence[LegForm]
+) -> tuple[LegForm, ...]:
     """Legs read from the platform, or a body that its arms place, on twins of these arms and of those below."""
-    twins = _twins(_way_to(outer), below, is_inner=False) if legs else []
-    return *twins, *put_on(twins[-1] if twins else None, legs)
+    mirrors = _mirrors(_way_to(outer), below, is_inner=False) if legs else []
+    return *mirrors, *put_on(mirrors[-1] if mirrors else None, legs)
 
 
-def _rod_between(inner: Arm | None, outer: Arm, items: list[Item]) -> tuple[LegForm, ...]:
+def _rod_between(inner: RedundantJoint | None, outer: RedundantJoint, items: list[Item]) -> tuple[LegForm, ...]:
     """A rod between two bodies that arms place, the inner one maybe the platform, on twins of these arms."""
-    twins = _twins(_way_to(inner), _way_to(outer), is_inner=True)
-    return *twins, replace(rigid_rod(items), on=twins[-1])
+    mirrors = _mirrors(_way_to(inner), _way_to(outer), is_inner=True)
+    return *mirrors, replace(rigid_rod(items), on=mirrors[-1])
 
 
-def _twins(feet: Sequence[Arm], heads: Sequence[Arm], is_inner: bool) -> list[Arm]:
+def _mirrors(feet: Sequence[RedundantJoint], heads: Sequence[RedundantJoint], is_inner: bool) -> list[RedundantJoint]:
     """Arms with the coordinates of others, that move the body of the feet, then that of the heads."""
-    twins: list[Arm] = []
+    mirrors: list[RedundantJoint] = []
     for arm, at_head in (*((each, False) for each in feet), *((each, True) for each in heads)):
-        on = twins[-1] if twins else None
-        twins.append(Arm(arm.item, is_reversed=True, at_head=at_head, on=on, twin=arm, is_inner=is_inner))
-    return twins
+        on = mirrors[-1] if mirrors else None
+        mirrors.append(
+            RedundantJoint(arm.item, is_reversed=True, at_head=at_head, on=on, mirror_of=arm, is_inner=is_inner)
+        )
+    return mirrors
 
 
-def _way_to(arm: Arm | None) -> list[Arm]:
+def _way_to(arm: RedundantJoint | None) -> list[RedundantJoint]:
     """The arms of the platform that place a body, in order from the platform."""
-    way: list[Arm] = []
+    way: list[RedundantJoint] = []
     while arm is not None and arm.at_head:
         way.append(arm)
         arm = arm.on

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Record
-from ..decomposition.leg_forms import Arm, Rod
+from ..decomposition.leg_forms import RedundantJoint, Rod
 from ..decomposition.leg_records import row_counts
 from ..decomposition.leg_table import LegTable, table_of_poses
 from ..description.mechanism import Mechanism
@@ -87,9 +87,11 @@ class Machine:
         self.mechanism, self.limits, self.cones = mechanism, table.limits, table.cones
         task = table.task[0]
         self.axes, self.rotations, self.unset = task["axes"].tolist(), int(task["rotations"]), int(task["unset"])
-        self.n_arms, self.leads_arms = len(table.arms), table.leads_arms
-        if self.leads_arms and generic_of(mechanism).home_is_singular:
-            reason = f"its loops are singular at home, where joints {', '.join(table.arm_joints)} follow from no pose"
+        self.n_arms, self.has_implicit_joints = len(table.redundant), table.has_implicit_joints
+        if self.has_implicit_joints and generic_of(mechanism).home_is_singular:
+            reason = (
+                f"its loops are singular at home, where joints {', '.join(table.redundant_joints)} follow from no pose"
+            )
             raise UnsupportedMechanism(mechanism.name, [reason], "exported")
         self.legs = _legs(mechanism, table)
         ordered = table.driven[np.argsort(table.driven["column"])]
@@ -100,7 +102,7 @@ class Machine:
     @property
     def completes(self) -> bool:
         """Whether more follows from a target than the coordinates of its legs."""
-        return self.unset > 0 or self.leads_arms
+        return self.unset > 0 or self.has_implicit_joints
 
     @property
     def n_frames(self) -> int:
@@ -147,7 +149,7 @@ def _legs(mechanism: Mechanism, table: LegTable) -> list[Leg]:
         if isinstance(form, Rod):
             numbers = _rod_numbers(form, record, length)
         else:
-            numbers = (_arm_numbers if isinstance(form, Arm) else _pivot_numbers)(record, length)
+            numbers = (_arm_numbers if isinstance(form, RedundantJoint) else _pivot_numbers)(record, length)
         legs.append(Leg(main, record, numbers, tuple(dict.fromkeys(item.joint.name for item in form.items))))
     return legs
 

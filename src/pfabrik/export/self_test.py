@@ -66,7 +66,7 @@ def _are_all_answers(machine: Machine, targets: Floats, found: Solution, kept: M
     """Whether no other answer to targets (n,) is within limits than those found: from home, and where arms follow from
     where they were, from the answers kept where each actuator is least, and where it is most."""
     starts: list[Floats | None] = [None]
-    if machine.leads_arms and kept.any():
+    if machine.has_implicit_joints and kept.any():
         ends = found.actuators[kept]
         some = np.flatnonzero(kept)[np.unique([ends.argmin(axis=0), ends.argmax(axis=0)])]
         starts += list(found.q[some])

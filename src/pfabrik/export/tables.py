@@ -14,7 +14,7 @@ from .machine import Coordinate, Leg, Machine
 from .self_test import Checks
 from .wording import ACCURACY, Precision, comment, literal, quoted
 
-KINDS = {K.ROD: "PFK_ROD", K.PIVOT: "PFK_PIVOT", K.ARM: "PFK_ARM"}
+KINDS = {K.ROD: "PFK_ROD", K.PIVOT: "PFK_PIVOT", K.REDUNDANT: "PFK_ARM"}
 FRAMES = {K.FROM_BASE: "PFK_FROM_BASE", K.FROM_PLATFORM: "PFK_FROM_PLATFORM", K.FROM_ITSELF: "PFK_FROM_ITSELF"}
 CARRIERS = {K.CRANK: "PFK_CRANK", K.CARRIAGE: "PFK_CARRIAGE", K.SHARED: "PFK_SHARED"}
 ENDINGS = {K.WELD: "PFK_WELD", K.HINGE: "PFK_HINGE", K.CROSS: "PFK_CROSS", K.TRIPLE: "PFK_TRIPLE", K.BALL: "PFK_BALL"}
@@ -32,15 +32,15 @@ def features(machine: Machine, parts: Sequence[str]) -> set[str]:
     completes = "ik" in parts and machine.completes
     asked: dict[str, object] = {
         "ARMS": machine.n_arms > 0,
-        "LED": machine.leads_arms,
+        "LED": machine.has_implicit_joints,
         "YAW": completes and machine.rotations == 1,
         "TURNS": "ik" in parts and any(each.may_turn for each in machine.driven),
         "PIVOTS": any(record["kind"] == K.PIVOT for record in records),
         "CONES": "limits" in parts and len(machine.cones) > 0,
         "TWISTS": any(record["twists"] for record in records),
         "COMPLETES": completes,
-        "LEADS": completes or machine.leads_arms,
-        "MOVES": completes or machine.leads_arms or "fk" in parts,
+        "LEADS": completes or machine.has_implicit_joints,
+        "MOVES": completes or machine.has_implicit_joints or "fk" in parts,
         "RESTS": "limits" in parts or (machine.n_arms and "fk" in parts) or ("ik" in parts and not completes),
         "SOLVES": machine.equations > 0 or "fk" in parts,
     }
@@ -89,7 +89,7 @@ def _numbers(machine: Machine, precision: Precision, parts: Sequence[str]) -> It
     yield f"#define PFK_DEAD {literal(accuracy.dead)}         /* square of the sine of an angle from a dead point */"
     yield f"#define PFK_RANK {literal(accuracy.rank)}         /* share of the largest that says nothing any more */"
     yield f"#define PFK_NO_ROTATION {literal(accuracy.rotation)}  /* deviation of a target from a rotation */"
-    near = 0.5 if machine.leads_arms else COMPLETED_WITHIN  # with arms there are more poses that close
+    near = 0.5 if machine.has_implicit_joints else COMPLETED_WITHIN  # with arms there are more poses that close
     yield f"#define PFK_NEAR {near}            /* what follows goes no farther at once [L or rad] */"
     yield f"#define PFK_FARTHEST {COMPLETED_WITHIN}        /* nor than this where nothing nearer closes */"
     yield "enum {"
@@ -100,7 +100,7 @@ def _numbers(machine: Machine, precision: Precision, parts: Sequence[str]) -> It
     yield f"    PFK_RANGES = {len(machine.limited)},"
     yield f"    PFK_CONES = {len(machine.cones)},"
     yield f"    PFK_ROTATIONS = {machine.rotations}, /* of the pose's three that the task sets */"
-    yield f"    PFK_WAYS = {6 if machine.leads_arms else 3}, /* in which a target is led to */"
+    yield f"    PFK_WAYS = {6 if machine.has_implicit_joints else 3}, /* in which a target is led to */"
     yield f"    PFK_TURNING = {int(turning)}, /* 0: the end effector is a point */"
     yield f"    PFK_OWN_ROWS = {machine.equations}, /* equations of the legs */"
     yield f"    PFK_ROWS = {machine.equations + machine.drive_equations * forward}, /* and of actuators */"
@@ -146,16 +146,16 @@ def _leg(leg: Leg, members: Mapping[str, str]) -> str:
     record = leg.record
     told = {"kind": KINDS[int(record["kind"])], "proximal": CARRIERS.get(int(record["proximal"]), "")}
     told["frame"] = FRAMES.get(int(record["frame"]), str(record["frame"]))
-    if record["kind"] != K.ARM:
+    if record["kind"] != K.REDUNDANT:
         told["foot_end"] = ENDINGS[int(record["foot"])]
     if record["kind"] == K.ROD:
         told["head_end"] = ENDINGS[int(record["head"])]
     whole = {name: record[name] for name in ("slides", "twists", "foot_aimed", "head_aimed", "upright")}
     whole |= {"main": leg.main, "is_back": record["reversed"], "pairs": record["axis_rows"]}
-    whole |= {"on": record["arm"] + 1, "is_inner": record["inner"]}
-    if record["kind"] == K.ARM:
-        whole |= {name: record[name] for name in ("makes", "column", "at_head", "by_plane", "bears")}
-        whole |= {"is_twin": record["twin"] >= 0}
+    whole |= {"on": record["redundant"] + 1, "is_inner": record["inner"]}
+    if record["kind"] == K.REDUNDANT:
+        whole |= {name: record[name] for name in ("makes", "column", "at_head", "orients", "has_rows")}
+        whole |= {"is_twin": record["mirror_of"] >= 0}
     told |= {name: str(int(value)) for name, value in whole.items() if value}
     told |= {name: literal(value) for name, value in leg.numbers.items() if np.any(value)}
     values = {name: told.pop(name, "") or zero for name, zero in members.items()}

@@ -80,10 +80,10 @@ def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Fl
     if isinstance(start, LegAnswers):
         return start.sides
     sides = np.repeat(table.home_sides, len(start), axis=0)
-    if len(table.led_arms):
-        arms = table.led_arms
-        columns = [table.known["column"][table.known["leg"] == k][0] for k in arms["leg"]]
-        sides[:, arms["leg"]] = arms["sense"] * start.coordinates[:, columns] / arms["unit"]
+    if len(table.implicit_joints):
+        redundant = table.implicit_joints
+        columns = [table.known["column"][table.known["leg"] == k][0] for k in redundant["leg"]]
+        sides[:, redundant["leg"]] = redundant["sense"] * start.coordinates[:, columns] / redundant["unit"]
     choosing = np.flatnonzero(table.home_sides[0])
     if not len(choosing):
         return sides
@@ -96,7 +96,7 @@ def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Fl
     else:
         present = start.coordinates
     turning = closure.turning[own] > 0.0
-    on_arms = table.legs["kind"][choosing] != K.ARM
+    on_arms = table.legs["kind"][choosing] != K.REDUNDANT
     for some in (~on_arms, on_arms):  # where arms are decides where the legs on them are
         off = []
         for factor in (1.0, -1.0):

@@ -58,7 +58,7 @@ def corners_of(mechanism: Mechanism) -> Starts:
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
     rng = np.random.default_rng(0)
-    is_many = table.leads_arms or len(_sided_pivots(table)) > 0
+    is_many = table.has_implicit_joints or len(_sided_pivots(table)) > 0
     near, beyond = (CORNERS_OF_MANY, BEYOND_OF_MANY) if is_many else (CORNERS, BEYOND)
     corners = _far_apart(home_start(mechanism, table), _drawn(mechanism, table, rng, DRAWS, FAR), near)
     others = _far_apart(corners, _drawn(mechanism, table, rng, DRAWS, FARTHER), beyond)
@@ -75,8 +75,8 @@ def assembled_otherwise(mechanism: Mechanism) -> Starts:
     table, corners = leg_table(mechanism), corners_of(mechanism)
     assert isinstance(table, LegTable)
     poses, length = in_lengths(corners.poses, mechanism.characteristic_length), mechanism.characteristic_length
-    rows, sides, arms = new_rows(mechanism, len(poses)), corners.sides.copy(), table.led_arms["leg"]
-    sides[:, arms] = table.home_sides[:, arms]
+    rows, sides, redundant = new_rows(mechanism, len(poses)), corners.sides.copy(), table.implicit_joints["leg"]
+    sides[:, redundant] = table.home_sides[:, redundant]
     answer(
         machine(table).address,
         poses,
@@ -104,7 +104,7 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     if not keeps_rotation(mechanism):
         poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
     q = np.zeros((n, len(table.legs)))
-    q_proximal = np.concatenate([proximal_coordinates(table), table.arms])
+    q_proximal = np.concatenate([proximal_coordinates(table), table.redundant])
     for proximal in q_proximal[_by_place(table, q_proximal["leg"])]:
         way = _way(table, proximal["leg"])
         ends = way * proximal["sense"] * np.clip([proximal["lo"], proximal["hi"]], -np.pi, np.pi)

@@ -200,7 +200,7 @@ def _toward_values(mechanism: Mechanism, corners: bool) -> NearestPose:
     return NearestPose(mechanism, table, (0.0,) * 6, settings, others, table.driven)
 
 
-def move_arms(
+def move_redundant(
     mechanism: Mechanism,
     table: LegTable,
     targets: Floats,
@@ -221,13 +221,13 @@ def move_arms(
     The rows for which there is such a place, and the poses that the searches ended at, (rows, 4, 4) [length].
     """
     own = starts_at(mechanism, table, begins if len(begins) == 1 else begins[places], sides[places])
-    found = _nearest_arms(mechanism, table, targets[places], own)
+    found = _nearest_redundant(mechanism, table, targets[places], own)
     placed = np.isfinite(found.distances)
     sides[places[placed]] = found.sides[placed]
     return places[placed], found.poses[placed]
 
 
-def _nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
+def _nearest_redundant(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
     """Feasible configurations at targets (n, 4, 4) [length] whose arms are near to where the starts (n,) have them.
 
     Searches start there alone: what they miss, projections from elsewhere find. Where one set of arms has no place the
@@ -240,10 +240,10 @@ def _nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: S
     best = new_found(len(targets), table)
     best.distances[:], best.sides[:] = 0.0, own.sides
     left = np.arange(len(targets))
-    for arms, legs, nearest_pose in _toward_arms(mechanism, table):
+    for redundant, legs, nearest_pose in _toward_redundant(mechanism, table):
         poses = own.poses if len(own.poses) == 1 else own.poses[left]
         begin = Starts(poses, np.ascontiguousarray(own.q[:, legs]), np.ascontiguousarray(own.sides[left][:, legs]))
-        values = np.ascontiguousarray(arms["sense"] * begin.sides[:, arms["leg"]])
+        values = np.ascontiguousarray(redundant["sense"] * begin.sides[:, redundant["leg"]])
         found = nearest_pose.find(targets[left], begin, values)
         best.distances[left] = np.maximum(best.distances[left], found.distances)
         best.poses[left], best.sides[left, legs] = found.poses, found.sides
@@ -252,28 +252,32 @@ def _nearest_arms(mechanism: Mechanism, table: LegTable, targets: Floats, own: S
 
 
 @lru_cache(maxsize=64)
-def _toward_arms(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, slice, NearestPose], ...]:
+def _toward_redundant(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, slice, NearestPose], ...]:
     """Searches for each set of arms at poses that are held: the arms, and which legs these are."""
     held = task_of(mechanism).held
     return tuple(
-        (part.arms, legs, NearestPose(mechanism, part, held, {"steps": MOST_STEPS}, no_starts(part), part.arms))
-        for part, legs in _apart_by_arms(table)
+        (
+            part.redundant,
+            legs,
+            NearestPose(mechanism, part, held, {"steps": MOST_STEPS}, no_starts(part), part.redundant),
+        )
+        for part, legs in _apart_by_redundant(table)
     )
 
 
-def _apart_by_arms(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
+def _apart_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
     """Tables of the legs on each set of arms, and which legs these are: they have nothing to do with each other where
     the pose is given; else all in one."""
     if table.task["unset"][0] > 0 or table.task["rows"][0] > 0:
         return ((table, slice(None)),)
     legs, parts = table.legs, []
-    starts = np.flatnonzero((legs["kind"] == K.ARM) & (legs["arm"] < 0)).tolist()
+    starts = np.flatnonzero((legs["kind"] == K.REDUNDANT) & (legs["redundant"] < 0)).tolist()
     for k, after in zip(starts, [*starts[1:], len(legs)], strict=True):
         end = k + 1
-        while end < after and legs[end]["arm"] >= k:
+        while end < after and legs[end]["redundant"] >= k:
             end += 1
         own_legs, before = legs[k:end].copy(), legs[k]["makes"] - 2
-        own_legs["arm"] -= np.where(own_legs["arm"] >= 0, k, 0)
+        own_legs["redundant"] -= np.where(own_legs["redundant"] >= 0, k, 0)
         own_legs["makes"] -= before
         own_legs["frame"] -= np.where(own_legs["frame"] >= 2, before, 0)
         own = {name: getattr(table, name) for name in ("limited", "cones", "known")}

@@ -71,13 +71,13 @@ class NearestPose:
         counted, rests = np.array(weights, dtype=float), keeps_rotation(mechanism)
         counted[3:] = LOCKED if rests else counted[3:]
         at_home = table.task[0]["rotations"] == 0 and counted[3] == LOCKED and searches
-        legs = without_idle_legs(table) if at_home and not len(table.arms) else machine_searched(table)
+        legs = without_idle_legs(table) if at_home and not len(table.redundant) else machine_searched(table)
         self._legs = legs if driven is None else Handle(legs.record._replace(driven=driven))
         cones = self._legs.record.cones
         minded = len(cones) if minds_aims or not searches else int((cones["leader"] != OF_AIMS).sum())
         own = np.zeros(1, SETTINGS)
         own["margin"], own["near"], own["cones"] = TOLERANCES.inside, TOLERANCES.active, minded
-        own["implied"] = 0 if len(table.arms) else implied_rows(mechanism)
+        own["implied"] = 0 if len(table.redundant) else implied_rows(mechanism)
         own["agreements"] = _agreements(table) if driven is None else AGREEMENTS_OF_VALUES
         for name, value in {"frame": task_of(mechanism).frame, **settings}.items():
             own[name] = value
@@ -150,7 +150,7 @@ def _agreements(table: LegTable) -> int:
     task = table.task[0]
     if table.leaves_open:
         return AGREEMENTS_OF_MANY
-    if task["rows"] > 0 or len(table.arms):
+    if task["rows"] > 0 or len(table.redundant):
         return AGREEMENTS
     q_proximal = table.legs["proximal"][proximal_coordinates(table)["leg"]]
     return (

@@ -31,7 +31,7 @@ class OneTarget:
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators = len(mechanism.actuator_names)
-        self._is_for_blocks, self._leads_arms = table.is_for_blocks, table.leads_arms
+        self._is_for_blocks, self._leads_arms = table.is_for_blocks, table.has_implicit_joints
         self._anywhere, self._nearby = machine(table), machine_nearby(table)
         self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
         self._resting = resting_at_home(table)

@@ -28,7 +28,7 @@ from ..tolerances import TOLERANCES
 from .answers import LegAnswers, begins_of, coordinates_of, sides_at
 from .coordinates import settled
 from .forward import assembled
-from .nearest import move_arms, weighed_limits
+from .nearest import move_redundant, weighed_limits
 from .nearest_pose import starts_at
 from .one import Ends, OneAssembly, OneTarget, new_scratch
 from .table import Machine, machine, machine_nearby, resting_at_home
@@ -74,7 +74,7 @@ class LegsEngine:
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
         first = self._sides_of(start)
         rows = self._one.new_rows() if is_one else new_rows(self.mechanism, len(targets))
-        ends = first.copy() if self._table.leads_arms else first
+        ends = first.copy() if self._table.has_implicit_joints else first
         if is_one and self._reach_one(targets, start, ends, keep_mode, rows):
             mechanism, table = self.mechanism, self._table
             begins, told = begins_of(mechanism, table, start, first), (rows.poses, rows.actuators, ends)
@@ -320,14 +320,14 @@ class LegsEngine:
         """
         begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
         asked = machine_nearby(self._table) if keep_mode else machine(self._table)
-        if self._table.leads_arms:
+        if self._table.has_implicit_joints:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
         left = 1 if tried else self._reach_as_they_are(start is None, asked, targets, begins, sides, rows)
         if left and self._table.is_for_blocks and self._table.task["unset"][0]:
             left -= self._complete(asked, targets, begins, sides, rows)
-        if left and self._table.has_free_arms:
+        if left and self._table.has_free_redundant:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
-            left -= self._reach_by_arms(asked, targets, begins, sides, rows)
+            left -= self._reach_by_redundant(asked, targets, begins, sides, rows)
             if left and start is not None and not keep_mode:
                 left -= self._reach_from_home(asked, targets, sides, rows)
         if start is not None:
@@ -344,10 +344,10 @@ class LegsEngine:
         rows.actuators[:] = resting.actuators
         return self._run(True, machine(resting.table), targets, begins, resting.table.home_sides, rows)
 
-    def _reach_by_arms(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
+    def _reach_by_redundant(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
         """Answer rows whose legs reach once arms have moved, and note where; how many these are."""
         before, rest = sides.copy(), np.flatnonzero(rows.status != REACHED)
-        some, poses = move_arms(self.mechanism, self._table, targets, begins, sides, rest)
+        some, poses = move_redundant(self.mechanism, self._table, targets, begins, sides, rest)
         if not len(some):
             return 0
         own, begins = rows_at(rows, some), poses
@@ -359,9 +359,9 @@ class LegsEngine:
 
     def _reach_from_home(self, asked: Machine, targets: Floats, sides: Floats, rows: Rows) -> int:
         """The same, with arms that start at home: from where they are, limits may be in the way."""
-        away, home, arms = rows.status != REACHED, sides.copy(), self._table.led_arms["leg"]
-        home[:, arms] = self._table.home_sides[:, arms]
-        n = self._reach_by_arms(asked, targets, self._one.home, home, rows)
+        away, home, redundant = rows.status != REACHED, sides.copy(), self._table.implicit_joints["leg"]
+        home[:, redundant] = self._table.home_sides[:, redundant]
+        n = self._reach_by_redundant(asked, targets, self._one.home, home, rows)
         found = away & (rows.status == REACHED)
         sides[found] = home[found]
         return n

@@ -29,10 +29,12 @@ def kernel_table(table: LegTable) -> K.Table:
     """The same records, with the unknown that the coordinate of each carrier, then of each arm, is."""
     columns = np.full(len(table.legs), -1)
     turned_by_proximal = (table.legs["kind"] == K.ROD) & np.isin(table.legs["proximal"], (K.CRANK, K.CARRIAGE))
-    arms, twins = ((table.legs["kind"] == K.ARM) & own for own in (table.legs["twin"] < 0, table.legs["twin"] >= 0))
-    own = np.concatenate([np.flatnonzero(turned_by_proximal), np.flatnonzero(arms)])
+    redundant, mirrors = (
+        (table.legs["kind"] == K.REDUNDANT) & own for own in (table.legs["mirror_of"] < 0, table.legs["mirror_of"] >= 0)
+    )
+    own = np.concatenate([np.flatnonzero(turned_by_proximal), np.flatnonzero(redundant)])
     columns[own] = 6 + np.arange(len(own))
-    columns[twins] = columns[table.legs["twin"][twins]]
+    columns[mirrors] = columns[table.legs["mirror_of"][mirrors]]
     return K.Table(table.legs, table.limited, table.cones, table.driven, table.known, table.task, columns)
 
 
@@ -93,4 +95,4 @@ def reading_of(table: LegTable) -> Scratch[Reading]:
 @lru_cache(maxsize=64)
 def resting_at_home(table: LegTable) -> Resting | None:
     """Legs as they stand while the arms that they are on are where they are at home."""
-    return at_rest(table, table.home_sides[0]) if table.has_free_arms else None
+    return at_rest(table, table.home_sides[0]) if table.has_free_redundant else None

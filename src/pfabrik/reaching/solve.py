@@ -19,7 +19,7 @@ from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import LOCKED
-from ..kernels.legs.records import ARM
+from ..kernels.legs.records import REDUNDANT
 from ..kernels.reaching import plan as P
 from ..kernels.rows import FAILED, ITERATIONS, REACHED, ROUNDS
 from ..kernels.threads import in_blocks
@@ -111,7 +111,7 @@ class ReachingEngine:
         if not isinstance(self._table, LegTable):
             return np.zeros((1, 0))
         legs, home = self._table.legs, self._table.home_sides
-        chosen = (legs["kind"] != ARM) | (legs["by_plane"] == 1)
+        chosen = (legs["kind"] != REDUNDANT) | (legs["orients"] == 1)
         return np.where(chosen, home if found is None else sides_at(self.mechanism, self._table, found), 0.0)
 
     def _tried(self, wanted: Floats, begin: Floats, options: Options, way: Way) -> Configurations:

@@ -14,10 +14,10 @@ from ..rotations import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..vectors import copy_row, cross, dot, norm, put, scale, vec, wrap_into
 from .endings import SURE
-from .frames import by_arm, coordinate_of, facing, new_frames, place_arm, set_frames
+from .frames import new_frames, orienting_coordinate, place_redundant, q_redundant_of, set_frames, slope_by_redundant
 from .pivots import any_across, pivot_rows, pivot_slopes, place_pivot
 from .poses import bring_yaw, load, turn_pose
-from .records import ARM, N_VALUES, PIVOT, ROD, SHARED, Table
+from .records import N_VALUES, PIVOT, REDUNDANT, ROD, SHARED, Table
 from .rods import place_rod, rod_rows, rod_slopes
 from .table import open_table
 
@@ -25,7 +25,7 @@ from .table import open_table
 # gap of a loop may be some times the constraint's.
 CLOSED, CLOSE = 1e-13, 1e-10
 # Newton steps that complete a pose: they take one to five; with arms that follow, more where these are nearly singular.
-MOST_STEPS, MOST_OF_ARMS = 8, 16
+MOST_STEPS, MOST_STEPS_IMPLICIT = 8, 16
 # What is added to the squares of unknowns, as a share of the largest: what constraints leave open stays where it is.
 LOOSE = 1e-12
 # Longest step [L or rad]: beyond, derivatives tell little.
@@ -52,7 +52,7 @@ class Completion(NamedTuple):
 @allocator
 def new_completion(table: Table) -> Completion:
     """Scratch memory of one thread."""
-    legs, m, arms = table.legs.shape[0], table.task[0]["rows"], table.task[0]["arms"]
+    legs, m, redundant = table.legs.shape[0], table.task[0]["rows"], table.task[0]["redundant"]
     return Completion(
         np.zeros((4, 4)),
         np.zeros(legs),
@@ -61,32 +61,32 @@ def new_completion(table: Table) -> Completion:
         np.zeros((legs, 3)),
         np.zeros((legs, 6)),
         np.zeros(m),
-        np.zeros((m, 6 + arms)),
+        np.zeros((m, 6 + redundant)),
         np.zeros((7, 6)),
-        np.zeros((7 + arms, 8 + arms)),
+        np.zeros((7 + redundant, 8 + redundant)),
     )
 
 
 @routine
 def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lines: Floats) -> tuple[float, float]:
     """Fill the values of all legs at a pose; how sure the least sure of all are, see `SURE`, and of those that bear."""
-    sure, bearing, main = 1.0, 1.0, 0
+    sure, margin_of_rows, main = 1.0, 1.0, 0
     for k in range(legs.shape[0]):
         leg = legs[k]
         frame, found = frames[leg["frame"]], 1.0
         main = main if leg["proximal"] == SHARED else k
         if leg["kind"] == PIVOT:
             found = place_pivot(leg, frame, sides[k], values[k])
-        elif leg["kind"] == ARM:
-            q = coordinate_of(legs, k, sides)
-            if leg["by_plane"] == 1:
-                q, found = facing(leg, legs[k + 1], frame, q)
-            place_arm(leg, q, frames, values[k])
+        elif leg["kind"] == REDUNDANT:
+            q = q_redundant_of(legs, k, sides)
+            if leg["orients"] == 1:
+                q, found = orienting_coordinate(leg, legs[k + 1], frame, q)
+            place_redundant(leg, q, frames, values[k])
         else:
             found = place_rod(leg, legs[main], frame, sides[k], values[main], values[k], lines[k])
         sure = min(sure, found)
-        bearing = min(bearing, found) if leg["bears"] == 1 else bearing
-    return sure, bearing
+        margin_of_rows = min(margin_of_rows, found) if leg["has_rows"] == 1 else margin_of_rows
+    return sure, margin_of_rows
 
 
 @routine
@@ -115,7 +115,7 @@ def put_slopes(
     for k in range(legs.shape[0]):
         leg = legs[k]
         main = main if leg["proximal"] == SHARED else k
-        if leg["bears"] == 0:
+        if leg["has_rows"] == 0:
             continue
         frame = frames[leg["frame"]]
         if leg["kind"] == PIVOT:
@@ -123,18 +123,18 @@ def put_slopes(
         elif leg["kind"] == ROD:
             rod_slopes(leg, legs[main], frame, values[main], values[k], lines[k], proximal_slopes[main], slopes)
         for row in range(leg["first_row"], end_of_rows(legs, k, slopes.shape[0])):
-            put_arm_slopes(legs, k, values, slopes[row])
+            put_redundant_slopes(legs, k, values, slopes[row])
 
 
 @routine
-def put_arm_slopes(legs: Records, k: int, values: Floats, slope: Floats) -> None:
+def put_redundant_slopes(legs: Records, k: int, values: Floats, slope: Floats) -> None:
     """Derivatives by the arms that a leg is on, from those by the pose."""
     for j in range(6, slope.shape[0]):
         slope[j] = 0.0
-    arm = legs[k]["arm"]
+    arm = legs[k]["redundant"]
     while arm >= 0:
-        slope[6 + legs[arm]["column"]] += by_arm(slope, values[arm])
-        arm = legs[arm]["arm"]
+        slope[6 + legs[arm]["column"]] += slope_by_redundant(slope, values[arm])
+        arm = legs[arm]["redundant"]
     if legs[k]["inner"] == 1:
         for j in range(6):
             slope[j] = 0.0
@@ -175,7 +175,7 @@ def newton_step(table: Table, scratch: Completion) -> float:
     where it cannot be."""
     task, pose, rows, slopes = table.task[0], scratch.pose, scratch.rows, scratch.slopes
     motions, normal, unset = scratch.motions, scratch.normal, task["unset"]
-    n = unset + task["arms"]
+    n = unset + task["redundant"]
     put_motions(task, pose, motions)
     for i in range(n):
         for j in range(n + 1):
@@ -211,9 +211,9 @@ def newton_step(table: Table, scratch: Completion) -> float:
     turn_pose(pose, scale(share, vec(twist[3:])))
     if task["rotations"] == 1:
         bring_yaw(pose, yaw)
-    for k in range(table.legs.shape[0] if task["led"] == 1 else 0):
+    for k in range(table.legs.shape[0] if task["implicit"] == 1 else 0):
         leg = table.legs[k]
-        if leg["kind"] == ARM and leg["by_plane"] == 0 and leg["twin"] < 0:
+        if leg["kind"] == REDUNDANT and leg["orients"] == 0 and leg["mirror_of"] < 0:
             scratch.sides[k] += share * normal[unset + leg["column"], n]
     return share * step
 
@@ -277,7 +277,7 @@ def answer(
         side = sides[row if sides.shape[0] > 1 else 0]
         if load(targets[row], begin, table.task[0], scratch.pose) and complete(table, side, scratch):
             status[row] = write_answer(table, scratch, poses[row], actuators[row], measures[row])
-            if table.task[0]["led"] == 1 and status[row] == REACHED:
+            if table.task[0]["implicit"] == 1 and status[row] == REACHED:
                 copy_row(scratch.sides, side)
         left += status[row]
     return left // PENDING
@@ -320,15 +320,15 @@ def complete(table: Table, sides: Floats, scratch: Completion) -> bool:
     legs, task, frames, values, lines = table.legs, table.task[0], scratch.frames, scratch.values, scratch.lines
     gone, before, is_set = 0.0, math.inf, task["unset"] == 0
     copy_row(sides, scratch.sides)
-    for _ in range(MOST_OF_ARMS if task["led"] == 1 else MOST_STEPS):
+    for _ in range(MOST_STEPS_IMPLICIT if task["implicit"] == 1 else MOST_STEPS):
         set_frames(scratch.pose, task, frames)
-        sure, bearing = place_legs(legs, frames, scratch.sides, values, lines)
-        if not bearing > SURE * SURE:
+        sure, margin_of_rows = place_legs(legs, frames, scratch.sides, values, lines)
+        if not margin_of_rows > SURE * SURE:
             return False
         worst = put_rows(legs, frames, values, lines, scratch.rows)
-        if worst <= CLOSED or (is_set and worst <= CLOSE and (task["led"] == 0 or worst > 0.5 * before)):
+        if worst <= CLOSED or (is_set and worst <= CLOSE and (task["implicit"] == 0 or worst > 0.5 * before)):
             return sure > SURE * SURE
-        if is_set and task["led"] == 0:
+        if is_set and task["implicit"] == 0:
             return False
         put_slopes(legs, frames, values, lines, scratch.proximal_slopes, scratch.slopes)
         gone += newton_step(table, scratch)

@@ -74,9 +74,9 @@ def feasibility(
         margins[row], bindings[row] = math.nan, -1
         is_pose, closed = True, False
         for parts in (1, PARTS, MORE_PARTS):
-            if parts > 1 and not (margins[row] < 0.0 and task[0]["unset"] + task[0]["led"] > 0):
+            if parts > 1 and not (margins[row] < 0.0 and task[0]["unset"] + task[0]["implicit"] > 0):
                 break
-            if parts == MORE_PARTS and closed and task[0]["led"] == 0:
+            if parts == MORE_PARTS and closed and task[0]["implicit"] == 0:
                 break
             aim(begins[0], begins[0], 1.0, task[0], before, turn)
             copy_row(sides[0], own)

@@ -22,7 +22,7 @@ from ...arrays import Floats, Record, Records
 from .._jit import allocator, routine
 from ..vectors import Vec, add, cross, dot, move, put, scale, sub, turn, vec
 from .endings import either_angle, turned
-from .records import ARM, CRANK, FIXED, FROM_BASE, FROM_ITSELF, FROM_PLATFORM, Q_PROXIMAL, RATE
+from .records import CRANK, FIXED, FROM_BASE, FROM_ITSELF, FROM_PLATFORM, Q_PROXIMAL, RATE, REDUNDANT
 
 NOWHERE: Vec = (0.0, 0.0, 0.0)
 # Rows of a frame.
@@ -34,7 +34,7 @@ def new_frames(legs: Records) -> Floats:
     """Memory for the frames of a machine."""
     n = FIXED
     for k in range(legs.shape[0]):
-        n += 1 if legs[k]["kind"] == ARM else 0
+        n += 1 if legs[k]["kind"] == REDUNDANT else 0
     frames = np.zeros((n, N_ROWS, 4))
     for i in range(3):
         frames[FROM_BASE, AXES + i, i] = frames[FROM_ITSELF, i, i] = frames[FROM_ITSELF, AXES + i, i] = 1.0
@@ -55,7 +55,7 @@ def set_frames(pose: Floats, task: Record, frames: Floats) -> None:
 
 
 @routine
-def facing(arm: Record, rod: Record, frame: Floats, side: float) -> tuple[float, float]:
+def orienting_coordinate(arm: Record, rod: Record, frame: Floats, side: float) -> tuple[float, float]:
     """The coordinate of an arm at which the plane across the hinge at a rod's foot holds the rod's head, and how sure.
 
     The second number is as of `endings.either_angle`. With the hinge n through F, which the arm turns about a through
@@ -72,13 +72,13 @@ def facing(arm: Record, rod: Record, frame: Floats, side: float) -> tuple[float,
 
 
 @routine
-def place_arm(arm: Record, q: float, frames: Floats, own: Floats) -> None:
+def place_redundant(arm: Record, q: float, frames: Floats, own: Floats) -> None:
     """Fill the frame that an arm makes, and its values, its coordinate given."""
     before, after = frames[arm["frame"]], frames[arm["makes"]]
     axis, at, is_hinge = vec(arm["proximal_axis"]), vec(arm["proximal_point"]), arm["proximal"] == CRANK
     cosine, sine = (math.cos(q), math.sin(q)) if is_hinge else (1.0, 0.0)
     own[Q_PROXIMAL] = q
-    put_rate_of_arm(arm, before, own)
+    put_redundant_rate(arm, before, own)
     for j in range(3):
         heads = (before[0, j], before[1, j], before[2, j])
         feet = (before[AXES, j], before[AXES + 1, j], before[AXES + 2, j])
@@ -106,7 +106,7 @@ def place_arm(arm: Record, q: float, frames: Floats, own: Floats) -> None:
 
 
 @routine
-def put_rate_of_arm(arm: Record, before: Floats, own: Floats) -> None:
+def put_redundant_rate(arm: Record, before: Floats, own: Floats) -> None:
     """Fill the velocity, at its reference point, and the angular velocity with which the platform would change all in
     an arm's frame as the arm does."""
     axis, at = vec(arm["proximal_axis"]), vec(arm["proximal_point"])
@@ -121,13 +121,13 @@ def put_rate_of_arm(arm: Record, before: Floats, own: Floats) -> None:
 
 
 @routine
-def coordinate_of(legs: Records, k: int, q: Floats) -> float:
+def q_redundant_of(legs: Records, k: int, q: Floats) -> float:
     """The coordinate of an arm, or of the one whose twin it is."""
-    return float(q[legs[k]["twin"] if legs[k]["twin"] >= 0 else k])
+    return float(q[legs[k]["mirror_of"] if legs[k]["mirror_of"] >= 0 else k])
 
 
 @routine
-def by_arm(slope: Floats, own: Floats) -> float:
+def slope_by_redundant(slope: Floats, own: Floats) -> float:
     """Derivative by an arm of something in its frame, from that by the platform's pose (6,)."""
     rate: float = dot(vec(slope[:3]), vec(own[RATE : RATE + 3])) + dot(vec(slope[3:6]), vec(own[RATE + 3 : RATE + 6]))
     return rate

@@ -18,7 +18,7 @@ import numpy as np
 from ...arrays import Ints, Records
 
 # An idle leg has nothing to say of a platform that does not turn.
-ROD, PIVOT, ARM, IDLE = 0, 1, 2, 3
+ROD, PIVOT, REDUNDANT, IDLE = 0, 1, 2, 3
 # What carries the foot: nothing, a hinge, a slide; or what carries the rod before (a second forearm). Of an arm, what
 # it is.
 NO_PROXIMAL, CRANK, CARRIAGE, SHARED = 0, 1, 2, 3
@@ -33,14 +33,14 @@ LEG = np.dtype(
     [
         ("kind", "i8"),
         ("reversed", "i8"),
-        ("arm", "i8"),  # the leg which is the arm that it is on; -1 if it is on none
+        ("redundant", "i8"),  # the leg which is the arm that it is on; -1 if it is on none
         ("frame", "i8"),  # that it is read in, see `frames`
         ("makes", "i8"),  # of an arm: the frame that it makes
-        ("twin", "i8"),  # of an arm: the leg whose coordinate it has, -1 if its own; see `frames`
+        ("mirror_of", "i8"),  # of an arm: the leg whose coordinate it has, -1 if its own; see `frames`
         ("column", "i8"),  # of an arm: where derivatives by its coordinate are, after the six by the pose
         ("inner", "i8"),  # 1: it is between bodies that arms on the platform place, and says nothing of the pose
         ("at_head", "i8"),  # of an arm, 1: it moves the body that heads are on
-        ("by_plane", "i8"),  # of an arm, 1: it brings the hinge at the foot of the rod after it to face the head
+        ("orients", "i8"),  # of an arm, 1: it brings the hinge at the foot of the rod after it to face the head
         ("proximal", "i8"),
         ("slides", "i8"),  # 1: a rod that changes its length; of a pivot, how many slides there are
         ("twists", "i8"),  # 1: both endings hold the rod against spinning about itself
@@ -69,7 +69,7 @@ LEG = np.dtype(
         ("moved", "f8", (3, 3)),
         ("value", *_vector),
         ("first_row", "i8"),  # place of its first constraint among all
-        ("bears", "i8"),  # 1: it, or a rod on its carrier, leaves a constraint; of an arm, a leg on it
+        ("has_rows", "i8"),  # 1: it, or a rod on its carrier, leaves a constraint; of an arm, a leg on it
         ("upright", "i8"),  # of a pivot: how many of its `foot_axes` R must not turn over
     ]
 )
@@ -115,8 +115,8 @@ TASK = np.dtype(
         ("axes", "i8", (3,)),  # 1: this coordinate of the position is set
         ("rotations", "i8"),  # 3: the rotation is set, 2: the direction of the z axis, 1: the yaw, 0: nothing
         ("unset", "i8"),  # how many coordinates of the pose are not
-        ("arms", "i8"),  # how many arms there are, if these follow from what the legs on them ask for
-        ("led", "i8"),  # 1: some of them by no closed form, but from where they were
+        ("redundant", "i8"),  # how many arms there are, if these follow from what the legs on them ask for
+        ("implicit", "i8"),  # 1: some of them by no closed form, but from where they were
         ("rows", "i8"),  # how many constraints the legs have
         ("farthest", "f8"),  # what is not set may not go farther from where it began [L or rad]
     ]

@@ -143,7 +143,7 @@ def way_of(table: Table, k: int) -> tuple[int, int, int]:
     leg, at, first, hinge, slide = table.legs[k], main_of(table, k), -1, -1, -1
     while at >= 0 and leg["kind"] == ROD:
         lead = table.legs[at]
-        if lead["at_head"] == 1 or lead["twin"] >= 0 or (lead["arm"] < 0 and lead["frame"] != FROM_BASE):
+        if lead["at_head"] == 1 or lead["mirror_of"] >= 0 or (lead["redundant"] < 0 and lead["frame"] != FROM_BASE):
             return -1, -1, -1
         if lead["proximal"] == CRANK and hinge < 0:
             hinge = at
@@ -151,7 +151,7 @@ def way_of(table: Table, k: int) -> tuple[int, int, int]:
             slide = at
         elif lead["proximal"] != NO_PROXIMAL:
             return -1, -1, -1
-        first, at = at, lead["arm"]
+        first, at = at, lead["redundant"]
     return first, hinge, slide
 
 

@@ -11,7 +11,7 @@ import math
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine
 from ..free_motions import FreeMotions, put_step, restoring_step
-from ..legs.records import ARM, Table
+from ..legs.records import REDUNDANT, Table
 from ..sqp import (
     CLOSED,
     CORRECTIONS,
@@ -100,7 +100,7 @@ def restore_feasibility(
         if is_closed(reduced.linear, tolerance):
             return True
         gap = reduced.linear.totals[0]["gap"]
-        if not restoring_step(reduced, table.task[0]["arms"] > 0 or gap > STUCK * before, search.p):
+        if not restoring_step(reduced, table.task[0]["redundant"] > 0 or gap > STUCK * before, search.p):
             return False
         before = gap
         take(table, reduced, search.p.x, state, search)
@@ -122,7 +122,7 @@ def is_near(legs: Records, state: PlatformState, incumbent: PlatformState, holdi
             if abs(pose[i, j] - other[i, j]) > NEAR_INCUMBENT:
                 return False
     for k in range(q.shape[0]):
-        if (holding[k] == 1 or legs[k]["kind"] != ARM) and abs(wrap(q[k] - incumbent.q[k], 0.0)) > NEAR_INCUMBENT:
+        if (holding[k] == 1 or legs[k]["kind"] != REDUNDANT) and abs(wrap(q[k] - incumbent.q[k], 0.0)) > NEAR_INCUMBENT:
             return False
     return True
 

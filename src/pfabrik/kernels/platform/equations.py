@@ -17,10 +17,18 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..legs.answer import end_of_rows
 from ..legs.endings import turned
-from ..legs.frames import NOWHERE, by_arm, coordinate_of, facing, new_frames, place_arm, put_pose_slope, set_frames
+from ..legs.frames import (
+    NOWHERE,
+    new_frames,
+    orienting_coordinate,
+    place_redundant,
+    put_pose_slope,
+    q_redundant_of,
+    set_frames,
+    slope_by_redundant,
+)
 from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
 from ..legs.records import (
-    ARM,
     CARRIAGE,
     COSINE,
     CRANK,
@@ -28,6 +36,7 @@ from ..legs.records import (
     N_VALUES,
     PIVOT,
     Q_PROXIMAL,
+    REDUNDANT,
     ROD,
     SHARED,
     SINE,
@@ -141,8 +150,8 @@ def place_leg(table: Table, k: int, main: int, state: PlatformState, leg_eval: L
     if leg["kind"] == PIVOT:
         place_pivot(leg, frame, state.sides[k], values[k])
         pivot_rows(leg, frame, leg_eval.rows)
-    elif leg["kind"] == ARM:
-        place_arm(leg, coordinate_of(legs, k, state.q), leg_eval.frames, values[k])
+    elif leg["kind"] == REDUNDANT:
+        place_redundant(leg, q_redundant_of(legs, k, state.q), leg_eval.frames, values[k])
     elif leg["kind"] == ROD:
         if has_proximal(leg):
             values[k, Q_PROXIMAL] = state.q[k]
@@ -161,13 +170,13 @@ def close_rods(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> N
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
-        if leg["by_plane"] == 1:
+        if leg["orients"] == 1:
             frame, rod = leg_eval.frames[leg["frame"]], table.legs[k + 1]
-            found, sure = facing(leg, rod, frame, side_of_arm(leg, rod, frame, q[k]))
+            found, sure = orienting_coordinate(leg, rod, frame, branch_of_redundant(leg, rod, frame, q[k]))
             if sure > SURELY:
                 q[k] = wrap(found, q[k]) if leg["proximal"] == CRANK else found
-        if leg["kind"] == ARM:
-            place_arm(leg, coordinate_of(table.legs, k, q), leg_eval.frames, own[k])
+        if leg["kind"] == REDUNDANT:
+            place_redundant(leg, q_redundant_of(table.legs, k, q), leg_eval.frames, own[k])
         if has_proximal(leg):
             head = move(leg_eval.frames[leg["frame"]], vec(leg["head_point"]))
             if solve_proximal(leg, head, side_of(leg, head, q[k]), own[k]) > SURELY:
@@ -186,8 +195,8 @@ def side_of(rod: Record, head: Vec, q: float) -> float:
 
 
 @routine
-def side_of_arm(arm: Record, rod: Record, frame: Floats, q: float) -> float:
-    """The same of an arm that `facing` places: by which way the plane turns away from the head."""
+def branch_of_redundant(arm: Record, rod: Record, frame: Floats, q: float) -> float:
+    """The same of an arm that `orienting_coordinate` places: by which way the plane turns away from the head."""
     axis, n = vec(arm["proximal_axis"]), vec(rod["foot_axes"][0])
     x = sub(move(frame, vec(rod["head_point"])), vec(arm["proximal_point"]))
     return math.copysign(1.0, dot(cross(turned(n, axis, math.cos(q), math.sin(q)), axis), x))
@@ -218,7 +227,7 @@ def put_leg_slopes(table: Table, k: int, main: int, leg_eval: LegEvaluation) -> 
     if leg["kind"] == PIVOT:
         pivot_slopes(leg, leg_eval.frames[leg["frame"]], leg_eval.slopes)
         for row in range(leg["first_row"], end_of_rows(table.legs, k, table.task[0]["rows"])):
-            put_arm_slopes(table, k, leg_eval, slopes[row])
+            put_redundant_slopes(table, k, leg_eval, slopes[row])
     elif leg["kind"] == ROD:
         if has_proximal(leg):
             put_rate(table, k, k, direction(leg_eval.lines[k]), NOWHERE, NOWHERE, leg_eval, slopes[own_row(table, k)])
@@ -242,20 +251,20 @@ def put_rate(table: Table, k: int, main: int, a: Vec, b: Vec, c: Vec, leg_eval: 
     put_pose_slope(rod, leg_eval.frames[rod["frame"]], a, c, slope)
     if column >= 0:
         slope[column] = proximal_rate(proximal, base_end_of(rod, proximal, leg_eval.values[main]), a, b)
-    put_arm_slopes(table, k, leg_eval, slope)
+    put_redundant_slopes(table, k, leg_eval, slope)
 
 
 @routine
-def put_arm_slopes(table: Table, k: int, leg_eval: LegEvaluation, slope: Floats) -> None:
+def put_redundant_slopes(table: Table, k: int, leg_eval: LegEvaluation, slope: Floats) -> None:
     """Derivatives by the arms that a leg is on, from those by the pose."""
-    arm = table.legs[k]["arm"]
+    arm = table.legs[k]["redundant"]
     while arm >= 0:
         slope[table.columns[arm]] = 0.0
-        arm = table.legs[arm]["arm"]
-    arm = table.legs[k]["arm"]
+        arm = table.legs[arm]["redundant"]
+    arm = table.legs[k]["redundant"]
     while arm >= 0:
-        slope[table.columns[arm]] += by_arm(slope, leg_eval.values[arm])
-        arm = table.legs[arm]["arm"]
+        slope[table.columns[arm]] += slope_by_redundant(slope, leg_eval.values[arm])
+        arm = table.legs[arm]["redundant"]
     if table.legs[k]["inner"] == 1:
         for j in range(6):
             slope[j] = 0.0

@@ -42,7 +42,7 @@ ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
 """Largest equation of an assembled configuration, and of one that no step makes more so [L or rad]: more actuators than
 freedoms, or conditions that repeat each other, agree no better than the description is exact."""
 
-STEPS, LED_STEPS = 24, 8
+STEPS, IMPLICIT_STEPS = 24, 8
 """Most steps of Newton's method, and those at each stride where actuators are led to their values."""
 
 STRIDES = 8
@@ -243,7 +243,7 @@ def lead(table: Table, values: Floats, scratch: Newton) -> float:
     for stride in range(1, STRIDES + 1):
         for column in range(state.shape[0]):
             state[column] = begin[column] + (values[column] - begin[column]) * stride / STRIDES
-        worst = newton(table, STEPS if stride == STRIDES else LED_STEPS, scratch)
+        worst = newton(table, STEPS if stride == STRIDES else IMPLICIT_STEPS, scratch)
     return worst
 
 

@@ -85,8 +85,8 @@ def note_pulled(table: Table, objective: PlatformObjective, search: Search) -> N
         if pulled[k] == 1:
             if legs[k]["proximal"] == SHARED:
                 pulled[k - 1] = 1
-            if legs[k]["arm"] >= 0:
-                pulled[legs[k]["arm"]] = 1
+            if legs[k]["redundant"] >= 0:
+                pulled[legs[k]["redundant"]] = 1
 
 
 @routine

@@ -15,7 +15,7 @@ from ..legs.frames import NOWHERE, put_pose_slope
 from ..legs.records import CRANK, CROSS, FOOT, FOOT_LINE, HEAD, HINGE, PIVOT, Q_PROXIMAL, SLIDE, TRIPLE, Table
 from ..legs.rods import base_end_of, mark, turned_by_proximal
 from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
-from .equations import LegEvaluation, direction, main_of, put_arm_slopes, put_rate
+from .equations import LegEvaluation, direction, main_of, put_rate, put_redundant_slopes
 
 AT_FOOT, AT_HEAD = 0, 1
 # Sine below which a line is straight along the axis of its cone: no direction leads in or out.
@@ -55,7 +55,7 @@ def coordinate_slope(table: Table, coordinate: Record, leg_eval: LegEvaluation) 
     leg = table.legs[k]
     if leg["kind"] == PIVOT:
         put_pivot_slope(leg, leg_eval.frames[leg["frame"]], leg_eval.values[k], spot, leg_eval.slope)
-        put_arm_slopes(table, k, leg_eval, leg_eval.slope)
+        put_redundant_slopes(table, k, leg_eval, leg_eval.slope)
     elif spot == Q_PROXIMAL:
         slope[table.columns[k]] = 1.0
     elif spot == SLIDE:
@@ -143,7 +143,7 @@ def pivot_cone_slope(table: Table, cone: Record, leg_eval: LegEvaluation) -> flo
     across = cross(axis, line)
     if norm(across) > ALIGNED:
         put_pose_slope(leg, leg_eval.frames[leg["frame"]], NOWHERE, scale(1.0 / norm(across), across), slope)
-        put_arm_slopes(table, k, leg_eval, slope)
+        put_redundant_slopes(table, k, leg_eval, slope)
     return angle_between(axis, line)
 
 

@@ -14,7 +14,7 @@ from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import balance
 from ..legs.answer import deviation, excess_of
 from ..legs.poses import make_exact
-from ..legs.records import ARM, Table
+from ..legs.records import REDUNDANT, Table
 from ..legs.table import SAMPLE, open_table
 from ..qp import QP, new_qp
 from ..references import opener
@@ -142,7 +142,7 @@ def holds_all(objective: PoseObjective) -> bool:
 def is_other_mode(legs: Records, first: Floats, sides: Floats) -> bool:
     """Whether some leg takes its other solution."""
     for k in range(sides.shape[0]):
-        if (legs[k]["kind"] != ARM or legs[k]["by_plane"] == 1) and first[k] * sides[k] < 0.0:
+        if (legs[k]["kind"] != REDUNDANT or legs[k]["orients"] == 1) and first[k] * sides[k] < 0.0:
             return True
     return False
 
@@ -251,7 +251,7 @@ def search_row(
     sides = own.sides[first]
     for k in range(kept.shape[0]):
         kept[k] = sides[k] if stays == 1 and has_proximal(table.legs[k]) else 0.0
-    at_once = holds_all(objective.pose) or (n > 0 and table.task[0]["led"] == 0)
+    at_once = holds_all(objective.pose) or (n > 0 and table.task[0]["implicit"] == 0)
     clear(best_tally)
     clear(phase1_tally)
     for i in range(n + 1):

@@ -22,7 +22,7 @@ from ..legs.endings import SURE
 from ..legs.feasibility import largest_row
 from ..legs.frames import set_frames
 from ..legs.poses import load
-from ..legs.records import ARM, Table
+from ..legs.records import REDUNDANT, Table
 from ..legs.table import open_table
 from ..rows import PENDING, REACHED, UNSURE
 from ..vectors import copy_row
@@ -52,7 +52,7 @@ def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) ->
         if not cone_cosine(table.cones[i], values) >= table.cones[i]["least_cosine"]:
             misfits[main_of(table, table.cones[i]["leg"])] = 1.0
     for k in range(misfits.shape[0]):
-        if table.legs[k]["by_plane"] == 1:
+        if table.legs[k]["orients"] == 1:
             misfits[k] = misfits[k + 1] = max(misfits[k], misfits[k + 1])
 
 
@@ -72,7 +72,7 @@ def note_choices(table: Table, sides: Floats, choosing: Ints) -> int:
     """Note the legs that take one of two solutions; how many these are."""
     legs, n = table.legs, 0
     for k in range(legs.shape[0]):
-        if sides[k] != 0.0 and (legs[k]["kind"] != ARM or legs[k]["by_plane"] == 1):
+        if sides[k] != 0.0 and (legs[k]["kind"] != REDUNDANT or legs[k]["orients"] == 1):
             choosing[n] = k
             n += 1
     return n
@@ -108,9 +108,9 @@ def answer_otherwise(
     scratch, legs, n_legs, own, left = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
     misfits, choosing, alone = np.zeros(n_legs), np.zeros(n_legs, np.int64), 1
     for k in range(n_legs):
-        alone = 3 if legs[k]["by_plane"] == 1 else alone
+        alone = 3 if legs[k]["orients"] == 1 else alone
     n_choices = note_choices(table, sides[0], choosing) if sides.shape[0] > 0 else 0
-    together = own["unset"] + own["led"] > 0
+    together = own["unset"] + own["implicit"] > 0
     tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if together else alone
     for row in range(targets.shape[0]):
         status[row], begin = PENDING, begins[row if begins.shape[0] > 1 else 0]
@@ -124,7 +124,7 @@ def answer_otherwise(
                 k = choosing[c]
                 flips = (attempt ^ (attempt - 1)) >> c & 1 == 1
                 if not together:  # a rod first, then the arm that it is on, then the rod again
-                    flips = misfits[k] == 1.0 and (legs[k]["by_plane"] == 1) == (attempt == 2)
+                    flips = misfits[k] == 1.0 and (legs[k]["orients"] == 1) == (attempt == 2)
                 sides[row, k] = -sides[row, k] if flips else sides[row, k]
             if not load(targets[row], begin, own, scratch.pose):
                 break

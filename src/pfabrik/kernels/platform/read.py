@@ -69,17 +69,17 @@ def read(
             copy_row(q_proximal[row], state.q)
             for k in range(state.q.shape[0]):
                 total += state.q[k]
-        bearing = 1.0
+        margin_of_rows = 1.0
         if abs(total) < math.inf:
             place(table, state, leg_eval)
         else:
             set_frames(state.pose, table.task[0], leg_eval.frames)
-            _, bearing = place_legs(legs, leg_eval.frames, state.sides, leg_eval.values, leg_eval.lines)
+            _, margin_of_rows = place_legs(legs, leg_eval.frames, state.sides, leg_eval.values, leg_eval.lines)
         for i in range(known.shape[0] if found.shape[0] > 0 else 0):
             found[row, known[i]["column"]] = deviation(known[i], leg_eval.values) * known[i]["unit"]
         if rows.shape[0] > 0:
             put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
             put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.proximal_slopes, slopes[row])
-            for i in range(rows.shape[1] if not bearing > SURE * SURE else 0):
+            for i in range(rows.shape[1] if not margin_of_rows > SURE * SURE else 0):
                 for j in range(slopes.shape[2]):
                     slopes[row, i, j] = math.nan

@@ -14,8 +14,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from .._jit import routine
-from ..legs.frames import AXES, place_arm, set_frames
-from ..legs.records import ARM, COSINE, FROM_BASE, HINGE, IDLE, NO_PROXIMAL, Q_PROXIMAL, ROD, SINE, SLIDE, Table
+from ..legs.frames import AXES, place_redundant, set_frames
+from ..legs.records import COSINE, FROM_BASE, HINGE, IDLE, NO_PROXIMAL, Q_PROXIMAL, REDUNDANT, ROD, SINE, SLIDE, Table
 from ..legs.rods import base_end_of
 from ..vectors import add, cross, dot, put, scale, sub, turn, vec
 from .equations import LegEvaluation, PlatformState, has_proximal, main_of
@@ -48,9 +48,11 @@ def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
     base."""
     for k, leg in enumerate(table.legs):
         is_loose = leg["proximal"] != NO_PROXIMAL and (main_of(table, k), Q_PROXIMAL) not in driven
-        turns = leg["kind"] != ARM and (leg["foot"] == HINGE or leg["head"] == HINGE or leg["twists"] == 1)
-        is_on_base = leg["frame"] == FROM_BASE or leg["arm"] >= 0
-        is_read = leg["kind"] in (ROD, ARM) and is_on_base and leg["at_head"] == leg["reversed"] == leg["inner"] == 0
+        turns = leg["kind"] != REDUNDANT and (leg["foot"] == HINGE or leg["head"] == HINGE or leg["twists"] == 1)
+        is_on_base = leg["frame"] == FROM_BASE or leg["redundant"] >= 0
+        is_read = (
+            leg["kind"] in (ROD, REDUNDANT) and is_on_base and leg["at_head"] == leg["reversed"] == leg["inner"] == 0
+        )
         if leg["kind"] != IDLE and (is_loose or turns or not is_read):
             return False
     return all(place in (Q_PROXIMAL, SLIDE) for _, place in driven)
@@ -63,15 +65,15 @@ def set_spheres(table: Table, values: Floats, state: PlatformState, leg_eval: Le
     p = (pose[0, 3], pose[1, 3], pose[2, 3])
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
-        if legs[k]["kind"] == ARM:
-            place_arm(legs[k], q[k], leg_eval.frames, own[k])
+        if legs[k]["kind"] == REDUNDANT:
+            place_redundant(legs[k], q[k], leg_eval.frames, own[k])
         elif has_proximal(legs[k]):
             own[k, Q_PROXIMAL], own[k, COSINE], own[k, SINE] = q[k], math.cos(q[k]), math.sin(q[k])
     for e in range(spheres.legs.shape[0]):
         k, i = spheres.legs[e], spheres.drivers[e]
         leg, main = legs[k], main_of(table, k)
         foot = base_end_of(leg, legs[main], own[main])
-        if leg["arm"] >= 0:
+        if leg["redundant"] >= 0:
             frame = frames[leg["frame"]]
             foot = add(p, turn(frame[AXES:], sub(foot, (frame[0, 3], frame[1, 3], frame[2, 3]))))
         put(spheres.feet[e], foot)

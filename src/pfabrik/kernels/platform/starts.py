@@ -8,13 +8,13 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
-from ..legs.frames import NOWHERE, coordinate_of, facing, place_arm, set_frames
+from ..legs.frames import NOWHERE, orienting_coordinate, place_redundant, q_redundant_of, set_frames
 from ..legs.poses import bring_yaw, column, is_pose, make_exact, middle_of, turn_pose
-from ..legs.records import ARM, CRANK, Q_PROXIMAL, Table
+from ..legs.records import CRANK, Q_PROXIMAL, REDUNDANT, Table
 from ..legs.rods import solve_proximal
 from ..rotations import yaw_of
 from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, sub, vec, wrap
-from .equations import LegEvaluation, PlatformState, has_proximal, side_of_arm
+from .equations import LegEvaluation, PlatformState, branch_of_redundant, has_proximal
 from .records import STRETCHED, Starts
 from .search import Search
 
@@ -68,11 +68,11 @@ def place_proximal(table: Table, state: PlatformState, leg_eval: LegEvaluation) 
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         leg, own = table.legs[k], leg_eval.values[k]
-        q[k] = coordinate_of(table.legs, k, sides) if leg["kind"] == ARM else 0.0
-        if leg["by_plane"] == 1:
-            q[k], _ = facing(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], sides[k])
-        if leg["kind"] == ARM:
-            place_arm(leg, q[k], leg_eval.frames, own)
+        q[k] = q_redundant_of(table.legs, k, sides) if leg["kind"] == REDUNDANT else 0.0
+        if leg["orients"] == 1:
+            q[k], _ = orienting_coordinate(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], sides[k])
+        if leg["kind"] == REDUNDANT:
+            place_redundant(leg, q[k], leg_eval.frames, own)
         if has_proximal(leg):
             head = move(leg_eval.frames[leg["frame"]], vec(leg["head_point"]))
             solve_proximal(leg, head, -sides[k], own)
@@ -107,10 +107,10 @@ def put_held(
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
-        if leg["by_plane"] == 1:
-            q[k] = nearest_facing(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
-        if leg["kind"] == ARM:
-            place_arm(leg, coordinate_of(table.legs, k, q), leg_eval.frames, leg_eval.values[k])
+        if leg["orients"] == 1:
+            q[k] = nearest_orienting(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
+        if leg["kind"] == REDUNDANT:
+            place_redundant(leg, q_redundant_of(table.legs, k, q), leg_eval.frames, leg_eval.values[k])
         if has_proximal(leg):
             q[k] = nearest_q_proximal(leg, leg_eval.frames[leg["frame"]], q[k], leg_eval.values[k])
 
@@ -130,12 +130,12 @@ def nearest_q_proximal(leg: Record, frame: Floats, present: float, own: Floats) 
 
 
 @routine
-def nearest_facing(arm: Record, rod: Record, frame: Floats, present: float) -> float:
+def nearest_orienting(arm: Record, rod: Record, frame: Floats, present: float) -> float:
     """Of the coordinates at which an arm has its rod's plane hold the head, the one nearer to this."""
-    found, _ = facing(arm, rod, frame, 1.0)
+    found, _ = orienting_coordinate(arm, rod, frame, 1.0)
     if arm["proximal"] != CRANK:
         return found
-    other, _ = facing(arm, rod, frame, -1.0)
+    other, _ = orienting_coordinate(arm, rod, frame, -1.0)
     found, other = wrap(found, present), wrap(other, present)
     return found if abs(found - present) <= abs(other - present) else other
 
@@ -147,12 +147,12 @@ def put_sides(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> No
     sides, q = state.sides, state.q
     for k in range(q.shape[0]):
         leg = table.legs[k]
-        if leg["kind"] == ARM:
-            if leg["by_plane"] == 0:
+        if leg["kind"] == REDUNDANT:
+            if leg["orients"] == 0:
                 sides[k] = q[k]
             elif sides[k] != 0.0:
-                sides[k] = side_of_arm(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
-            place_arm(leg, q[k], leg_eval.frames, leg_eval.values[k])
+                sides[k] = branch_of_redundant(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
+            place_redundant(leg, q[k], leg_eval.frames, leg_eval.values[k])
         if has_proximal(leg):
             frame = leg_eval.frames[leg["frame"]]
             head = move(frame, vec(leg["head_point"]))
