@@ -71,10 +71,10 @@ def machine(name: str) -> pf.Mechanism:
             r * np.array([np.cos(np.radians(a)), np.sin(np.radians(a))]) for r, a in ((150, low), (80, high))
         )
         if name == "rails":
-            rail, foot, head = f'["base", "carriage{leg}"]', f"carriage{leg}", "platform"
+            rail, base_end, platform_end = f'["base", "carriage{leg}"]', f"carriage{leg}", "platform"
         else:
-            rail, foot, head = f'["carriage{leg}", "platform"]', "base", f"carriage{leg}"
-        legs += LEG.format(leg=leg, x=x, y=y, u=u, v=v, rail=rail, foot=foot, head=head)
+            rail, base_end, platform_end = f'["carriage{leg}", "platform"]', "base", f"carriage{leg}"
+        legs += LEG.format(leg=leg, x=x, y=y, u=u, v=v, rail=rail, base_end=base_end, platform_end=platform_end)
     return loads(RAILS + legs)
 
 

@@ -210,8 +210,8 @@ def test_a_slide_counts_as_its_joint_says_whichever_way_that_points() -> None:
     joints = []
     for place, joint in enumerate(machine("stewart").joints):
         if joint.along is not None:
-            foot, head = (np.array(machine("stewart").joint(end).at) for end in joint.along)
-            axis = (head - foot) / np.linalg.norm(head - foot) * (1 if place % 2 else -1)
+            base_end, platform_end = (np.array(machine("stewart").joint(end).at) for end in joint.along)
+            axis = (platform_end - base_end) / np.linalg.norm(platform_end - base_end) * (1 if place % 2 else -1)
             bodies = joint.connects if place % 4 < 2 else joint.connects[::-1]
             joint = pf.Joint(joint.name, "prismatic", bodies, axis=axis, actuated=True, range=(-40.0, 40.0))
         joints.append(joint)

@@ -203,9 +203,9 @@ def test_rods_of_one_arm_that_are_not_parallel_have_no_dead_point_alone() -> Non
         )
         for i, (y, z) in enumerate(beside):
             elbow = (170 + 5 * i) * out + y * across + (0, 0, 30 + z)
-            head = (30 - 3 * i) * out + y * across + (0, 0, 0.8 * z - 120)
+            platform_end = (30 - 3 * i) * out + y * across + (0, 0, 0.8 * z - 120)
             joints.append(pf.Joint(f"B{k}{i}", "spherical", (f"arm{k}", f"rod{k}{i}"), elbow))
-            joints.append(pf.Joint(f"C{k}{i}", "spherical", (f"rod{k}{i}", "platform"), head))
+            joints.append(pf.Joint(f"C{k}{i}", "spherical", (f"rod{k}{i}", "platform"), platform_end))
     mechanism = pf.Mechanism("3-2-1", joints, "platform", (0, 0, -120), task=("x", "y", "z"))
     assert isinstance(engine_of(mechanism), LegsEngine)
     (reach,) = pf.travel(pf.solve_ik(mechanism, mechanism.home_pose), along=(1, 0, 0))

@@ -72,8 +72,10 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
     mechanism, described, table = described_by_name(name)
     rng = np.random.default_rng(0)
     n, leg_eval = E.count_unknowns(table), E.new_leg_evaluation(table)
-    pivots = (table.legs["kind"] == K.PIVOT) & (table.legs["foot"] == K.CROSS)
-    told = [each for each in (*table.limited, *table.driven) if not pivots[each["leg"]] or each["place"] >= K.HEAD]
+    pivots = (table.legs["kind"] == K.PIVOT) & (table.legs["base_end"] == K.CROSS)
+    told = [
+        each for each in (*table.limited, *table.driven) if not pivots[each["leg"]] or each["place"] >= K.PLATFORM_END
+    ]
 
     on_carriers = [k for k, leg in enumerate(table.legs) if E.has_proximal(leg)]
 

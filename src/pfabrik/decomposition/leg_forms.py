@@ -37,12 +37,12 @@ class Rod:
     """
 
     proximal: Item | None
-    foot_ending: Ending
+    base_ending: Ending
     slide: Item | None
     twist: Item | None
-    head_ending: Ending
-    foot: Floats
-    head: Floats
+    platform_ending: Ending
+    base_end: Floats
+    platform_end: Floats
     is_reversed: bool
     is_shared: bool = False
     beside: tuple[Item, ...] = ()
@@ -51,7 +51,7 @@ class Rod:
     @property
     def items(self) -> tuple[Item, ...]:
         between = tuple(item for item in (self.proximal, self.slide, self.twist) if item is not None)
-        return (*between, *self.foot_ending.items, *self.head_ending.items)
+        return (*between, *self.base_ending.items, *self.platform_ending.items)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class RedundantJoint:
 
     item: Item
     is_reversed: bool
-    at_head: bool = False
+    at_platform_end: bool = False
     on: RedundantJoint | None = None
     faces: bool = False
     mirror_of: RedundantJoint | None = None
@@ -112,7 +112,7 @@ LegForm = Rod | Pivot | KeptAxis | RedundantJoint
 
 def keeps_from_spinning(rod: Rod) -> bool:
     """Whether both ends keep a rod from spinning about itself, and nothing along it lets it: a constraint."""
-    return holds_spin(rod.foot_ending) and holds_spin(rod.head_ending) and rod.twist is None and not rod.beside
+    return holds_spin(rod.base_ending) and holds_spin(rod.platform_ending) and rod.twist is None and not rod.beside
 
 
 def holds_spin(ending: Ending) -> bool:
@@ -129,19 +129,19 @@ def told_places(form: LegForm) -> Iterator[tuple[Item, int]]:
             yield form.item, K.Q_PROXIMAL
         return
     if isinstance(form, Pivot):
-        yield from ((item, K.HEAD + place) for place, item in enumerate(form.slides))
+        yield from ((item, K.PLATFORM_END + place) for place, item in enumerate(form.slides))
         if form.ending.kind != "ball":
-            yield from ((item, K.FOOT + place) for place, item in enumerate(form.ending.items))
+            yield from ((item, K.BASE_END + place) for place, item in enumerate(form.ending.items))
         return
     if form.proximal is not None:
         yield form.proximal, K.Q_PROXIMAL
     if form.slide is not None:
         yield form.slide, K.SLIDE
-    if holds_spin(form.foot_ending):
-        yield from ((item, K.FOOT + place) for place, item in enumerate(form.foot_ending.items))
-    if holds_spin(form.head_ending):
+    if holds_spin(form.base_ending):
+        yield from ((item, K.BASE_END + place) for place, item in enumerate(form.base_ending.items))
+    if holds_spin(form.platform_ending):
         # as the body beyond sees the rod
-        yield from ((item.back, K.HEAD + place) for place, item in enumerate(form.head_ending.items[::-1]))
+        yield from ((item.back, K.PLATFORM_END + place) for place, item in enumerate(form.platform_ending.items[::-1]))
     if form.beside:
         inner, outer = form.beside
-        yield from ((inner, K.FOOT + 1), (outer.back, K.HEAD + 1))
+        yield from ((inner, K.BASE_END + 1), (outer.back, K.PLATFORM_END + 1))

@@ -41,7 +41,7 @@ def row_counts(legs: Records) -> list[int]:
             counts.append(0)
             continue
         is_rigid = not leg["slides"] and leg["proximal"] in (K.NO_PROXIMAL, K.SHARED)
-        hinges = int(leg["foot"] == K.HINGE) + int(leg["head"] == K.HINGE)
+        hinges = int(leg["base_end"] == K.HINGE) + int(leg["platform_end"] == K.HINGE)
         counts.append(int(is_rigid) + hinges + int(leg["twists"]))
     return counts
 
@@ -82,10 +82,10 @@ def _put_orienting(legs: Records, forms: Sequence[LegForm]) -> None:
     """Which arms have the rod after them face its head, and which of two solutions is home's."""
     for k, (form, after) in enumerate(pairwise(forms)):
         if isinstance(form, RedundantJoint) and form.faces and isinstance(after, Rod):
-            across = np.cross(form.item.axis, after.foot_ending.items[0].axis)
+            across = np.cross(form.item.axis, after.base_ending.items[0].axis)
             legs["orients"][k] = 1
             if form.item.kind == "R":
-                legs["side"][k] = -math.copysign(1.0, across @ (after.head - form.item.point))
+                legs["side"][k] = -math.copysign(1.0, across @ (after.platform_end - form.item.point))
 
 
 def _record(mechanism: Mechanism, form: LegForm) -> Records:
@@ -96,7 +96,7 @@ def _record(mechanism: Mechanism, form: LegForm) -> Records:
     return _pivot_record(mechanism, form) if isinstance(form, Pivot) else _kept_axis_record(form)
 
 
-def _head_point(mechanism: Mechanism, point: Floats, is_reversed: bool) -> Floats:
+def _platform_point(mechanism: Mechanism, point: Floats, is_reversed: bool) -> Floats:
     """A head at home as `frames` map it [L]."""
     reference = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
     return point if is_reversed else point - reference
@@ -116,9 +116,12 @@ def _pivot_record(mechanism: Mechanism, pivot: Pivot) -> Records:
     if not pivot.ending.items:
         centre = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
     axes = np.eye(3) if kind == "weld" else _axes(pivot.ending.items)
-    record["kind"], record["reversed"], record["foot"] = K.PIVOT, pivot.is_reversed, _ENDINGS[kind]
-    record["foot_point"], record["head_point"] = centre, _head_point(mechanism, centre, pivot.is_reversed)
-    record["foot_axes"], n_slides = axes, len(pivot.slides)
+    record["kind"], record["reversed"], record["base_end"] = K.PIVOT, pivot.is_reversed, _ENDINGS[kind]
+    record["base_end_point"], record["platform_end_point"] = (
+        centre,
+        _platform_point(mechanism, centre, pivot.is_reversed),
+    )
+    record["base_end_axes"], n_slides = axes, len(pivot.slides)
     record["slides"] = n_slides
     directions = np.array([item.axis for item in pivot.slides]).reshape(-1, 3)
     record["slide_rows"][:n_slides] = np.linalg.pinv(directions.T) if n_slides else 0.0
@@ -132,17 +135,17 @@ def _pivot_record(mechanism: Mechanism, pivot: Pivot) -> Records:
 def _kept_axis_record(form: KeptAxis) -> Records:
     """A pivot that slides to all sides, and whose hinge is the axis."""
     record = np.zeros((), K.LEG)
-    record["kind"], record["foot"], record["slides"] = K.PIVOT, K.HINGE, 3
-    record["foot_axes"][0] = form.ending.items[0].axis
-    _put_axis_rows(record, "hinge", record["foot_axes"])
+    record["kind"], record["base_end"], record["slides"] = K.PIVOT, K.HINGE, 3
+    record["base_end_axes"][0] = form.ending.items[0].axis
+    _put_axis_rows(record, "hinge", record["base_end_axes"])
     return record
 
 
 def _redundant_record(mechanism: Mechanism, arm: RedundantJoint) -> Records:
     record, point = np.zeros((), K.LEG), arm.item.point
-    record["kind"], record["reversed"], record["at_head"] = K.REDUNDANT, arm.is_reversed, arm.at_head
+    record["kind"], record["reversed"], record["at_platform_end"] = K.REDUNDANT, arm.is_reversed, arm.at_platform_end
     record["proximal"], record["proximal_axis"] = _PROXIMAL[arm.item.kind], arm.item.axis
-    record["proximal_point"] = _head_point(mechanism, point, arm.is_reversed) if arm.at_head else point
+    record["proximal_point"] = _platform_point(mechanism, point, arm.is_reversed) if arm.at_platform_end else point
     return record
 
 
@@ -170,35 +173,35 @@ def _home_side(axes: Floats, line: Floats) -> float:
 
 def _rod_record(mechanism: Mechanism, rod: Rod) -> Records:
     record = np.zeros((), K.LEG)
-    line = rod.head - rod.foot
+    line = rod.platform_end - rod.base_end
     length = np.linalg.norm(line)
     line = line / length
     record["kind"], record["reversed"] = K.ROD, rod.is_reversed
-    record["foot_point"], record["length"], record["line"] = rod.foot, length, line
-    record["head_point"] = _head_point(mechanism, rod.head, rod.is_reversed)
+    record["base_end_point"], record["length"], record["line"] = rod.base_end, length, line
+    record["platform_end_point"] = _platform_point(mechanism, rod.platform_end, rod.is_reversed)
     record["slides"] = rod.slide is not None
-    for end, ending, order in (("foot", rod.foot_ending, 1), ("head", rod.head_ending, -1)):
+    for end, ending, order in (("base_end", rod.base_ending, 1), ("platform_end", rod.platform_ending, -1)):
         axes = _axes(ending.items[::order])
         record[end], record[f"{end}_axes"] = _ENDINGS[ending.kind], axes
         record[f"{end}_side"] = _home_side(axes, line) if ending.kind == "cross" else 0.0
     record["twists"] = keeps_from_spinning(rod)
-    foot_mark, head_mark = rod.foot_ending.items[-1].axis, rod.head_ending.items[0].axis
+    foot_mark, head_mark = rod.base_ending.items[-1].axis, rod.platform_ending.items[0].axis
     flat = foot_mark @ head_mark - (line @ foot_mark) * (line @ head_mark)
     record["twist"] = math.atan2(line @ np.cross(foot_mark, head_mark), flat)
     record["proximal"] = K.SHARED if rod.is_shared else K.NO_PROXIMAL
     if rod.proximal is not None:
-        _put_proximal(record, rod.proximal, rod.foot, line)
+        _put_proximal(record, rod.proximal, rod.base_end, line)
     return record
 
 
-def _put_proximal(record: Records, proximal: Item, foot: Floats, line: Floats) -> None:
+def _put_proximal(record: Records, proximal: Item, base_end: Floats, line: Floats) -> None:
     axis = proximal.axis
     record["proximal"], record["proximal_axis"] = _PROXIMAL[proximal.kind], axis
     motion = axis
     if proximal.kind == "R":
-        point = proximal.point + axis * (axis @ (foot - proximal.point))
-        record["proximal_point"], record["crank"] = point, foot - point
-        record["crank_across"] = motion = np.cross(axis, foot - point)
+        point = proximal.point + axis * (axis @ (base_end - proximal.point))
+        record["proximal_point"], record["crank"] = point, base_end - point
+        record["crank_across"] = motion = np.cross(axis, base_end - point)
     # home's solution, of a carriage q = middle +- root, of a crank q = atan2(B, A) +- acos: the foot leaves the line
     # forward, or backward
     record["side"] = -1.0 if line @ motion >= 0.0 else 1.0

@@ -112,8 +112,8 @@ class LegTable:
     def is_for_blocks(self) -> bool:
         """Whether blocks of poses serve: rods read from the base, of which no angle of crossed hinges is asked for."""
         legs = self.legs
-        aimed = [(legs[f"{end}_aimed"] == 0) | (legs[end] == K.HINGE) for end in ("foot", "head")]
-        twists = (legs["twists"] == 0) | ((legs["foot"] == K.HINGE) & (legs["head"] == K.HINGE))
+        aimed = [(legs[f"{end}_aimed"] == 0) | (legs[end] == K.HINGE) for end in ("base_end", "platform_end")]
+        twists = (legs["twists"] == 0) | ((legs["base_end"] == K.HINGE) & (legs["platform_end"] == K.HINGE))
         rods = (legs["kind"] == K.ROD) & (legs["frame"] == 0)
         return bool(np.all([rods, twists, *aimed]) and self.task["rotations"][0] in (0, 3))
 
@@ -190,7 +190,7 @@ def _aimed(legs: Records, asked: Records) -> Records:
     only their angles tell whether there are any.
     """
     legs = legs.copy()
-    for end, start in (("foot", K.FOOT), ("head", K.HEAD)):
+    for end, start in (("base_end", K.BASE_END), ("platform_end", K.PLATFORM_END)):
         outer, inner = legs[f"{end}_axes"][:, 0], legs[f"{end}_axes"][:, 1]
         along = np.maximum(np.abs((inner * outer).sum(axis=1)), np.abs((inner * legs["line"]).sum(axis=1)))
         wanted = ((legs["twists"] == 1) | (along > TOLERANCES.alignment)) & (legs[end] == K.CROSS)
@@ -234,14 +234,17 @@ def _cone(mechanism: Mechanism, forms: Sequence[LegForm], joint: Joint) -> tuple
     for leg, form in enumerate(forms):
         if not isinstance(form, Rod):
             continue
-        for place, ending, outer in ((K.FOOT_LINE, form.foot_ending, False), (K.HEAD_LINE, form.head_ending, True)):
+        for place, ending, outer in (
+            (K.BASE_LINE, form.base_ending, False),
+            (K.PLATFORM_LINE, form.platform_ending, True),
+        ):
             own = [item for item in ending.items if item.joint is joint]
             if not own:
                 continue
             body = own[-1].outward if outer else own[0].inward
             ends = np.array([start.at, end.at]) / length
-            line = form.head - form.foot
-            off = [np.linalg.norm(np.cross(point - form.foot, line)) for point in ends]
+            line = form.platform_end - form.base_end
+            off = [np.linalg.norm(np.cross(point - form.base_end, line)) for point in ends]
             is_last = own[-1] is ending.items[-1] if outer else own[0] is ending.items[0]
             others = {item.joint.name for item in form.items} - {joint.name}
             if joint.cone.fixed_to != body or max(off) > TOLERANCES.implied or not is_last or end.name not in others:

@@ -97,7 +97,7 @@ def _are_alike(rods: Sequence[Rod]) -> bool:
     As long as the platform does not turn, all have the dead points of their carrier that one of them has; else where
     one has its own the others place the carrier, and beyond is no other working mode.
     """
-    lines = [rod.head - rod.foot for rod in rods]
+    lines = [rod.platform_end - rod.base_end for rod in rods]
     return bool(np.ptp(lines, axis=0).max() <= TOLERANCES.nearly_implied)
 
 
@@ -107,7 +107,7 @@ def _on_redundant(trunk: Sequence[Item], branches: Sequence[list[Item]], is_reve
         raise NoLeg("several joints carry its branches")
     rods = [_rod(None, branch, is_reversed) for branch in branches]
     for rod in rods:
-        ends = rod.foot_ending, rod.head_ending
+        ends = rod.base_ending, rod.platform_ending
         if rod.slide is None or any(end.kind == "hinge" for end in ends) or keeps_from_spinning(rod):
             raise NoLeg("arms carry rods that do not let the platform go wherever it may be wanted")
     redundant: list[RedundantJoint] = []
@@ -129,7 +129,9 @@ def _with_parallelogram(mechanism: Mechanism, chain: SubChain, split: Split) -> 
         try:
             rod = _parallelogram_rod(before, inner, outer, after, is_reversed)
             beside = (_turned_as(inner, inner_beside), _turned_as(outer, outer_beside))
-            return replace(rod, beside=beside), KeptAxis(Ending("hinge", rod.head_ending.items[-1:], rod.head))
+            return replace(rod, beside=beside), KeptAxis(
+                Ending("hinge", rod.platform_ending.items[-1:], rod.platform_end)
+            )
         except NoLeg as reason:
             reasons.append(str(reason))
     raise NoLeg(reasons[0])
@@ -169,11 +171,11 @@ def _parallelogram_rod(
     way = way - inner.axis * (inner.axis @ way)
     if area(last.point - way - first.point, first.axis) > TOLERANCES.implied:
         raise NoLeg("a parallelogram that is not as long as the hinges beside it are apart")
-    foot = Ending("cross", (first, inner), first.point)
-    head = Ending("cross", (outer, last), first.point + way)
+    base_end = Ending("cross", (first, inner), first.point)
+    platform_end = Ending("cross", (outer, last), first.point + way)
     if are_parallel(first, inner):
         raise NoLeg("a parallelogram whose pins are parallel to the hinges beside it")
-    return _checked_rod(proximal, foot, (), head, is_reversed)
+    return _checked_rod(proximal, base_end, (), platform_end, is_reversed)
 
 
 def _leg(items: list[Item]) -> tuple[LegForm, ...]:
@@ -221,9 +223,9 @@ def _readings(items: list[Item]) -> Iterator[Callable[[], tuple[LegForm, ...]]]:
 def _orienting(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm, ...]:
     """A rod on an arm that turns, or shifts, the plane across the hinge at its foot to where the head is."""
     arm, rod = items[0], _rod_on(items[1:], n_carriers, is_reversed)
-    if arm.kind == "S" or rod.foot_ending.kind != "hinge" or (rod.proximal is None and rod.slide is None):
+    if arm.kind == "S" or rod.base_ending.kind != "hinge" or (rod.proximal is None and rod.slide is None):
         raise NoLeg("several joints carry its rod")
-    axis = rod.foot_ending.items[0].axis
+    axis = rod.base_ending.items[0].axis
     lean = abs(arm.axis @ axis) if arm.kind == "P" else area(arm.axis, axis)
     if lean <= TOLERANCES.alignment:
         raise NoLeg("several joints carry its rod")
@@ -242,7 +244,7 @@ def _led(items: list[Item], n_carriers: int, is_reversed: bool) -> tuple[LegForm
     working mode then, and it is an arm rather.
     """
     rod = _rod_on(items[1:], n_carriers, is_reversed)
-    hinges = [end for end in (rod.foot_ending, rod.head_ending) if end.kind == "hinge"]
+    hinges = [end for end in (rod.base_ending, rod.platform_ending) if end.kind == "hinge"]
     asks = len(hinges) + keeps_from_spinning(rod)
     if items[0].kind == "S" or asks == 0 or (n_carriers == 1 and asks > 1):
         raise NoLeg("several joints carry its rod")
@@ -283,11 +285,13 @@ def _rod(proximal: Item | None, items: list[Item], is_reversed: bool) -> Rod:
     for foot_size, head_size in sorted(product(sizes, sizes), key=sum, reverse=True):
         if foot_size + head_size > len(items):
             continue
-        foot, head = _ending(items[:foot_size]), _ending(items[len(items) - head_size :])
-        if foot is None or head is None:
+        base_end, platform_end = _ending(items[:foot_size]), _ending(items[len(items) - head_size :])
+        if base_end is None or platform_end is None:
             continue
         try:
-            return _checked_rod(proximal, foot, items[foot_size : len(items) - head_size], head, is_reversed)
+            return _checked_rod(
+                proximal, base_end, items[foot_size : len(items) - head_size], platform_end, is_reversed
+            )
         except NoLeg as found:
             reason = str(found)
     raise NoLeg(reason)
@@ -318,8 +322,10 @@ def _crossing(first: Item, second: Item) -> Floats:
     return np.asarray(first.point + along * first.axis)
 
 
-def _checked_rod(proximal: Item | None, foot: Ending, middle: Sequence[Item], head: Ending, is_reversed: bool) -> Rod:
-    start, end = _ends(foot, head)
+def _checked_rod(
+    proximal: Item | None, base_end: Ending, middle: Sequence[Item], platform_end: Ending, is_reversed: bool
+) -> Rod:
+    start, end = _ends(base_end, platform_end)
     line = end - start
     if np.linalg.norm(line) <= TOLERANCES.alignment:
         raise NoLeg("a rod of no length")
@@ -329,7 +335,7 @@ def _checked_rod(proximal: Item | None, foot: Ending, middle: Sequence[Item], he
     slides, twists = ([_along(item, line) for item in middle if item.kind == kind] for kind in "PR")
     if len(slides) > 1 or len(twists) > 1:
         raise NoLeg("several joints along its rod")
-    for ending, axes in ((foot, foot.items), (head, head.items[::-1])):
+    for ending, axes in ((base_end, base_end.items), (platform_end, platform_end.items[::-1])):
         if ending.kind in ("hinge", "cross") and _is_singular([item.axis for item in axes], line):
             raise NoLeg("a hinge along its rod")
         if ending.kind == "triple" and any(abs(a.axis @ b.axis) > TOLERANCES.alignment for a, b in pairwise(axes)):
@@ -340,7 +346,7 @@ def _checked_rod(proximal: Item | None, foot: Ending, middle: Sequence[Item], he
         if proximal.kind == "R" and area(proximal.axis, start - proximal.point) <= TOLERANCES.alignment:
             raise NoLeg("a crank of no length")
     slide, twist = (found[0] if found else None for found in (slides, twists))
-    return Rod(proximal, foot, slide, twist, head, start, end, is_reversed)
+    return Rod(proximal, base_end, slide, twist, platform_end, start, end, is_reversed)
 
 
 def _along(item: Item, line: Floats) -> Item:
@@ -355,17 +361,17 @@ def _is_singular(axes: Sequence[Floats], line: Floats) -> bool:
     return bool(abs(np.cross(axes[0], line) @ axes[1]) <= TOLERANCES.alignment)
 
 
-def _ends(foot: Ending, head: Ending) -> tuple[Floats, Floats]:
+def _ends(base_end: Ending, platform_end: Ending) -> tuple[Floats, Floats]:
     """The two ends of a rod: on a single hinge the point nearest to the other end."""
-    if foot.kind == "hinge" and head.kind == "hinge":
-        first, second = foot.items[0], head.items[0]
+    if base_end.kind == "hinge" and platform_end.kind == "hinge":
+        first, second = base_end.items[0], platform_end.items[0]
         if are_parallel(first, second):
             return first.point + first.axis * (first.axis @ (second.point - first.point)), second.point
         return _crossing(first, second), _crossing(second, first)
-    if foot.kind == "hinge":
-        item = foot.items[0]
-        return item.point + item.axis * (item.axis @ (head.centre - item.point)), head.centre
-    if head.kind == "hinge":
-        item = head.items[0]
-        return foot.centre, item.point + item.axis * (item.axis @ (foot.centre - item.point))
-    return foot.centre, head.centre
+    if base_end.kind == "hinge":
+        item = base_end.items[0]
+        return item.point + item.axis * (item.axis @ (platform_end.centre - item.point)), platform_end.centre
+    if platform_end.kind == "hinge":
+        item = platform_end.items[0]
+        return base_end.centre, item.point + item.axis * (item.axis @ (base_end.centre - item.point))
+    return base_end.centre, platform_end.centre

@@ -34,8 +34,15 @@ def at_rest(table: LegTable, sides: Floats) -> Resting | None:
     legs = table.legs
     redundant = legs["kind"] == K.REDUNDANT
     is_otherwise = (legs["frame"] != K.FROM_BASE) & (legs["redundant"] < 0) & ~redundant
-    is_otherwise |= (legs["at_head"] == 1) | (legs["orients"] == 1) | (legs["reversed"] == 1) | (legs["inner"] == 1)
-    if table.task["unset"][0] or is_otherwise.any() or legs["head_aimed"].any() or not _are_within(table, sides):
+    is_otherwise |= (
+        (legs["at_platform_end"] == 1) | (legs["orients"] == 1) | (legs["reversed"] == 1) | (legs["inner"] == 1)
+    )
+    if (
+        table.task["unset"][0]
+        or is_otherwise.any()
+        or legs["platform_end_aimed"].any()
+        or not _are_within(table, sides)
+    ):
         return None
     moved = _moved(legs, sides)
     of_arms = {name: redundant[getattr(table, name)["leg"]] for name in ("limited", "cones", "driven", "known")}
@@ -43,7 +50,7 @@ def at_rest(table: LegTable, sides: Floats) -> Resting | None:
     parts = {name: getattr(table, name)[~own] for name, own in of_arms.items()}
     cones = parts["cones"]
     axes = np.einsum("nij,nj->ni", moved[cones["leg"], :3, :3], cones["axis"])
-    cones["axis"] = np.where((cones["place"] == K.FOOT_LINE)[:, None], axes, cones["axis"])
+    cones["axis"] = np.where((cones["place"] == K.BASE_LINE)[:, None], axes, cones["axis"])
     for part in parts.values():
         part["leg"] = numbers[part["leg"]]
     standing = _standing(legs, moved)[~redundant]
@@ -80,10 +87,10 @@ def _moved(legs: Records, sides: Floats) -> Floats:
 def _standing(legs: Records, moved: Floats) -> Records:
     """Legs with what they stand on as displaced."""
     legs, rotations = legs.copy(), moved[:, :3, :3]
-    for name in ("foot_point", "proximal_point"):
+    for name in ("base_end_point", "proximal_point"):
         legs[name] = np.einsum("nij,nj->ni", rotations, legs[name]) + moved[:, :3, 3]
     for name in ("proximal_axis", "crank", "crank_across", "line"):
         legs[name] = np.einsum("nij,nj->ni", rotations, legs[name])
-    legs["foot_axes"] = np.einsum("nij,nkj->nki", rotations, legs["foot_axes"])
+    legs["base_end_axes"] = np.einsum("nij,nkj->nki", rotations, legs["base_end_axes"])
     legs["redundant"], legs["frame"] = -1, K.FROM_BASE
     return legs

@@ -109,7 +109,7 @@ def _stations(
         for edge, other in ways[body]:
             if other not in redundant:
                 item = _passed(mechanism, edge, before)[0]
-                redundant[other] = RedundantJoint(item, is_reversed=False, at_head=True, on=on)
+                redundant[other] = RedundantJoint(item, is_reversed=False, at_platform_end=True, on=on)
                 left.remove(edge)
             before, on = other, redundant[other]
     return redundant, left
@@ -138,13 +138,17 @@ def _rod_between(inner: RedundantJoint | None, outer: RedundantJoint, items: lis
     return *mirrors, replace(rigid_rod(items), on=mirrors[-1])
 
 
-def _mirrors(feet: Sequence[RedundantJoint], heads: Sequence[RedundantJoint], is_inner: bool) -> list[RedundantJoint]:
+def _mirrors(
+    base_ends: Sequence[RedundantJoint], platform_ends: Sequence[RedundantJoint], is_inner: bool
+) -> list[RedundantJoint]:
     """Arms with the coordinates of others, that move the body of the feet, then that of the heads."""
     mirrors: list[RedundantJoint] = []
-    for arm, at_head in (*((each, False) for each in feet), *((each, True) for each in heads)):
+    for arm, at_platform_end in (*((each, False) for each in base_ends), *((each, True) for each in platform_ends)):
         on = mirrors[-1] if mirrors else None
         mirrors.append(
-            RedundantJoint(arm.item, is_reversed=True, at_head=at_head, on=on, mirror_of=arm, is_inner=is_inner)
+            RedundantJoint(
+                arm.item, is_reversed=True, at_platform_end=at_platform_end, on=on, mirror_of=arm, is_inner=is_inner
+            )
         )
     return mirrors
 
@@ -152,7 +156,7 @@ def _mirrors(feet: Sequence[RedundantJoint], heads: Sequence[RedundantJoint], is
 def _way_to(arm: RedundantJoint | None) -> list[RedundantJoint]:
     """The arms of the platform that place a body, in order from the platform."""
     way: list[RedundantJoint] = []
-    while arm is not None and arm.at_head:
+    while arm is not None and arm.at_platform_end:
         way.append(arm)
         arm = arm.on
     return way[::-1]

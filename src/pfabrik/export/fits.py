@@ -60,7 +60,7 @@ def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
         return None
     if any(leg.record["reversed"] for leg in legs):
         return None
-    ends = [(np.asarray(leg.numbers["foot"]), np.asarray(leg.numbers["head"])) for leg in legs]
+    ends = [(np.asarray(leg.numbers["base_end"]), np.asarray(leg.numbers["platform_end"])) for leg in legs]
     added = [each.home - _length(leg) for each, leg in zip(machine.driven, legs, strict=True)]
     return [(*each, more) for each, more in zip(ends, added, strict=True)]
 
@@ -86,7 +86,7 @@ def towers_of(machine: Machine) -> list[Tower] | None:
         if pair is None:
             return None
         axis = np.asarray(pair[0].numbers["axis"]) * each.sense
-        spans = [np.asarray(leg.numbers["foot"]) - np.asarray(leg.numbers["head"]) for leg in pair]
+        spans = [np.asarray(leg.numbers["base_end"]) - np.asarray(leg.numbers["platform_end"]) for leg in pair]
         lengths = [_length(leg) for leg in pair]
         off = max(np.abs(spans[0] - spans[1]).max() / size, abs(lengths[0] - lengths[1]) / size)
         if (
@@ -123,8 +123,8 @@ def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
     if pair is None:
         return None
     axis, crank = (np.asarray(pair[0].numbers[name]) for name in ("axis", "crank"))
-    knees = [np.asarray(leg.numbers["foot"]) for leg in pair]
-    ankles = [np.asarray(leg.numbers["head"]) for leg in pair]
+    knees = [np.asarray(leg.numbers["base_end"]) for leg in pair]
+    ankles = [np.asarray(leg.numbers["platform_end"]) for leg in pair]
     aside = np.cross(axis, knees[1] - knees[0])
     off = max(np.abs((knees[1] - knees[0]) - (ankles[1] - ankles[0])).max(), np.linalg.norm(aside)) / size
     knee, ankle = 0.5 * (knees[0] + knees[1]), 0.5 * (ankles[0] + ankles[1])

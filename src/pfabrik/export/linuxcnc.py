@@ -87,8 +87,8 @@ def _genhexkins(mechanism: Mechanism, struts: list[tuple[Floats, Floats, float]]
     for name, (_, _, added) in zip(mechanism.actuator_names, struts, strict=True):
         if abs(added) > TOLERANCES.alignment * mechanism.characteristic_length:
             lines.append(f"# joint {comment(name)} counts {added:.9g} more than the length of its strut")
-    for place, (foot, head, _) in enumerate(struts):
-        for part, point in (("base", foot), ("platform", head)):
+    for place, (base_end, platform_end, _) in enumerate(struts):
+        for part, point in (("base", base_end), ("platform", platform_end)):
             lines += [
                 f"setp genhexkins.{part}.{place}.{axis} {value:.12g}" for axis, value in zip("xyz", point, strict=True)
             ]

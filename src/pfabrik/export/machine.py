@@ -156,13 +156,24 @@ def _legs(mechanism: Mechanism, table: LegTable) -> list[Leg]:
 
 def _rod_numbers(rod: Rod, record: Record, length: float) -> dict[str, Number]:
     """What is to be reached at home counts from a crank's axis, or from the foot on a carriage."""
-    numbers: dict[str, Number] = {"foot": record["foot_point"] * length, "head": record["head_point"] * length}
-    numbers |= {name: record[name] for name in ("line", "foot_side", "head_side", "twist")}
-    numbers |= {f"{end}_axes": record[f"{end}_axes"] for end in ("foot", "head") if record[end] in (K.HINGE, K.CROSS)}
+    numbers: dict[str, Number] = {
+        "base_end": record["base_end_point"] * length,
+        "platform_end": record["platform_end_point"] * length,
+    }
+    numbers |= {name: record[name] for name in ("line", "base_end_side", "platform_end_side", "twist")}
+    numbers |= {
+        f"{end}_axes": record[f"{end}_axes"]
+        for end in ("base_end", "platform_end")
+        if record[end] in (K.HINGE, K.CROSS)
+    }
     numbers["length"] = record["length"] * length
     if rod.proximal is not None:
-        begin = record["proximal_point"] if record["proximal"] == K.CRANK else rod.foot
-        numbers |= {"axis": record["proximal_axis"], "side": record["side"], "reach": (rod.head - begin) * length}
+        begin = record["proximal_point"] if record["proximal"] == K.CRANK else rod.base_end
+        numbers |= {
+            "axis": record["proximal_axis"],
+            "side": record["side"],
+            "reach": (rod.platform_end - begin) * length,
+        }
         fields = {"centre": "proximal_point", "crank": "crank", "across": "crank_across"}
         numbers |= {name: record[field] * length for name, field in fields.items()}
     return numbers
@@ -173,14 +184,14 @@ def _arm_numbers(record: Record, length: float) -> dict[str, Number]:
 
 
 def _pivot_numbers(record: Record, length: float) -> dict[str, Number]:
-    slides, last = int(record["slides"]), {K.CROSS: 1, K.TRIPLE: 2}.get(int(record["foot"]))
+    slides, last = int(record["slides"]), {K.CROSS: 1, K.TRIPLE: 2}.get(int(record["base_end"]))
     return {
-        "foot": record["foot_point"] * length,
-        "head": record["head_point"] * length,
-        "foot_axes": record["foot_axes"],
+        "base_end": record["base_end_point"] * length,
+        "platform_end": record["platform_end_point"] * length,
+        "base_end_axes": record["base_end_axes"],
         "side": record["side"],
         "rows": np.concatenate([record["slide_rows"][:slides], record["fixed_rows"][: 3 - slides]]),
         "kept": record["kept"],
         "moved": record["moved"],
-        "square": np.zeros(3) if last is None else square_to(record["foot_axes"][last])[0],
+        "square": np.zeros(3) if last is None else square_to(record["base_end_axes"][last])[0],
     }

@@ -147,14 +147,14 @@ def _leg(leg: Leg, members: Mapping[str, str]) -> str:
     told = {"kind": KINDS[int(record["kind"])], "proximal": CARRIERS.get(int(record["proximal"]), "")}
     told["frame"] = FRAMES.get(int(record["frame"]), str(record["frame"]))
     if record["kind"] != K.REDUNDANT:
-        told["foot_end"] = ENDINGS[int(record["foot"])]
+        told["foot_end"] = ENDINGS[int(record["base_end"])]
     if record["kind"] == K.ROD:
-        told["head_end"] = ENDINGS[int(record["head"])]
-    whole = {name: record[name] for name in ("slides", "twists", "foot_aimed", "head_aimed", "upright")}
+        told["head_end"] = ENDINGS[int(record["platform_end"])]
+    whole = {name: record[name] for name in ("slides", "twists", "base_end_aimed", "platform_end_aimed", "upright")}
     whole |= {"main": leg.main, "is_back": record["reversed"], "pairs": record["axis_rows"]}
     whole |= {"on": record["redundant"] + 1, "is_inner": record["inner"]}
     if record["kind"] == K.REDUNDANT:
-        whole |= {name: record[name] for name in ("makes", "column", "at_head", "orients", "has_rows")}
+        whole |= {name: record[name] for name in ("makes", "column", "at_platform_end", "orients", "has_rows")}
         whole |= {"is_twin": record["mirror_of"] >= 0}
     told |= {name: str(int(value)) for name, value in whole.items() if value}
     told |= {name: literal(value) for name, value in leg.numbers.items() if np.any(value)}
@@ -186,5 +186,5 @@ def _coordinate(each: Coordinate) -> str:
 
 
 def _cone(cone: Record) -> str:
-    is_head = int(cone["place"] == K.HEAD_LINE)
+    is_head = int(cone["place"] == K.PLATFORM_LINE)
     return f"    {{{int(cone['leg'])}, {is_head}, {literal(cone['axis'])}, {literal(float(cone['half_angle']))}}}"

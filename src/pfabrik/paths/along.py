@@ -60,11 +60,11 @@ def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
         if not isinstance(form, Rod):
             continue
         proximal = proximal if form.is_shared else form.proximal
-        if proximal is None or form.slide is not None or not form.foot_ending.items:
+        if proximal is None or form.slide is not None or not form.base_ending.items:
             continue
         turns = proximal.kind == "R"
-        motion = np.cross(proximal.axis, form.foot - proximal.point) if turns else proximal.axis
-        found.append((form.foot_ending.items[-1].outward, form.head - form.foot, proximal.outward, motion))
+        motion = np.cross(proximal.axis, form.base_end - proximal.point) if turns else proximal.axis
+        found.append((form.base_ending.items[-1].outward, form.platform_end - form.base_end, proximal.outward, motion))
     return found
 
 

@@ -88,7 +88,7 @@ def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Fl
     if not len(choosing):
         return sides
     closure = closure_of(mechanism, whole=False)
-    places = np.where(table.legs["kind"] == K.PIVOT, K.FOOT, K.Q_PROXIMAL)
+    places = np.where(table.legs["kind"] == K.PIVOT, K.BASE_END, K.Q_PROXIMAL)
     own = [table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in choosing]
     if set(own) <= set(closure.actuated.tolist()):
         present = np.zeros((len(start), len(closure.scale)))

@@ -152,7 +152,7 @@ def _sided_pivots(table: LegTable) -> NDArray[np.intp]:
 def _by_place(table: LegTable, legs: NDArray[np.intp]) -> NDArray[np.intp]:
     """Legs in an order that depends on where they are at home: what is drawn is theirs however they are described."""
     own = table.legs[legs]
-    places = np.concatenate([own[end] for end in ("head_point", "foot_point", "proximal_point")], axis=1)
+    places = np.concatenate([own[end] for end in ("platform_end_point", "base_end_point", "proximal_point")], axis=1)
     return np.lexsort(np.round(places, PLACES).T[::-1])
 
 

@@ -65,7 +65,7 @@ def with_aims(legs: Records, cones: Records) -> Records:
     """
     aims = []
     for k, leg in enumerate(legs):
-        for end, place in (("foot", K.FOOT_LINE), ("head", K.HEAD_LINE)):
+        for end, place in (("base_end", K.BASE_LINE), ("platform_end", K.PLATFORM_LINE)):
             is_pivot = leg["kind"] == K.PIVOT and leg[end] == K.TRIPLE
             if not is_pivot and (leg["kind"] != K.ROD or leg[end] != K.CROSS):
                 continue

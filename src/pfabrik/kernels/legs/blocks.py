@@ -47,7 +47,7 @@ from .columns import (
 )
 from .endings import SURE
 from .poses import ROUNDED
-from .records import CARRIAGE, CRANK, FOOT, FOOT_LINE, HEAD, HINGE, NO_PROXIMAL, Q_PROXIMAL, SHARED, SLIDE
+from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, HINGE, NO_PROXIMAL, PLATFORM_END, Q_PROXIMAL, SHARED, SLIDE
 from .table import open_table
 
 TURN = 2.0 * math.pi
@@ -61,16 +61,16 @@ def lay_rod(rod: Record, proximal: Record, n: int, S: Floats) -> None:
     ----------
     carrier : the rod whose carrier it is on, laid before; itself if it shares none.
     """
-    head, point = vec(rod["head_point"]), vec(proximal["proximal_point"])
+    platform_end, point = vec(rod["platform_end_point"]), vec(proximal["proximal_point"])
     if proximal["proximal"] == CRANK:
-        axis, arm = vec(proximal["proximal_axis"]), sub(vec(rod["foot_point"]), point)
+        axis, arm = vec(proximal["proximal_axis"]), sub(vec(rod["base_end_point"]), point)
         rest = scale(dot(axis, arm), axis)
-        lay_moved(head, add(point, rest), n, S)
+        lay_moved(platform_end, add(point, rest), n, S)
         if rod["proximal"] == CRANK:
             lay_crank(rod, n, S)
         leave_arm(sub(arm, rest), cross(axis, arm), n, S)
     else:
-        lay_moved(head, vec(rod["foot_point"]), n, S)
+        lay_moved(platform_end, vec(rod["base_end_point"]), n, S)
         if rod["proximal"] == CARRIAGE:
             lay_carriage(rod, n, S)
         if proximal["proximal"] == CARRIAGE:
@@ -144,27 +144,27 @@ def lay_length(length: float, n: int, S: Floats) -> None:
 @routine
 def lay_hinges(rod: Record, proximal: Record, n: int, S: Floats) -> None:
     """Constraints and angles of single hinges at the ends of a rod, and that they do not twist."""
-    foot, head, home = vec(rod["foot_axes"][0]), vec(rod["head_axes"][0]), vec(rod["line"])
-    if rod["foot"] == HINGE:
-        lay_along_carried(foot, proximal, VALUE, n, S)
+    base_end, platform_end, home = vec(rod["base_end_axes"][0]), vec(rod["platform_end_axes"][0]), vec(rod["line"])
+    if rod["base_end"] == HINGE:
+        lay_along_carried(base_end, proximal, VALUE, n, S)
         note_row(VALUE, n, S)
-    if rod["head"] == HINGE:
-        lay_along_turned(head, VALUE, n, S)
+    if rod["platform_end"] == HINGE:
+        lay_along_turned(platform_end, VALUE, n, S)
         note_row(VALUE, n, S)
     if rod["twists"] == 1:
-        lay_carried(foot, proximal, n, S)
-        lay_turned(head, n, S)
+        lay_carried(base_end, proximal, n, S)
+        lay_turned(platform_end, n, S)
         lay_inverse(n, S)
         lay_twist(rod["twist"], n, S)
         note_row(VALUE, n, S)
-    if rod["foot_aimed"] == 1:
-        lay_along_carried(cross(foot, home), proximal, AY, n, S)
-        lay_along_carried(along(home, -dot(foot, home), foot), proximal, AX, n, S)
-        lay_angle(VALUES + FOOT, n, S)
-    if rod["head_aimed"] == 1:
-        lay_along_turned(cross(head, home), AY, n, S)
-        lay_along_turned(along(home, -dot(head, home), head), AX, n, S)
-        lay_angle(VALUES + HEAD, n, S)
+    if rod["base_end_aimed"] == 1:
+        lay_along_carried(cross(base_end, home), proximal, AY, n, S)
+        lay_along_carried(along(home, -dot(base_end, home), base_end), proximal, AX, n, S)
+        lay_angle(VALUES + BASE_END, n, S)
+    if rod["platform_end_aimed"] == 1:
+        lay_along_turned(cross(platform_end, home), AY, n, S)
+        lay_along_turned(along(home, -dot(platform_end, home), platform_end), AX, n, S)
+        lay_angle(VALUES + PLATFORM_END, n, S)
 
 
 @routine
@@ -230,7 +230,7 @@ def note_range(coordinate: Record, n: int, S: Floats) -> None:
 @routine
 def lay_along_cone(cone: Record, proximal: Record, n: int, S: Floats) -> None:
     """Fill VALUE with the share of the rod's line along the axis of a cone."""
-    if cone["place"] == FOOT_LINE:
+    if cone["place"] == BASE_LINE:
         lay_along_carried(vec(cone["axis"]), proximal, VALUE, n, S)
     else:
         lay_along_turned(vec(cone["axis"]), VALUE, n, S)

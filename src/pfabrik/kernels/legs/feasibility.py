@@ -13,7 +13,7 @@ from ..vectors import angle_between, copy_row, scale, vec
 from .answer import CLOSE, KEPT, complete, deviation, end_of_rows, new_completion, put_rows
 from .endings import missed_by
 from .poses import lean_to, load, put_pose, turn_pose
-from .records import CARRIAGE, CRANK, CROSS, FOOT, FOOT_LINE, HEAD, HEAD_LINE, PIVOT, ROD, SLIDE, TRIPLE
+from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, CROSS, PIVOT, PLATFORM_END, PLATFORM_LINE, ROD, SLIDE, TRIPLE
 from .table import open_table
 
 PARTS, MORE_PARTS = 4, 16
@@ -138,14 +138,16 @@ def reach_of(leg: Record, own: Floats) -> float:
 @routine
 def missed_by_ends(leg: Record, own: Floats) -> float:
     """The largest angle by which crossed hinges of a leg, or the first two of three, cannot point where they should."""
-    if leg["kind"] == PIVOT and leg["foot"] == TRIPLE:
-        axes = leg["foot_axes"]
-        return missed_by(axes, vec(axes[2]), vec(own[FOOT_LINE:]), own[FOOT:])
+    if leg["kind"] == PIVOT and leg["base_end"] == TRIPLE:
+        axes = leg["base_end_axes"]
+        return missed_by(axes, vec(axes[2]), vec(own[BASE_LINE:]), own[BASE_END:])
     worst = 0.0
-    if leg["kind"] == ROD and leg["foot_aimed"] == 1 and leg["foot"] == CROSS:
-        worst = missed_by(leg["foot_axes"], vec(leg["line"]), vec(own[FOOT_LINE:]), own[FOOT:])
-    if leg["kind"] == ROD and leg["head_aimed"] == 1 and leg["head"] == CROSS:
-        worst = max(worst, missed_by(leg["head_axes"], vec(leg["line"]), vec(own[HEAD_LINE:]), own[HEAD:]))
+    if leg["kind"] == ROD and leg["base_end_aimed"] == 1 and leg["base_end"] == CROSS:
+        worst = missed_by(leg["base_end_axes"], vec(leg["line"]), vec(own[BASE_LINE:]), own[BASE_END:])
+    if leg["kind"] == ROD and leg["platform_end_aimed"] == 1 and leg["platform_end"] == CROSS:
+        worst = max(
+            worst, missed_by(leg["platform_end_axes"], vec(leg["line"]), vec(own[PLATFORM_LINE:]), own[PLATFORM_END:])
+        )
     return worst
 
 

@@ -61,13 +61,13 @@ def orienting_coordinate(arm: Record, rod: Record, frame: Floats, side: float) -
     The second number is as of `endings.either_angle`. With the hinge n through F, which the arm turns about a through
     o, or shifts along a, and the head H: (Rot n) . (H - o) = n . (F - o), or n . (H - F - q a) = 0.
     """
-    axis, at, n = vec(arm["proximal_axis"]), vec(arm["proximal_point"]), vec(rod["foot_axes"][0])
-    head, foot, lean = move(frame, vec(rod["head_point"])), vec(rod["foot_point"]), dot(axis, n)
+    axis, at, n = vec(arm["proximal_axis"]), vec(arm["proximal_point"]), vec(rod["base_end_axes"][0])
+    platform_end, base_end, lean = move(frame, vec(rod["platform_end_point"])), vec(rod["base_end_point"]), dot(axis, n)
     if arm["proximal"] != CRANK:
-        return dot(n, sub(head, foot)) / lean, 1.0
-    x = sub(head, at)
+        return dot(n, sub(platform_end, base_end)) / lean, 1.0
+    x = sub(platform_end, at)
     rest = lean * dot(axis, x)
-    cosine, sine, sure = either_angle(dot(n, x) - rest, dot(cross(axis, n), x), dot(n, sub(foot, at)) - rest, side)
+    cosine, sine, sure = either_angle(dot(n, x) - rest, dot(cross(axis, n), x), dot(n, sub(base_end, at)) - rest, side)
     return math.atan2(sine, cosine), sure
 
 
@@ -80,20 +80,20 @@ def place_redundant(arm: Record, q: float, frames: Floats, own: Floats) -> None:
     own[Q_PROXIMAL] = q
     put_redundant_rate(arm, before, own)
     for j in range(3):
-        heads = (before[0, j], before[1, j], before[2, j])
-        feet = (before[AXES, j], before[AXES + 1, j], before[AXES + 2, j])
+        platform_ends = (before[0, j], before[1, j], before[2, j])
+        base_ends = (before[AXES, j], before[AXES + 1, j], before[AXES + 2, j])
         if is_hinge:
             e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
             e = turned(e, axis, cosine, sine)
-            if arm["at_head"] == 1:
-                heads = turn(before, e)
+            if arm["at_platform_end"] == 1:
+                platform_ends = turn(before, e)
             else:
-                heads, feet = turned(heads, axis, cosine, -sine), turn(before[AXES:], e)
+                platform_ends, base_ends = turned(platform_ends, axis, cosine, -sine), turn(before[AXES:], e)
         for i in range(3):
-            after[i, j], after[AXES + i, j] = heads[i], feet[i]
+            after[i, j], after[AXES + i, j] = platform_ends[i], base_ends[i]
     shift = (before[0, 3], before[1, 3], before[2, 3])
     about = vec(before[ABOUT])
-    if arm["at_head"] == 1:
+    if arm["at_platform_end"] == 1:
         shift = move(before, sub(at, turned(at, axis, cosine, sine)) if is_hinge else scale(q, axis))
     elif is_hinge:
         shift = add(at, turned(sub(shift, at), axis, cosine, -sine))
@@ -110,12 +110,12 @@ def put_redundant_rate(arm: Record, before: Floats, own: Floats) -> None:
     """Fill the velocity, at its reference point, and the angular velocity with which the platform would change all in
     an arm's frame as the arm does."""
     axis, at = vec(arm["proximal_axis"]), vec(arm["proximal_point"])
-    if arm["at_head"] == 1:
+    if arm["at_platform_end"] == 1:
         axis, at = turn(before, axis), move(before, at)
     velocity, spin = axis, NOWHERE
     if arm["proximal"] == CRANK:
         velocity, spin = cross(axis, sub(vec(before[ABOUT]), at)), axis
-    sense = 1.0 if arm["at_head"] != arm["reversed"] else -1.0
+    sense = 1.0 if arm["at_platform_end"] != arm["reversed"] else -1.0
     put(own[RATE : RATE + 3], scale(sense, turn(before[AXES:], velocity)))
     put(own[RATE + 3 : RATE + 6], scale(sense, turn(before[AXES:], spin)))
 
@@ -139,7 +139,7 @@ def put_pose_slope(leg: Record, frame: Floats, a: Vec, c: Vec, slope: Floats) ->
 
     dH and w are those of the head as the foot's body sees it.
     """
-    spin = add(cross(sub(move(frame, vec(leg["head_point"])), vec(frame[ABOUT])), a), c)
+    spin = add(cross(sub(move(frame, vec(leg["platform_end_point"])), vec(frame[ABOUT])), a), c)
     if leg["frame"] != FROM_BASE:
         sense = -1.0 if leg["reversed"] == 1 else 1.0
         a, spin = scale(sense, turn(frame[AXES:], a)), scale(sense, turn(frame[AXES:], spin))

@@ -124,7 +124,7 @@ def note_leg(rod: Record, reach: int, closed: int, n: int, S: Floats) -> None:
 def has_rows(rod: Record) -> bool:
     """Whether a rod leaves any constraint on the pose."""
     is_rigid = rod["slides"] == 0 and (rod["proximal"] == NO_PROXIMAL or rod["proximal"] == SHARED)
-    return bool(is_rigid or rod["foot"] == HINGE or rod["head"] == HINGE or rod["twists"] == 1)
+    return bool(is_rigid or rod["base_end"] == HINGE or rod["platform_end"] == HINGE or rod["twists"] == 1)
 
 
 @kernel

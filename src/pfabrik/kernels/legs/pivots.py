@@ -13,7 +13,7 @@ from .._jit import routine
 from ..vectors import Vec, cross, dot, move, put, sub, turn, vec
 from .endings import aim, angle_to, spin_angle, turned
 from .frames import NOWHERE, put_pose_slope
-from .records import CROSS, FOOT, FOOT_LINE, HEAD, HEAD_LINE, HINGE, TRIPLE
+from .records import BASE_END, BASE_LINE, CROSS, HINGE, PLATFORM_END, PLATFORM_LINE, TRIPLE
 
 # What is added to conditions that an axis meets also where it is turned over.
 TURNED_OVER = 2.0
@@ -22,20 +22,20 @@ TURNED_OVER = 2.0
 @routine
 def place_pivot(pivot: Record, frame: Floats, side: float, own: Floats) -> float:
     """Fill a pivot's values; how sure they are, see `SURE`."""
-    offset = sub(move(frame, vec(pivot["head_point"])), vec(pivot["foot_point"]))
+    offset = sub(move(frame, vec(pivot["platform_end_point"])), vec(pivot["base_end_point"]))
     for i in range(pivot["slides"]):
-        own[HEAD + i] = dot(vec(pivot["slide_rows"][i]), offset)
-    axes = pivot["foot_axes"]
-    if pivot["foot"] == HINGE:
-        own[FOOT] = spin_angle(frame, vec(axes[0]))
-    elif pivot["foot"] == CROSS:
-        own[FOOT] = angle_to(vec(axes[0]), vec(axes[1]), turn(frame, vec(axes[1])))
-        own[FOOT + 1] = last_angle(frame, axes, own[FOOT], 0.0, 1)
-    elif pivot["foot"] == TRIPLE:
+        own[PLATFORM_END + i] = dot(vec(pivot["slide_rows"][i]), offset)
+    axes = pivot["base_end_axes"]
+    if pivot["base_end"] == HINGE:
+        own[BASE_END] = spin_angle(frame, vec(axes[0]))
+    elif pivot["base_end"] == CROSS:
+        own[BASE_END] = angle_to(vec(axes[0]), vec(axes[1]), turn(frame, vec(axes[1])))
+        own[BASE_END + 1] = last_angle(frame, axes, own[BASE_END], 0.0, 1)
+    elif pivot["base_end"] == TRIPLE:
         last = vec(axes[2])
-        put(own[FOOT_LINE:HEAD_LINE], turn(frame, last))
-        sure = aim(axes, last, vec(own[FOOT_LINE:]), side, own[FOOT:HEAD])
-        own[FOOT + 2] = last_angle(frame, axes, own[FOOT], own[FOOT + 1], 2)
+        put(own[BASE_LINE:PLATFORM_LINE], turn(frame, last))
+        sure = aim(axes, last, vec(own[BASE_LINE:]), side, own[BASE_END:PLATFORM_END])
+        own[BASE_END + 2] = last_angle(frame, axes, own[BASE_END], own[BASE_END + 1], 2)
         return sure
     return 1.0
 
@@ -64,12 +64,12 @@ def any_across(v: Vec) -> Vec:
 def pivot_rows(pivot: Record, frame: Floats, rows: Floats) -> None:
     """Fill a pivot's constraints."""
     n, n_fixed = pivot["first_row"], 3 - pivot["slides"]
-    offset = sub(move(frame, vec(pivot["head_point"])), vec(pivot["foot_point"]))
+    offset = sub(move(frame, vec(pivot["platform_end_point"])), vec(pivot["base_end_point"]))
     for i in range(n_fixed):
         rows[n + i] = dot(vec(pivot["fixed_rows"][i]), offset)
     over = 0.0
     for i in range(pivot["upright"]):
-        axis = vec(pivot["foot_axes"][i])
+        axis = vec(pivot["base_end_axes"][i])
         over = TURNED_OVER if dot(axis, turn(frame, axis)) < 0.0 else over
     for i in range(pivot["axis_rows"]):
         kept, moved = vec(pivot["kept"][i]), turn(frame, vec(pivot["moved"][i]))

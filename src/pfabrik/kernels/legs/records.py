@@ -39,28 +39,28 @@ LEG = np.dtype(
         ("mirror_of", "i8"),  # of an arm: the leg whose coordinate it has, -1 if its own; see `frames`
         ("column", "i8"),  # of an arm: where derivatives by its coordinate are, after the six by the pose
         ("inner", "i8"),  # 1: it is between bodies that arms on the platform place, and says nothing of the pose
-        ("at_head", "i8"),  # of an arm, 1: it moves the body that heads are on
+        ("at_platform_end", "i8"),  # of an arm, 1: it moves the body that heads are on
         ("orients", "i8"),  # of an arm, 1: it brings the hinge at the foot of the rod after it to face the head
         ("proximal", "i8"),
         ("slides", "i8"),  # 1: a rod that changes its length; of a pivot, how many slides there are
         ("twists", "i8"),  # 1: both endings hold the rod against spinning about itself
-        ("foot", "i8"),  # ending of a rod's foot, or of a pivot
-        ("head", "i8"),
-        ("foot_aimed", "i8"),  # 1: the angles of this ending are asked for
-        ("head_aimed", "i8"),
+        ("base_end", "i8"),  # ending of a rod's foot, or of a pivot
+        ("platform_end", "i8"),
+        ("base_end_aimed", "i8"),  # 1: the angles of this ending are asked for
+        ("platform_end_aimed", "i8"),
         ("proximal_axis", *_vector),
         ("proximal_point", *_vector),  # of a crank: where on its axis the spoke stands
         ("crank", *_vector),  # from there to the foot
         ("crank_across", *_vector),  # the spoke a quarter turn on
         ("side", "f8"),  # which of two solutions is home's: of carrier, arm, or a pivot's three hinges
-        ("foot_point", *_vector),
-        ("head_point", *_vector),  # as `frames` map it: seen from the reference point, if not reversed
+        ("base_end_point", *_vector),
+        ("platform_end_point", *_vector),  # as `frames` map it: seen from the reference point, if not reversed
         ("length", "f8"),
         ("line", *_vector),  # unit vector from foot to head
-        ("foot_axes", "f8", (3, 3)),  # hinges in order from the body that the foot is on
-        ("head_axes", "f8", (3, 3)),  # hinges in order from the body that the head is on
-        ("foot_side", "f8"),  # which of the two ways to aim two crossed hinges is home's
-        ("head_side", "f8"),
+        ("base_end_axes", "f8", (3, 3)),  # hinges in order from the body that the foot is on
+        ("platform_end_axes", "f8", (3, 3)),  # hinges in order from the body that the head is on
+        ("base_end_side", "f8"),  # which of the two ways to aim two crossed hinges is home's
+        ("platform_end_side", "f8"),
         ("twist", "f8"),  # angle between the marks of the two endings, about the line
         ("slide_rows", "f8", (3, 3)),  # of a pivot: the first `slides` give these from the centre's displacement
         ("fixed_rows", "f8", (3, 3)),  # of a pivot: directions in which its centre cannot move, 3 - slides of them
@@ -70,14 +70,19 @@ LEG = np.dtype(
         ("value", *_vector),
         ("first_row", "i8"),  # place of its first constraint among all
         ("has_rows", "i8"),  # 1: it, or a rod on its carrier, leaves a constraint; of an arm, a leg on it
-        ("upright", "i8"),  # of a pivot: how many of its `foot_axes` R must not turn over
+        ("upright", "i8"),  # of a pivot: how many of its `base_end_axes` R must not turn over
     ]
 )
 
 # What is told of a leg at a pose: places in its row of `values`.
-Q_PROXIMAL, FOOT, SLIDE, HEAD = 0, 1, 4, 5  # three angles at FOOT and at HEAD; the slides of a pivot at HEAD
+Q_PROXIMAL, BASE_END, SLIDE, PLATFORM_END = (
+    0,
+    1,
+    4,
+    5,
+)  # three angles at FOOT and at HEAD; the slides of a pivot at HEAD
 # The rod's direction as seen by the body its foot, or its head, is on; the third hinge of a pivot by that of its foot.
-FOOT_LINE, HEAD_LINE = 8, 11
+BASE_LINE, PLATFORM_LINE = 8, 11
 COSINE, SINE = 14, 15  # of the crank's angle
 RATE = 1  # of an arm: the velocity and angular velocity of the platform that would change as much in its frame
 N_VALUES = 16

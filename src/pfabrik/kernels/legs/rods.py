@@ -3,8 +3,8 @@
 With F the foot, H the head, l = H - F, u = l / |l|, each rod leaves some of these constraints on the pose:
 
 - `length`, rigid rods that no carrier is turned for: |l| - length;
-- `foot`, a foot on one hinge n: n . l;
-- `head`, a head on one hinge m: m . l;
+- `base_end`, a foot on one hinge n: n . l;
+- `platform_end`, a head on one hinge m: m . l;
 - `twist`, both ends keep the rod from spinning: the angle about u between marks that go with its ends, less home's.
 
 The derivative of each is a . (dH - dF) + b . W + c . w, with W and w the angular velocities of the bodies of foot and
@@ -21,16 +21,16 @@ from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, 
 from .endings import aim, angle_to, either_angle, turned, turned_back
 from .frames import NOWHERE, put_pose_slope
 from .records import (
+    BASE_END,
+    BASE_LINE,
     CARRIAGE,
     COSINE,
     CRANK,
     CROSS,
-    FOOT,
-    FOOT_LINE,
-    HEAD,
-    HEAD_LINE,
     HINGE,
     NO_PROXIMAL,
+    PLATFORM_END,
+    PLATFORM_LINE,
     Q_PROXIMAL,
     SHARED,
     SINE,
@@ -39,20 +39,20 @@ from .records import (
 
 
 @routine
-def solve_proximal(rod: Record, head: Vec, side: float, own: Floats) -> float:
+def solve_proximal(rod: Record, platform_end: Vec, side: float, own: Floats) -> float:
     """Turn the crank, or move the carriage, until the rod reaches the head; how far from a dead point, see `SURE`.
 
     A crank: |o + spoke cos q + across sin q - H| = length; a carriage: |F + q a - H| = length. Where none reaches, it
     stays where it comes nearest.
     """
     if rod["proximal"] == CRANK:
-        x, crank = sub(head, vec(rod["proximal_point"])), vec(rod["crank"])
+        x, crank = sub(platform_end, vec(rod["proximal_point"])), vec(rod["crank"])
         C = 0.5 * (dot(x, x) + dot(crank, crank) - rod["length"] * rod["length"])
         cosine, sine, sure = either_angle(dot(crank, x), dot(vec(rod["crank_across"]), x), C, side)
         own[COSINE], own[SINE] = cosine, sine
         own[Q_PROXIMAL] = math.atan2(sine, cosine)
         return sure
-    x = sub(head, vec(rod["foot_point"]))
+    x = sub(platform_end, vec(rod["base_end_point"]))
     middle = dot(x, vec(rod["proximal_axis"]))
     square = rod["length"] * rod["length"]
     rest = square - dot(x, x) + middle * middle
@@ -64,12 +64,12 @@ def solve_proximal(rod: Record, head: Vec, side: float, own: Floats) -> float:
 def base_end_of(rod: Record, proximal: Record, own: Floats) -> Vec:
     """Where the foot is, with the carrier (the rod's, or the one it shares) as `own` says."""
     if proximal["proximal"] == NO_PROXIMAL:
-        return vec(rod["foot_point"])
+        return vec(rod["base_end_point"])
     if proximal["proximal"] == CARRIAGE:
-        return along(vec(rod["foot_point"]), own[Q_PROXIMAL], vec(proximal["proximal_axis"]))
+        return along(vec(rod["base_end_point"]), own[Q_PROXIMAL], vec(proximal["proximal_axis"]))
     if rod["proximal"] == SHARED:
         point = vec(proximal["proximal_point"])
-        arm = turned(sub(vec(rod["foot_point"]), point), vec(proximal["proximal_axis"]), own[COSINE], own[SINE])
+        arm = turned(sub(vec(rod["base_end_point"]), point), vec(proximal["proximal_axis"]), own[COSINE], own[SINE])
         return add(point, arm)
     arm = along(scale(own[COSINE], vec(rod["crank"])), own[SINE], vec(rod["crank_across"]))
     return add(vec(rod["proximal_point"]), arm)
@@ -95,7 +95,7 @@ def place_rod(
     """
     sure = 1.0
     if rod["proximal"] == CRANK or rod["proximal"] == CARRIAGE:
-        sure = solve_proximal(rod, move(frame, vec(rod["head_point"])), side, own)
+        sure = solve_proximal(rod, move(frame, vec(rod["platform_end_point"])), side, own)
     return min(sure, read_rod(rod, proximal, frame, lead, own, line))
 
 
@@ -106,24 +106,44 @@ def read_rod(rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Fl
     Two crossed hinges aim a rod in either of two ways, half a turn about it apart: those of home, unless the two ends
     then hold the rod the other way around.
     """
-    span = sub(move(frame, vec(rod["head_point"])), base_end_of(rod, proximal, lead))
+    span = sub(move(frame, vec(rod["platform_end_point"])), base_end_of(rod, proximal, lead))
     length, sure = norm(span), 1.0
     u, home = scale(1.0 / length, span), vec(rod["line"])
-    foot_line, head_line = turned_by_proximal(proximal, lead, u, -1.0), turned_back(frame, u)
+    base_line, platform_line = turned_by_proximal(proximal, lead, u, -1.0), turned_back(frame, u)
     put(line, span)
-    put(own[FOOT_LINE:HEAD_LINE], foot_line)
-    put(own[HEAD_LINE:COSINE], head_line)
+    put(own[BASE_LINE:PLATFORM_LINE], base_line)
+    put(own[PLATFORM_LINE:COSINE], platform_line)
     own[SLIDE] = length - rod["length"]
-    if rod["foot_aimed"] == 1:
-        sure = min(sure, aim_end(rod["foot"], rod["foot_axes"], home, foot_line, rod["foot_side"], own[FOOT:SLIDE]))
-    if rod["head_aimed"] == 1:
-        sure = min(sure, aim_end(rod["head"], rod["head_axes"], home, head_line, rod["head_side"], own[HEAD:FOOT_LINE]))
-    is_crossed = rod["foot"] == CROSS or rod["head"] == CROSS
+    if rod["base_end_aimed"] == 1:
+        sure = min(
+            sure,
+            aim_end(rod["base_end"], rod["base_end_axes"], home, base_line, rod["base_end_side"], own[BASE_END:SLIDE]),
+        )
+    if rod["platform_end_aimed"] == 1:
+        sure = min(
+            sure,
+            aim_end(
+                rod["platform_end"],
+                rod["platform_end_axes"],
+                home,
+                platform_line,
+                rod["platform_end_side"],
+                own[PLATFORM_END:BASE_LINE],
+            ),
+        )
+    is_crossed = rod["base_end"] == CROSS or rod["platform_end"] == CROSS
     if rod["twists"] == 1 and is_crossed and abs(twist_of(rod, proximal, frame, lead, own, u)) > 0.5 * math.pi:
-        if rod["head"] == CROSS:
-            aim_end(CROSS, rod["head_axes"], home, head_line, -rod["head_side"], own[HEAD:FOOT_LINE])
+        if rod["platform_end"] == CROSS:
+            aim_end(
+                CROSS,
+                rod["platform_end_axes"],
+                home,
+                platform_line,
+                -rod["platform_end_side"],
+                own[PLATFORM_END:BASE_LINE],
+            )
         else:
-            aim_end(CROSS, rod["foot_axes"], home, foot_line, -rod["foot_side"], own[FOOT:SLIDE])
+            aim_end(CROSS, rod["base_end_axes"], home, base_line, -rod["base_end_side"], own[BASE_END:SLIDE])
     return sure
 
 
@@ -148,9 +168,9 @@ def mark(ending: int, axes: Floats, angles: Floats) -> Vec:
 @routine
 def twist_of(rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Floats, u: Vec) -> float:
     """The angle about a rod's line between marks that go with its ends, less home's."""
-    foot = turned_by_proximal(proximal, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
-    head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
-    return wrap(angle_to(u, foot, head) - rod["twist"], 0.0)
+    base_end = turned_by_proximal(proximal, lead, mark(rod["base_end"], rod["base_end_axes"], own[BASE_END:SLIDE]), 1.0)
+    platform_end = turn(frame, mark(rod["platform_end"], rod["platform_end_axes"], own[PLATFORM_END:BASE_LINE]))
+    return wrap(angle_to(u, base_end, platform_end) - rod["twist"], 0.0)
 
 
 @routine
@@ -173,13 +193,13 @@ def spin_rate(ending: int, first: Vec, last: Vec, u: Vec) -> tuple[Vec, Vec]:
 @routine
 def twist_rate(rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Floats, u: Vec) -> tuple[Vec, Vec, Vec]:
     """Derivative of the twist of a rod by du, W and w."""
-    foot = turned_by_proximal(proximal, lead, mark(rod["foot"], rod["foot_axes"], own[FOOT:SLIDE]), 1.0)
-    head = turn(frame, mark(rod["head"], rod["head_axes"], own[HEAD:FOOT_LINE]))
-    first_foot = turned_by_proximal(proximal, lead, vec(rod["foot_axes"][0]), 1.0)
-    first_head = turn(frame, vec(rod["head_axes"][0]))
-    foot_line, foot_body = spin_rate(rod["foot"], first_foot, foot, u)
-    head_line, head_body = spin_rate(rod["head"], first_head, head, u)
-    return sub(head_line, foot_line), scale(-1.0, foot_body), head_body
+    base_end = turned_by_proximal(proximal, lead, mark(rod["base_end"], rod["base_end_axes"], own[BASE_END:SLIDE]), 1.0)
+    platform_end = turn(frame, mark(rod["platform_end"], rod["platform_end_axes"], own[PLATFORM_END:BASE_LINE]))
+    first_foot = turned_by_proximal(proximal, lead, vec(rod["base_end_axes"][0]), 1.0)
+    first_head = turn(frame, vec(rod["platform_end_axes"][0]))
+    base_line, foot_body = spin_rate(rod["base_end"], first_foot, base_end, u)
+    platform_line, head_body = spin_rate(rod["platform_end"], first_head, platform_end, u)
+    return sub(platform_line, base_line), scale(-1.0, foot_body), head_body
 
 
 @routine
@@ -208,12 +228,12 @@ def put_slope(
 
 
 @routine
-def proximal_rate(proximal: Record, foot: Vec, a: Vec, b: Vec) -> float:
+def proximal_rate(proximal: Record, base_end: Vec, a: Vec, b: Vec) -> float:
     """Derivative of - a . F + b . W by the coordinate of a carrier, with the foot F on it."""
     axis = vec(proximal["proximal_axis"])
     if proximal["proximal"] == CARRIAGE:
         return -dot(a, axis)
-    return dot(b, axis) - dot(a, cross(axis, sub(foot, vec(proximal["proximal_point"]))))
+    return dot(b, axis) - dot(a, cross(axis, sub(base_end, vec(proximal["proximal_point"]))))
 
 
 @routine
@@ -234,11 +254,11 @@ def rod_rows(
     if rod["slides"] == 0 and (rod["proximal"] == NO_PROXIMAL or rod["proximal"] == SHARED):
         rows[n] = own[SLIDE]
         n += 1
-    if rod["foot"] == HINGE:
-        rows[n] = norm(span) * dot(vec(rod["foot_axes"][0]), vec(own[FOOT_LINE:HEAD_LINE]))
+    if rod["base_end"] == HINGE:
+        rows[n] = norm(span) * dot(vec(rod["base_end_axes"][0]), vec(own[BASE_LINE:PLATFORM_LINE]))
         n += 1
-    if rod["head"] == HINGE:
-        rows[n] = norm(span) * dot(vec(rod["head_axes"][0]), vec(own[HEAD_LINE:COSINE]))
+    if rod["platform_end"] == HINGE:
+        rows[n] = norm(span) * dot(vec(rod["platform_end_axes"][0]), vec(own[PLATFORM_LINE:COSINE]))
         n += 1
     if rod["twists"] == 1:
         rows[n] = twist_of(rod, proximal, frame, lead, own, scale(1.0 / norm(span), span))
@@ -263,12 +283,12 @@ def rod_slopes(
     elif rod["slides"] == 0:
         put_slope(rod, proximal, frame, lead, proximal_slopes, u, NOWHERE, NOWHERE, slopes[n])
         n += 1
-    if rod["foot"] == HINGE:
-        axis = turned_by_proximal(proximal, lead, vec(rod["foot_axes"][0]), 1.0)
+    if rod["base_end"] == HINGE:
+        axis = turned_by_proximal(proximal, lead, vec(rod["base_end_axes"][0]), 1.0)
         put_slope(rod, proximal, frame, lead, proximal_slopes, axis, cross(axis, span), NOWHERE, slopes[n])
         n += 1
-    if rod["head"] == HINGE:
-        axis = turn(frame, vec(rod["head_axes"][0]))
+    if rod["platform_end"] == HINGE:
+        axis = turn(frame, vec(rod["platform_end_axes"][0]))
         put_slope(rod, proximal, frame, lead, proximal_slopes, axis, NOWHERE, cross(axis, span), slopes[n])
         n += 1
     if rod["twists"] == 1:

@@ -32,14 +32,14 @@ from ..free_motions import put_multipliers
 from ..legs.answer import deviation
 from ..legs.frames import AXES, NOWHERE
 from ..legs.records import (
+    BASE_END,
+    BASE_LINE,
     CARRIAGE,
     CRANK,
-    FOOT,
-    FOOT_LINE,
     FROM_BASE,
-    HEAD,
     HINGE,
     NO_PROXIMAL,
+    PLATFORM_END,
     Q_PROXIMAL,
     ROD,
     SLIDE,
@@ -48,7 +48,7 @@ from ..legs.records import (
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
 from .equations import LegEvaluation, direction, has_proximal, main_of, own_row, place
 from .lagrangian import put_force
-from .limits import AT_FOOT, AT_HEAD, cone_slope, seen
+from .limits import AT_BASE_END, AT_PLATFORM_END, cone_slope, seen
 from .linearise import linearise
 from .records import PlatformObjective
 from .search import Search, put_objective
@@ -97,19 +97,23 @@ def share_of(table: Table, root: int, nearer: float, search: Search) -> tuple[Ve
         first, on_hinge, on_slide = way_of(table, k)
         if first != root:
             continue
-        m, at_foot, at_head = hold_of(table, k, search)
-        if m == 0.0 and norm(at_foot) + norm(at_head) == 0.0:
+        m, at_foot, at_platform_end = hold_of(table, k, search)
+        if m == 0.0 and norm(at_foot) + norm(at_platform_end) == 0.0:
             continue
         if (hinge >= 0 and on_hinge not in (-1, hinge)) or (slide >= 0 and on_slide not in (-1, slide)):
             return force, pushing, math.inf
         axes = reduced.frames[table.legs[k]["frame"], AXES:]
-        line, at_foot, at_head = turn(axes, vec(reduced.lines[k])), turn(axes, at_foot), turn(axes, at_head)
-        pull = along(scale(m, line), -1.0, at_head)
+        line, at_foot, at_platform_end = (
+            turn(axes, vec(reduced.lines[k])),
+            turn(axes, at_foot),
+            turn(axes, at_platform_end),
+        )
+        pull = along(scale(m, line), -1.0, at_platform_end)
         force, pushing = add(force, sub(at_foot, pull)), pushing + m
         axis, arm, course = NOWHERE, NOWHERE, NOWHERE
         if on_hinge >= 0:
             hinge, axis = on_hinge, axis_of(table, on_hinge, reduced)
-            arm = sub(head_from(table, k, on_hinge, reduced), line)
+            arm = sub(platform_end_from(table, k, on_hinge, reduced), line)
             crank, turned, rod = flatten(arm, axis), flatten(at_foot, axis), add(line, arm)
             A += dot(pull, crank) + m * dot(crank, crank) + dot(turned, rod)
             B += dot(pull, cross(axis, crank)) + dot(cross(axis, turned), rod)
@@ -143,7 +147,11 @@ def way_of(table: Table, k: int) -> tuple[int, int, int]:
     leg, at, first, hinge, slide = table.legs[k], main_of(table, k), -1, -1, -1
     while at >= 0 and leg["kind"] == ROD:
         lead = table.legs[at]
-        if lead["at_head"] == 1 or lead["mirror_of"] >= 0 or (lead["redundant"] < 0 and lead["frame"] != FROM_BASE):
+        if (
+            lead["at_platform_end"] == 1
+            or lead["mirror_of"] >= 0
+            or (lead["redundant"] < 0 and lead["frame"] != FROM_BASE)
+        ):
             return -1, -1, -1
         if lead["proximal"] == CRANK and hinge < 0:
             hinge = at
@@ -163,11 +171,11 @@ def axis_of(table: Table, proximal: int, reduced: LegEvaluation) -> Vec:
 
 
 @routine
-def head_from(table: Table, k: int, hinge: int, reduced: LegEvaluation) -> Vec:
+def platform_end_from(table: Table, k: int, hinge: int, reduced: LegEvaluation) -> Vec:
     """Where the head of a rod is, from a hinge that it is on."""
     lead = table.legs[hinge]
     frame = reduced.frames[lead["frame"]]
-    return turn(frame[AXES:], sub(move(frame, vec(table.legs[k]["head_point"])), vec(lead["proximal_point"])))
+    return turn(frame[AXES:], sub(move(frame, vec(table.legs[k]["platform_end_point"])), vec(lead["proximal_point"])))
 
 
 @routine
@@ -176,17 +184,19 @@ def hold_of(table: Table, k: int, search: Search) -> tuple[float, Vec, Vec]:
     objective, as the body of the foot sees it."""
     leg, main, leg_eval, multipliers = table.legs[k], main_of(table, k), search.leg_eval, search.hessian.multipliers
     length, ranges, row, pull = norm(vec(leg_eval.lines[k])), table.limited.shape[0], leg["first_row"], 0.0
-    at_foot, at_head = NOWHERE, NOWHERE
+    at_foot, at_platform_end = NOWHERE, NOWHERE
     if has_proximal(leg):
         pull = search.balance[own_row(table, k)]
     elif leg["slides"] == 0:
         pull = search.balance[row]
         row += 1
-    if leg["foot"] == HINGE:
-        at_foot = scale(search.balance[row], seen(table, k, main, AT_FOOT, vec(leg["foot_axes"][0]), leg_eval))
+    if leg["base_end"] == HINGE:
+        at_foot = scale(search.balance[row], seen(table, k, main, AT_BASE_END, vec(leg["base_end_axes"][0]), leg_eval))
         row += 1
-    if leg["head"] == HINGE:
-        at_head = scale(search.balance[row], seen(table, k, main, AT_HEAD, vec(leg["head_axes"][0]), leg_eval))
+    if leg["platform_end"] == HINGE:
+        at_platform_end = scale(
+            search.balance[row], seen(table, k, main, AT_PLATFORM_END, vec(leg["platform_end_axes"][0]), leg_eval)
+        )
     u = direction(leg_eval.lines[k])
     for i in range(table.limited.shape[0]):
         limited, at_lo, at_hi = table.limited[i], multipliers[2 * i], multipliers[2 * i + 1]
@@ -198,26 +208,30 @@ def hold_of(table: Table, k: int, search: Search) -> tuple[float, Vec, Vec]:
         half = 0.5 * (limited["hi"] - limited["lo"])
         if spot == SLIDE:
             pull += sense * (at_hi - at_lo)
-        elif half < math.pi and ((spot == FOOT and leg["foot"] == HINGE) or (spot == HEAD and leg["head"] == HINGE)):
-            end, hinge = (AT_FOOT, leg["foot_axes"]) if spot == FOOT else (AT_HEAD, leg["head_axes"])
+        elif half < math.pi and (
+            (spot == BASE_END and leg["base_end"] == HINGE) or (spot == PLATFORM_END and leg["platform_end"] == HINGE)
+        ):
+            end, hinge = (
+                (AT_BASE_END, leg["base_end_axes"]) if spot == BASE_END else (AT_PLATFORM_END, leg["platform_end_axes"])
+            )
             middle = rotate(
                 u, seen(table, k, main, end, vec(hinge[0]), leg_eval), sense * (limited["lo"] + half - state)
             )
             stretch, lengthwise, push = bound_by(leg, max(at_lo, at_hi) / length, half)
-            pull, at_head = pull + stretch, along(at_head, lengthwise, u)
-            at_foot = along(at_foot, -push, middle) if end == AT_FOOT else at_foot
-            at_head = along(at_head, -push, middle) if end == AT_HEAD else at_head
+            pull, at_platform_end = pull + stretch, along(at_platform_end, lengthwise, u)
+            at_foot = along(at_foot, -push, middle) if end == AT_BASE_END else at_foot
+            at_platform_end = along(at_platform_end, -push, middle) if end == AT_PLATFORM_END else at_platform_end
     for i in range(table.cones.shape[0]):
         cone, push = table.cones[i], multipliers[2 * ranges + i]
         if cone["leg"] != k or push == 0.0 or cone_slope(table, cone, leg_eval) < cone["half_angle"] - BALANCED:
             continue
-        end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
+        end = AT_BASE_END if cone["place"] == BASE_LINE else AT_PLATFORM_END
         axis = seen(table, k, main, end, vec(cone["axis"]), leg_eval)
         stretch, lengthwise, push = bound_by(leg, push / length, cone["half_angle"])
-        pull, at_head = pull + stretch, along(at_head, lengthwise, u)
-        at_foot = along(at_foot, -push, axis) if end == AT_FOOT else at_foot
-        at_head = along(at_head, -push, axis) if end == AT_HEAD else at_head
-    return -pull / length, at_foot, at_head
+        pull, at_platform_end = pull + stretch, along(at_platform_end, lengthwise, u)
+        at_foot = along(at_foot, -push, axis) if end == AT_BASE_END else at_foot
+        at_platform_end = along(at_platform_end, -push, axis) if end == AT_PLATFORM_END else at_platform_end
+    return -pull / length, at_foot, at_platform_end
 
 
 @routine

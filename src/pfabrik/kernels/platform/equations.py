@@ -178,27 +178,27 @@ def close_rods(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> N
         if leg["kind"] == REDUNDANT:
             place_redundant(leg, q_redundant_of(table.legs, k, q), leg_eval.frames, own[k])
         if has_proximal(leg):
-            head = move(leg_eval.frames[leg["frame"]], vec(leg["head_point"]))
-            if solve_proximal(leg, head, side_of(leg, head, q[k]), own[k]) > SURELY:
+            platform_end = move(leg_eval.frames[leg["frame"]], vec(leg["platform_end_point"]))
+            if solve_proximal(leg, platform_end, side_of(leg, platform_end, q[k]), own[k]) > SURELY:
                 q[k] = wrap(own[k, Q_PROXIMAL], q[k]) if leg["proximal"] == CRANK else own[k, Q_PROXIMAL]
 
 
 @routine
-def side_of(rod: Record, head: Vec, q: float) -> float:
+def side_of(rod: Record, platform_end: Vec, q: float) -> float:
     """The side of a carrier: of its dead point, where the rod comes nearest to the head."""
     if rod["proximal"] == CRANK:
-        x = sub(head, vec(rod["proximal_point"]))
+        x = sub(platform_end, vec(rod["proximal_point"]))
         return math.copysign(
             1.0, dot(vec(rod["crank"]), x) * math.sin(q) - dot(vec(rod["crank_across"]), x) * math.cos(q)
         )
-    return math.copysign(1.0, q - dot(sub(head, vec(rod["foot_point"])), vec(rod["proximal_axis"])))
+    return math.copysign(1.0, q - dot(sub(platform_end, vec(rod["base_end_point"])), vec(rod["proximal_axis"])))
 
 
 @routine
 def branch_of_redundant(arm: Record, rod: Record, frame: Floats, q: float) -> float:
     """The same of an arm that `orienting_coordinate` places: by which way the plane turns away from the head."""
-    axis, n = vec(arm["proximal_axis"]), vec(rod["foot_axes"][0])
-    x = sub(move(frame, vec(rod["head_point"])), vec(arm["proximal_point"]))
+    axis, n = vec(arm["proximal_axis"]), vec(rod["base_end_axes"][0])
+    x = sub(move(frame, vec(rod["platform_end_point"])), vec(arm["proximal_point"]))
     return math.copysign(1.0, dot(cross(turned(n, axis, math.cos(q), math.sin(q)), axis), x))
 
 
@@ -283,12 +283,12 @@ def put_rod_slopes(table: Table, k: int, main: int, leg_eval: LegEvaluation) -> 
     if rod["slides"] == 0 and not has_proximal(rod):
         put_rate(table, k, main, u, NOWHERE, NOWHERE, leg_eval, slopes[n])
         n += 1
-    if rod["foot"] == HINGE:
-        axis = turned_by_proximal(proximal, lead, vec(rod["foot_axes"][0]), 1.0)
+    if rod["base_end"] == HINGE:
+        axis = turned_by_proximal(proximal, lead, vec(rod["base_end_axes"][0]), 1.0)
         put_rate(table, k, main, axis, cross(axis, span), NOWHERE, leg_eval, slopes[n])
         n += 1
-    if rod["head"] == HINGE:
-        axis = turn(frame, vec(rod["head_axes"][0]))
+    if rod["platform_end"] == HINGE:
+        axis = turn(frame, vec(rod["platform_end_axes"][0]))
         put_rate(table, k, main, axis, NOWHERE, cross(axis, span), leg_eval, slopes[n])
         n += 1
     if rod["twists"] == 1:

@@ -12,12 +12,24 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..legs.answer import deviation
 from ..legs.frames import NOWHERE, put_pose_slope
-from ..legs.records import CRANK, CROSS, FOOT, FOOT_LINE, HEAD, HINGE, PIVOT, Q_PROXIMAL, SLIDE, TRIPLE, Table
+from ..legs.records import (
+    BASE_END,
+    BASE_LINE,
+    CRANK,
+    CROSS,
+    HINGE,
+    PIVOT,
+    PLATFORM_END,
+    Q_PROXIMAL,
+    SLIDE,
+    TRIPLE,
+    Table,
+)
 from ..legs.rods import base_end_of, mark, turned_by_proximal
 from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
 from .equations import LegEvaluation, direction, main_of, put_rate, put_redundant_slopes
 
-AT_FOOT, AT_HEAD = 0, 1
+AT_BASE_END, AT_PLATFORM_END = 0, 1
 # Sine below which a line is straight along the axis of its cone: no direction leads in or out.
 ALIGNED = 1e-12
 
@@ -28,14 +40,14 @@ def put_turning(table: Table, k: int, main: int, end: int, t: Vec, leg_eval: Leg
     u = direction(leg_eval.lines[k])
     flat = along(t, -dot(t, u), u)
     a, spin = scale(1.0 / norm(vec(leg_eval.lines[k])), flat), scale(-1.0, cross(u, t))
-    b, c = (spin, NOWHERE) if end == AT_FOOT else (NOWHERE, spin)
+    b, c = (spin, NOWHERE) if end == AT_BASE_END else (NOWHERE, spin)
     put_rate(table, k, main, a, b, c, leg_eval, leg_eval.slope)
 
 
 @routine
 def seen(table: Table, k: int, main: int, end: int, v: Vec, leg_eval: LegEvaluation) -> Vec:
     """A direction that goes with the body which an end of a rod is on, as it is now."""
-    if end == AT_FOOT:
+    if end == AT_BASE_END:
         return turned_by_proximal(table.legs[main], leg_eval.values[main], v, 1.0)
     return turn(leg_eval.frames[table.legs[k]["frame"]], v)
 
@@ -75,14 +87,18 @@ def put_hinge_slope(table: Table, k: int, spot: int, leg_eval: LegEvaluation) ->
     D = (a x u) . b.
     """
     leg, main, u = table.legs[k], main_of(table, k), direction(leg_eval.lines[k])
-    end = AT_FOOT if spot < HEAD else AT_HEAD
-    ending, axes = (leg["foot"], leg["foot_axes"]) if end == AT_FOOT else (leg["head"], leg["head_axes"])
+    end = AT_BASE_END if spot < PLATFORM_END else AT_PLATFORM_END
+    ending, axes = (
+        (leg["base_end"], leg["base_end_axes"])
+        if end == AT_BASE_END
+        else (leg["platform_end"], leg["platform_end_axes"])
+    )
     first = seen(table, k, main, end, vec(axes[0]), leg_eval)
     if ending == HINGE:
         across = cross(first, u)
         t = scale(1.0 / dot(across, across), across)
     else:
-        place = FOOT if end == AT_FOOT else HEAD
+        place = BASE_END if end == AT_BASE_END else PLATFORM_END
         last = seen(table, k, main, end, mark(ending, axes, leg_eval.values[k, place:]), leg_eval)
         D = dot(cross(first, u), last)
         t = scale(1.0 / D, last) if spot == place else scale(-1.0 / D, first)
@@ -92,16 +108,16 @@ def put_hinge_slope(table: Table, k: int, spot: int, leg_eval: LegEvaluation) ->
 @routine
 def put_pivot_slope(pivot: Record, frame: Floats, own: Floats, spot: int, slope: Floats) -> None:
     """Derivative of a coordinate of a pivot: a slide, or one of up to three hinges that add up to its turn w."""
-    if spot >= HEAD:
-        put_pose_slope(pivot, frame, vec(pivot["slide_rows"][spot - HEAD]), NOWHERE, slope)
+    if spot >= PLATFORM_END:
+        put_pose_slope(pivot, frame, vec(pivot["slide_rows"][spot - PLATFORM_END]), NOWHERE, slope)
         return
-    axes, which = pivot["foot_axes"], spot - FOOT
+    axes, which = pivot["base_end_axes"], spot - BASE_END
     first = vec(axes[0])
-    if pivot["foot"] == HINGE:
+    if pivot["base_end"] == HINGE:
         put_pose_slope(pivot, frame, NOWHERE, first, slope)
         return
-    second = mark(CROSS, axes, own[FOOT:])
-    if pivot["foot"] == TRIPLE:
+    second = mark(CROSS, axes, own[BASE_END:])
+    if pivot["base_end"] == TRIPLE:
         third = turn(frame, vec(axes[2]))
         others = cross(second, third) if which == 0 else (cross(third, first) if which == 1 else cross(first, second))
         D = dot(first, cross(second, third))
@@ -122,7 +138,7 @@ def cone_slope(table: Table, cone: Record, leg_eval: LegEvaluation) -> float:
     slope, k = leg_eval.slope, cone["leg"]
     if table.legs[k]["kind"] == PIVOT:
         return pivot_cone_slope(table, cone, leg_eval)
-    end = AT_FOOT if cone["place"] == FOOT_LINE else AT_HEAD
+    end = AT_BASE_END if cone["place"] == BASE_LINE else AT_PLATFORM_END
     main = main_of(table, k)
     axis, u = seen(table, k, main, end, vec(cone["axis"]), leg_eval), direction(leg_eval.lines[k])
     for j in range(slope.shape[0]):
@@ -137,7 +153,7 @@ def cone_slope(table: Table, cone: Record, leg_eval: LegEvaluation) -> float:
 def pivot_cone_slope(table: Table, cone: Record, leg_eval: LegEvaluation) -> float:
     """`cone_slope` of a pivot."""
     slope, k = leg_eval.slope, cone["leg"]
-    leg, axis, line = table.legs[k], vec(cone["axis"]), vec(leg_eval.values[k, FOOT_LINE:])
+    leg, axis, line = table.legs[k], vec(cone["axis"]), vec(leg_eval.values[k, BASE_LINE:])
     for j in range(slope.shape[0]):
         slope[j] = 0.0
     across = cross(axis, line)
@@ -161,5 +177,5 @@ def dead_point_slope(table: Table, k: int, leg_eval: LegEvaluation) -> float:
     axis = vec(leg["proximal_axis"])
     if leg["proximal"] == CRANK:
         axis = cross(axis, sub(base_end_of(leg, leg, own), vec(leg["proximal_point"])))
-    put_turning(table, k, k, AT_FOOT, axis, leg_eval)
+    put_turning(table, k, k, AT_BASE_END, axis, leg_eval)
     return dot(axis, direction(leg_eval.lines[k]))

@@ -26,8 +26,8 @@ class Spheres(NamedTuple):
 
     legs: Ints  # (e,): the rod that is its radius
     drivers: Ints  # (e,): the actuator that makes the rod longer; -1 if none does
-    heads: Floats  # (e, 3): points of the platform
-    feet: Floats  # (e, 3): centres
+    platform_ends: Floats  # (e, 3): points of the platform
+    base_ends: Floats  # (e, 3): centres
     lengths: Floats  # (e,): radii
 
 
@@ -39,8 +39,8 @@ def new_spheres(table: Table) -> Spheres:
     ]
     rods = radii if _are_spheres(table, driven) else []
     drivers = np.array([driven.get((k, SLIDE), -1) for k in rods], dtype=np.int64)
-    heads, e = table.legs["head_point"][rods], len(rods)
-    return Spheres(np.array(rods, dtype=np.int64), drivers, heads, np.zeros((e, 3)), np.zeros(e))
+    platform_ends, e = table.legs["platform_end_point"][rods], len(rods)
+    return Spheres(np.array(rods, dtype=np.int64), drivers, platform_ends, np.zeros((e, 3)), np.zeros(e))
 
 
 def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
@@ -48,10 +48,14 @@ def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
     base."""
     for k, leg in enumerate(table.legs):
         is_loose = leg["proximal"] != NO_PROXIMAL and (main_of(table, k), Q_PROXIMAL) not in driven
-        turns = leg["kind"] != REDUNDANT and (leg["foot"] == HINGE or leg["head"] == HINGE or leg["twists"] == 1)
+        turns = leg["kind"] != REDUNDANT and (
+            leg["base_end"] == HINGE or leg["platform_end"] == HINGE or leg["twists"] == 1
+        )
         is_on_base = leg["frame"] == FROM_BASE or leg["redundant"] >= 0
         is_read = (
-            leg["kind"] in (ROD, REDUNDANT) and is_on_base and leg["at_head"] == leg["reversed"] == leg["inner"] == 0
+            leg["kind"] in (ROD, REDUNDANT)
+            and is_on_base
+            and leg["at_platform_end"] == leg["reversed"] == leg["inner"] == 0
         )
         if leg["kind"] != IDLE and (is_loose or turns or not is_read):
             return False
@@ -72,11 +76,11 @@ def set_spheres(table: Table, values: Floats, state: PlatformState, leg_eval: Le
     for e in range(spheres.legs.shape[0]):
         k, i = spheres.legs[e], spheres.drivers[e]
         leg, main = legs[k], main_of(table, k)
-        foot = base_end_of(leg, legs[main], own[main])
+        base_end = base_end_of(leg, legs[main], own[main])
         if leg["redundant"] >= 0:
             frame = frames[leg["frame"]]
-            foot = add(p, turn(frame[AXES:], sub(foot, (frame[0, 3], frame[1, 3], frame[2, 3]))))
-        put(spheres.feet[e], foot)
+            base_end = add(p, turn(frame[AXES:], sub(base_end, (frame[0, 3], frame[1, 3], frame[2, 3]))))
+        put(spheres.base_ends[e], base_end)
         spheres.lengths[e] = leg["length"]
         if i >= 0:
             spheres.lengths[e] += table.driven[i]["sense"] * values[table.driven[i]["column"]]
@@ -86,11 +90,11 @@ def set_spheres(table: Table, values: Floats, state: PlatformState, leg_eval: Le
 def put_spheres(pose: Floats, spheres: Spheres, equations: Floats) -> float:
     """Fill the equations (e, m + 1), right-hand side last, at a pose; the largest residual, infinite where one is
     not a number."""
-    heads, feet, lengths, worst = spheres.heads, spheres.feet, spheres.lengths, 0.0
+    platform_ends, base_ends, lengths, worst = spheres.platform_ends, spheres.base_ends, spheres.lengths, 0.0
     p, m = (pose[0, 3], pose[1, 3], pose[2, 3]), equations.shape[1] - 1
     for e in range(lengths.shape[0]):
-        arm, own = turn(pose, vec(heads[e])), equations[e]
-        x = sub(add(arm, p), vec(feet[e]))
+        arm, own = turn(pose, vec(platform_ends[e])), equations[e]
+        x = sub(add(arm, p), vec(base_ends[e]))
         length = math.sqrt(dot(x, x))
         u, off = scale(1.0 / length, x), length - lengths[e]
         put(own, u)

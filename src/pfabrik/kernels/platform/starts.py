@@ -74,10 +74,10 @@ def place_proximal(table: Table, state: PlatformState, leg_eval: LegEvaluation) 
         if leg["kind"] == REDUNDANT:
             place_redundant(leg, q[k], leg_eval.frames, own)
         if has_proximal(leg):
-            head = move(leg_eval.frames[leg["frame"]], vec(leg["head_point"]))
-            solve_proximal(leg, head, -sides[k], own)
+            platform_end = move(leg_eval.frames[leg["frame"]], vec(leg["platform_end_point"]))
+            solve_proximal(leg, platform_end, -sides[k], own)
             other = own[Q_PROXIMAL]
-            solve_proximal(leg, head, sides[k], own)
+            solve_proximal(leg, platform_end, sides[k], own)
             q[k] = own[Q_PROXIMAL] if abs(own[Q_PROXIMAL] - other) >= STRETCHED else own[Q_PROXIMAL] + BENT * sides[k]
 
 
@@ -118,9 +118,9 @@ def put_held(
 @routine
 def nearest_q_proximal(leg: Record, frame: Floats, present: float, own: Floats) -> float:
     """Of the two coordinates at which a carrier's rod reaches its head, or comes nearest, the one nearer to this."""
-    head, best = move(frame, vec(leg["head_point"])), math.inf
+    platform_end, best = move(frame, vec(leg["platform_end_point"])), math.inf
     for i in range(2):
-        solve_proximal(leg, head, 2.0 * i - 1.0, own)
+        solve_proximal(leg, platform_end, 2.0 * i - 1.0, own)
         found: float = own[Q_PROXIMAL]
         if leg["proximal"] == CRANK:
             found = wrap(found, present)
@@ -155,10 +155,10 @@ def put_sides(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> No
             place_redundant(leg, q[k], leg_eval.frames, leg_eval.values[k])
         if has_proximal(leg):
             frame = leg_eval.frames[leg["frame"]]
-            head = move(frame, vec(leg["head_point"]))
+            platform_end = move(frame, vec(leg["platform_end_point"]))
             off = (0.0, 0.0)
             for side in (-1.0, 1.0):
-                solve_proximal(leg, head, side, leg_eval.values[k])
+                solve_proximal(leg, platform_end, side, leg_eval.values[k])
                 away = leg_eval.values[k, Q_PROXIMAL] - q[k]
                 off = (off[1], abs(wrap(away, 0.0) if leg["proximal"] == CRANK else away))
             if abs(off[1] - off[0]) > STRETCHED:
