@@ -13,7 +13,7 @@ from ..linear import solve_spd
 from ..rotations import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..vectors import copy_row, cross, dot, norm, put, scale, vec, wrap_into
-from .endings import SURE
+from .endings import LEAST_MARGIN
 from .frames import new_frames, orienting_coordinate, place_redundant, q_redundant_of, set_frames, slope_by_redundant
 from .pivots import any_across, pivot_rows, pivot_slopes, place_pivot
 from .poses import bring_yaw, load, turn_pose
@@ -69,8 +69,8 @@ def new_completion(table: Table) -> Completion:
 
 @routine
 def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lines: Floats) -> tuple[float, float]:
-    """Fill the values of all legs at a pose; how sure the least sure of all are, see `SURE`, and of those that bear."""
-    sure, margin_of_rows, main = 1.0, 1.0, 0
+    """Fill the values of all legs at a pose; how sure the least sure of all are, see `LEAST_MARGIN`, and of those that bear."""
+    singularity_margin, margin_of_rows, main = 1.0, 1.0, 0
     for k in range(legs.shape[0]):
         leg = legs[k]
         frame, found = frames[leg["frame"]], 1.0
@@ -84,9 +84,9 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
             place_redundant(leg, q, frames, values[k])
         else:
             found = place_rod(leg, legs[main], frame, sides[k], values[main], values[k], lines[k])
-        sure = min(sure, found)
+        singularity_margin = min(singularity_margin, found)
         margin_of_rows = min(margin_of_rows, found) if leg["has_rows"] == 1 else margin_of_rows
-    return sure, margin_of_rows
+    return singularity_margin, margin_of_rows
 
 
 @routine
@@ -322,12 +322,12 @@ def complete(table: Table, sides: Floats, scratch: Completion) -> bool:
     copy_row(sides, scratch.sides)
     for _ in range(MOST_STEPS_IMPLICIT if task["implicit"] == 1 else MOST_STEPS):
         set_frames(scratch.pose, task, frames)
-        sure, margin_of_rows = place_legs(legs, frames, scratch.sides, values, lines)
-        if not margin_of_rows > SURE * SURE:
+        singularity_margin, margin_of_rows = place_legs(legs, frames, scratch.sides, values, lines)
+        if not margin_of_rows > LEAST_MARGIN * LEAST_MARGIN:
             return False
         worst = put_rows(legs, frames, values, lines, scratch.rows)
         if worst <= CLOSED or (is_set and worst <= CLOSE and (task["implicit"] == 0 or worst > 0.5 * before)):
-            return sure > SURE * SURE
+            return singularity_margin > LEAST_MARGIN * LEAST_MARGIN
         if is_set and task["implicit"] == 0:
             return False
         put_slopes(legs, frames, values, lines, scratch.proximal_slopes, scratch.slopes)

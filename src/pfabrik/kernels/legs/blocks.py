@@ -22,8 +22,8 @@ from .columns import (
     COS,
     EXCESS,
     INVERSE,
-    IS_SURE,
     LENGTH,
+    MARGIN,
     MORE,
     OFF,
     PX,
@@ -45,7 +45,7 @@ from .columns import (
     lay_out,
     lay_turned,
 )
-from .endings import SURE
+from .endings import LEAST_MARGIN
 from .poses import ROUNDED
 from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, HINGE, NO_PROXIMAL, PLATFORM_END, Q_PROXIMAL, SHARED, SLIDE
 from .table import open_table
@@ -97,7 +97,7 @@ def lay_crank(rod: Record, n: int, S: Floats) -> None:
         C = farthest if farthest < C else (-farthest if -farthest > C else C)
         root, inverse = S[SIDE, i] * math.sqrt(rest if rest > 0.0 else 0.0), 1.0 / square
         cosine, sine = (A * C - B * root) * inverse, (B * C + A * root) * inverse
-        S[IS_SURE, i] = S[IS_SURE, i] if rest > SURE * SURE * square else 0.0
+        S[MARGIN, i] = S[MARGIN, i] if rest > LEAST_MARGIN * LEAST_MARGIN * square else 0.0
         S[COS, i], S[SIN, i] = cosine, sine
         S[VALUES + Q_PROXIMAL, i] = arctangent(sine, cosine)
 
@@ -120,7 +120,7 @@ def lay_carriage(rod: Record, n: int, S: Floats) -> None:
         x, y, z = S[X, i], S[Y, i], S[Z, i]
         middle = x * axis[0] + y * axis[1] + z * axis[2]
         rest = square - (x * x + y * y + z * z) + middle * middle
-        S[IS_SURE, i] = S[IS_SURE, i] if rest > SURE * SURE * square else 0.0
+        S[MARGIN, i] = S[MARGIN, i] if rest > LEAST_MARGIN * LEAST_MARGIN * square else 0.0
         S[VALUES + Q_PROXIMAL, i] = middle + S[SIDE, i] * math.sqrt(rest if rest > 0.0 else 0.0)
 
 
@@ -304,8 +304,8 @@ def write_status(task: Record, first: int, n: int, S: Floats, status: Ints, meas
     status, measures = status[first : first + n], measures[first : first + n]
     for i in range(n):
         is_closed = S[ROW, i] <= enough
-        is_reached = (S[IS_SURE, i] == 1.0) & is_closed & (S[EXCESS, i] <= KEPT)
-        is_open = (S[IS_SURE, i] == 1.0) & (not is_closed) & (task["unset"] > 0)
+        is_reached = (S[MARGIN, i] == 1.0) & is_closed & (S[EXCESS, i] <= KEPT)
+        is_open = (S[MARGIN, i] == 1.0) & (not is_closed) & (task["unset"] > 0)
         status[i] = REACHED if is_reached else (OPEN if is_open else PENDING)
         left += 0 if is_reached else 1
         measures[i, RESIDUAL] = S[ROW, i] * length

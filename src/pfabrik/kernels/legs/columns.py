@@ -16,7 +16,7 @@ BLOCK = 64
 # Rows of the table: rotation and position of the platform [L]; how far the rotation was from orthonormal, whether the
 # row is a pose and all solutions are sure, its largest constraint, its largest excess; sides that rods take.
 XX, XY, XZ, YX, YY, YZ, ZX, ZY, ZZ, PX, PY, PZ = range(12)
-OFF, IS_SURE, ROW, EXCESS, SIDE = range(12, 17)
+OFF, MARGIN, ROW, EXCESS, SIDE = range(12, 17)
 # Of one rod: from foot to head, its length and the inverse of that, the carrier's angle, two directions, a number.
 X, Y, Z, LENGTH, INVERSE, COS, SIN = range(17, 24)
 AX, AY, AZ, BX, BY, BZ, VALUE = range(24, 31)
@@ -77,7 +77,7 @@ def lay_out(targets: Floats, begins: Floats, task: Record, first: int, n: int, p
     check_poses(n, S)
     if task["rotations"] == 3:
         for i in range(n):
-            if S[OFF, i] > ROUNDED and S[IS_SURE, i] == 1.0:
+            if S[OFF, i] > ROUNDED and S[MARGIN, i] == 1.0:
                 straighten(i, pose, S)
     else:
         for j in range(9):
@@ -112,7 +112,7 @@ def check_poses(n: int, S: Floats) -> None:
         volume = xx * (yy * zz - yz * zy) - xy * (yx * zz - yz * zx) + xz * (yx * zy - yy * zx)
         farthest = abs(S[PX, i]) + abs(S[PY, i]) + abs(S[PZ, i])
         is_pose = (off + S[OFF, i] <= NOT_A_ROTATION) & (volume > 0.0) & (farthest < math.inf)
-        S[IS_SURE, i], S[ROW, i], S[EXCESS, i] = (1.0 if is_pose else 0.0), 0.0, -math.inf
+        S[MARGIN, i], S[ROW, i], S[EXCESS, i] = (1.0 if is_pose else 0.0), 0.0, -math.inf
         S[OFF, i] = off
 
 

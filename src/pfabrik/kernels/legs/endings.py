@@ -13,7 +13,7 @@ from .._jit import routine
 from ..vectors import Vec, along, angle_between, cross, dot, scale
 
 # Sine of the angle from a dead point, or from aligned hinges, below which a solution is not sure to half its digits.
-SURE = 1e-6
+LEAST_MARGIN = 1e-6
 
 
 @routine
@@ -60,10 +60,12 @@ def aim(axes: Floats, u: Vec, w: Vec, side: float, angles: Floats) -> float:
     """Angles of two crossed hinges that turn `u`, given at home, into `w`, into angles[:2]; how sure they are."""
     a, b = (axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])
     bu = dot(b, u)
-    cosine, sine, sure = either_angle(dot(a, along(u, -bu, b)), dot(a, cross(b, u)), dot(a, w) - dot(a, b) * bu, side)
+    cosine, sine, singularity_margin = either_angle(
+        dot(a, along(u, -bu, b)), dot(a, cross(b, u)), dot(a, w) - dot(a, b) * bu, side
+    )
     angles[0] = angle_to(a, turned(u, b, cosine, sine), w)
     angles[1] = math.atan2(sine, cosine)
-    return sure
+    return singularity_margin
 
 
 @routine

@@ -67,8 +67,10 @@ def orienting_coordinate(arm: Record, rod: Record, frame: Floats, side: float) -
         return dot(n, sub(platform_end, base_end)) / lean, 1.0
     x = sub(platform_end, at)
     rest = lean * dot(axis, x)
-    cosine, sine, sure = either_angle(dot(n, x) - rest, dot(cross(axis, n), x), dot(n, sub(base_end, at)) - rest, side)
-    return math.atan2(sine, cosine), sure
+    cosine, sine, singularity_margin = either_angle(
+        dot(n, x) - rest, dot(cross(axis, n), x), dot(n, sub(base_end, at)) - rest, side
+    )
+    return math.atan2(sine, cosine), singularity_margin
 
 
 @routine

@@ -17,8 +17,8 @@ from .columns import (
     BLOCK,
     EXCESS,
     INVERSE,
-    IS_SURE,
     LENGTH,
+    MARGIN,
     MORE,
     ROW,
     VALUE,
@@ -44,7 +44,7 @@ LEAST, BINDING, IS_KNOWN, LARGEST, IS_POSE, CONES = EXCESS, MORE, MORE + 1, MORE
 def begin_margins(n_cones: int, n: int, S: Floats) -> None:
     for i in range(n):
         S[LEAST, i], S[BINDING, i], S[IS_KNOWN, i], S[LARGEST, i] = math.inf, -1.0, 1.0, 0.0
-        S[IS_POSE, i] = S[IS_SURE, i]
+        S[IS_POSE, i] = S[MARGIN, i]
     for c in range(n_cones):
         for i in range(n):
             S[CONES + 2 * c, i] = math.inf
@@ -177,7 +177,7 @@ def margins_in_blocks(
         for i in range(n):
             margins[start + i], bindings[start + i] = S[LEAST, i], int(S[BINDING, i])
             is_pose = S[IS_POSE, i] == 1.0
-            is_open = follows == 1 if S[IS_SURE, i] == 0.0 else task[0]["unset"] > 0 and S[LARGEST, i] > enough
+            is_open = follows == 1 if S[MARGIN, i] == 0.0 else task[0]["unset"] > 0 and S[LARGEST, i] > enough
             if not is_pose:
                 margins[start + i], bindings[start + i] = math.nan, -1
             elif is_open or S[IS_KNOWN, i] == 0.0:

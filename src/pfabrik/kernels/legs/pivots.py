@@ -21,7 +21,7 @@ TURNED_OVER = 2.0
 
 @routine
 def place_pivot(pivot: Record, frame: Floats, side: float, own: Floats) -> float:
-    """Fill a pivot's values; how sure they are, see `SURE`."""
+    """Fill a pivot's values; how sure they are, see `LEAST_MARGIN`."""
     offset = sub(move(frame, vec(pivot["platform_end_point"])), vec(pivot["base_end_point"]))
     for i in range(pivot["slides"]):
         own[PLATFORM_END + i] = dot(vec(pivot["slide_rows"][i]), offset)
@@ -34,9 +34,9 @@ def place_pivot(pivot: Record, frame: Floats, side: float, own: Floats) -> float
     elif pivot["base_end"] == TRIPLE:
         last = vec(axes[2])
         put(own[BASE_LINE:PLATFORM_LINE], turn(frame, last))
-        sure = aim(axes, last, vec(own[BASE_LINE:]), side, own[BASE_END:PLATFORM_END])
+        singularity_margin = aim(axes, last, vec(own[BASE_LINE:]), side, own[BASE_END:PLATFORM_END])
         own[BASE_END + 2] = last_angle(frame, axes, own[BASE_END], own[BASE_END + 1], 2)
-        return sure
+        return singularity_margin
     return 1.0
 
 

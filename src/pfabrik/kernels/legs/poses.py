@@ -8,7 +8,7 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..rotations import UPSIDE_DOWN, turn_about_z, yaw_of
 from ..vectors import Vec, cross, dot, norm, scale, turn, vec
-from .endings import SURE, turned
+from .endings import LEAST_MARGIN, turned
 
 # Deviation from an orthonormal matrix up to which a target is a pose, and from which on it is not made one.
 NOT_A_ROTATION, ROUNDED = 1e-6, 1e-14
@@ -77,7 +77,7 @@ def lean_to(target: Floats, share: float, pose: Floats) -> bool:
     sine, cosine = norm(across), dot(now, wanted)
     if sine > 0.0:
         turn_pose(pose, scale(share * math.atan2(sine, cosine) / sine, across))
-    return cosine > SURE - 1.0
+    return cosine > LEAST_MARGIN - 1.0
 
 
 @routine

@@ -40,7 +40,7 @@ from .records import (
 
 @routine
 def solve_proximal(rod: Record, platform_end: Vec, side: float, own: Floats) -> float:
-    """Turn the crank, or move the carriage, until the rod reaches the head; how far from a dead point, see `SURE`.
+    """Turn the crank, or move the carriage, until the rod reaches the head; how far from a dead point, see `LEAST_MARGIN`.
 
     A crank: |o + spoke cos q + across sin q - H| = length; a carriage: |F + q a - H| = length. Where none reaches, it
     stays where it comes nearest.
@@ -48,10 +48,10 @@ def solve_proximal(rod: Record, platform_end: Vec, side: float, own: Floats) -> 
     if rod["proximal"] == CRANK:
         x, crank = sub(platform_end, vec(rod["proximal_point"])), vec(rod["crank"])
         C = 0.5 * (dot(x, x) + dot(crank, crank) - rod["length"] * rod["length"])
-        cosine, sine, sure = either_angle(dot(crank, x), dot(vec(rod["crank_across"]), x), C, side)
+        cosine, sine, singularity_margin = either_angle(dot(crank, x), dot(vec(rod["crank_across"]), x), C, side)
         own[COSINE], own[SINE] = cosine, sine
         own[Q_PROXIMAL] = math.atan2(sine, cosine)
-        return sure
+        return singularity_margin
     x = sub(platform_end, vec(rod["base_end_point"]))
     middle = dot(x, vec(rod["proximal_axis"]))
     square = rod["length"] * rod["length"]
@@ -87,16 +87,16 @@ def turned_by_proximal(proximal: Record, own: Floats, v: Vec, sense: float) -> V
 def place_rod(
     rod: Record, proximal: Record, frame: Floats, side: float, lead: Floats, own: Floats, line: Floats
 ) -> float:
-    """Fill a rod's values, and the present `line` from foot to head; how sure they are, see `SURE`.
+    """Fill a rod's values, and the present `line` from foot to head; how sure they are, see `LEAST_MARGIN`.
 
     Parameters
     ----------
     carrier, lead : the rod whose carrier it is on and that rod's values; its own if it shares none.
     """
-    sure = 1.0
+    singularity_margin = 1.0
     if rod["proximal"] == CRANK or rod["proximal"] == CARRIAGE:
-        sure = solve_proximal(rod, move(frame, vec(rod["platform_end_point"])), side, own)
-    return min(sure, read_rod(rod, proximal, frame, lead, own, line))
+        singularity_margin = solve_proximal(rod, move(frame, vec(rod["platform_end_point"])), side, own)
+    return min(singularity_margin, read_rod(rod, proximal, frame, lead, own, line))
 
 
 @routine
@@ -107,7 +107,7 @@ def read_rod(rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Fl
     then hold the rod the other way around.
     """
     span = sub(move(frame, vec(rod["platform_end_point"])), base_end_of(rod, proximal, lead))
-    length, sure = norm(span), 1.0
+    length, singularity_margin = norm(span), 1.0
     u, home = scale(1.0 / length, span), vec(rod["line"])
     base_line, platform_line = turned_by_proximal(proximal, lead, u, -1.0), turned_back(frame, u)
     put(line, span)
@@ -115,13 +115,13 @@ def read_rod(rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Fl
     put(own[PLATFORM_LINE:COSINE], platform_line)
     own[SLIDE] = length - rod["length"]
     if rod["base_end_aimed"] == 1:
-        sure = min(
-            sure,
+        singularity_margin = min(
+            singularity_margin,
             aim_end(rod["base_end"], rod["base_end_axes"], home, base_line, rod["base_end_side"], own[BASE_END:SLIDE]),
         )
     if rod["platform_end_aimed"] == 1:
-        sure = min(
-            sure,
+        singularity_margin = min(
+            singularity_margin,
             aim_end(
                 rod["platform_end"],
                 rod["platform_end_axes"],
@@ -144,7 +144,7 @@ def read_rod(rod: Record, proximal: Record, frame: Floats, lead: Floats, own: Fl
             )
         else:
             aim_end(CROSS, rod["base_end_axes"], home, base_line, -rod["base_end_side"], own[BASE_END:SLIDE])
-    return sure
+    return singularity_margin
 
 
 @routine

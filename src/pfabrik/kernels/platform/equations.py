@@ -55,7 +55,7 @@ from ..legs.rods import (
 from ..vectors import Vec, along, cross, dot, move, norm, scale, sub, turn, vec, wrap
 
 # How far from a dead point, as `solve_proximal` says, a carrier must be to be put where its rod has its length.
-SURELY = 1e-2
+WELL_AWAY = 1e-2
 
 
 class PlatformState(NamedTuple):
@@ -172,14 +172,16 @@ def close_rods(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> N
         leg = table.legs[k]
         if leg["orients"] == 1:
             frame, rod = leg_eval.frames[leg["frame"]], table.legs[k + 1]
-            found, sure = orienting_coordinate(leg, rod, frame, branch_of_redundant(leg, rod, frame, q[k]))
-            if sure > SURELY:
+            found, singularity_margin = orienting_coordinate(
+                leg, rod, frame, branch_of_redundant(leg, rod, frame, q[k])
+            )
+            if singularity_margin > WELL_AWAY:
                 q[k] = wrap(found, q[k]) if leg["proximal"] == CRANK else found
         if leg["kind"] == REDUNDANT:
             place_redundant(leg, q_redundant_of(table.legs, k, q), leg_eval.frames, own[k])
         if has_proximal(leg):
             platform_end = move(leg_eval.frames[leg["frame"]], vec(leg["platform_end_point"]))
-            if solve_proximal(leg, platform_end, side_of(leg, platform_end, q[k]), own[k]) > SURELY:
+            if solve_proximal(leg, platform_end, side_of(leg, platform_end, q[k]), own[k]) > WELL_AWAY:
                 q[k] = wrap(own[k, Q_PROXIMAL], q[k]) if leg["proximal"] == CRANK else own[k, Q_PROXIMAL]
 
 

@@ -18,7 +18,7 @@ from ..legs.answer import (
     put_rows,
     write_answer,
 )
-from ..legs.endings import SURE
+from ..legs.endings import LEAST_MARGIN
 from ..legs.feasibility import largest_row
 from ..legs.frames import set_frames
 from ..legs.poses import load
@@ -57,11 +57,11 @@ def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) ->
 
 
 @routine
-def is_unsure(table: Table, sides: Floats, scratch: Completion) -> bool:
+def is_singular(table: Table, sides: Floats, scratch: Completion) -> bool:
     """Whether legs on these sides reach a pose, as far as can be told where one of them is at a dead point."""
     set_frames(scratch.pose, table.task[0], scratch.frames)
-    sure, _ = place_legs(table.legs, scratch.frames, sides, scratch.values, scratch.lines)
-    if sure > SURE * SURE or sure < -NEARLY * NEARLY:
+    singularity_margin, _ = place_legs(table.legs, scratch.frames, sides, scratch.values, scratch.lines)
+    if singularity_margin > LEAST_MARGIN * LEAST_MARGIN or singularity_margin < -NEARLY * NEARLY:
         return False
     worst = put_rows(table.legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
     return bool(worst <= NEARLY and excess_of(table.limited, table.cones, scratch.values) <= NEARLY)
@@ -133,7 +133,7 @@ def answer_otherwise(
                     status[row] = REACHED
                     copy_row(scratch.sides, sides[row])
                     break
-            elif own["unset"] == 0 and is_unsure(table, sides[row], scratch):
+            elif own["unset"] == 0 and is_singular(table, sides[row], scratch):
                 status[row] = UNSURE
         left += 0 if status[row] == REACHED else 1
     return left

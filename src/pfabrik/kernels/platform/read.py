@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Floats
 from .._jit import search
 from ..legs.answer import deviation, place_legs, put_rows, put_slopes
-from ..legs.endings import SURE
+from ..legs.endings import LEAST_MARGIN
 from ..legs.frames import set_frames
 from ..legs.poses import load_pose
 from ..legs.records import Table
@@ -80,6 +80,6 @@ def read(
         if rows.shape[0] > 0:
             put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
             put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.proximal_slopes, slopes[row])
-            for i in range(rows.shape[1] if not margin_of_rows > SURE * SURE else 0):
+            for i in range(rows.shape[1] if not margin_of_rows > LEAST_MARGIN * LEAST_MARGIN else 0):
                 for j in range(slopes.shape[2]):
                     slopes[row, i, j] = math.nan
