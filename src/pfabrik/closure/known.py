@@ -22,13 +22,13 @@ FAR_CORNER, TURNED_CORNER = 0.5, 0.5
 """Where corners are looked for: so far from home [L], and turned so far [rad]."""
 
 
-CORNERS, CHANCES, A_CHANCE = 8, 128, 20
+SEEDS, CHANCES, A_CHANCE = 8, 128, 20
 """How many corners searches start from, and how many random configurations are closed to find some, in about how many
 steps each."""
 
 
 @lru_cache(maxsize=64)
-def corners_of(mechanism: Mechanism) -> tuple[Floats, ...]:
+def seeds_of(mechanism: Mechanism) -> tuple[Floats, ...]:
     """Feasible configurations far from home and from each other, as joint coordinates (columns,).
 
     Some are as far as the workspace goes from home in four directions; some are chanced upon, in parts of it to which
@@ -43,22 +43,22 @@ def corners_of(mechanism: Mechanism) -> tuple[Floats, ...]:
     ]
     turning = 0.0 if mechanism.end_effector_is_joint else 1.0
     home = np.zeros((len(directions), len(closure.scale)))
-    _, steps = descents_within(closure, CORNERS, MOST_STEPS)
+    _, steps = descents_within(closure, SEEDS, MOST_STEPS)
     platform = (1.0, 1.0, 1.0, turning, turning, turning)
     ends = nearest_configurations(closure, home, np.array(poses), platform=platform, steps=max(steps, 1))
-    coordinates, places = chanced_upon(mechanism)
+    coordinates, places = random_feasible(mechanism)
     kept = ends.feasible
     coordinates = np.concatenate([home[:1], ends.coordinates[kept], coordinates])
     places = np.concatenate([mechanism.home_pose[None], ends.poses[kept], places])
     chosen = [0]
-    while len(chosen) <= min(CORNERS, len(places) - 1):
+    while len(chosen) <= min(SEEDS, len(places) - 1):
         apart = [differences(closure, places, np.repeat(places[i : i + 1], len(places), axis=0)) for i in chosen]
         chosen.append(int(np.min(apart, axis=0).argmax()))
     return tuple(coordinates[chosen[1:]])
 
 
 @lru_cache(maxsize=64)
-def chanced_upon(mechanism: Mechanism) -> tuple[Floats, Floats]:
+def random_feasible(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """Feasible configurations closed from random ones: joint coordinates (k, columns), and poses (k, 4, 4).
 
     They are in the assembly of home as far as a task tells it.

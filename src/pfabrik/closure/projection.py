@@ -19,7 +19,7 @@ from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of, platform_poses
 from .descend import MOST_STEPS, nearest_configurations, weighed_limits
 from .effort import descents_within
-from .known import CORNERS, corners_of
+from .known import SEEDS, seeds_of
 from .parasitic import strays
 
 SAME = 1e-7
@@ -104,7 +104,7 @@ def kept(mechanism: Mechanism, holds: Ints, position: Floats, rotation: Floats) 
 
 
 def project(
-    closure: Closure, targets: Floats, starts: Sequence[Floats], ways: Sequence[Way], *, corners: bool
+    closure: Closure, targets: Floats, starts: Sequence[Floats], ways: Sequence[Way], *, seeds: bool
 ) -> Projected:
     """The nearest feasible configurations that local searches from several starts find.
 
@@ -118,9 +118,9 @@ def project(
     """
     n, frame = len(targets), task_of(closure.mechanism).frame
     best = Projected(close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, HOLD_NOTHING))
-    count, steps = descents_within(closure, len(starts) + (CORNERS if corners else 0), MOST_STEPS)
+    count, steps = descents_within(closure, len(starts) + (SEEDS if seeds else 0), MOST_STEPS)
     is_long = count < len(starts) or steps == 0
-    elsewhere = corners_of(closure.mechanism) if corners and count == len(starts) + CORNERS else ()
+    elsewhere = seeds_of(closure.mechanism) if seeds and count == len(starts) + SEEDS else ()
     if is_long:
         starts = [_nearest_at_rest(closure, targets, starts, ways[-1])]
     everywhere = [*starts, *(np.where(closure.idle, starts[0], corner) for corner in elsewhere)]
@@ -178,7 +178,7 @@ def _let_go(closure: Closure, best: Projected, targets: Floats, starts: Sequence
     far = np.flatnonzero((best.holds == ways[0].hold) & ways[0].is_too_far(closure, best.distances, begun, targets))
     if not len(far):
         return
-    other = project(closure, targets[far], [start[far] for start in starts], ways[-1:], corners=False)
+    other = project(closure, targets[far], [start[far] for start in starts], ways[-1:], seeds=False)
     nearer = other.distances <= (1.0 + SAME) * ways[-1].distances(closure, begun[far], targets[far])
     best.closing.take(far[nearer], other.closing, nearer)
     best.distances[far[nearer]], best.holds[far[nearer]] = other.distances[nearer], other.holds[nearer]

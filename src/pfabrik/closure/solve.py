@@ -31,7 +31,7 @@ from .configurations import (
 )
 from .descend import within_sight
 from .effort import starts_within, steps_within, stride_within
-from .known import chanced_upon
+from .known import random_feasible
 from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
 from .projection import Way, held_back, kept, project, ways_of
 from .starts import random_coordinates
@@ -176,7 +176,7 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
         starts = [start[away]] if stays else [start[away], found.coordinates[away]]
         sought = within_sight(mechanism, wanted[away])
         answers = project(
-            closure, sought, starts, ways_of(mechanism, options.hold, options.rotation_length), corners=not keep_mode
+            closure, sought, starts, ways_of(mechanism, options.hold, options.rotation_length), seeds=not keep_mode
         )
         holds[away] = kept(mechanism, answers.holds, *task_of(mechanism).errors(answers.closing.poses, wanted[away]))
         found.take(away, answers.closing)
@@ -235,7 +235,7 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
     if not keep_mode and follows and (has_parasitic_motion(mechanism) or asks_too_much(mechanism)):
         held = task.held if has_parasitic_motion(mechanism) else HELD
         _start_nearby(closure, found, targets, held)  # in other ways of assembly, where this one does not reach
-        if asks_too_much(mechanism) or len(chanced_upon(mechanism)[0]) < NEARBY:
+        if asks_too_much(mechanism) or len(random_feasible(mechanism)[0]) < NEARBY:
             anywhere = task.completed(targets, begin)
             _search(closure, found, np.arange(len(targets)), anywhere, held, at_rest=False)
     return found
@@ -243,7 +243,7 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
 
 def _start_nearby(closure: Closure, found: Closing, targets: Floats, held: Weights) -> None:
     """Look for what does not reach yet from known configurations whose end effectors are nearest to the targets."""
-    coordinates, poses = chanced_upon(closure.mechanism)
+    coordinates, poses = random_feasible(closure.mechanism)
     task, rest = task_of(closure.mechanism), np.flatnonzero(~found.feasible)
     away = np.array([_distances(closure, poses, np.repeat(targets[[row]], len(poses), axis=0)) for row in rest])
     nearby = starts_within(closure, NEARBY, STEPS)

@@ -18,10 +18,10 @@ from ..kernels.handle import Handle
 from ..kernels.platform.records import Starts
 from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
-from .corners import corners_of
 from .nearest import nearest_actuators
 from .nearest_pose import home_start, no_starts, starts_at
 from .one import Ends, scratch_of
+from .seeds import seeds_of
 from .table import machine_searched
 
 ROWS_A_BLOCK = 256
@@ -56,7 +56,7 @@ def assembled(
     found, strayed = Starts(rows.poses, *ends), rows.status == PENDING
     missed = partial(_assemble_missed, mechanism, table, values, rows, wanted, found)
     if is_cold:
-        missed(own, corners_of, np.flatnonzero(rows.status != REACHED))
+        missed(own, seeds_of, np.flatnonzero(rows.status != REACHED))
     rest = np.flatnonzero(rows.status != REACHED)
     if not len(rest):
         return rows, found.q, found.sides
@@ -70,7 +70,7 @@ def assembled(
     if is_over_determined(mechanism):
         strayed &= (rows.status == PENDING) | (rows.measures[:, ACTUATOR_ERROR] > NOISE)
     missed(own, _starts_elsewhere, np.flatnonzero(strayed))
-    missed(home_start(mechanism, table), corners_of, np.flatnonzero(strayed & (rows.status != REACHED)))
+    missed(home_start(mechanism, table), seeds_of, np.flatnonzero(strayed & (rows.status != REACHED)))
     places = np.flatnonzero(strayed & (rows.status != REACHED))
     if len(places):
         _project_elsewhere(mechanism, table, wanted, own, places, rows, values, found, tolerance)
@@ -83,7 +83,7 @@ def _starts_elsewhere(mechanism: Mechanism) -> Starts:
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
     home = home_start(mechanism, table)
-    return Starts(*(np.concatenate(both) for both in zip(home, corners_of(mechanism), strict=True)))
+    return Starts(*(np.concatenate(both) for both in zip(home, seeds_of(mechanism), strict=True)))
 
 
 def _assemble_missed(
@@ -161,7 +161,7 @@ def _project(
     For these one turn is as good as another. Rows that end beyond a bound, and so a turn away, stay PENDING.
     """
     first = own.of(places)
-    ended = nearest_actuators(mechanism, values[places], first, corners=anywhere)
+    ended = nearest_actuators(mechanism, values[places], first, seeds=anywhere)
     near = np.flatnonzero(np.isfinite(ended.distances))
     ended, places = ended.at(near), places[near]
     asked, actuators, measures = rows.actuators[places], ended.actuators, ended.measures

@@ -24,15 +24,15 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION, PROJECTED, REACHED
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .corners import corners_of
 from .nearest_pose import NearestPose, new_found, no_starts, starts_at
+from .seeds import seeds_of
 
 MOST_STEPS = 200
 """Steps of a search, including those that are taken back; most need a dozen."""
 
 
 def project(
-    mechanism: Mechanism, options: Options, targets: Floats, own: Starts, found: Found, *, corners: bool, stays: bool
+    mechanism: Mechanism, options: Options, targets: Floats, own: Starts, found: Found, *, seeds: bool, stays: bool
 ) -> int:
     """Fill the nearest feasible configurations that searches from several starts find.
 
@@ -50,7 +50,7 @@ def project(
     How many rows have none.
     """
     tolerances = options.tolerance, options.rotation_tolerance
-    asked = _asked(mechanism, options.hold, options.rotation_length, *tolerances, corners, stays)
+    asked = _asked(mechanism, options.hold, options.rotation_length, *tolerances, seeds, stays)
     first, *others = asked.searches
     left = first.fill(targets, own, found)
     for search in others:
@@ -87,7 +87,7 @@ def _asked(
     rotation_length: float | None,
     tolerance: float | None,
     rotation_tolerance: float,
-    corners: bool,
+    seeds: bool,
     stays: bool,
 ) -> Asked:
     """The ways to project, in the order in which they are tried, and searches of each."""
@@ -95,7 +95,7 @@ def _asked(
     assert isinstance(table, LegTable)
     settings = {"steps": MOST_STEPS, "stays": int(stays), "rotation": rotation_tolerance}
     settings["position"] = tolerance or TOLERANCES.position * length
-    starts = corners_of(mechanism) if corners else no_starts(table)
+    starts = seeds_of(mechanism) if seeds else no_starts(table)
     ways = ways_of(mechanism, hold, rotation_length)
     searches = tuple(_search(mechanism, table, way, settings, starts) for way in ways)
     holding = ways_of(mechanism, "orientation", rotation_length)
@@ -183,19 +183,19 @@ def _weighing(mechanism: Mechanism, table: LegTable, way: Way) -> NearestPose:
     return NearestPose(mechanism, table, way.weights, {"steps": 0}, no_starts(table))
 
 
-def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, corners: bool) -> Found:
+def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, seeds: bool) -> Found:
     """Feasible configurations whose actuators are nearest to values (n, n_a), deviations from home [L or rad]."""
     poses = in_lengths(own.poses, mechanism.characteristic_length)
     poses = poses if len(poses) == len(values) else np.repeat(poses, len(values), axis=0)
-    return _toward_values(mechanism, corners).find(poses, own, values)
+    return _toward_values(mechanism, seeds).find(poses, own, values)
 
 
 @lru_cache(maxsize=64)
-def _toward_values(mechanism: Mechanism, corners: bool) -> NearestPose:
+def _toward_values(mechanism: Mechanism, seeds: bool) -> NearestPose:
     """Searches for actuators that have values; the pose does not count."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    others = corners_of(mechanism) if corners else no_starts(table)
+    others = seeds_of(mechanism) if seeds else no_starts(table)
     settings = {"frame": BASE_AXES, "steps": MOST_STEPS}
     return NearestPose(mechanism, table, (0.0,) * 6, settings, others, table.driven)
 

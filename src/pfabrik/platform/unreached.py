@@ -19,9 +19,9 @@ from ..kernels.platform.records import Found, Starts
 from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options
-from .corners import assembled_otherwise
 from .nearest import project
 from .nearest_pose import starts_at
+from .seeds import seeds_of_other_assemblies
 from .table import Machine, machine, machine_nearby
 
 ROWS_A_BLOCK = 64
@@ -102,9 +102,9 @@ def _answer_completed(question: Question, some: Unreached) -> None:
     if question.keep_mode or not question.table.is_completed:
         _project(question, some)
         return
-    corners = assembled_otherwise(question.mechanism)
-    if len(corners.poses):
-        some.answer(_reach_from(corners, question, some), partial(_project, question))
+    seeds = seeds_of_other_assemblies(question.mechanism)
+    if len(seeds.poses):
+        some.answer(_reach_from(seeds, question, some), partial(_project, question))
     else:
         _project(question, some)
 
@@ -130,15 +130,15 @@ def _reach_otherwise(table: LegTable, some: Unreached) -> Mask:
     return np.asarray(status == PENDING)
 
 
-def _reach_from(corners: Starts, question: Question, some: Unreached) -> Mask:
+def _reach_from(seeds: Starts, question: Question, some: Unreached) -> Mask:
     """Answer rows in other ways of assembly, completed from the nearest corner that leads to one; which are left."""
-    length, legs, k = question.mechanism.characteristic_length, machine(question.table), len(corners.poses)
-    poses = in_lengths(corners.poses, length)
+    length, legs, k = question.mechanism.characteristic_length, machine(question.table), len(seeds.poses)
+    poses = in_lengths(seeds.poses, length)
 
     def reach(block: slice) -> Mask:
         own = some.at(block)
         n = len(own.targets)
-        begins, ends = np.concatenate([poses] * n), np.concatenate([corners.sides] * n)
+        begins, ends = np.concatenate([poses] * n), np.concatenate([seeds.sides] * n)
         targets, rows = np.repeat(own.targets, k, axis=0), new_rows(question.mechanism, n * k)
         every = Unreached(targets, begins, ends, np.empty_like(ends), rows)
         _complete(legs, begins, ends, every)
@@ -149,7 +149,7 @@ def _reach_from(corners: Starts, question: Question, some: Unreached) -> Mask:
         if np.count_nonzero(found):
             wanted = in_lengths(own.targets, 1.0 / length)[:, None]
             scale = np.abs(wanted).max(axis=(1, 2, 3), initial=1.0)  # squares of what is farther may be infinite
-            away = np.square((corners.poses - wanted)[:, :, :3] / scale[:, None, None, None]).sum(axis=(2, 3))
+            away = np.square((seeds.poses - wanted)[:, :, :3] / scale[:, None, None, None]).sum(axis=(2, 3))
             nearest = np.where(reached, away, np.inf).argmin(axis=1)
             own.put(found, every.at((np.arange(0, n * k, k) + nearest)[found]))
         return np.asarray(~found)
@@ -166,7 +166,7 @@ def _project(question: Question, some: Unreached) -> None:
     n, own = len(targets), starts_at(mechanism, table, begins, sides[: len(begins)])
     ends = rows.poses, np.empty_like(q_proximal), np.empty_like(sides)
     found = Found(np.empty(n), *ends, rows.counters, rows.actuators, rows.measures, rows.status)
-    left = project(mechanism, options, targets, own, found, corners=not nearby, stays=keep_mode)
+    left = project(mechanism, options, targets, own, found, seeds=not nearby, stays=keep_mode)
     if left == n:
         return
     placed = slice(None) if left == 0 else found.distances < np.inf

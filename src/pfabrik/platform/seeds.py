@@ -23,7 +23,7 @@ from .nearest_pose import NearestPose, home_start, no_starts, proximal_coordinat
 from .rotation import constraints_at, keeps_rotation
 from .table import machine
 
-CORNERS, CORNERS_OF_MANY = 16, 32
+SEEDS, SEEDS_OF_MANY = 16, 32
 """How many configurations searches start from at most, and how many where arms are led, or pivots have two solutions:
 there are many more configurations."""
 
@@ -53,29 +53,29 @@ PLACES = 6
 
 
 @lru_cache(maxsize=64)
-def corners_of(mechanism: Mechanism) -> Starts:
+def seeds_of(mechanism: Mechanism) -> Starts:
     """Feasible configurations far from home and from each other; every third may be in a room beyond the base."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
     rng = np.random.default_rng(0)
     is_many = table.has_implicit_joints or len(_sided_pivots(table)) > 0
-    near, beyond = (CORNERS_OF_MANY, BEYOND_OF_MANY) if is_many else (CORNERS, BEYOND)
-    corners = _far_apart(home_start(mechanism, table), _drawn(mechanism, table, rng, DRAWS, FAR), near)
-    others = _far_apart(corners, _drawn(mechanism, table, rng, DRAWS, FARTHER), beyond)
-    turns = np.concatenate([np.arange(len(corners.poses)), 2.0 * np.arange(len(others.poses)) + 0.5])
+    near, beyond = (SEEDS_OF_MANY, BEYOND_OF_MANY) if is_many else (SEEDS, BEYOND)
+    seeds = _far_apart(home_start(mechanism, table), _drawn(mechanism, table, rng, DRAWS, FAR), near)
+    others = _far_apart(seeds, _drawn(mechanism, table, rng, DRAWS, FARTHER), beyond)
+    turns = np.concatenate([np.arange(len(seeds.poses)), 2.0 * np.arange(len(others.poses)) + 0.5])
     in_turn = np.argsort(turns)
-    return Starts(*(np.concatenate(both)[in_turn] for both in zip(corners, others, strict=True)))
+    return Starts(*(np.concatenate(both)[in_turn] for both in zip(seeds, others, strict=True)))
 
 
 @lru_cache(maxsize=64)
-def assembled_otherwise(mechanism: Mechanism) -> Starts:
+def seeds_of_other_assemblies(mechanism: Mechanism) -> Starts:
     """The corners whose poses are others where what the task leaves out of them, and arms, are completed from home."""
     from ..kernels.legs.answer import answer
 
-    table, corners = leg_table(mechanism), corners_of(mechanism)
+    table, seeds = leg_table(mechanism), seeds_of(mechanism)
     assert isinstance(table, LegTable)
-    poses, length = in_lengths(corners.poses, mechanism.characteristic_length), mechanism.characteristic_length
-    rows, sides, redundant = new_rows(mechanism, len(poses)), corners.sides.copy(), table.implicit_joints["leg"]
+    poses, length = in_lengths(seeds.poses, mechanism.characteristic_length), mechanism.characteristic_length
+    rows, sides, redundant = new_rows(mechanism, len(poses)), seeds.sides.copy(), table.implicit_joints["leg"]
     sides[:, redundant] = table.home_sides[:, redundant]
     answer(
         machine(table).address,
@@ -87,8 +87,8 @@ def assembled_otherwise(mechanism: Mechanism) -> Starts:
         rows.actuators,
         rows.measures,
     )
-    off = np.abs(in_lengths(rows.poses, 1.0 / length) - corners.poses).max(axis=(1, 2))
-    return corners.at(np.flatnonzero((rows.status != REACHED) | (off > TOLERANCES.same_mode)))
+    off = np.abs(in_lengths(rows.poses, 1.0 / length) - seeds.poses).max(axis=(1, 2))
+    return seeds.at(np.flatnonzero((rows.status != REACHED) | (off > TOLERANCES.same_mode)))
 
 
 def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: int, far: float) -> Starts:
