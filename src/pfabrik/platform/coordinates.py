@@ -10,7 +10,7 @@ from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..motion.limits import within_turns
 from ..tolerances import TOLERANCES
-from .table import machine_aimed, reading_of
+from .table import reading_of, reading_table
 
 NO_ROWS, NO_SLOPES = np.zeros((0, 0)), np.zeros((0, 0, 0))
 
@@ -82,6 +82,6 @@ def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats, q_pr
     """
     from ..kernels.platform.read import read
 
-    legs, given = machine_aimed(table), NO_ROWS if q_proximal is None else q_proximal
+    legs, given = reading_table(table), NO_ROWS if q_proximal is None else q_proximal
     own = np.require(poses, requirements=["C", "W"])
     read(legs.address, reading_of(table).address, own, sides, given, found, NO_ROWS, NO_SLOPES)

@@ -22,7 +22,7 @@ from .nearest import nearest_actuators
 from .nearest_pose import home_start, no_starts, starts_at
 from .one import Ends, scratch_of
 from .seeds import seeds_of
-from .table import machine_searched
+from .table import search_table
 
 ROWS_A_BLOCK = 256
 
@@ -189,7 +189,7 @@ def _assemble(
     """Assemble rows on all cores; the arrays are the actuators, then what is filled: see the kernel."""
     from ..kernels.platform.forward import assemble
 
-    legs, scratch, elsewhere = machine_searched(table), scratch_of(mechanism, table), Handle(others)
+    legs, scratch, elsewhere = search_table(table), scratch_of(mechanism, table), Handle(others)
 
     def run(block: slice) -> None:
         first, (values, *filled) = Handle(own.of(block)), (a[block] for a in arrays)

@@ -21,7 +21,7 @@ from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .rotation import implied_rows, keeps_rotation, without_idle_legs
-from .table import OF_AIMS, machine_searched
+from .table import OF_AIMS, search_table
 
 if TYPE_CHECKING:
     from ..kernels.platform.nearest import NearestScratch
@@ -71,7 +71,7 @@ class NearestPose:
         counted, rests = np.array(weights, dtype=float), keeps_rotation(mechanism)
         counted[3:] = LOCKED if rests else counted[3:]
         at_home = table.task[0]["rotations"] == 0 and counted[3] == LOCKED and searches
-        legs = without_idle_legs(table) if at_home and not len(table.redundant) else machine_searched(table)
+        legs = without_idle_legs(table) if at_home and not len(table.redundant) else search_table(table)
         self._legs = legs if driven is None else Handle(legs.record._replace(driven=driven))
         cones = self._legs.record.cones
         minded = len(cones) if minds_aims or not searches else int((cones["leader"] != OF_AIMS).sum())

@@ -17,7 +17,7 @@ from ..kernels.handle import Handle, Scratch
 from ..kernels.platform.records import Starts
 from ..kernels.rows import N_COUNTERS, Rows
 from .nearest_pose import home_start, no_starts
-from .table import machine, machine_nearby, machine_searched, resting_at_home
+from .table import local_table, machine, resting_at_home, search_table
 
 if TYPE_CHECKING:
     from ..kernels.platform.forward import Newton
@@ -32,7 +32,7 @@ class OneTarget:
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators = len(mechanism.actuator_names)
         self._is_for_blocks, self._leads_arms = table.is_for_blocks, table.has_implicit_joints
-        self._anywhere, self._nearby = machine(table), machine_nearby(table)
+        self._anywhere, self._nearby = machine(table), local_table(table)
         self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
         self._resting = resting_at_home(table)
         self._at_rest = machine(table if self._resting is None else self._resting.table)
@@ -108,7 +108,7 @@ class OneAssembly:
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self._n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
         self.home, self._nowhere = Handle(home_start(mechanism, table)), Handle(no_starts(table))
-        self._legs, self._scratched = machine_searched(table), (mechanism, table)
+        self._legs, self._scratched = search_table(table), (mechanism, table)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -141,7 +141,7 @@ def new_scratch(mechanism: Mechanism, table: LegTable) -> Newton:
     """Scratch memory of assembly."""
     from ..kernels.platform.forward import new_newton
 
-    return new_newton(machine_searched(table).record, not mechanism.end_effector_is_joint)
+    return new_newton(search_table(table).record, not mechanism.end_effector_is_joint)
 
 
 @lru_cache(maxsize=64)

@@ -16,7 +16,7 @@ from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..motion.walks import around_home
 from ..tolerances import TOLERANCES
-from .table import Machine, kernel_table, machine, machine_searched, reading_of, with_aims
+from .table import Machine, kernel_table, machine, reading_of, search_table, with_aims
 
 SAMPLES, NEARBY = 8, 0.05
 """How many poses about home are looked at, and how far off they are [L]."""
@@ -74,7 +74,7 @@ def without_idle_legs(table: LegTable) -> Machine:
     legs, rows = table.legs.copy(), table.task[0]["rows"]
     values, slopes = constraints_at(table, _shifted_about_home(table))
     if not len(values):
-        return machine_searched(table)
+        return search_table(table)
     quiet = np.maximum(np.abs(values), np.abs(slopes[:, :, :3]).max(axis=2)).max(axis=0) <= TOLERANCES.implied
     ends = np.append(legs["first_row"][1:], rows)
     limited = np.concatenate([table.limited["leg"], table.driven["leg"]])

@@ -31,7 +31,7 @@ from .forward import assembled
 from .nearest import move_redundant, weighed_limits
 from .nearest_pose import starts_at
 from .one import Ends, OneAssembly, OneTarget, new_scratch
-from .table import Machine, machine, machine_nearby, resting_at_home
+from .table import Machine, local_table, machine, resting_at_home
 from .unreached import Question, Unreached, answer_unreached
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
@@ -319,7 +319,7 @@ class LegsEngine:
         One row that was `tried` has a status already.
         """
         begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
-        asked = machine_nearby(self._table) if keep_mode else machine(self._table)
+        asked = local_table(self._table) if keep_mode else machine(self._table)
         if self._table.has_implicit_joints:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
         left = 1 if tried else self._reach_as_they_are(start is None, asked, targets, begins, sides, rows)

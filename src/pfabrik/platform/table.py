@@ -45,13 +45,13 @@ def machine(table: LegTable) -> Machine:
 
 
 @lru_cache(maxsize=64)
-def machine_nearby(table: LegTable) -> Machine:
+def local_table(table: LegTable) -> Machine:
     """The same for poses that are completed near to where they began alone."""
     return Handle(kernel_table(table)._replace(task=table.task_within(STRANGE)))
 
 
 @lru_cache(maxsize=64)
-def machine_searched(table: LegTable) -> Machine:
+def search_table(table: LegTable) -> Machine:
     """The same for searches and assembly, where it is a limit that crossed hinges cannot point rods anywhere."""
     return Handle(kernel_table(table)._replace(cones=with_aims(table.legs, table.cones)))
 
@@ -79,7 +79,7 @@ def with_aims(legs: Records, cones: Records) -> Records:
 
 
 @lru_cache(maxsize=64)
-def machine_aimed(table: LegTable) -> Machine:
+def reading_table(table: LegTable) -> Machine:
     """The same with the angles of all endings asked for."""
     return Handle(kernel_table(table)._replace(legs=table.aimed))
 

@@ -22,7 +22,7 @@ from ..options import Options
 from .nearest import project
 from .nearest_pose import starts_at
 from .seeds import seeds_of_other_assemblies
-from .table import Machine, machine, machine_nearby
+from .table import Machine, local_table, machine
 
 ROWS_A_BLOCK = 64
 
@@ -174,7 +174,7 @@ def _project(question: Question, some: Unreached) -> None:
     is_near = (found.distances <= NEARLY) & ~(rows.certain & (rows.status == PROJECTED))
     if np.count_nonzero(is_near):
         rows.status[is_near] = UNSURE
-    asked = (machine_nearby if nearby else machine)(table)
+    asked = (local_table if nearby else machine)(table)
     some.answer(found.distances < np.inf if table.is_partial else is_near, partial(_reach_again, asked))
 
 
