@@ -75,7 +75,7 @@ def lagrangian_gradient(
 def lagrangian_hessian(
     loops: Loops, row: int, objective: Objective, scratch: DescentScratch, reduced: FreeMotions
 ) -> float:
-    """Curvature of the objective and of the active limits along the loops, at `scratch.best`; the largest on the diagonal.
+    """Curvature of objective and active limits along the loops, at `scratch.best`; the largest on the diagonal.
 
     By differences of the gradient of the Lagrangian, whose multipliers of the loops balance it at pivot coordinates.
     """

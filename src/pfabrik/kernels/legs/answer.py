@@ -69,7 +69,7 @@ def new_completion(table: Table) -> Completion:
 
 @routine
 def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lines: Floats) -> tuple[float, float]:
-    """Fill the values of all legs at a pose; how sure the least sure of all are, see `LEAST_MARGIN`, and of those that bear."""
+    """Fill the values of all legs at a pose; the least singularity margin of all legs, and of those with rows."""
     singularity_margin, margin_of_rows, main = 1.0, 1.0, 0
     for k in range(legs.shape[0]):
         leg = legs[k]

@@ -40,7 +40,7 @@ from .records import (
 
 @routine
 def solve_proximal(rod: Record, platform_end: Vec, side: float, own: Floats) -> float:
-    """Turn the crank, or move the carriage, until the rod reaches the head; how far from a dead point, see `LEAST_MARGIN`.
+    """Turn the crank, or move the carriage, until the rod reaches its platform end; the singularity margin.
 
     A crank: |o + spoke cos q + across sin q - H| = length; a carriage: |F + q a - H| = length. Where none reaches, it
     stays where it comes nearest.

@@ -298,7 +298,7 @@ def put_deviations(table: Table, values: Floats, wanted: Floats) -> None:
 def assemble_row(
     table: Table, given: Floats, own: Starts, row: int, others: Starts, wanted: Floats, scratch: Newton
 ) -> int:
-    """Assemble one row, into `scratch.state`, within all limits, and read the legs there; its status, see `assemble`."""
+    """Assemble one row within all limits, into `scratch.state`, with the legs evaluated there; its status."""
     first, values, status = row if own.poses.shape[0] > 1 else 0, wanted[row], PENDING
     put_deviations(table, given[row], values)
     for attempt in range(2):
