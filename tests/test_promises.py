@@ -15,7 +15,10 @@ import pfabrik as pf
 from checks import excess_of_joints, gap_of_joints
 from machines import closure
 from pfabrik import Cone, Joint, Mechanism, Options, Status
+from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.errors import InvalidArgument
+from pfabrik.kernels.legs.records import CARRIAGE
+from pfabrik.platform.along import carriages_along
 
 Z = (0.0, 0.0, 1.0)
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -32,9 +35,10 @@ def five_bar() -> Mechanism:
     return Mechanism("unlimited 5-bar", joints, "tip")
 
 
-def arm_on_a_rail() -> Mechanism:
+def arm_on_a_rail(travel: float | None = None) -> Mechanism:
+    limits = None if travel is None else (-travel, travel)
     joints = [
-        Joint("P", "prismatic", ("base", "c"), axis=(0, 1, 0), actuated=True),
+        Joint("P", "prismatic", ("base", "c"), axis=(0, 1, 0), actuated=True, range=limits),
         Joint("R1", "revolute", ("c", "a"), at=(0, 0, 0), axis=Z, actuated=True, range=(-0.4, 0.4)),
         Joint("R2", "revolute", ("a", "b"), at=(100, 0, 0), axis=Z, actuated=True, range=(-0.9, 0.5)),
         Joint("tip", "revolute", ("b", "g"), at=(150, 50, 0), axis=Z),
@@ -61,12 +65,23 @@ def test_a_projection_keeps_the_working_mode_of_its_seed() -> None:
     np.testing.assert_allclose(back.actuators, home.actuators, atol=1e-9)
 
 
-def test_an_arm_on_an_endless_rail_reaches_what_its_joints_reach() -> None:
+@pytest.mark.parametrize(("travel", "far"), [(None, 600), (None, 60_000), (20_000, 20_000)])
+def test_an_arm_on_a_long_rail_reaches_what_its_joints_reach(travel: float | None, far: float) -> None:
     rng = np.random.default_rng(0)
-    slide, first, second = rng.uniform((-600, -0.4, -0.9), (600, 0.4, 0.5), (100, 3)).T
+    slide, first, second = rng.uniform((-far, -0.4, -0.9), (far, 0.4, 0.5), (100, 3)).T
     tip = slide * 1j + np.exp(1j * first) * (100 + np.exp(1j * second) * (50 + 50j))
     targets = np.stack([tip.real, tip.imag, 0 * slide], axis=-1)
-    assert pf.solve_ik(arm_on_a_rail(), targets)
+    assert pf.solve_ik(arm_on_a_rail(travel), targets)
+
+
+def test_beside_an_endless_rail_answers_are_as_near_anywhere_along_it() -> None:
+    along, off = np.random.default_rng(3).uniform((-60_000, 1), (60_000, 100), (50, 2)).T
+    farthest = 100 + 50 * np.sqrt(2) * np.cos(np.pi / 4)
+    for first in np.linspace(-0.4, 0.4, 401):
+        second = np.clip(-np.pi / 4 - first, -0.9, 0.5)
+        farthest = max(farthest, 100 * np.cos(first) + 50 * np.sqrt(2) * np.cos(first + second + np.pi / 4))
+    answers = pf.solve_ik(arm_on_a_rail(), np.stack([farthest + off, along, 0 * off], axis=-1))
+    np.testing.assert_allclose(answers.position_error, off, atol=1e-6)
 
 
 def test_a_rail_oblique_to_its_hinge_is_driven_to_where_the_plane_holds_the_target() -> None:
@@ -269,3 +284,16 @@ def test_what_is_no_mechanism_and_what_are_no_options_are_named() -> None:
         with pytest.raises(InvalidArgument):
             call()
     assert Options(max_iterations=np.int64(5), tolerance=np.float32(0.5)) != Options()
+
+
+@pytest.mark.parametrize(
+    ("name", "along"), [("hexaglide", [0, 1, 0]), ("prs", [0, 0, 1]), ("orthoglide", [0, 0, 0]), ("delta", [0, 0, 0])]
+)
+def test_parallel_rails_alone_take_a_whole_machine_along(name: str, along: list[float]) -> None:
+    table = leg_table(pf.load(name))
+    assert isinstance(table, LegTable)
+    found = carriages_along(table)
+    np.testing.assert_allclose(found.part, np.outer(along, along), atol=1e-9)
+    rails = table.legs["carrier"] == CARRIAGE
+    expected = rails[:, None] * (table.legs["carrier_axis"] @ found.part)
+    np.testing.assert_allclose(found.rates, expected, atol=1e-9)

@@ -20,6 +20,7 @@ from ..kernels.platform.records import SETTINGS, Found, Plan, Starts
 from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
+from .along import carriages_along, proximal_coordinates, stays_there
 from .rotation import implied_rows, keeps_rotation, without_idle_legs
 from .table import OF_AIMS, search_table
 
@@ -82,7 +83,8 @@ class NearestPose:
         for name, value in {"frame": task_of(mechanism).frame, **settings}.items():
             own[name] = value
         own["frame"] = BASE_AXES if rests else own["frame"]
-        self._plan = Handle(Plan(counted, own, *others))
+        along = stays_there(table) if driven is not None else carriages_along(table)
+        self._plan = Handle(Plan(counted, own, *others, along))
         self._no_values = np.zeros((0, len(self._legs.record.driven)))
         self._minding: NearestPose | None = None
         if minded < len(cones):
@@ -160,12 +162,6 @@ def _agreements(table: LegTable) -> int:
         if (q_proximal == K.CARRIAGE).any()
         else AGREEMENTS
     )
-
-
-def proximal_coordinates(table: LegTable) -> Records:
-    """The coordinates of carriers among those known."""
-    on_rods = table.legs["kind"][table.known["leg"]] == K.ROD
-    return np.asarray(table.known[on_rods & (table.known["place"] == K.Q_PROXIMAL)])
 
 
 def new_found(n: int, table: LegTable) -> Found:

@@ -19,7 +19,8 @@ from ..kernels.platform.records import Starts
 from ..kernels.rows import REACHED
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
-from .nearest_pose import NearestPose, home_start, no_starts, proximal_coordinates
+from .along import proximal_coordinates
+from .nearest_pose import NearestPose, home_start, no_starts
 from .rotation import constraints_at, keeps_rotation
 from .table import machine
 

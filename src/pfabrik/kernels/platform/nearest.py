@@ -37,9 +37,9 @@ from .certificate import is_global
 from .descend import descend
 from .equations import PlatformState, has_proximal, new_platform_state, place
 from .linearise import linearise
-from .records import SETTINGS, Found, Plan, PlatformObjective, Starts
+from .records import SETTINGS, Along, Found, Plan, PlatformObjective, Starts
 from .search import Search, copy_platform_state, fix, new_search
-from .starts import begin, load_target, nearest_start, put_held, put_sides
+from .starts import begin, load_target, nearest_start, put_held, put_sides, take_along, way_along
 
 LARGEST_NUMBER = 1.7976931348623157e308
 """Distances are finite, however far a target is."""
@@ -88,7 +88,8 @@ def new_nearest_scratch(table: Table, plan: Plan) -> NearestScratch:
     )
 
 
-_PLAN = Plan(np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
+_STAYS = Along(np.zeros((3, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
+_PLAN = Plan(np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), _STAYS)
 open_plan, open_scratch = opener(_PLAN), opener(new_nearest_scratch(SAMPLE, _PLAN))
 """What `nearest_pose` is asked, and its scratch memory: it is given the addresses of their handles."""
 
@@ -227,6 +228,7 @@ def search_row(
     phase1_objective: PlatformObjective,
     own: Starts,
     others: Starts,
+    along: Along,
     agreements: int,
     stays: int,
     scratch: NearestScratch,
@@ -246,7 +248,7 @@ def search_row(
         scratch.distances_to_held,
     )
     target, n = search.target, others.poses.shape[0]
-    near = -1
+    near, by = -1, way_along(table, objective.pose, target, along)
     first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
     sides = own.sides[first]
     for k in range(kept.shape[0]):
@@ -259,9 +261,11 @@ def search_row(
     for start in range(n + 2):
         if is_enough(best_tally, agreements) or (start == n + 1 and best_tally["is_unbroken"] == 1):
             break
-        near = nearest_start(objective.pose, target, others, search.gradient) if start == 1 else near
+        near = nearest_start(objective.pose, by, others, search) if start == 1 else near
         place = -1 if start == 0 or start == n + 1 else near if start == 1 else start - 2 + int(start - 2 >= near)
         begin(table, own if place < 0 else others, first if place < 0 else place, search)
+        if place >= 0:
+            take_along(by, along, search.best)
         if stays == 1 and is_other_mode(table.legs, sides, search.best.sides):
             continue
         in_place = (start <= n) == at_once
@@ -288,6 +292,8 @@ def search_row(
             break
         distances_to_held[place + 1] = math.inf
         begin(table, own if place < 0 else others, first if place < 0 else place, search)
+        if place >= 0:
+            take_along(by, along, search.best)
         distance = descend(
             table,
             row,
@@ -375,7 +381,7 @@ def nearest_pose(
         Starts(asked.poses, asked.q, asked.sides),
         Found(distances, ends, ends_q, ends_sides, counters, actuators, measures, status),
     )
-    scratch = open_scratch(scratch_address)
+    along, scratch = asked.along, open_scratch(scratch_address)
     search, best, held = scratch.search, scratch.best, scratch.held
     frame, margin, near, weighs = setting["frame"], setting["margin"], setting["near"], setting["steps"] == 0
     pose = PoseObjective(targets, asked.weights, frame, margin, near, setting["steps"])
@@ -393,7 +399,16 @@ def nearest_pose(
             weigh(table, row, objective, own, scratch, weights[row])
             continue
         least = search_row(
-            table, row, objective, phase1_objective, own, others, setting["agreements"], setting["stays"], scratch
+            table,
+            row,
+            objective,
+            phase1_objective,
+            own,
+            others,
+            along,
+            setting["agreements"],
+            setting["stays"],
+            scratch,
         )
         distances[row] = least
         if least < math.inf:

@@ -57,6 +57,14 @@ SETTINGS = np.dtype(
 )
 
 
+class Along(NamedTuple):
+    """How carriages take a whole machine along: legs, arms and platform, none of which then moves within it."""
+
+    part: Floats  # (3, 3): of a displacement, the part that they can take
+    rates: Floats  # (legs, 3): of it, what each carriage goes
+    room: Floats  # (legs, 2): least and most coordinate of each [L]
+
+
 class Plan(NamedTuple):
     """What searches are to bring near, and how, whatever the rows."""
 
@@ -65,6 +73,7 @@ class Plan(NamedTuple):
     poses: Floats  # starts that follow a row's own, for any row, as of `Starts`
     q: Floats
     sides: Floats
+    along: Along
 
 
 class Found(NamedTuple):

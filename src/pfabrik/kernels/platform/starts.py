@@ -7,19 +7,24 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
-from ..closure.pose_objective import PoseGradient, pose_gradient
+from ..closure.pose_objective import pose_gradient
 from ..legs.frames import NOWHERE, orienting_coordinate, place_redundant, q_redundant_of, set_frames
 from ..legs.poses import bring_yaw, column, is_pose, make_exact, middle_of, turn_pose
 from ..legs.records import CRANK, Q_PROXIMAL, REDUNDANT, Table
 from ..legs.rods import solve_proximal
 from ..rotations import yaw_of
-from ..vectors import copy_row, copy_table, cross, dot, move, norm, scale, sub, vec, wrap
+from ..vectors import Vec, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec, wrap
 from .equations import LegEvaluation, PlatformState, branch_of_redundant, has_proximal
-from .records import STRETCHED, Starts
+from .records import STRETCHED, Along, Starts
 from .search import Search
 
 BENT = 1e-2
 """How far rods that are stretched out are bent where a search starts [L or rad]."""
+
+AROUND = 2.5
+"""Targets farther from home than this [L], along carriages that take a whole machine there, are searched for from
+other starts as nearer ones are: starts are as far apart as this, and where all are on one side of a target, all
+searches lead to it alike, and may agree on a pose that is not the nearest."""
 
 
 @routine
@@ -55,6 +60,34 @@ def begin(table: Table, starts: Starts, start: int, search: Search) -> None:
         copy_row(starts.q[start], search.best.q)
     else:
         place_proximal(table, search.best, search.leg_eval)
+
+
+@routine
+def way_along(table: Table, objective: PoseObjective, target: Floats, along: Along) -> Vec:
+    """By how much other starts are to be taken along for a target."""
+    home = table.task[0]["reference"]
+    off = (
+        target[0, 3] - home[0] if objective.platform[0] != 0.0 else 0.0,
+        target[1, 3] - home[1] if objective.platform[1] != 0.0 else 0.0,
+        target[2, 3] - home[2] if objective.platform[2] != 0.0 else 0.0,
+    )
+    by = turn(along.part, off)
+    return scale(1.0 - AROUND / max(norm(by), AROUND), by)
+
+
+@routine
+def take_along(by: Vec, along: Along, state: PlatformState) -> None:
+    """Take a configuration along, as far as the ranges of carriages let it."""
+    pose, q, share = state.pose, state.q, 1.0
+    for k in range(q.shape[0]):
+        step = dot(vec(along.rates[k]), by)
+        if step != 0.0:
+            end = along.room[k, 1] if step > 0.0 else along.room[k, 0]
+            share = min(share, max((end - q[k]) / step, 0.0))
+    for k in range(q.shape[0]):
+        q[k] += share * dot(vec(along.rates[k]), by)
+    for i in range(3):
+        pose[i, 3] += share * by[i]
 
 
 @routine
@@ -166,9 +199,12 @@ def put_sides(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> No
 
 
 @routine
-def nearest_start(objective: PoseObjective, target: Floats, starts: Starts, gradient: PoseGradient) -> int:
-    """The start whose pose is nearest to a target; -1 where there is none."""
-    nearest, least = -1, math.inf
+def nearest_start(objective: PoseObjective, by: Vec, starts: Starts, search: Search) -> int:
+    """The start whose pose, taken along, is nearest to the target; -1 where there is none."""
+    nearest, least, target, gradient = -1, math.inf, search.trial.pose, search.gradient
+    copy_table(search.target, target)
+    for i in range(3):
+        target[i, 3] -= by[i]
     gradient.unit[0] = 1.0
     for start in range(starts.poses.shape[0]):
         value, _ = pose_gradient(objective, target, starts.poses[start], gradient, True)
