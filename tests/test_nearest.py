@@ -376,6 +376,21 @@ def test_what_a_known_pose_holds_is_not_given_up_and_hardly_ever_farther(name: s
     assert np.mean(farther) <= (0.0 if name == "2-PRU/UPR" else 0.06)
 
 
+@pytest.mark.parametrize("by_legs", [True, False])
+def test_without_a_start_nothing_is_given_up_for_home(by_legs: bool) -> None:
+    """Upright targets at heights of poses that lean: home, upright and beside them, is nearer than what holds one."""
+    mechanism, count = closure.rotopod(), 1 if INTERPRETED else 40
+    leaning = drawn(mechanism, np.random.default_rng(5), count, 0.6, 0.7)
+    heights = pf.solve_ik(mechanism, leaning, options=Options(hold=None)).pose[:, 2, 3]
+    targets = np.tile(mechanism.home_pose, (count, 1, 1))
+    targets[:, 2, 3] = heights
+    engine = engine_of(mechanism) if by_legs else ClosureEngine(mechanism)
+    assert isinstance(engine, LegsEngine) == by_legs
+    rows = engine.answer(targets, None, Options(hold="position"), keep_mode=False).rows
+    assert (rows.status == Status.PROJECTED).all()
+    assert (np.abs(rows.poses[:, 2, 3] - heights) <= FEASIBLE * mechanism.characteristic_length).all()
+
+
 # --- what holds answers back -----------------------------------------------------------------------------------------
 
 GIVEN_WAY = 1e-5

@@ -34,7 +34,7 @@ RESTING = 20
 
 DRAGGED = 1.0
 """How much farther than where it starts an answer may be that holds part of its target, for each unit by which that
-part differs at the start [L per rad, or rad per L]: a turn about the middle of a machine moves no joint by more."""
+part differs at the start [L per rad, or per L]: a turn about the middle of a machine moves no joint by more."""
 
 
 class Way(NamedTuple):
@@ -104,7 +104,13 @@ def kept(mechanism: Mechanism, holds: Ints, position: Floats, rotation: Floats) 
 
 
 def project(
-    closure: Closure, targets: Floats, starts: Sequence[Floats], ways: Sequence[Way], *, seeds: bool
+    closure: Closure,
+    targets: Floats,
+    starts: Sequence[Floats],
+    ways: Sequence[Way],
+    *,
+    seeds: bool,
+    seeded: bool,
 ) -> Projected:
     """The nearest feasible configurations that local searches from several starts find.
 
@@ -115,6 +121,7 @@ def project(
     ways : tried in turn, until one has an answer.
     corners : search from the corners of the workspace too, there with what is held put in its place. Without, the
         search stays about where it starts.
+    seeded : the first start was given: nothing held leads farther away than it is.
     """
     n, frame = len(targets), task_of(closure.mechanism).frame
     best = Projected(close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, HOLD_NOTHING))
@@ -148,7 +155,7 @@ def project(
         _take_nearer(
             closure, best, lost, _at_rest(closure, starts[0][lost]), targets, ways[-1], np.zeros(len(lost), np.int64)
         )
-    if len(ways) > 1:
+    if seeded and len(ways) > 1:
         _let_go(closure, best, targets, starts, ways)
     return best
 
@@ -178,7 +185,7 @@ def _let_go(closure: Closure, best: Projected, targets: Floats, starts: Sequence
     far = np.flatnonzero((best.holds == ways[0].hold) & ways[0].is_too_far(closure, best.distances, begun, targets))
     if not len(far):
         return
-    other = project(closure, targets[far], [start[far] for start in starts], ways[-1:], seeds=False)
+    other = project(closure, targets[far], [start[far] for start in starts], ways[-1:], seeds=False, seeded=True)
     nearer = other.distances <= (1.0 + SAME) * ways[-1].distances(closure, begun[far], targets[far])
     best.closing.take(far[nearer], other.closing, nearer)
     best.distances[far[nearer]], best.holds[far[nearer]] = other.distances[nearer], other.holds[nearer]

@@ -71,9 +71,9 @@ class ClosureEngine:
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        known, begin = are_poses(targets), begin_of(self.mechanism, start)
+        known, begin, seeded = are_poses(targets), begin_of(self.mechanism, start), start is not None
         begin = begin[known] if len(begin) > 1 else np.repeat(begin, known.sum(), axis=0)
-        return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode).among(known)
+        return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode, seeded).among(known)
 
     def follow(
         self,
@@ -87,16 +87,19 @@ class ClosureEngine:
         found = [np.zeros((0, begin.shape[1]))]
         rows, bends = new_rows(self.mechanism, int(known.sum())), Bends(self.mechanism, options)
         for i in steps_of(known, on_progress):
-            answer = self._follow_one(made_exact(targets[i : i + 1]), begin, options, bends)
+            seeded = start is not None or len(found) > 1
+            answer = self._follow_one(made_exact(targets[i : i + 1]), begin, options, bends, seeded)
             put_rows(rows, slice(len(found) - 1, len(found)), answer.rows)
             begin = answer.coordinates
             found.append(begin)
         return Configurations(rows, np.concatenate(found)).among(known)
 
-    def _follow_one(self, target: Floats, begin: Floats, options: Options, bends: Bends) -> Configurations:
-        answer = _answer(self._closure, target, begin, options, keep_mode=True)
+    def _follow_one(
+        self, target: Floats, begin: Floats, options: Options, bends: Bends, seeded: bool
+    ) -> Configurations:
+        answer = _answer(self._closure, target, begin, options, True, seeded)
         if bends.before is not None:
-            other = _answer(self._closure, target, bends.before, options, keep_mode=True)
+            other = _answer(self._closure, target, bends.before, options, True, seeded)
             answer = other if bends.prefer(target, answer.rows, other.rows) else answer
         bends.note(int(answer.rows.status[0]), begin, answer.coordinates)
         return answer
@@ -165,8 +168,10 @@ def begin_of(mechanism: Mechanism, start: Configurations | None) -> Floats:
     return present.coordinates
 
 
-def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, keep_mode: bool) -> Configurations:
-    """Answer poses (n, 4, 4) from joint coordinates (n, columns): reached, or projected."""
+def _answer(
+    closure: Closure, wanted: Floats, start: Floats, options: Options, keep_mode: bool, seeded: bool
+) -> Configurations:
+    """Answer poses (n, 4, 4) from joint coordinates (n, columns), `seeded` or at home: reached, or projected."""
     mechanism = closure.mechanism
     found = _reach(closure, wanted, start, platform_poses(mechanism, start), keep_mode)
     holds = np.full(len(wanted), HOLD_NOTHING)
@@ -175,9 +180,8 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
         stays = keep_mode or follows_task(mechanism)
         starts = [start[away]] if stays else [start[away], found.coordinates[away]]
         sought = within_sight(mechanism, wanted[away])
-        answers = project(
-            closure, sought, starts, ways_of(mechanism, options.hold, options.rotation_length), seeds=not keep_mode
-        )
+        ways = ways_of(mechanism, options.hold, options.rotation_length)
+        answers = project(closure, sought, starts, ways, seeds=not keep_mode, seeded=seeded)
         holds[away] = kept(mechanism, answers.holds, *task_of(mechanism).errors(answers.closing.poses, wanted[away]))
         found.take(away, answers.closing)
     return told(closure, found, wanted, holds, options)

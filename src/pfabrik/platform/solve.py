@@ -86,7 +86,7 @@ class LegsEngine:
             q_proximal = np.empty_like(sides)
             q_proximal[:] = np.nan
             poses = self._one.home if start is None else start.rows.poses
-            question = Question(self.mechanism, self._table, options, keep_mode, nearby)
+            question = Question(self.mechanism, self._table, options, keep_mode, nearby, start is not None)
             unreached = Unreached(targets, poses, sides, q_proximal, rows)
             away = rows.status != REACHED
             if start is not None and self._table.has_sides:

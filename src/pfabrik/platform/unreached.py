@@ -33,7 +33,8 @@ NEARLY = 1e-4
 class Question(NamedTuple):
     """What is asked of all targets.
 
-    With `keep_mode` in the working mode of the start; `nearby`, as along a path, about the start alone.
+    With `keep_mode` in the working mode of the start; `nearby`, as along a path, about the start alone; `seeded` from a
+    start that was given, not from home.
     """
 
     mechanism: Mechanism
@@ -41,6 +42,7 @@ class Question(NamedTuple):
     options: Options
     keep_mode: bool
     nearby: bool
+    seeded: bool
 
 
 class Unreached(NamedTuple):
@@ -161,12 +163,12 @@ def _project(question: Question, some: Unreached) -> None:
     """Answer rows by the nearest feasible poses, and exactly from there where these are as good as reached, or the task
     leaves some of the pose open. Those as good as reached that are not, and not certain to be the nearest, are UNSURE.
     """
-    mechanism, table, options, keep_mode, nearby = question
+    mechanism, table, options, keep_mode, nearby, seeded = question
     targets, begins, sides, q_proximal, rows = some
     n, own = len(targets), starts_at(mechanism, table, begins, sides[: len(begins)])
     ends = rows.poses, np.empty_like(q_proximal), np.empty_like(sides)
     found = Found(np.empty(n), *ends, rows.counters, rows.actuators, rows.measures, rows.status)
-    left = project(mechanism, options, targets, own, found, seeds=not nearby, stays=keep_mode)
+    left = project(mechanism, options, targets, own, found, seeds=not nearby, stays=keep_mode, seeded=seeded)
     if left == n:
         return
     placed = slice(None) if left == 0 else found.distances < np.inf
