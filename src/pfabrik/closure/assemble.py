@@ -43,7 +43,7 @@ SIGHT = 3.0
 """How far off asked values are at most looked for, where they are too far for a search to end [L or rad]."""
 
 
-def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seeded: bool) -> Closing:
+def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, has_start: bool) -> Closing:
     """Close the loops at actuated values (n, n_a), or at feasible ones as near as a search brings them.
 
     Newton's method with the actuators locked; where it strays, the actuators led to their values in steps; then random
@@ -52,7 +52,7 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seede
     Parameters
     ----------
     coordinates : joint coordinates to start from, (n, columns), deviations from home.
-    seeded : they are to stay in their mode where they assemble in it, within limits or not. Other starts, home the
+    has_start : they are to stay in their mode where they assemble in it, within limits or not. Other starts, home the
         first, only replace a projection.
 
     Returns
@@ -63,7 +63,7 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seede
     best = _locked(closure, coordinates, poses, values)
     if not best.feasible.all():
         attempts = [] if is_over_determined(mechanism) else [_led]
-        for attempt in attempts if seeded else [*attempts, _scattered]:
+        for attempt in attempts if has_start else [*attempts, _scattered]:
             rest = np.flatnonzero(~best.feasible)
             if len(rest):
                 best.improve(rest, attempt(closure, coordinates[rest], poses[rest], values[rest]))
@@ -71,8 +71,8 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seede
     if not len(rest):
         return best
     strayed = best.gap[rest] > CLOSED
-    _project(closure, best, rest, (coordinates[rest], poses[rest]), values[rest], seeded)
-    if seeded:
+    _project(closure, best, rest, (coordinates[rest], poses[rest]), values[rest], has_start)
+    if has_start:
         off = np.abs(actuator_errors(closure, best.coordinates[rest], values[rest])).max(axis=1, initial=0.0)
         near = NOISE if is_over_determined(mechanism) else NEAR
         missed = rest[strayed & ((off > near) | ~best.feasible[rest])]
@@ -145,7 +145,12 @@ def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:
 
 
 def _project(
-    closure: Closure, best: Closing, rest: NDArray[np.intp], start: tuple[Floats, Floats], values: Floats, seeded: bool
+    closure: Closure,
+    best: Closing,
+    rest: NDArray[np.intp],
+    start: tuple[Floats, Floats],
+    values: Floats,
+    has_start: bool,
 ) -> None:
     """Feasible configurations with actuators near the asked values, for the rows `rest` of the best so far.
 
@@ -156,8 +161,8 @@ def _project(
     found = close(closure, *start, max_iterations=0)
     distance = np.full(len(rest), np.inf)
     ranged = np.isfinite(closure.loops.lo[closure.actuated]) | np.isfinite(closure.loops.hi[closure.actuated])
-    n, steps = descents_within(closure, 2 if seeded else 2 + PROJECTIONS, MOST_STEPS, int(np.count_nonzero(ranged)))
-    others = () if seeded else _newton_ends(closure, values)
+    n, steps = descents_within(closure, 2 if has_start else 2 + PROJECTIONS, MOST_STEPS, int(np.count_nonzero(ranged)))
+    others = () if has_start else _newton_ends(closure, values)
     for coordinates, poses in islice(chain([ended, start], others), n):
         waiting = np.flatnonzero(distance > NEAR)
         if not len(waiting):

@@ -110,7 +110,7 @@ def project(
     ways: Sequence[Way],
     *,
     seeds: bool,
-    seeded: bool,
+    has_start: bool,
 ) -> Projected:
     """The nearest feasible configurations that local searches from several starts find.
 
@@ -121,7 +121,7 @@ def project(
     ways : tried in turn, until one has an answer.
     corners : search from the corners of the workspace too, there with what is held put in its place. Without, the
         search stays about where it starts.
-    seeded : the first start was given: nothing held leads farther away than it is.
+    has_start : the first start was given: nothing held leads farther away than it is.
     """
     n, frame = len(targets), task_of(closure.mechanism).frame
     best = Projected(close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, HOLD_NOTHING))
@@ -155,7 +155,7 @@ def project(
         _take_nearer(
             closure, best, lost, _at_rest(closure, starts[0][lost]), targets, ways[-1], np.zeros(len(lost), np.int64)
         )
-    if seeded and len(ways) > 1:
+    if has_start and len(ways) > 1:
         _let_go(closure, best, targets, starts, ways)
     return best
 
@@ -185,7 +185,7 @@ def _let_go(closure: Closure, best: Projected, targets: Floats, starts: Sequence
     far = np.flatnonzero((best.holds == ways[0].hold) & ways[0].is_too_far(closure, best.distances, begun, targets))
     if not len(far):
         return
-    other = project(closure, targets[far], [start[far] for start in starts], ways[-1:], seeds=False, seeded=True)
+    other = project(closure, targets[far], [start[far] for start in starts], ways[-1:], seeds=False, has_start=True)
     nearer = other.distances <= (1.0 + SAME) * ways[-1].distances(closure, begun[far], targets[far])
     best.closing.take(far[nearer], other.closing, nearer)
     best.distances[far[nearer]], best.holds[far[nearer]] = other.distances[nearer], other.holds[nearer]

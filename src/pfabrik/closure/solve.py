@@ -71,9 +71,9 @@ class ClosureEngine:
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        known, begin, seeded = are_poses(targets), begin_of(self.mechanism, start), start is not None
+        known, begin, has_start = are_poses(targets), begin_of(self.mechanism, start), start is not None
         begin = begin[known] if len(begin) > 1 else np.repeat(begin, known.sum(), axis=0)
-        return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode, seeded).among(known)
+        return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode, has_start).among(known)
 
     def follow(
         self,
@@ -87,19 +87,19 @@ class ClosureEngine:
         found = [np.zeros((0, begin.shape[1]))]
         rows, bends = new_rows(self.mechanism, int(known.sum())), Bends(self.mechanism, options)
         for i in steps_of(known, on_progress):
-            seeded = start is not None or len(found) > 1
-            answer = self._follow_one(made_exact(targets[i : i + 1]), begin, options, bends, seeded)
+            has_start = start is not None or len(found) > 1
+            answer = self._follow_one(made_exact(targets[i : i + 1]), begin, options, bends, has_start)
             put_rows(rows, slice(len(found) - 1, len(found)), answer.rows)
             begin = answer.coordinates
             found.append(begin)
         return Configurations(rows, np.concatenate(found)).among(known)
 
     def _follow_one(
-        self, target: Floats, begin: Floats, options: Options, bends: Bends, seeded: bool
+        self, target: Floats, begin: Floats, options: Options, bends: Bends, has_start: bool
     ) -> Configurations:
-        answer = _answer(self._closure, target, begin, options, True, seeded)
+        answer = _answer(self._closure, target, begin, options, True, has_start)
         if bends.before is not None:
-            other = _answer(self._closure, target, bends.before, options, True, seeded)
+            other = _answer(self._closure, target, bends.before, options, True, has_start)
             answer = other if bends.prefer(target, answer.rows, other.rows) else answer
         bends.note(int(answer.rows.status[0]), begin, answer.coordinates)
         return answer
@@ -150,7 +150,7 @@ class ClosureEngine:
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
         coordinates = coordinates_for(self.mechanism, start, len(values))
-        closing = assemble(self.mechanism, coordinates, values, seeded=start is not None)
+        closing = assemble(self.mechanism, coordinates, values, has_start=start is not None)
         return judged(self.mechanism, self.at(closing), closing, values, tolerance)
 
 
@@ -169,9 +169,9 @@ def begin_of(mechanism: Mechanism, start: Configurations | None) -> Floats:
 
 
 def _answer(
-    closure: Closure, wanted: Floats, start: Floats, options: Options, keep_mode: bool, seeded: bool
+    closure: Closure, wanted: Floats, start: Floats, options: Options, keep_mode: bool, has_start: bool
 ) -> Configurations:
-    """Answer poses (n, 4, 4) from joint coordinates (n, columns), `seeded` or at home: reached, or projected."""
+    """Answer poses (n, 4, 4) from joint coordinates (n, columns), `has_start` or at home: reached, or projected."""
     mechanism = closure.mechanism
     found = _reach(closure, wanted, start, platform_poses(mechanism, start), keep_mode)
     holds = np.full(len(wanted), HOLD_NOTHING)
@@ -181,7 +181,7 @@ def _answer(
         starts = [start[away]] if stays else [start[away], found.coordinates[away]]
         sought = within_sight(mechanism, wanted[away])
         ways = ways_of(mechanism, options.hold, options.rotation_length)
-        answers = project(closure, sought, starts, ways, seeds=not keep_mode, seeded=seeded)
+        answers = project(closure, sought, starts, ways, seeds=not keep_mode, has_start=has_start)
         holds[away] = kept(mechanism, answers.holds, *task_of(mechanism).errors(answers.closing.poses, wanted[away]))
         found.take(away, answers.closing)
     return told(closure, found, wanted, holds, options)

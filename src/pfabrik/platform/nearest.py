@@ -40,7 +40,7 @@ def project(
     *,
     seeds: bool,
     stays: bool,
-    seeded: bool,
+    has_start: bool,
 ) -> int:
     """Fill the nearest feasible configurations that searches from several starts find.
 
@@ -52,7 +52,7 @@ def project(
     found : distances are infinite where there is none.
     corners : start from elsewhere too. Without, a search stays about where it starts.
     stays : in the working mode of the first start; through a dead point lies another.
-    seeded : the first start was given: nothing held leads farther away than it is.
+    has_start : the first start was given: nothing held leads farther away than it is.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def project(
         some = found.at(lost)
         left = search.fill(targets[lost], own.of(lost), some)
         found.put(lost, some)
-    if seeded and len(others) and _may_be_far(asked, targets, own, found):
+    if has_start and len(others) and _may_be_far(asked, targets, own, found):
         _let_go(asked, targets, own, found)
     if asked.otherwise is not None:
         _reach_otherwise(asked.otherwise, targets, own, found)

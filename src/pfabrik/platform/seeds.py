@@ -13,6 +13,7 @@ from ..closure.configurations import new_rows
 from ..closure.parasitic import strays
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
+from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
 from ..kernels.platform.records import Starts
@@ -75,6 +76,8 @@ def seeds_of_other_assemblies(mechanism: Mechanism) -> Starts:
 
     table, seeds = leg_table(mechanism), seeds_of(mechanism)
     assert isinstance(table, LegTable)
+    if keeps_rotation(mechanism) and all(task_of(mechanism).axes) and not table.has_implicit_joints:
+        return no_starts(table)  # a position that is set is the pose
     poses, length = in_lengths(seeds.poses, mechanism.characteristic_length), mechanism.characteristic_length
     rows, sides, redundant = new_rows(mechanism, len(poses)), seeds.sides.copy(), table.implicit_joints["leg"]
     sides[:, redundant] = table.home_sides[:, redundant]

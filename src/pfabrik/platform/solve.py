@@ -94,7 +94,7 @@ class LegsEngine:
             unreached.answer(away, partial(answer_unreached, question))
             if start is not None:
                 self._count_turns(start.rows.actuators, rows)
-        waits = (rows.status == PENDING) | (rows.status == UNSURE) if q_proximal is not None else rows.status != REACHED
+        waits = rows.status >= PENDING if q_proximal is not None else rows.status != REACHED  # or UNSURE
         rest = waits.nonzero()[0]
         if len(rest):
             begin = start if start is None or len(start) == 1 or len(rest) == len(start) else start.at(rest)

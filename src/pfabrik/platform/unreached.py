@@ -33,8 +33,8 @@ NEARLY = 1e-4
 class Question(NamedTuple):
     """What is asked of all targets.
 
-    With `keep_mode` in the working mode of the start; `nearby`, as along a path, about the start alone; `seeded` from a
-    start that was given, not from home.
+    With `keep_mode` in the working mode of the start; `nearby`, as along a path, about the start alone; `has_start` if
+    one was given.
     """
 
     mechanism: Mechanism
@@ -42,7 +42,7 @@ class Question(NamedTuple):
     options: Options
     keep_mode: bool
     nearby: bool
-    seeded: bool
+    has_start: bool
 
 
 class Unreached(NamedTuple):
@@ -163,18 +163,19 @@ def _project(question: Question, some: Unreached) -> None:
     """Answer rows by the nearest feasible poses, and exactly from there where these are as good as reached, or the task
     leaves some of the pose open. Those as good as reached that are not, and not certain to be the nearest, are UNSURE.
     """
-    mechanism, table, options, keep_mode, nearby, seeded = question
+    mechanism, table, options, keep_mode, nearby, has_start = question
     targets, begins, sides, q_proximal, rows = some
     n, own = len(targets), starts_at(mechanism, table, begins, sides[: len(begins)])
     ends = rows.poses, np.empty_like(q_proximal), np.empty_like(sides)
     found = Found(np.empty(n), *ends, rows.counters, rows.actuators, rows.measures, rows.status)
-    left = project(mechanism, options, targets, own, found, seeds=not nearby, stays=keep_mode, seeded=seeded)
+    left = project(mechanism, options, targets, own, found, seeds=not nearby, stays=keep_mode, has_start=has_start)
     if left == n:
         return
     placed = slice(None) if left == 0 else found.distances < np.inf
     sides[placed], q_proximal[placed] = found.sides[placed], found.q[placed]
-    is_near = (found.distances <= NEARLY) & ~(rows.certain & (rows.status == PROJECTED))
+    is_near = found.distances <= NEARLY
     if np.count_nonzero(is_near):
+        is_near &= ~(rows.certain & (rows.status == PROJECTED))
         rows.status[is_near] = UNSURE
     asked = (local_table if nearby else machine)(table)
     some.answer(found.distances < np.inf if table.is_partial else is_near, partial(_reach_again, asked))
