@@ -294,6 +294,6 @@ def test_parallel_rails_alone_take_a_whole_machine_along(name: str, along: list[
     assert isinstance(table, LegTable)
     found = carriages_along(table)
     np.testing.assert_allclose(found.part, np.outer(along, along), atol=1e-9)
-    rails = table.legs["carrier"] == CARRIAGE
-    expected = rails[:, None] * (table.legs["carrier_axis"] @ found.part)
+    rails = table.legs["proximal"] == CARRIAGE
+    expected = rails[:, None] * (table.legs["proximal_axis"] @ found.part)
     np.testing.assert_allclose(found.rates, expected, atol=1e-9)
