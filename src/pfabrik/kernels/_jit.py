@@ -36,7 +36,7 @@ def kernel(function: F) -> F:
     """Compile `function` for any thread: no GIL, IEEE division, results cached on disk.
 
     The cache is beside the source if that can be written, else in the user's cache folder, else there is none. One that
-    takes the address of its `scratch` memory cannot allocate, see `routine`.
+    takes a `scratch_address` cannot allocate, see `routine`.
     """
     return _compiled(function, _KERNEL)
 
@@ -51,7 +51,7 @@ def search(function: F) -> F:
 
 def _compiled(function: F, options: dict[str, Any]) -> F:
     """Compile a kernel, keep it, and say when it is compiled."""
-    dispatcher = _njit(**options, _nrt="scratch" not in signature(function).parameters)(function)
+    dispatcher = _njit(**options, _nrt="scratch_address" not in signature(function).parameters)(function)
     if not _config.DISABLE_JIT:
         compile_quietly = dispatcher._compiler.compile
         dispatcher._compiler.compile = partial(compile_announced, name_of(function), compile_quietly)

@@ -18,7 +18,7 @@ from .lattice import join, number_points
 from .legs.answer import answer
 from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
-from .legs.maps import margins_in_blocks
+from .legs.margin_blocks import margins_in_blocks
 from .platform.forward import assemble
 from .platform.nearest import nearest_pose
 from .platform.otherwise import answer_otherwise

@@ -30,7 +30,7 @@ from .._jit import routine
 from ..closure.loops import BASE_AXES
 from ..free_motions import put_multipliers
 from ..legs.answer import deviation
-from ..legs.frames import AXES, NOWHERE
+from ..legs.frames import AXES, ZERO
 from ..legs.records import (
     BASE_END,
     BASE_LINE,
@@ -90,7 +90,7 @@ def is_global(table: Table, row: int, objective: PlatformObjective, search: Sear
 def share_of(table: Table, root: int, nearer: float, search: Search) -> tuple[Vec, float, float]:
     """How rods that reach the base by one leg, see `way_of`, hold the platform: with what force, how much they push,
     and what share their carriers need; infinite where these may bring something nearer."""
-    reduced, force, pushing, moved = search.leg_eval, NOWHERE, 0.0, NOWHERE
+    reduced, force, pushing, moved = search.leg_eval, ZERO, 0.0, ZERO
     A, B, b, push, lean, twist = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     hinge, slide = -1, -1
     for k in range(root, table.legs.shape[0]):
@@ -110,7 +110,7 @@ def share_of(table: Table, root: int, nearer: float, search: Search) -> tuple[Ve
         )
         pull = along(scale(m, line), -1.0, at_platform_end)
         force, pushing = add(force, sub(at_foot, pull)), pushing + m
-        axis, arm, course = NOWHERE, NOWHERE, NOWHERE
+        axis, arm, course = ZERO, ZERO, ZERO
         if on_hinge >= 0:
             hinge, axis = on_hinge, axis_of(table, on_hinge, reduced)
             arm = sub(platform_end_from(table, k, on_hinge, reduced), line)
@@ -184,7 +184,7 @@ def hold_of(table: Table, k: int, search: Search) -> tuple[float, Vec, Vec]:
     objective, as the body of the foot sees it."""
     leg, main, leg_eval, multipliers = table.legs[k], main_of(table, k), search.leg_eval, search.hessian.multipliers
     length, ranges, row, pull = norm(vec(leg_eval.lines[k])), table.limited.shape[0], leg["first_row"], 0.0
-    at_foot, at_platform_end = NOWHERE, NOWHERE
+    at_foot, at_platform_end = ZERO, ZERO
     if has_proximal(leg):
         pull = search.balance[own_row(table, k)]
     elif leg["slides"] == 0:

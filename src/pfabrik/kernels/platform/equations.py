@@ -18,14 +18,14 @@ from .._jit import routine
 from ..legs.answer import end_of_rows
 from ..legs.endings import turned
 from ..legs.frames import (
-    NOWHERE,
+    ZERO,
     new_frames,
     orienting_coordinate,
     place_redundant,
     put_pose_slope,
     q_redundant_of,
+    redundant_slope,
     set_frames,
-    slope_by_redundant,
 )
 from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
 from ..legs.records import (
@@ -45,8 +45,8 @@ from ..legs.records import (
 )
 from ..legs.rods import (
     base_end_of,
+    evaluate_rod,
     proximal_rate,
-    read_rod,
     rod_rows,
     solve_proximal,
     turned_by_proximal,
@@ -156,7 +156,7 @@ def place_leg(table: Table, k: int, main: int, state: PlatformState, leg_eval: L
         if has_proximal(leg):
             values[k, Q_PROXIMAL] = state.q[k]
             values[k, COSINE], values[k, SINE] = math.cos(state.q[k]), math.sin(state.q[k])
-        read_rod(leg, lead, frame, values[main], values[k], lines[k])
+        evaluate_rod(leg, lead, frame, values[main], values[k], lines[k])
         rod_rows(leg, lead, frame, values[main], values[k], lines[k], leg_eval.rows)
         if has_proximal(leg):
             rows[own_row(table, k)] = values[k, SLIDE]
@@ -232,7 +232,7 @@ def put_leg_slopes(table: Table, k: int, main: int, leg_eval: LegEvaluation) -> 
             put_redundant_slopes(table, k, leg_eval, slopes[row])
     elif leg["kind"] == ROD:
         if has_proximal(leg):
-            put_rate(table, k, k, direction(leg_eval.lines[k]), NOWHERE, NOWHERE, leg_eval, slopes[own_row(table, k)])
+            put_rate(table, k, k, direction(leg_eval.lines[k]), ZERO, ZERO, leg_eval, slopes[own_row(table, k)])
         put_rod_slopes(table, k, main, leg_eval)
 
 
@@ -265,7 +265,7 @@ def put_redundant_slopes(table: Table, k: int, leg_eval: LegEvaluation, slope: F
         arm = table.legs[arm]["redundant"]
     arm = table.legs[k]["redundant"]
     while arm >= 0:
-        slope[table.columns[arm]] += slope_by_redundant(slope, leg_eval.values[arm])
+        slope[table.columns[arm]] += redundant_slope(slope, leg_eval.values[arm])
         arm = table.legs[arm]["redundant"]
     if table.legs[k]["inner"] == 1:
         for j in range(6):
@@ -283,15 +283,15 @@ def put_rod_slopes(table: Table, k: int, main: int, leg_eval: LegEvaluation) -> 
         direction(leg_eval.lines[k]),
     )
     if rod["slides"] == 0 and not has_proximal(rod):
-        put_rate(table, k, main, u, NOWHERE, NOWHERE, leg_eval, slopes[n])
+        put_rate(table, k, main, u, ZERO, ZERO, leg_eval, slopes[n])
         n += 1
     if rod["base_end"] == HINGE:
         axis = turned_by_proximal(proximal, lead, vec(rod["base_end_axes"][0]), 1.0)
-        put_rate(table, k, main, axis, cross(axis, span), NOWHERE, leg_eval, slopes[n])
+        put_rate(table, k, main, axis, cross(axis, span), ZERO, leg_eval, slopes[n])
         n += 1
     if rod["platform_end"] == HINGE:
         axis = turn(frame, vec(rod["platform_end_axes"][0]))
-        put_rate(table, k, main, axis, NOWHERE, cross(axis, span), leg_eval, slopes[n])
+        put_rate(table, k, main, axis, ZERO, cross(axis, span), leg_eval, slopes[n])
         n += 1
     if rod["twists"] == 1:
         by_line, b, c = twist_rate(rod, proximal, frame, lead, leg_eval.values[k], u)

@@ -14,8 +14,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record
 from .._jit import kernel, routine
-from ..legs.answer import KEPT, deviation, excess_of, worst_of
-from ..legs.poses import make_exact, middle_of
+from ..legs.answer import KEPT, deviation, excess_of, largest_entry
+from ..legs.poses import middle_of, orthonormalise
 from ..legs.records import PIVOT, Q_PROXIMAL, Table
 from ..legs.table import SAMPLE, open_table
 from ..linear import solve_spd, solve_square
@@ -330,8 +330,8 @@ def assemble_row(
 def write_assembled(table: Table, row: int, scratch: Newton, ends: Starts, measures: Floats) -> None:
     """Write a configuration that is assembled, its pose in [length], and what is measured of it."""
     length, pose = table.task[0]["length"], ends.poses[row]
-    make_exact(scratch.state.pose)
-    measures[row, RESIDUAL] = worst_of(scratch.leg_eval.rows) * length
+    orthonormalise(scratch.state.pose)
+    measures[row, RESIDUAL] = largest_entry(scratch.leg_eval.rows) * length
     measures[row, LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, scratch.leg_eval.values), 0.0)
     copy_table(scratch.state.pose, pose)
     for i in range(3):

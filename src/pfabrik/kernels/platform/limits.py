@@ -11,7 +11,7 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..legs.answer import deviation
-from ..legs.frames import NOWHERE, put_pose_slope
+from ..legs.frames import ZERO, put_pose_slope
 from ..legs.records import (
     BASE_END,
     BASE_LINE,
@@ -25,7 +25,7 @@ from ..legs.records import (
     TRIPLE,
     Table,
 )
-from ..legs.rods import base_end_of, mark, turned_by_proximal
+from ..legs.rods import base_end_of, turned_by_proximal, twist_mark
 from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
 from .equations import LegEvaluation, direction, main_of, put_rate, put_redundant_slopes
 
@@ -40,7 +40,7 @@ def put_turning(table: Table, k: int, main: int, end: int, t: Vec, leg_eval: Leg
     u = direction(leg_eval.lines[k])
     flat = along(t, -dot(t, u), u)
     a, spin = scale(1.0 / norm(vec(leg_eval.lines[k])), flat), scale(-1.0, cross(u, t))
-    b, c = (spin, NOWHERE) if end == AT_BASE_END else (NOWHERE, spin)
+    b, c = (spin, ZERO) if end == AT_BASE_END else (ZERO, spin)
     put_rate(table, k, main, a, b, c, leg_eval, leg_eval.slope)
 
 
@@ -71,7 +71,7 @@ def coordinate_slope(table: Table, coordinate: Record, leg_eval: LegEvaluation) 
     elif spot == Q_PROXIMAL:
         slope[table.columns[k]] = 1.0
     elif spot == SLIDE:
-        put_rate(table, k, main_of(table, k), direction(leg_eval.lines[k]), NOWHERE, NOWHERE, leg_eval, leg_eval.slope)
+        put_rate(table, k, main_of(table, k), direction(leg_eval.lines[k]), ZERO, ZERO, leg_eval, leg_eval.slope)
     else:
         put_hinge_slope(table, k, spot, leg_eval)
     for j in range(slope.shape[0]):
@@ -99,7 +99,7 @@ def put_hinge_slope(table: Table, k: int, spot: int, leg_eval: LegEvaluation) ->
         t = scale(1.0 / dot(across, across), across)
     else:
         place = BASE_END if end == AT_BASE_END else PLATFORM_END
-        last = seen(table, k, main, end, mark(ending, axes, leg_eval.values[k, place:]), leg_eval)
+        last = seen(table, k, main, end, twist_mark(ending, axes, leg_eval.values[k, place:]), leg_eval)
         D = dot(cross(first, u), last)
         t = scale(1.0 / D, last) if spot == place else scale(-1.0 / D, first)
     put_turning(table, k, main, end, t, leg_eval)
@@ -109,24 +109,24 @@ def put_hinge_slope(table: Table, k: int, spot: int, leg_eval: LegEvaluation) ->
 def put_pivot_slope(pivot: Record, frame: Floats, own: Floats, spot: int, slope: Floats) -> None:
     """Derivative of a coordinate of a pivot: a slide, or one of up to three hinges that add up to its turn w."""
     if spot >= PLATFORM_END:
-        put_pose_slope(pivot, frame, vec(pivot["slide_rows"][spot - PLATFORM_END]), NOWHERE, slope)
+        put_pose_slope(pivot, frame, vec(pivot["slide_rows"][spot - PLATFORM_END]), ZERO, slope)
         return
     axes, which = pivot["base_end_axes"], spot - BASE_END
     first = vec(axes[0])
     if pivot["base_end"] == HINGE:
-        put_pose_slope(pivot, frame, NOWHERE, first, slope)
+        put_pose_slope(pivot, frame, ZERO, first, slope)
         return
-    second = mark(CROSS, axes, own[BASE_END:])
+    second = twist_mark(CROSS, axes, own[BASE_END:])
     if pivot["base_end"] == TRIPLE:
         third = turn(frame, vec(axes[2]))
         others = cross(second, third) if which == 0 else (cross(third, first) if which == 1 else cross(first, second))
         D = dot(first, cross(second, third))
-        put_pose_slope(pivot, frame, NOWHERE, scale(1.0 / math.copysign(max(abs(D), ALIGNED), D), others), slope)
+        put_pose_slope(pivot, frame, ZERO, scale(1.0 / math.copysign(max(abs(D), ALIGNED), D), others), slope)
         return
     lean = dot(first, second)
     own_axis, other = (first, second) if which == 0 else (second, first)
     rate = scale(1.0 / (1.0 - lean * lean), along(own_axis, -lean, other))
-    put_pose_slope(pivot, frame, NOWHERE, rate, slope)
+    put_pose_slope(pivot, frame, ZERO, rate, slope)
 
 
 @routine
@@ -158,7 +158,7 @@ def pivot_cone_slope(table: Table, cone: Record, leg_eval: LegEvaluation) -> flo
         slope[j] = 0.0
     across = cross(axis, line)
     if norm(across) > ALIGNED:
-        put_pose_slope(leg, leg_eval.frames[leg["frame"]], NOWHERE, scale(1.0 / norm(across), across), slope)
+        put_pose_slope(leg, leg_eval.frames[leg["frame"]], ZERO, scale(1.0 / norm(across), across), slope)
         put_redundant_slopes(table, k, leg_eval, slope)
     return angle_between(axis, line)
 

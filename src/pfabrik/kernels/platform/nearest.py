@@ -13,7 +13,7 @@ from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import balance
 from ..legs.answer import deviation, excess_of
-from ..legs.poses import make_exact
+from ..legs.poses import orthonormalise
 from ..legs.records import REDUNDANT, Table
 from ..legs.table import SAMPLE, open_table
 from ..qp import QP, new_qp
@@ -98,7 +98,7 @@ def write(table: Table, row: int, objective: PoseObjective, search: Search, best
     """Write a configuration, and what is measured of it."""
     leg_eval, task, own = search.leg_eval, table.task[0], objective.targets[row]
     pose, measures, length = found.poses[row], found.measures[row], task["length"]
-    make_exact(best.pose)
+    orthonormalise(best.pose)
     measures[RESIDUAL] = place(table, best, leg_eval) * length
     measures[LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, leg_eval.values), 0.0)
     copy_row(best.q, found.q[row])

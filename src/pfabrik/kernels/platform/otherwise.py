@@ -9,7 +9,7 @@ from .._jit import routine, search
 from ..legs.answer import (
     KEPT,
     Completion,
-    complete,
+    complete_pose,
     cone_cosine,
     deviation,
     excess_of,
@@ -19,9 +19,9 @@ from ..legs.answer import (
     write_answer,
 )
 from ..legs.endings import LEAST_MARGIN
-from ..legs.feasibility import largest_row
+from ..legs.feasibility import largest_constraint
 from ..legs.frames import set_frames
-from ..legs.poses import load
+from ..legs.poses import read_target
 from ..legs.records import REDUNDANT, Table
 from ..legs.table import open_table
 from ..rows import PENDING, REACHED, UNSURE
@@ -41,7 +41,7 @@ def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) ->
     for k in range(misfits.shape[0]):
         misfits[k] = 0.0
     for k in range(misfits.shape[0]):
-        if largest_row(table.legs, rows, k) > KEPT:
+        if largest_constraint(table.legs, rows, k) > KEPT:
             misfits[main_of(table, k)] = 1.0
     for i in range(table.limited.shape[0]):
         limited = table.limited[i]
@@ -115,7 +115,7 @@ def answer_otherwise(
     for row in range(targets.shape[0]):
         status[row], begin = PENDING, begins[row if begins.shape[0] > 1 else 0]
         for attempt in range(1, tries + 1):
-            if not together and load(targets[row], begin, own, scratch.pose):
+            if not together and read_target(targets[row], begin, own, scratch.pose):
                 set_frames(scratch.pose, own, scratch.frames)
                 place_legs(legs, scratch.frames, sides[row], scratch.values, scratch.lines)
                 put_rows(legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
@@ -126,9 +126,9 @@ def answer_otherwise(
                 if not together:  # a rod first, then the arm that it is on, then the rod again
                     flips = misfits[k] == 1.0 and (legs[k]["orients"] == 1) == (attempt == 2)
                 sides[row, k] = -sides[row, k] if flips else sides[row, k]
-            if not load(targets[row], begin, own, scratch.pose):
+            if not read_target(targets[row], begin, own, scratch.pose):
                 break
-            if complete(table, sides[row], scratch):
+            if complete_pose(table, sides[row], scratch):
                 if write_answer(table, scratch, poses[row], actuators[row], measures[row]) == REACHED:
                     status[row] = REACHED
                     copy_row(scratch.sides, sides[row])

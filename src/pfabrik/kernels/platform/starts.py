@@ -8,8 +8,8 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
-from ..legs.frames import NOWHERE, orienting_coordinate, place_redundant, q_redundant_of, set_frames
-from ..legs.poses import bring_yaw, column, is_pose, make_exact, middle_of, turn_pose
+from ..legs.frames import ZERO, orienting_coordinate, place_redundant, q_redundant_of, set_frames
+from ..legs.poses import column, is_pose, middle_of, orthonormalise, set_yaw, turn_pose
 from ..legs.records import CRANK, Q_PROXIMAL, REDUNDANT, Table
 from ..legs.rods import solve_proximal
 from ..rotations import yaw_of
@@ -42,7 +42,7 @@ def load_target(table: Table, objective: PoseObjective, row: int, search: Search
     for i in range(3):
         home = task["reference"][i]
         target[i, 3] = home + (own[i, 3] / task["length"] - home) * min(1.0, SIGHT / max(most, SIGHT))
-    make_exact(target)
+    orthonormalise(target)
     return True
 
 
@@ -100,8 +100,8 @@ def put_held(
         if sine > 0.0:
             turn_pose(state.pose, scale(math.atan2(sine, dot(column(state.pose, 2), column(target, 2))) / sine, axis))
     if objective.frame == HALF_WAY and objective.platform[5] == LOCKED:
-        bring_yaw(state.pose, yaw_of(target))
-    off = sub(middle, middle_of(pose, table.task[0])) if table.task[0]["unset"] == 0 else NOWHERE
+        set_yaw(state.pose, yaw_of(target))
+    off = sub(middle, middle_of(pose, table.task[0])) if table.task[0]["unset"] == 0 else ZERO
     for i in range(3):
         pose[i, 3] = target[i, 3] if objective.platform[i] == LOCKED else pose[i, 3] + off[i]
     set_frames(state.pose, table.task[0], leg_eval.frames)
