@@ -19,10 +19,10 @@ from pfabrik.kernels.legs.records import Table
 from pfabrik.kernels.platform import equations as E
 from pfabrik.kernels.platform import forward as F
 from pfabrik.kernels.platform import limits
-from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
+from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_involved
 from pfabrik.kernels.platform.nearest import new_nearest_scratch
 from pfabrik.kernels.platform.records import SETTINGS, Plan, PlatformObjective
-from pfabrik.kernels.platform.search import new_search
+from pfabrik.kernels.platform.search import new_search_scratch
 from pfabrik.platform.table import kernel_table
 
 pytestmark = [
@@ -80,7 +80,7 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
     on_carriers = [k for k, leg in enumerate(table.legs) if E.has_proximal(leg)]
 
     def values(state: E.PlatformState) -> np.ndarray:
-        E.place(table, state, leg_eval)
+        E.evaluate_legs(table, state, leg_eval)
         return np.array(
             [
                 *leg_eval.rows,
@@ -99,7 +99,7 @@ def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: st
 
     for _ in range(3):
         state = somewhere(mechanism, described, rng)
-        E.place(table, state, leg_eval)
+        E.evaluate_legs(table, state, leg_eval)
         E.put_slopes(table, leg_eval)
         told_by = [
             *leg_eval.slopes.copy(),
@@ -118,7 +118,7 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
     """Looked at alone, those that have multipliers, and what carries them, give the gradient that all legs give."""
     mechanism, described, table = described_by_name(name)
     rng = np.random.default_rng(1)
-    search, n = new_search(table, table.cones.shape[0]), E.count_unknowns(table)
+    search, n = new_search_scratch(table, table.cones.shape[0]), E.count_unknowns(table)
     objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
     objective = PlatformObjective(objective, np.zeros((0, len(table.driven))), 0)
     search.target[:] = somewhere(mechanism, described, rng).pose
@@ -126,18 +126,18 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
     limits, rows = 2 * len(table.limited) + len(table.cones), len(search.leg_eval.rows)
     seen = set()
     for which in range(limits + rows):
-        E.place(table, somewhere(mechanism, described, rng), search.leg_eval)
+        E.evaluate_legs(table, somewhere(mechanism, described, rng), search.leg_eval)
         E.put_slopes(table, search.leg_eval)
-        search.hessian.multipliers[:], search.balance[:] = 0.0, 0.0
+        search.hessian.multipliers[:], search.equation_multipliers[:] = 0.0, 0.0
         if which < limits:
             search.hessian.multipliers[which] = 1.0
         else:
-            search.balance[which - limits] = 1.0
+            search.equation_multipliers[which - limits] = 1.0
         state, own, every = somewhere(mechanism, described, rng), np.zeros(n), np.zeros(n)
-        note_pulled(table, objective, search)
-        seen.add(int(search.pulled.sum()))
+        note_involved(table, objective, search)
+        seen.add(int(search.involved.sum()))
         lagrangian_gradient(table, 0, objective, state, search, own)
-        search.pulled[:] = 1
+        search.involved[:] = 1
         lagrangian_gradient(table, 0, objective, state, search, every)
         np.testing.assert_allclose(own, every, rtol=0, atol=1e-12)
     assert min(seen) < len(table.legs)
@@ -148,7 +148,7 @@ def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> 
     """Equation by equation, in another order and the sense of the actuator."""
     mechanism, described, table = described_by_name(name)
     rng = np.random.default_rng(2)
-    scratch = F.new_newton(table, not mechanism.end_effector_is_joint)
+    scratch = F.new_newton_scratch(table, not mechanism.end_effector_is_joint)
     assert (len(scratch.spheres.legs) > 0) == (name in ON_SPHERES)
     if name not in ON_SPHERES:
         return
@@ -159,7 +159,7 @@ def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> 
         for to, source in zip(scratch.state, state, strict=True):
             to[:] = source
         scratch.values[:] = rng.uniform(-0.3, 0.3, len(scratch.values))
-        F.put_drivers(table, scratch)
+        F.place_drivers(table, scratch)
         F.set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
         worst = F.put_residuals(table, scratch)
         assert worst == pytest.approx(F.put_residuals(table, by_leg), abs=1e-12)
@@ -182,5 +182,5 @@ def test_limits_are_weighed_in_more_motions_than_there_are_limits() -> None:
     linear.metric[:] = np.eye(n)
     linear.totals["motions"], linear.totals["limits"] = n, 1
     linear.g[:], linear.G[0], linear.h[0] = -3.0, np.eye(n)[0], 0.0
-    assert balance(linear, 1e-6, scratch.p, scratch.pulls) == 1
+    assert balance(linear, 1e-6, scratch.p, scratch.natural_gradients) == 1
     assert scratch.p.x[0] == pytest.approx(3.0)

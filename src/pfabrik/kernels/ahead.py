@@ -19,10 +19,10 @@ from .legs.answer import answer
 from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
 from .legs.margin_blocks import margins_in_blocks
+from .platform.any_mode import answer_in_any_mode
+from .platform.evaluate import evaluate_poses
 from .platform.forward import assemble
 from .platform.nearest import nearest_pose
-from .platform.otherwise import answer_otherwise
-from .platform.read import read
 from .reaching import plan as P
 from .reaching.solve import solve_by_passes
 from .timing import fastest, second_derivatives
@@ -58,10 +58,10 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (close, (*_values("i i i"), ClosureProblem(*_values("f1 i f3 i f i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
-    (read, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
+    (evaluate_poses, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
     (first_order, (*_values("i i"), PLAN, _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
-    (answer_otherwise, _ANSWERS),
+    (answer_in_any_mode, _ANSWERS),
     (nearest_pose, tuple(_values("i i i f3 f2 f3 f2 f2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i f2 i i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i f3 f3 f2 i f1 i1"))),

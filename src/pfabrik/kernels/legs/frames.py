@@ -61,7 +61,7 @@ def orienting_coordinate(joint: Record, rod: Record, frame: Floats, side: float)
     """Coordinate of a redundant joint that turns a rod's base hinge towards its platform end; the singularity margin.
 
     The platform end H lies in the plane across the hinge n through F. If the joint turns about a through o, then
-    (Rot n) . (H - o) = n . (F - o); if it shifts along a, then n . (H - F - q a) = 0. The margin is that of `solve_angle`.
+    (Rot n) . (H - o) = n . (F - o); if it shifts along a, then n . (H - F - q a) = 0. The margin is of `solve_angle`.
     """
     axis, point, n = vec(joint["proximal_axis"]), vec(joint["proximal_point"]), vec(rod["base_end_axes"][0])
     platform_end, base_end, axial = (
