@@ -1,4 +1,4 @@
-"""Compiling ahead: every kernel that a mechanism's questions lead to, without a mechanism."""
+"""Ahead-of-time compilation of every kernel, without a mechanism."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _PLAN_RECORDS = (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT)
 
 
 def _values(codes: str) -> list[Any]:
-    """Values of the types that codes stand for: i and f for numbers, followed by their dimensions for arrays."""
+    """Values of the types of the codes: i and f for numbers, followed by the dimensions for arrays."""
     numbers = {"i": 0, "f": 0.0}
     return [numbers[c] if len(c) == 1 else np.zeros((0,) * int(c[1]), c[0] + "8") for c in codes.split()]
 
@@ -70,7 +70,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (second_derivatives, tuple(_values("f1 f2 f2"))),
     (fastest, (*_values("f1 f2 f2 f1 f1"), True, np.zeros(0))),
 )
-"""Every kernel with arguments of the types it takes, what most questions need first."""
+"""Every kernel with arguments of its types, the most used first."""
 
 
 def compile_all(report: Callable[[str, float], None] | None = None) -> None:
@@ -78,7 +78,7 @@ def compile_all(report: Callable[[str, float], None] | None = None) -> None:
 
     Parameters
     ----------
-    report : called after each kernel with its name and the seconds it took.
+    report : called after each kernel with its name and the seconds taken.
     """
     if _config.DISABLE_JIT:
         return

@@ -329,8 +329,10 @@ def complete_pose(table: Table, sides: Floats, scratch: Completion) -> bool:
         singularity_margin, margin_of_rows = place_legs(legs, frames, scratch.sides, values, lines)
         if not margin_of_rows > LEAST_MARGIN * LEAST_MARGIN:
             return False
-        worst = put_rows(legs, frames, values, lines, scratch.rows)
-        if worst <= CLOSED or (is_set and worst <= NEARLY_CLOSED and (task["implicit"] == 0 or worst > 0.5 * previous)):
+        residual = put_rows(legs, frames, values, lines, scratch.rows)
+        if residual <= CLOSED or (
+            is_set and residual <= NEARLY_CLOSED and (task["implicit"] == 0 or residual > 0.5 * previous)
+        ):
             return singularity_margin > LEAST_MARGIN * LEAST_MARGIN
         if is_set and task["implicit"] == 0:
             return False
@@ -338,5 +340,5 @@ def complete_pose(table: Table, sides: Floats, scratch: Completion) -> bool:
         travelled += newton_step(table, scratch)
         if not travelled <= task["farthest"]:
             return False
-        previous = worst
+        previous = residual
     return False

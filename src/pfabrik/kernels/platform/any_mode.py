@@ -32,7 +32,7 @@ NEARLY = 1e-6
 """Tolerance of closure and limits for legs at dead points, where closed forms lose half of their digits [rad or L]."""
 
 MOST_CHOICES = 8
-"""Legs with two solutions of which all combinations are tried, where all legs complete the pose together."""
+"""Most legs with two sides of which all combinations are tried, if the legs complete the pose together."""
 
 
 @routine
@@ -63,17 +63,17 @@ def is_singular(table: Table, sides: Floats, scratch: Completion) -> bool:
     singularity_margin, _ = place_legs(table.legs, scratch.frames, sides, scratch.values, scratch.lines)
     if singularity_margin > LEAST_MARGIN * LEAST_MARGIN or singularity_margin < -NEARLY * NEARLY:
         return False
-    worst = put_rows(table.legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
-    return bool(worst <= NEARLY and excess_of(table.limited, table.cones, scratch.values) <= NEARLY)
+    residual = put_rows(table.legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
+    return bool(residual <= NEARLY and excess_of(table.limited, table.cones, scratch.values) <= NEARLY)
 
 
 @routine
-def note_choices(table: Table, sides: Floats, choosing: Ints) -> int:
+def note_choices(table: Table, sides: Floats, choices: Ints) -> int:
     """List the legs that have two sides; their number."""
     legs, n = table.legs, 0
     for k in range(legs.shape[0]):
         if sides[k] != 0.0 and (legs[k]["kind"] != REDUNDANT or legs[k]["orients"] == 1):
-            choosing[n] = k
+            choices[n] = k
             n += 1
     return n
 
@@ -106,12 +106,12 @@ def answer_in_any_mode(
     """
     table = open_table(machine)
     scratch, legs, n_legs, task, n_unreached = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
-    misfits, choosing, n_attempts = np.zeros(n_legs), np.zeros(n_legs, np.int64), 1
+    misfits, choices, n_passes = np.zeros(n_legs), np.zeros(n_legs, np.int64), 1
     for k in range(n_legs):
-        n_attempts = 3 if legs[k]["orients"] == 1 else n_attempts
-    n_choices = note_choices(table, sides[0], choosing) if sides.shape[0] > 0 else 0
+        n_passes = 3 if legs[k]["orients"] == 1 else n_passes
+    n_choices = note_choices(table, sides[0], choices) if sides.shape[0] > 0 else 0
     is_coupled = task["unset"] + task["implicit"] > 0
-    n_tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if is_coupled else n_attempts
+    n_tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if is_coupled else n_passes
     for row in range(targets.shape[0]):
         status[row], begin = PENDING, begins[row if begins.shape[0] > 1 else 0]
         for attempt in range(1, n_tries + 1):
@@ -121,11 +121,11 @@ def answer_in_any_mode(
                 put_rows(legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
                 note_misfits(table, scratch.values, scratch.rows, misfits)
             for c in range(n_choices):
-                k = choosing[c]
-                flips = (attempt ^ (attempt - 1)) >> c & 1 == 1
+                k = choices[c]
+                is_flipped = (attempt ^ (attempt - 1)) >> c & 1 == 1
                 if not is_coupled:  # a rod first, then its orienting joint, then the rod again
-                    flips = misfits[k] == 1.0 and (legs[k]["orients"] == 1) == (attempt == 2)
-                sides[row, k] = -sides[row, k] if flips else sides[row, k]
+                    is_flipped = misfits[k] == 1.0 and (legs[k]["orients"] == 1) == (attempt == 2)
+                sides[row, k] = -sides[row, k] if is_flipped else sides[row, k]
             if not read_target(targets[row], begin, task, scratch.pose):
                 break
             if complete_pose(table, sides[row], scratch):

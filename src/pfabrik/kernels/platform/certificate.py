@@ -63,7 +63,7 @@ BALANCED = 1e-7
 
 @routine
 def is_global(table: Table, row: int, objective: PlatformObjective, search: SearchScratch) -> bool:
-    """True if nothing feasible is certainly nearer than `search.best`; `search.leg_eval` is evaluated there then."""
+    """True if the certificate holds: nothing feasible is nearer than `search.best`, where legs are evaluated then."""
     pose, used, reduced = objective.pose, search.elimination.used, search.first
     if pose.frame != BASE_AXES or objective.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
         return False
@@ -97,8 +97,8 @@ def leg_share(table: Table, root: int, nearer: float, search: SearchScratch) -> 
     A, B, b, push, lean, twist = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     hinge, slide = -1, -1
     for k in range(root, table.legs.shape[0]):
-        first, on_hinge, on_slide = path_to_base(table, k)
-        if first != root:
+        path_root, on_hinge, on_slide = path_to_base(table, k)
+        if path_root != root:
             continue
         m, at_base_end, at_platform_end = rod_multipliers(table, k, search)
         if m == 0.0 and norm(at_base_end) + norm(at_platform_end) == 0.0:
@@ -150,7 +150,7 @@ def path_to_base(table: Table, k: int) -> tuple[int, int, int]:
     The leg is the first of the redundant joints that the rod is on, else the owner of its proximal joint. All are -1 if
     the path has more joints, or the leg is no such rod.
     """
-    leg, index, first, hinge, slide = table.legs[k], owner_of(table, k), -1, -1, -1
+    leg, index, root, hinge, slide = table.legs[k], owner_of(table, k), -1, -1, -1
     while index >= 0 and leg["kind"] == ROD:
         joint = table.legs[index]
         if (
@@ -165,8 +165,8 @@ def path_to_base(table: Table, k: int) -> tuple[int, int, int]:
             slide = index
         elif joint["proximal"] != NO_PROXIMAL:
             return -1, -1, -1
-        first, index = index, joint["redundant"]
-    return first, hinge, slide
+        root, index = index, joint["redundant"]
+    return root, hinge, slide
 
 
 @routine

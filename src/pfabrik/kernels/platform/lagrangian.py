@@ -41,9 +41,9 @@ def put_limited_gradient(table: Table, search: SearchScratch, out: Floats) -> No
             cone_slope(table, table.cones[i], search.leg_eval)
             for j in range(out.shape[0]):
                 out[j] += multiplier * slope[j]
-    first = 2 * n_ranges + table.cones.shape[0]
+    offset = 2 * n_ranges + table.cones.shape[0]
     for k in range(kept_sides.shape[0]):
-        multiplier = multipliers[first + k] * kept_sides[k]
+        multiplier = multipliers[offset + k] * kept_sides[k]
         if multiplier != 0.0:
             dead_point_slope(table, k, search.leg_eval)
             for j in range(out.shape[0]):
@@ -78,9 +78,9 @@ def note_involved(table: Table, objective: PlatformObjective, search: SearchScra
         search.involved,
     )
     n_ranges, n = table.limited.shape[0], legs.shape[0]
-    first = 2 * n_ranges + table.cones.shape[0]
+    offset = 2 * n_ranges + table.cones.shape[0]
     for k in range(n):
-        largest = multipliers[first + k]
+        largest = multipliers[offset + k]
         for r in range(legs[k]["first_row"], end_of_rows(legs, k, table.task[0]["rows"])):
             largest = max(largest, abs(equation_multipliers[r]))
         if has_proximal(legs[k]):

@@ -96,7 +96,7 @@ def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced
             over = cone_slope(table, cone, search.leg_eval) - cone["half_angle"] + margin
             excess = max(excess, over)
             k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.leg_eval.slope, reduced)
-    first = 2 * table.limited.shape[0] + table.cones.shape[0]
+    offset = 2 * table.limited.shape[0] + table.cones.shape[0]
     for leg in range(kept_sides.shape[0]):
         if kept_sides[leg] != 0.0:
             over = kept_sides[leg] * dead_point_slope(table, leg, search.leg_eval)
@@ -104,6 +104,6 @@ def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced
                 excess = max(excess, over)
                 for j in range(slope.shape[0]):
                     slope[j] *= kept_sides[leg]
-                k = add_limit(k, over, first + leg, search.leg_eval.slope, reduced)
+                k = add_limit(k, over, offset + leg, search.leg_eval.slope, reduced)
     reduced.linear.totals[0]["limits"] = k
     reduced.linear.totals[0]["excess"] = excess

@@ -11,7 +11,7 @@ from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
-from ..holding import balance
+from ..holding import limit_multipliers
 from ..legs.answer import deviation, excess_of
 from ..legs.poses import orthonormalise
 from ..legs.records import REDUNDANT, Table
@@ -252,36 +252,42 @@ def search_row(
         scratch.phase1_tally[0],
         scratch.distances_to_held,
     )
-    target, n = search.target, seeds.poses.shape[0]
-    nearest = -1
+    target, n_seeds = search.target, seeds.poses.shape[0]
+    nearest_seed = -1
     own_start, kept_sides = row if starts.poses.shape[0] > 1 else 0, search.kept_sides
     sides = starts.sides[own_start]
     for k in range(kept_sides.shape[0]):
         kept_sides[k] = sides[k] if stays == 1 and has_proximal(table.legs[k]) else 0.0
-    at_once = holds_all(objective.pose) or (n > 0 and table.task[0]["implicit"] == 0)
+    is_placed_first = holds_all(objective.pose) or (n_seeds > 0 and table.task[0]["implicit"] == 0)
     clear_tally(best_tally)
     clear_tally(phase1_tally)
-    for i in range(n + 1):
+    for i in range(n_seeds + 1):
         distances_to_held[i] = math.inf
-    for start in range(n + 2):
-        if is_agreed(best_tally, agreements) or (start == n + 1 and best_tally["is_unbroken"] == 1):
+    for start in range(n_seeds + 2):
+        if is_agreed(best_tally, agreements) or (start == n_seeds + 1 and best_tally["is_unbroken"] == 1):
             break
-        nearest = nearest_start(objective.pose, target, seeds, search.gradient) if start == 1 else nearest
-        index = -1 if start == 0 or start == n + 1 else nearest if start == 1 else start - 2 + int(start - 2 >= nearest)
-        load_start(table, starts if index < 0 else seeds, own_start if index < 0 else index, search)
+        nearest_seed = nearest_start(objective.pose, target, seeds, search.gradient) if start == 1 else nearest_seed
+        seed = (
+            -1
+            if start == 0 or start == n_seeds + 1
+            else nearest_seed
+            if start == 1
+            else start - 2 + int(start - 2 >= nearest_seed)
+        )
+        load_start(table, starts if seed < 0 else seeds, own_start if seed < 0 else seed, search)
         if stays == 1 and is_other_mode(table.legs, sides, search.best.sides):
             continue
-        in_place = (start <= n) == at_once
-        fix_held(objective.pose, in_place, search)
-        if in_place:
+        is_in_place = (start <= n_seeds) == is_placed_first
+        fix_held(objective.pose, is_in_place, search)
+        if is_in_place:
             place_held(table, objective.pose, target, search.leg_eval, search.best)
         if (
             search_from(table, row, objective, sides, stays, search, best, best_tally)
             and phase1_objective.pose.max_iterations > 0
         ):
             search.gradient.unit[0] = 1.0
-            start_pose = starts.poses[own_start] if index < 0 else seeds.poses[index]
-            distances_to_held[index + 1], _ = pose_gradient(
+            start_pose = starts.poses[own_start] if seed < 0 else seeds.poses[seed]
+            distances_to_held[seed + 1], _ = pose_gradient(
                 phase1_objective.pose, target, start_pose, search.gradient, True
             )
     fix_held(phase1_objective.pose, False, search)
@@ -290,13 +296,13 @@ def search_row(
         and not is_agreed(best_tally, agreements)
         and (best_tally["least"] < math.inf or not is_agreed(phase1_tally, agreements))
     ):
-        index = -1
-        for i in range(n):
-            index = i if distances_to_held[i + 1] < distances_to_held[index + 1] else index
-        if distances_to_held[index + 1] == math.inf:
+        seed = -1
+        for i in range(n_seeds):
+            seed = i if distances_to_held[i + 1] < distances_to_held[seed + 1] else seed
+        if distances_to_held[seed + 1] == math.inf:
             break
-        distances_to_held[index + 1] = math.inf
-        load_start(table, starts if index < 0 else seeds, own_start if index < 0 else index, search)
+        distances_to_held[seed + 1] = math.inf
+        load_start(table, starts if seed < 0 else seeds, own_start if seed < 0 else seed, search)
         distance = descend(
             table,
             row,
@@ -337,7 +343,7 @@ def put_limit_multipliers(
     search.gradient.unit[0] = 1.0
     linearise(table, row, objective, search.best, search, search.first)
     scale_objective(linear)
-    for c in range(balance(linear, objective.pose.near, scratch.p, scratch.natural_gradients)):
+    for c in range(limit_multipliers(linear, objective.pose.near, scratch.p, scratch.natural_gradients)):
         weights[linear.which[c]] = scratch.p.x[c]
 
 
@@ -368,10 +374,11 @@ def nearest_pose(
 
     Parameters
     ----------
-    machine, plan_address, scratch_address : addresses of the kernel table, of `Plan`, and of `NearestScratch` made for
-    both. targets, values : as in `PlatformObjective`. begins, q, sides : the own start of each row, or one for all, as
-    in `Starts`; the seeds of the plan follow until enough
-        searches agree, as in `is_agreed`.
+    machine, plan_address : addresses of the kernel table and of `Plan`.
+    scratch_address : that of `NearestScratch`, allocated for both.
+    targets, values : as in `PlatformObjective`.
+    begins, q, sides : the own start of each row, or one for all, as in `Starts`; the seeds of the plan follow until
+        enough searches agree, as in `is_agreed`.
     distances, ends, ends_q, ends_sides, counters, actuators, measures, status : as in `PoseSolutions`.
 
     Returns

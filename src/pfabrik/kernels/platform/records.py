@@ -84,7 +84,7 @@ class PoseSolutions(NamedTuple):
         """The solutions of some rows."""
         return PoseSolutions._make(array[places] for array in self)
 
-    def put(self, places: NDArray[np.intp] | Mask, others: PoseSolutions) -> None:
+    def put(self, places: NDArray[np.intp] | Mask, solutions: PoseSolutions) -> None:
         """Write other solutions into some rows."""
-        for array, block in zip(self, others, strict=True):
+        for array, block in zip(self, solutions, strict=True):
             array[places] = block

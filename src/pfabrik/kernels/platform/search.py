@@ -35,7 +35,7 @@ class SearchScratch(NamedTuple):
     control: Records  # (1,): CONTROL
     p: QP
     elimination: Elimination
-    first: FreeMotions
+    first: FreeMotions  # reduced linearisations at `best` and `trial`, swapped when a step is accepted
     second: FreeMotions
     objective_gradient: Floats  # (n,): gradient of the objective
     here: Floats  # (n,): gradient of the Lagrangian at `best`
