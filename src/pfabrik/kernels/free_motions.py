@@ -73,12 +73,12 @@ def eliminate(rows: int, elimination: Elimination, reduced: FreeMotions, first: 
     for j in range(n):
         shift[j] = 0.0
         taken[j] = 0.0 if used[j] > 0 else 1.0
-    least, again = DEPENDENT, 0
+    least, n_postponed = DEPENDENT, 0
     if implied > 0:
-        least, again = max(DEPENDENT, LOOSE * reduced.linear.totals[0]["gap"]), first
-    for turn in range(rows + again):
-        row = turn if turn < first else turn - first if turn < first + again else turn - again
-        if not first <= turn < first + again or rank <= min(row, first - implied - 1):
+        least, n_postponed = max(DEPENDENT, LOOSE * reduced.linear.totals[0]["gap"]), first
+    for turn in range(rows + n_postponed):
+        row = turn if turn < first else turn - first if turn < first + n_postponed else turn - n_postponed
+        if not first <= turn < first + n_postponed or rank <= min(row, first - implied - 1):
             rank += solve_row(row, rank, rows, least if turn < first else DEPENDENT, elimination, reduced)
     motions = 0
     for j in range(n):
@@ -101,7 +101,7 @@ def eliminate(rows: int, elimination: Elimination, reduced: FreeMotions, first: 
 @routine
 def solve_row(row: int, rank: int, rows: int, least: float, elimination: Elimination, reduced: FreeMotions) -> int:
     """Solve a row for its pivot unknown, as pivot row number `rank`; 1, or 0 if it follows from those before."""
-    A, taken, filled_at, used = elimination.A, elimination.taken, elimination.filled, elimination.used
+    A, taken, columns, used = elimination.A, elimination.taken, elimination.filled, elimination.used
     n, largest, pivot = used.shape[0], 0.0, -1
     for j in range(n):
         size = abs(A[row, j])
@@ -111,17 +111,17 @@ def solve_row(row: int, rank: int, rows: int, least: float, elimination: Elimina
                 largest, pivot = size, j
     if pivot < 0:
         return 0
-    factor, filled = 1.0 / A[row, pivot], 0
+    factor, n_filled = 1.0 / A[row, pivot], 0
     for j in range(n + 1 + rows):
         A[row, j], A[rank, j] = A[rank, j], factor * A[row, j]
         if A[rank, j] != 0.0:
-            filled_at[filled] = j
-            filled += 1
+            columns[n_filled] = j
+            n_filled += 1
     for i in range(rows):
-        share = A[i, pivot]
-        if i != rank and share != 0.0:
-            for k in range(filled):
-                A[i, filled_at[k]] -= share * A[rank, filled_at[k]]
+        factor_of_row = A[i, pivot]
+        if i != rank and factor_of_row != 0.0:
+            for k in range(n_filled):
+                A[i, columns[k]] -= factor_of_row * A[rank, columns[k]]
             A[i, pivot] = 0.0
     taken[pivot] = 1.0
     reduced.pivots[rank] = pivot

@@ -27,7 +27,7 @@ def slot_of(code: int) -> int:
 
 
 @kernel
-def number_points(codes: Ints, table: Ints, known: Ints, count: int, adds: bool, numbers: Ints) -> int:
+def number_points(codes: Ints, table: Ints, known: Ints, count: int, is_adding: bool, numbers: Ints) -> int:
     """Fill the number of each code (n,); the number of known codes then.
 
     Parameters
@@ -35,7 +35,7 @@ def number_points(codes: Ints, table: Ints, known: Ints, count: int, adds: bool,
     table : hash table of numbers, -1 in empty slots; its size is a power of two, and at most half of it is filled.
     known : codes by their numbers, with space for new ones.
     count : number of known codes before.
-    adds : True to number unknown codes from there on; otherwise they get -1.
+    is_adding : True to number unknown codes from there on; otherwise they get -1.
     """
     mask = table.shape[0] - 1
     for i in range(codes.shape[0]):
@@ -45,7 +45,7 @@ def number_points(codes: Ints, table: Ints, known: Ints, count: int, adds: bool,
             if table[slot] < 0 or known[table[slot]] == code:
                 break
             slot = (slot + 1) & mask
-        if table[slot] < 0 and adds:
+        if table[slot] < 0 and is_adding:
             table[slot], known[count] = count, code
             count += 1
         numbers[i] = table[slot]

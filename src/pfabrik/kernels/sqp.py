@@ -24,7 +24,7 @@ from ..arrays import Floats, Ints, Record, Records
 from ._jit import routine
 from .qp import QP, factorise, solve_qp
 
-LONGEST_STEP, AT_FIRST = 0.4, 0.1
+LONGEST_STEP, FIRST_DAMPING = 0.4, 0.1
 """Longest step of any unknown [rad or L], beyond which the quadratic model is not trusted; and the initial damping, as
 a share of what would make the first step that long."""
 
@@ -58,17 +58,17 @@ LEAST_WEIGHT = 1.0
 """Least weight of the violation in the merit, in units of the gradient: if the objective has no gradient along an
 equation, its multiplier does not say how much violation is acceptable."""
 
-ENOUGH, GOOD, EXACT = 1e-4, 0.5, 0.1
+SUFFICIENT, GOOD, EXACT = 1e-4, 0.5, 0.1
 """Actual reduction as a share of the predicted: least of an accepted step, and least of one that lowers the damping;
 and largest relative difference of the two for which a full step lowers it much."""
 
-WORTH, MUCH = 0.01, 0.1
+LEAST_DAMPING, LARGE_DAMPING = 0.01, 0.1
 """Damping, in units of curvature: least after a rejected step; largest that an exact step divides by 100, not 10."""
 
 SOLVABLE = 1e-8
 """Least damping, in units of curvature, for a programme that rounding keeps from its solution."""
 
-STEEPEST = 1e8
+MOST_DAMPING = 1e8
 """Damping, in units of curvature, that ends a search: no step, however short, is accepted."""
 
 TOTALS = np.dtype(
@@ -161,7 +161,7 @@ def symmetrise(H: Floats, n: int) -> float:
 
 
 @routine
-def sum_of(multipliers: Floats, k: int) -> float:
+def sum_of_multipliers(multipliers: Floats, k: int) -> float:
     """Sum of the first k multipliers."""
     total = 0.0
     for c in range(k):
@@ -271,7 +271,7 @@ def is_sufficient(linear: Linearisation, actual: float, predicted: float, weight
     """True if the actual reduction of a step is sufficient for its predicted reduction."""
     if predicted <= FINE * linear.totals[0]["value"]:
         return actual >= -ROUNDING * linear.totals[0]["value"] - weight * CLOSED
-    return actual > ENOUGH * predicted
+    return actual > SUFFICIENT * predicted
 
 
 @routine
@@ -299,7 +299,7 @@ def begin_descent(linear: Linearisation, hessian: Hessian, control: Record) -> N
     """Initialise the step control at a feasible configuration."""
     for c in range(len(hessian.multipliers)):
         hessian.multipliers[c] = 0.0
-    control["damping"] = AT_FIRST * longest(linear.g, linear.totals[0]["motions"]) / LONGEST_STEP
+    control["damping"] = FIRST_DAMPING * longest(linear.g, linear.totals[0]["motions"]) / LONGEST_STEP
     control["predicted"], control["weight"] = math.inf, 0.0
     control["steps"] = control["is_done"] = control["is_rejected"] = control["is_exact"] = 0
 
@@ -323,11 +323,11 @@ def plan_step(linear: Linearisation, hessian: Hessian, control: Record, most_ste
     control["steps"] += 1
     control["predicted_before"] = control["predicted"]
     predicted, damping = solve_subproblem(linear, hessian, control["damping"], control["largest"], p)
-    multipliers = control["equation_multipliers"] + sum_of(p.multipliers, linear.totals[0]["limits"])
+    multipliers = control["equation_multipliers"] + sum_of_multipliers(p.multipliers, linear.totals[0]["limits"])
     control["weight"] = max(LEAST_WEIGHT, 2.0 * multipliers)
     predicted += control["weight"] * violation(linear)
     control["predicted"], control["damping"] = predicted, damping
-    if predicted <= 0.0 or damping > STEEPEST * control["largest"] or control["steps"] > most_steps:
+    if predicted <= 0.0 or damping > MOST_DAMPING * control["largest"] or control["steps"] > most_steps:
         control["is_done"] = 1
         return False
     note_multipliers(linear, p, hessian)
@@ -364,9 +364,9 @@ def judge_step(linear: Linearisation, other: Linearisation, is_feasible: bool, s
     )
     damping, largest = control["damping"], control["largest"]
     if not is_accepted:
-        control["damping"] = max(4.0 * damping, WORTH * largest)
+        control["damping"] = max(4.0 * damping, LEAST_DAMPING * largest)
     elif actual > GOOD * predicted and control["is_rejected"] == 0:
-        damping *= 0.01 if damping < MUCH * largest and share == 1.0 and control["is_exact"] == 1 else 0.1
+        damping *= 0.01 if damping < LARGE_DAMPING * largest and share == 1.0 and control["is_exact"] == 1 else 0.1
         control["damping"] = damping if damping > 1e-8 * largest else 0.0
     control["is_rejected"] = 0 if is_accepted else 1
     return is_accepted

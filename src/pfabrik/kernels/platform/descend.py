@@ -15,8 +15,8 @@ from ..legs.records import REDUNDANT, Table
 from ..sqp import (
     CLOSED,
     CORRECTIONS,
+    LARGE_DAMPING,
     LONGEST_STEP,
-    MUCH,
     NEARLY_CLOSED,
     RESTORING,
     allowed_violation,
@@ -154,7 +154,7 @@ def is_hopeless(deficit: float, share: float, control: Record) -> bool:
     deficit : by how much the objective exceeds the incumbent's.
     share : of the last step taken.
     """
-    is_damped = control["damping"] > MUCH * control["largest"]
+    is_damped = control["damping"] > LARGE_DAMPING * control["largest"]
     return bool(not is_damped and HOPELESS * control["predicted"] < share * deficit)
 
 
