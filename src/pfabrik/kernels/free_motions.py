@@ -118,10 +118,10 @@ def solve_row(row: int, rank: int, rows: int, least: float, elimination: Elimina
             columns[n_filled] = j
             n_filled += 1
     for i in range(rows):
-        factor_of_row = A[i, pivot]
-        if i != rank and factor_of_row != 0.0:
+        entry = A[i, pivot]
+        if i != rank and entry != 0.0:
             for k in range(n_filled):
-                A[i, columns[k]] -= factor_of_row * A[rank, columns[k]]
+                A[i, columns[k]] -= entry * A[rank, columns[k]]
             A[i, pivot] = 0.0
     taken[pivot] = 1.0
     reduced.pivots[rank] = pivot

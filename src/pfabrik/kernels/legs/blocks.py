@@ -85,12 +85,12 @@ def fill_rod(rod: Record, proximal: Record, n: int, S: Floats) -> None:
 def fill_crank(rod: Record, n: int, S: Floats) -> None:
     """Solve the crank angle at which the rod reaches its platform end, as `rods.solve_proximal` does."""
     crank, across = vec(rod["crank"]), vec(rod["crank_across"])
-    more = dot(crank, crank) - rod["length"] * rod["length"]
+    constant = dot(crank, crank) - rod["length"] * rod["length"]
     for i in range(n):
         x, y, z = S[X, i], S[Y, i], S[Z, i]
         A = crank[0] * x + crank[1] * y + crank[2] * z
         B = across[0] * x + across[1] * y + across[2] * z
-        C = 0.5 * (x * x + y * y + z * z + more)
+        C = 0.5 * (x * x + y * y + z * z + constant)
         square = A * A + B * B
         discriminant = square - C * C
         farthest = math.sqrt(square)
@@ -199,7 +199,7 @@ def track_constraint(column: int, n: int, S: Floats) -> None:
 
 @routine
 def counting_range(coordinate: Record) -> Vec:
-    """An offset to add to a coordinate and the bounds between which it then counts, as in `answer.deviation`."""
+    """A shift to add to a coordinate and the bounds that it is then wrapped between, as in `answer.deviation`."""
     if coordinate["turns"] == 0:
         return 0.0, -math.inf, math.inf
     lo, hi = coordinate["lo"], coordinate["hi"]
@@ -219,9 +219,9 @@ def wrap_between(angle: float, below: float, above: float) -> float:
 def track_range(coordinate: Record, n: int, S: Floats) -> None:
     """Raise EXCESS to the excess of a coordinate over its range."""
     lo, hi, sense, place = coordinate["lo"], coordinate["hi"], coordinate["sense"], VALUES + coordinate["place"]
-    more, least, most = counting_range(coordinate)
+    shift, lowest, highest = counting_range(coordinate)
     for i in range(n):
-        value = wrap_between(sense * S[place, i] + more, least, most)
+        value = wrap_between(sense * S[place, i] + shift, lowest, highest)
         below, above = lo - value, value - hi
         excess = below if below > above else above
         excess = excess if excess < math.inf else math.inf
@@ -333,8 +333,8 @@ def write_poses(task: Record, first: int, n: int, S: Floats, poses: Floats) -> N
 def write_actuator(driven: Record, first: int, n: int, S: Floats, actuators: Floats) -> None:
     """Write the values of an actuator [length or rad]."""
     home, unit, sense, place = driven["home"], driven["unit"], driven["sense"], VALUES + driven["place"]
-    (more, least, most), column = counting_range(driven), actuators[first : first + n, driven["column"]]
+    (shift, lowest, highest), column = counting_range(driven), actuators[first : first + n, driven["column"]]
     for i in range(n):
-        S[VALUE, i] = home + wrap_between(sense * S[place, i] + more, least, most) * unit
+        S[VALUE, i] = home + wrap_between(sense * S[place, i] + shift, lowest, highest) * unit
     for i in range(n):
         column[i] = S[VALUE, i]

@@ -66,9 +66,9 @@ def track_bounds(coordinate: Record, limit: int, n: int, S: Floats) -> None:
     lo, hi = coordinate["lo"], coordinate["hi"]
     half_range = 0.5 * (hi - lo)
     sense, place = coordinate["sense"], VALUES + coordinate["place"]
-    more, least, most = counting_range(coordinate)
+    shift, lowest, highest = counting_range(coordinate)
     for i in range(n):
-        value = wrap_between(sense * S[place, i] + more, least, most)
+        value = wrap_between(sense * S[place, i] + shift, lowest, highest)
         below, above, before, binding = value - lo, hi - value, S[LEAST, i], S[BINDING, i]
         nearer = float(limit + 1) if above < below else float(limit)
         margin = relative_margin(above if above < below else below, half_range)

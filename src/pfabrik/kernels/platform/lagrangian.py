@@ -135,13 +135,13 @@ def lagrangian_hessian(
     add_equation_gradient(linear.totals[0]["rows"] - search.leg_eval.slopes.shape[0], search, search.here)
     note_involved(table, objective, search)
     for a in range(motions):
-        probe = PROBE / math.sqrt(linear.metric[a, a])
+        step_length = PROBE / math.sqrt(linear.metric[a, a])
         for j in range(step.shape[0]):
             step[j] = basis[j, a]
         copy_platform_state(search.best, search.trial)
-        move(table, search.step, probe, search.trial)
+        move(table, search.step, step_length, search.trial)
         lagrangian_gradient(table, row, objective, search.trial, search, search.there)
         for j in range(step.shape[0]):
-            there[j] = (there[j] - here[j]) / probe
+            there[j] = (there[j] - here[j]) / step_length
         project(there, reduced, H[a])
     return symmetrise(H, motions)

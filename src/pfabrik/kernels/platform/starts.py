@@ -26,7 +26,7 @@ BENT = 1e-2
 def load_target(table: Table, objective: PoseObjective, row: int, search: SearchScratch) -> bool:
     """Fill `search.target` with the target of a row, brought within range of sight; False if it is no pose.
 
-    The rotation is home's for a platform that cannot turn and whose rotation is held.
+    For a platform that cannot turn and whose rotation is held, the rotation of the target is home's.
     """
     given, target, task = objective.targets[row], search.target, table.task[0]
     if not is_pose(given):
