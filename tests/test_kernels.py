@@ -61,7 +61,7 @@ def difference(A, B, out):
 @kernel
 def turn_pose(T, w):
     poses.turn_pose(T, w)
-    poses.make_exact(T)
+    poses.orthonormalise(T)
 
 
 @kernel

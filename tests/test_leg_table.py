@@ -18,7 +18,7 @@ from pfabrik.description.home_mobility import end_effector_freedom
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.feasibility import _margins
-from pfabrik.kernels.platform.read import read
+from pfabrik.kernels.platform.evaluate import evaluate_poses
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
 from pfabrik.platform.answers import sides_at
@@ -92,7 +92,7 @@ def constraints(name: str, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     rows = np.zeros((len(poses), own.task["rows"][0]))
     slopes = np.zeros((*rows.shape, 6 + len(own.redundant)))
     none = np.zeros((0, 0))
-    read(legs_of(own).address, reading_of(own).address, poses, own.home_sides, none, none, rows, slopes)
+    evaluate_poses(legs_of(own).address, reading_of(own).address, poses, own.home_sides, none, none, rows, slopes)
     return rows, slopes[:, :, :6]
 
 

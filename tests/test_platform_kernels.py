@@ -1,4 +1,4 @@
-"""Derivatives in the platform's pose and the carriers' coordinates, next to differences; run with kernels as Python."""
+"""Derivatives in the platform's pose and the proximal coordinates, compared with differences; kernels run as Python."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from conftest import INTERPRETED
 from machines import closure, published
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
-from pfabrik.kernels.holding import balance
+from pfabrik.kernels.holding import limit_multipliers
 from pfabrik.kernels.legs import records as K
 from pfabrik.kernels.legs.records import Table
 from pfabrik.kernels.platform import equations as E
 from pfabrik.kernels.platform import forward as F
 from pfabrik.kernels.platform import limits
-from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_pulled
+from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_involved
 from pfabrik.kernels.platform.nearest import new_nearest_scratch
 from pfabrik.kernels.platform.records import SETTINGS, Plan, PlatformObjective
-from pfabrik.kernels.platform.search import new_search
+from pfabrik.kernels.platform.search import new_search_scratch
 from pfabrik.platform.along import stays_there
 from pfabrik.platform.table import kernel_table
 
@@ -37,7 +37,7 @@ ON_SPHERES = ["delta", "hexaglide", "linear_delta", "nrpm", "psu", "reachy_mini"
 
 
 def moved(state: E.PlatformState, unknown: int, step: float, columns: np.ndarray) -> E.PlatformState:
-    """A configuration with one unknown changed: along an axis, about an axis, or of a carrier."""
+    """A configuration with one unknown changed: along an axis, about an axis, or of a proximal or redundant joint."""
     pose, q = state.pose.copy(), state.q.copy()
     if unknown < 3:
         pose[unknown, 3] += step
@@ -48,16 +48,16 @@ def moved(state: E.PlatformState, unknown: int, step: float, columns: np.ndarray
     return E.PlatformState(pose, q, state.sides)
 
 
-def described_by_name(name: str) -> tuple[pf.Mechanism, LegTable, Table]:
-    """A machine, its legs, and these as kernels take them."""
+def table_of(name: str) -> tuple[pf.Mechanism, LegTable, Table]:
+    """A machine, its legs, and their kernel table."""
     mechanism = closure.ON_ARMS[name]() if name in closure.ON_ARMS else pf.load(name)
-    described = leg_table(mechanism)
-    assert isinstance(described, LegTable)
-    return mechanism, described, kernel_table(described)
+    legs = leg_table(mechanism)
+    assert isinstance(legs, LegTable)
+    return mechanism, legs, kernel_table(legs)
 
 
-def somewhere(mechanism: pf.Mechanism, table: LegTable, rng: np.random.Generator) -> E.PlatformState:
-    """A configuration about home, on its legs or not."""
+def random_configuration(mechanism: pf.Mechanism, table: LegTable, rng: np.random.Generator) -> E.PlatformState:
+    """A random configuration about home; loops may be open."""
     state = E.new_platform_state(len(table.legs))
     state.sides[:], state.q[:] = table.home_sides[0], rng.uniform(-0.3, 0.3, len(table.legs))
     state.pose[:] = pf.pose(
@@ -69,109 +69,111 @@ def somewhere(mechanism: pf.Mechanism, table: LegTable, rng: np.random.Generator
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_equations_limits_and_actuators_change_as_their_derivatives_say(name: str) -> None:
-    """At any pose, on its legs or not; angles of two crossed hinges in a pivot only where it is kept, so not here."""
-    mechanism, described, table = described_by_name(name)
+    """At any pose, loops open or not; without crossed hinges in a pivot, whose slopes hold where loops are closed."""
+    mechanism, legs, table = table_of(name)
     rng = np.random.default_rng(0)
     n, leg_eval = E.count_unknowns(table), E.new_leg_evaluation(table)
     pivots = (table.legs["kind"] == K.PIVOT) & (table.legs["base_end"] == K.CROSS)
-    told = [
-        each for each in (*table.limited, *table.driven) if not pivots[each["leg"]] or each["place"] >= K.PLATFORM_END
+    coordinates = [
+        coordinate
+        for coordinate in (*table.limited, *table.driven)
+        if not pivots[coordinate["leg"]] or coordinate["place"] >= K.PLATFORM_END
     ]
 
-    on_carriers = [k for k, leg in enumerate(table.legs) if E.has_proximal(leg)]
+    with_proximal = [k for k, leg in enumerate(table.legs) if E.has_proximal(leg)]
 
     def values(state: E.PlatformState) -> np.ndarray:
-        E.place(table, state, leg_eval)
+        E.evaluate_legs(table, state, leg_eval)
         return np.array(
             [
                 *leg_eval.rows,
-                *(limits.coordinate_slope(table, each, leg_eval) for each in told),
+                *(limits.coordinate_slope(table, coordinate, leg_eval) for coordinate in coordinates),
                 *(limits.cone_slope(table, cone, leg_eval) for cone in table.cones),
-                *(limits.dead_point_slope(table, leg, leg_eval) for leg in on_carriers),
+                *(limits.dead_point_slope(table, leg, leg_eval) for leg in with_proximal),
             ]
         )
 
-    def slopes(measure: Callable[..., float], asked: Sequence[np.void | int]) -> list[np.ndarray]:
-        found = []
-        for each in asked:
-            measure(table, each, leg_eval)
-            found.append(leg_eval.slope.copy())
-        return found
+    def slopes(measure: Callable[..., float], arguments: Sequence[np.void | int]) -> list[np.ndarray]:
+        rows = []
+        for argument in arguments:
+            measure(table, argument, leg_eval)
+            rows.append(leg_eval.slope.copy())
+        return rows
 
     for _ in range(3):
-        state = somewhere(mechanism, described, rng)
-        E.place(table, state, leg_eval)
+        state = random_configuration(mechanism, legs, rng)
+        E.evaluate_legs(table, state, leg_eval)
         E.put_slopes(table, leg_eval)
-        told_by = [
+        derivatives = [
             *leg_eval.slopes.copy(),
-            *slopes(limits.coordinate_slope, told),
+            *slopes(limits.coordinate_slope, coordinates),
             *slopes(limits.cone_slope, list(table.cones)),
         ]
-        told_by += slopes(limits.dead_point_slope, on_carriers)
+        derivatives += slopes(limits.dead_point_slope, with_proximal)
         for unknown in range(n):
             ends = [values(moved(state, unknown, sign * STEP, table.columns)) for sign in (1.0, -1.0)]
             difference = (ends[0] - ends[1]) / (2.0 * STEP)
-            np.testing.assert_allclose(np.array(told_by)[:, unknown], difference, atol=1e-7)
+            np.testing.assert_allclose(np.array(derivatives)[:, unknown], difference, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> None:
-    """Looked at alone, those that have multipliers, and what carries them, give the gradient that all legs give."""
-    mechanism, described, table = described_by_name(name)
+    """The gradient from legs with multipliers, and what carries them, equals that from all legs."""
+    mechanism, legs, table = table_of(name)
     rng = np.random.default_rng(1)
-    search, n = new_search(table, table.cones.shape[0]), E.count_unknowns(table)
+    search, n = new_search_scratch(table, table.cones.shape[0]), E.count_unknowns(table)
     objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
     objective = PlatformObjective(objective, np.zeros((0, len(table.driven))), 0)
-    search.target[:] = somewhere(mechanism, described, rng).pose
+    search.target[:] = random_configuration(mechanism, legs, rng).pose
     search.gradient.unit[0] = 1.0
     limits, rows = 2 * len(table.limited) + len(table.cones), len(search.leg_eval.rows)
-    seen = set()
-    for which in range(limits + rows):
-        E.place(table, somewhere(mechanism, described, rng), search.leg_eval)
+    n_involved = set()
+    for index in range(limits + rows):
+        E.evaluate_legs(table, random_configuration(mechanism, legs, rng), search.leg_eval)
         E.put_slopes(table, search.leg_eval)
-        search.hessian.multipliers[:], search.balance[:] = 0.0, 0.0
-        if which < limits:
-            search.hessian.multipliers[which] = 1.0
+        search.hessian.multipliers[:], search.equation_multipliers[:] = 0.0, 0.0
+        if index < limits:
+            search.hessian.multipliers[index] = 1.0
         else:
-            search.balance[which - limits] = 1.0
-        state, own, every = somewhere(mechanism, described, rng), np.zeros(n), np.zeros(n)
-        note_pulled(table, objective, search)
-        seen.add(int(search.pulled.sum()))
-        lagrangian_gradient(table, 0, objective, state, search, own)
-        search.pulled[:] = 1
-        lagrangian_gradient(table, 0, objective, state, search, every)
-        np.testing.assert_allclose(own, every, rtol=0, atol=1e-12)
-    assert min(seen) < len(table.legs)
+            search.equation_multipliers[index - limits] = 1.0
+        state, gradient, full_gradient = random_configuration(mechanism, legs, rng), np.zeros(n), np.zeros(n)
+        note_involved(table, objective, search)
+        n_involved.add(int(search.involved.sum()))
+        lagrangian_gradient(table, 0, objective, state, search, gradient)
+        search.involved[:] = 1
+        lagrangian_gradient(table, 0, objective, state, search, full_gradient)
+        np.testing.assert_allclose(gradient, full_gradient, rtol=0, atol=1e-12)
+    assert min(n_involved) < len(table.legs)
 
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> None:
-    """Equation by equation, in another order and the sense of the actuator."""
-    mechanism, described, table = described_by_name(name)
+    """Equation by equation, up to their order and the sign of the actuator."""
+    mechanism, legs, table = table_of(name)
     rng = np.random.default_rng(2)
-    scratch = F.new_newton(table, not mechanism.end_effector_is_joint)
+    scratch = F.new_newton_scratch(table, not mechanism.end_effector_is_joint)
     assert (len(scratch.spheres.legs) > 0) == (name in ON_SPHERES)
     if name not in ON_SPHERES:
         return
     no_spheres = scratch.spheres._replace(legs=np.zeros(0, np.int64))
     by_leg = scratch._replace(spheres=no_spheres, equations=np.zeros_like(scratch.equations))
     for _ in range(3):
-        state = somewhere(mechanism, described, rng)
+        state = random_configuration(mechanism, legs, rng)
         for to, source in zip(scratch.state, state, strict=True):
             to[:] = source
         scratch.values[:] = rng.uniform(-0.3, 0.3, len(scratch.values))
-        F.put_drivers(table, scratch)
+        F.place_drivers(table, scratch)
         F.set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
         worst = F.put_residuals(table, scratch)
         assert worst == pytest.approx(F.put_residuals(table, by_leg), abs=1e-12)
         F.put_equations(table, by_leg)
-        own, others = scratch.equations[:, None], by_leg.equations[None]
-        apart = np.minimum(np.abs(own - others).max(axis=2), np.abs(own + others).max(axis=2))
-        assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-12
+        spheres, equations = scratch.equations[:, None], by_leg.equations[None]
+        differences = np.minimum(np.abs(spheres - equations).max(axis=2), np.abs(spheres + equations).max(axis=2))
+        assert max(differences.min(axis=0).max(), differences.min(axis=1).max()) < 1e-12
 
 
 def test_limits_are_weighed_in_more_motions_than_there_are_limits() -> None:
-    """Of an arm with one limit: memory takes every motion, and the multiplier is the pull along the limit."""
+    """For an arm with one limit: scratch memory suffices, and the multiplier is the pull along the limit."""
     table = leg_table(published.planar_arm())
     assert isinstance(table, LegTable)
     settings = np.zeros(1, SETTINGS)  # no steps: limits are weighed
@@ -183,5 +185,5 @@ def test_limits_are_weighed_in_more_motions_than_there_are_limits() -> None:
     linear.metric[:] = np.eye(n)
     linear.totals["motions"], linear.totals["limits"] = n, 1
     linear.g[:], linear.G[0], linear.h[0] = -3.0, np.eye(n)[0], 0.0
-    assert balance(linear, 1e-6, scratch.p, scratch.pulls) == 1
+    assert limit_multipliers(linear, 1e-6, scratch.p, scratch.natural_gradients) == 1
     assert scratch.p.x[0] == pytest.approx(3.0)

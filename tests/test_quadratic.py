@@ -1,4 +1,4 @@
-"""Quadratic programmes: a solution is told by the conditions of Karush, Kuhn and Tucker, whatever found it."""
+"""Quadratic programmes: solutions are checked by the conditions of Karush, Kuhn and Tucker."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ pytestmark = [] if INTERPRETED else [pytest.mark.campaign]  # a kernel of its ow
 def solve(
     H: np.ndarray, g: np.ndarray, G: np.ndarray, h: np.ndarray, x: np.ndarray, multipliers: np.ndarray
 ) -> tuple[bool, bool]:
-    """Whether H is positive, and whether there is a solution, which goes to `x` and `multipliers`."""
+    """True if H is positive definite; True if there is a solution, which goes to `x` and `multipliers`."""
     n, k = len(g), len(h)
     p = new_qp(n, k)
     p.H[:], p.g[:], p.G[:], p.h[:] = H, g, G, h
     if not factorise(p.H, n, 0.0, p.factor):
         return False, False
-    found = solve_qp(p, n, k)
+    is_solved = solve_qp(p, n, k)
     x[:], multipliers[:] = p.x, p.multipliers
-    return True, found
+    return True, is_solved
 
 
 def solved(H: np.ndarray, g: np.ndarray, G: np.ndarray, h: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
     x, multipliers = np.full(len(g), np.nan), np.full(len(h), np.nan)
-    positive, found = solve(H, g, G, h, x, multipliers)
-    assert positive
-    return found, x, multipliers
+    is_positive, is_solved = solve(H, g, G, h, x, multipliers)
+    assert is_positive
+    return is_solved, x, multipliers
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -44,31 +44,31 @@ def test_solutions_balance_the_objective_with_limits_that_are_met(seed: int) -> 
         A = rng.normal(size=(n, n))
         H, g = A @ A.T + 0.01 * np.eye(n), 10.0 * rng.normal(size=n)
         G, h = rng.normal(size=(k, n)), -rng.uniform(0.0, 1.0, k) * (rng.random(k) < 0.9)
-        if k > 5:  # limits that ask the same, and one that follows from two others
+        if k > 5:  # two equal limits, and one that follows from two others
             G[1], h[1], G[5], h[5] = G[0], h[0], G[3] + G[4], h[3] + h[4]
-        found, x, multipliers = solved(H, g, G, h)
-        assert found  # zero keeps all limits
-        over = G @ x + h
+        is_solved, x, multipliers = solved(H, g, G, h)
+        assert is_solved  # zero keeps all limits
+        excess = G @ x + h
         assert np.abs(H @ x + g + G.T @ multipliers).max() <= 1e-8
-        assert over.max(initial=0.0) <= 1e-8
+        assert excess.max(initial=0.0) <= 1e-8
         assert multipliers.min(initial=0.0) >= 0.0
-        assert np.abs(multipliers * over).max(initial=0.0) <= 1e-7
+        assert np.abs(multipliers * excess).max(initial=0.0) <= 1e-7
 
 
 def test_a_free_minimum_within_all_limits_needs_no_multiplier() -> None:
-    found, x, multipliers = solved(2.0 * np.eye(2), np.array([-2.0, 4.0]), np.array([[1.0, 0.0]]), np.array([-1.5]))
-    assert found
+    is_solved, x, multipliers = solved(2.0 * np.eye(2), np.array([-2.0, 4.0]), np.array([[1.0, 0.0]]), np.array([-1.5]))
+    assert is_solved
     np.testing.assert_allclose(x, [1.0, -2.0], atol=1e-15)
     assert multipliers.tolist() == [0.0]
 
 
-def test_limits_that_contradict_each_other_are_found_out() -> None:
+def test_contradicting_limits_have_no_solution() -> None:
     G = np.array([[1.0, 0.0], [-1.0, 0.0]])
     assert not solved(np.eye(2), np.zeros(2), G, np.array([1.0, 1.0]))[0]  # x <= -1 and x >= 1
     assert solved(np.eye(2), np.zeros(2), G, np.array([1.0, -1.0]))[0]  # x <= -1 and x >= -1
 
 
-def test_a_matrix_that_is_not_positive_is_refused() -> None:
+def test_a_matrix_that_is_not_positive_definite_is_refused() -> None:
     x, multipliers = np.zeros(2), np.zeros(0)
     none = np.zeros((0, 2)), np.zeros(0)
     assert solve(np.diag([1.0, -1.0]), np.zeros(2), *none, x, multipliers)[0] is False

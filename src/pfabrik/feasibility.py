@@ -23,7 +23,7 @@ ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of a kernel that measures one by one, or in blocks."""
 
 UNKNOWN = -2
-"""Binding of rows whose margin blocks do not tell, see `kernels.legs.maps`."""
+"""Binding of rows whose margin blocks do not tell, see `kernels.legs.margin_blocks`."""
 
 
 class Feasibility(NamedTuple):
@@ -80,7 +80,7 @@ def _margins(mechanism: Mechanism, table: LegTable, poses: Floats, begin: Floats
     margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
     legs, rest = machine(table), np.arange(len(poses))
     if table.is_for_blocks:
-        from .kernels.legs.maps import margins_in_blocks
+        from .kernels.legs.margin_blocks import margins_in_blocks
 
         follows = int(table.task["unset"][0] > 0 and has_parasitic_motion(mechanism))
 

@@ -1,4 +1,4 @@
-"""Compiled code kept on disk, keyed by the text that it is made of."""
+"""Compiled code kept on disk, keyed by its source text."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ _IMPORTS = re.compile(r"^\s*from (\.+)([\w.]*) import (\([^)]*\)|.*)$", re.MULTI
 @cache
 def _imported(path: Path) -> tuple[Path, ...]:
     """The files of this package that a file imports."""
-    found = []
+    modules = []
     for dots, module, names in _IMPORTS.findall(path.read_text(encoding="utf-8")):
         base = path.parents[len(dots) - 1].joinpath(*module.split("."))
-        found += [base, *(base / name for name in re.findall(r"\w+", names))]
-    files = (each for base in found for each in (base.with_name(f"{base.name}.py"), base / "__init__.py"))
-    return tuple(each for each in files if each.is_file())
+        modules += [base, *(base / name for name in re.findall(r"\w+", names))]
+    files = (file for base in modules for file in (base.with_name(f"{base.name}.py"), base / "__init__.py"))
+    return tuple(file for file in files if file.is_file())
 
 
 def _sources_of(path: Path) -> set[Path]:
-    """A file, the files of this package that it imports, and those that these import."""
-    found, waiting = {path}, [path]
-    while waiting:
-        fresh = set(_imported(waiting.pop())) - found
-        found |= fresh
-        waiting += fresh
-    return found
+    """A file and the files of this package that it imports, directly or not."""
+    sources, pending = {path}, [path]
+    while pending:
+        fresh = set(_imported(pending.pop())) - sources
+        sources |= fresh
+        pending += fresh
+    return sources
 
 
 def digest_for(function: Callable[..., Any]) -> str:
-    """Hash of all sources that a compiled function is made of: Numba itself sees no edit of another file."""
+    """Hash of all sources that a compiled function depends on: Numba itself sees no edit of other files."""
     digest = hashlib.sha256()
     for path in sorted(_sources_of(Path(function.__code__.co_filename))):
         digest.update(path.read_bytes())
@@ -56,8 +56,10 @@ def _checksum(data: bytes) -> bytes:
 
 
 class _WholeFiles(_CacheFiles):
-    """Numba's files of one kernel. What is not as it was written counts as missing, so that it is compiled again:
-    machine code that a crash or a full disk has cut short must not run."""
+    """Numba's files of one kernel; a damaged file counts as missing, so that the kernel is compiled again.
+
+    Machine code truncated by a crash or a full disk must not run.
+    """
 
     def _load_index(self) -> dict[Any, Any]:
         try:
@@ -69,7 +71,7 @@ class _WholeFiles(_CacheFiles):
         written = Path(self._data_path(name)).read_bytes()
         checksum, data = written[:CHECKSUM_BYTES], written[CHECKSUM_BYTES:]
         if checksum != _checksum(data):
-            raise OSError(f"{name} is damaged")  # which Numba takes for one that is gone
+            raise OSError(f"{name} is damaged")  # which Numba treats as a missing file
         return pickle.loads(data)
 
     def _save_data(self, name: str, data: Any) -> None:
@@ -79,17 +81,18 @@ class _WholeFiles(_CacheFiles):
 
 
 class KernelCache(_Cache):
-    """Numba's file cache, made stale by an edit to any file that the kernel is made of."""
+    """Numba's file cache, invalidated by an edit of any file that the kernel depends on."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         files: Any = self._cache_file
         self._cache_file: Any = _WholeFiles(self._cache_path, self._impl.filename_base, files._source_stamp)
-        # with the version, not the stamp: an index of other sources may hold types there are no more, and is not read
+        # in the version, not in the stamp: an index of other sources may hold types that no longer exist, and must not
+        # be read
         self._cache_file._version = (files._version, digest_for(function))
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
-        """Keep what was compiled; where the disk takes no more, it runs all the same."""
+        """Store compiled code; if the disk is full, it runs all the same."""
         try:
             super().save_overload(signature, compiled)
         except OSError:
@@ -98,7 +101,7 @@ class KernelCache(_Cache):
 
 @lru_cache(maxsize=1)
 def warn_of_no_cache() -> None:
-    """Say once that compiled code cannot be kept."""
+    """Warn once that compiled code cannot be kept."""
     warnings.warn(
         "compiled kernels cannot be kept, for neither the package's folder nor the user's cache folder can be written: "
         "every process compiles them anew (the environment variable NUMBA_CACHE_DIR names another folder)",

@@ -1,8 +1,8 @@
-"""The decorators of the compiled code: cached on disk, keyed by the text it is made of, announced when compiled.
+"""The decorators of compiled code: cached on disk, keyed by its source text, announced when compiled.
 
-A kernel is what Python calls; its parts (`routine`, `inlined`, `allocator`) are called by compiled code alone. Most of
-the time of compiling grows with the number of functions and of their arguments, so parts are compiled for one set of
-types each, and take a NamedTuple of arrays as one pointer.
+Python calls kernels; their parts (`routine`, `inlined`, `allocator`) are called by compiled code alone. Compile time
+grows with the number of functions and of their arguments, so parts are compiled for one set of types each, and take a
+NamedTuple of arrays as one pointer.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ if IS_HOOKED:
 def kernel(function: F) -> F:
     """Compile `function` for any thread: no GIL, IEEE division, results cached on disk.
 
-    The cache is beside the source if that can be written, else in the user's cache folder, else there is none. One that
-    takes the address of its `scratch` memory cannot allocate, see `routine`.
+    The cache is beside the source if that is writable, else in the user's cache folder, else there is none. A kernel
+    with a `scratch_address` cannot allocate, as a `routine` cannot.
     """
     return _compiled(function, _KERNEL)
 
 
 def search(function: F) -> F:
-    """Compile `function` as a kernel that searches, or looks at rows one by one: no loop is short enough for vectors.
+    """Compile `function` as a kernel that searches, or works row by row: no loop is short enough to vectorise.
 
-    A few in a hundred slower than a `kernel`, and optimised in half the time.
+    A few per cent slower than a `kernel`, and optimised in half the time.
     """
     return _compiled(function, _SEARCH)
 
 
 def _compiled(function: F, options: dict[str, Any]) -> F:
-    """Compile a kernel, keep it, and say when it is compiled."""
-    dispatcher = _njit(**options, _nrt="scratch" not in signature(function).parameters)(function)
+    """Compile a kernel, cached and announced."""
+    dispatcher = _njit(**options, _nrt="scratch_address" not in signature(function).parameters)(function)
     if not _config.DISABLE_JIT:
         compile_quietly = dispatcher._compiler.compile
         dispatcher._compiler.compile = partial(compile_announced, name_of(function), compile_quietly)
@@ -65,9 +65,9 @@ def _compiled(function: F, options: dict[str, Any]) -> F:
 def _resolve_call(
     dispatcher: Any, original: Callable[..., Any], known: dict[Any, Any], arguments: Any, keywords: Any
 ) -> Any:
-    """What Numba asks of a function called with arguments of some types, for the types that the part takes.
+    """Numba's call template for the types that a part takes.
 
-    It asks at each call, and to be told that the part is compiled already takes it long: what is known is kept.
+    Numba asks at each call, and takes long to see that the part is compiled already: results are cached.
     """
     _, folded = dispatcher._compiler.fold_argument_types(arguments, keywords)
     taken = tuple(argument_type(given) for given in folded)
@@ -88,14 +88,14 @@ def _part(function: F, **options: Any) -> F:
 def routine(function: F) -> F:
     """Compile `function` as a part of kernels: it has no cache entry of its own, and cannot allocate.
 
-    Without Numba's memory manager no reference is counted, which is most of the time of code as small as this, and
-    most of its compilation.
+    Without Numba's memory manager no references are counted: that would be most of the run time of code as small as
+    this, and most of its compile time.
     """
     return _part(function, _nrt=False)
 
 
 def inlined(function: F) -> F:
-    """A `routine` that every caller takes in whole: it is called so often that a call would show in the time."""
+    """A `routine` inlined at every call: it is called so often that the calls would cost time."""
     return _part(function, _nrt=False, forceinline=True)
 
 

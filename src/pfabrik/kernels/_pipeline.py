@@ -1,4 +1,4 @@
-"""How Numba compiles kernels here: parts once, optimised with what they go into, without what gives nothing."""
+"""The compiler pipeline of kernels: parts are optimised once, with the kernel that they go into."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any
 from numba.core import base, codegen, compiler, cpu, dispatcher, event, types
 from numba.core.registry import cpu_target
 
-# Numba is typed in some versions and not in others, and never for the options below the public ones.
+# Numba has type annotations in some versions only, and none for internals.
 _Library: Any = getattr(codegen, "JITCodeLibrary", object)
 _Codegen: Any = getattr(codegen, "CPUCodegen", object)
 _Compiler: Any = getattr(compiler, "Compiler", object)
@@ -27,7 +27,7 @@ _Context: Any = getattr(base, "BaseContext", object)
 _CpuContext: Any = getattr(cpu, "CPUContext", object)
 _event: Any = event
 
-# Numba promises these to nobody: with a version that has others, all is compiled in its own way, which takes longer.
+# Internals of Numba: with a version that lacks one, Numba's own pipeline compiles everything, which takes longer.
 _HOOKS = (
     (_Library, "_optimize_functions _optimize_final_module finalize codegen"),
     (_Codegen, "_function_pass_manager _module_pass_manager"),
@@ -41,21 +41,21 @@ _HOOKS = (
 IS_HOOKED = all(hasattr(owner, name) for owner, names in _HOOKS for name in names.split())
 
 LARGE = 150
-"""Instructions of a part, before it is optimised, beyond which a search does not take it in whole."""
+"""Instructions of a part, before optimisation, above which a search does not inline it."""
 
 TICK = 2.0
-"""Seconds between two signs of life while a kernel compiles."""
+"""Seconds between two dots of progress while a kernel compiles."""
 
 
 def name_of(function: Callable[..., Any]) -> str:
-    """A kernel as it is announced: its folder and its name."""
+    """Name of a kernel in announcements: its folder and its function."""
     return f"{function.__module__.rpartition('.')[0].rpartition('.')[2]}.{function.__name__}".lstrip(".")
 
 
 def compile_announced(name: str, original: Callable[..., Any], *arguments: Any) -> Any:
-    """Compile a kernel, saying so on standard error before, and afterwards how long it took.
+    """Compile a kernel, announced on standard error, with the seconds taken.
 
-    Numba calls this for what is not in the cache, with its lock held: one thread compiles, others wait for it.
+    Numba calls this for what is not in the cache, holding its lock: one thread compiles, the others wait.
     """
     _say(f"pfabrik: compiling {name} ...")
     began, done = time.perf_counter(), threading.Event()
@@ -69,13 +69,13 @@ def compile_announced(name: str, original: Callable[..., Any], *arguments: Any) 
 
 
 def _tick(done: threading.Event) -> None:
-    """A dot on standard error every few seconds, until it is done."""
+    """Write a dot on standard error every few seconds until done."""
     while not done.wait(TICK):
         _say(".")
 
 
 def _say(text: str) -> None:
-    """Write on standard error at once, where there is one: a program without a terminal may have closed it."""
+    """Write on standard error at once, if there is one: a program without a terminal may have closed it."""
     if sys.stderr is not None:
         sys.stderr.write(text)
         sys.stderr.flush()
@@ -83,95 +83,100 @@ def _say(text: str) -> None:
 
 @contextmanager
 def in_haste() -> Iterator[None]:
-    """Without what takes Numba long and gives nothing here, and arrays on whole lines of the cache, while it compiles.
+    """Compile without the parts of Numba that cost time and have no effect here, and align arrays to cache lines.
 
-    Collecting garbage among so many objects is a tenth of its time.
+    Garbage collection among so many objects takes a tenth of the compile time.
     """
     collects = gc.isenabled()
     gc.disable()
     if IS_HOOKED:
         cpu_target.target_context.refresh()
-        for owner, name, _, ours in _HASTENED:
+        for owner, name, _, ours in _REPLACED:
             setattr(owner, name, ours)
     try:
         yield
     finally:
         if IS_HOOKED:
-            for owner, name, theirs, _ in _HASTENED:
+            for owner, name, theirs, _ in _REPLACED:
                 setattr(owner, name, theirs)
         if collects:
             gc.enable()
 
 
-_FOUND: dict[Any, Any] = {}
+_CALL_TYPES: dict[Any, Any] = {}
 
 
-def _find_once(function: Any, find: Callable[..., Any], context: Any, arguments: Any, keywords: Any) -> Any:
-    """What a function of Numba's means for arguments of some types, found before or now.
+def _cached_call_type(function: Any, find: Callable[..., Any], context: Any, arguments: Any, keywords: Any) -> Any:
+    """Numba's call type of a function for arguments of some types, cached.
 
-    To find it out at each place anew, by trying all that an operator could mean, is another tenth.
+    Numba infers it anew at each place, by trying all candidates of an operator: another tenth of the time.
     """
-    asked = function, context, arguments, tuple(keywords.items())
-    if asked not in _FOUND:
-        _FOUND[asked] = find(function, context, arguments, keywords)
-    return _FOUND[asked]
+    key = function, context, arguments, tuple(keywords.items())
+    if key not in _CALL_TYPES:
+        _CALL_TYPES[key] = find(function, context, arguments, keywords)
+    return _CALL_TYPES[key]
 
 
 _SIZES: dict[str, int] = {}
 
 
-def _measure_once(context: Any, measure: Callable[..., int], kind: Any) -> int:
-    """The size of a type, for which LLVM is given a module with a variable of it, for every variable twice."""
+def _cached_size(context: Any, measure: Callable[..., int], kind: Any) -> int:
+    """The size of a type, cached: LLVM compiles a module for it, twice for every variable."""
     if str(kind) not in _SIZES:
         _SIZES[str(kind)] = measure(context, kind)
     return _SIZES[str(kind)]
 
 
-def _mangle_briefly(context: Any, mangle: Callable[..., str], name: str, taken: Any, **tags: Any) -> str:
-    """The name of a function in machine code, with a checksum of the types it takes: the types of records are thousands
-    of letters, and every call would repeat them."""
+def _short_mangled(context: Any, mangle: Callable[..., str], name: str, taken: Any, **tags: Any) -> str:
+    """The name of a function in machine code, with a checksum of its argument types.
+
+    The types of records are thousands of letters long, and every call would repeat them.
+    """
     return mangle(context, name, (f"{zlib.crc32(repr(taken).encode()):08x}",), **tags)
 
 
-def _install_new(context: Any) -> None:
-    """Take note of what was declared meanwhile; Numba imports all its own modules again before, a dozen times for every
-    function."""
+def _install_declared(context: Any) -> None:
+    """Install the declarations made meanwhile.
+
+    Numba imports all its own modules again before that, a dozen times for every function.
+    """
     for registry in list(context._registries):
         context.install_registry(registry)
 
 
-def _whole_lines(context: Any, kind: Any) -> int:
-    """Arrays begin where a line of the cache does: vectors as long as one would otherwise be read from two."""
+def _cache_line(context: Any, kind: Any) -> int:
+    """Alignment of arrays [bytes], a cache line: a vector as long as one would otherwise span two."""
     return 64
 
 
-def _tell_nobody(event: Any) -> None:
-    """Events, of which there are as many as calls of LLVM, tell times that nobody asks for."""
+def _no_broadcast(event: Any) -> None:
+    """Drop events: there is one for each call of LLVM, with times that are not used."""
 
 
-def _hastened(owner: Any, name: str, ours: Callable[..., Any], *, asks: bool) -> tuple[Any, str, Any, Any]:
-    """What of Numba is replaced by what of ours, which is given the replaced one if it `asks` that."""
+def _replaced(owner: Any, name: str, ours: Callable[..., Any], *, asks: bool) -> tuple[Any, str, Any, Any]:
+    """A function of Numba with its replacement, which gets the original as an argument if `asks`."""
     theirs = getattr(owner, name, None)
     return owner, name, theirs, partialmethod(ours, theirs) if asks else ours
 
 
-_HASTENED = (
-    _hastened(_Function, "get_call_type", _find_once, asks=True),
-    _hastened(_Context, "get_abi_sizeof", _measure_once, asks=True),
-    _hastened(_Context, "mangler", _mangle_briefly, asks=True),
-    _hastened(_CpuContext, "load_additional_registries", _install_new, asks=False),
-    _hastened(_event, "broadcast", _tell_nobody, asks=False),
-    _hastened(_Context, "get_preferred_array_alignment", _whole_lines, asks=False),
+_REPLACED = (
+    _replaced(_Function, "get_call_type", _cached_call_type, asks=True),
+    _replaced(_Context, "get_abi_sizeof", _cached_size, asks=True),
+    _replaced(_Context, "mangler", _short_mangled, asks=True),
+    _replaced(_CpuContext, "load_additional_registries", _install_declared, asks=False),
+    _replaced(_event, "broadcast", _no_broadcast, asks=False),
+    _replaced(_Context, "get_preferred_array_alignment", _cache_line, asks=False),
 )
 
 
 class _PartLibrary(_Library):
-    """The code of a part alone, not optimised and no machine code: each kernel that it goes into takes in what the part
-    calls, and does both for the whole."""
+    """The code of one part, neither optimised nor compiled to machine code.
+
+    Each kernel that it goes into includes the part's callees, and does both for the whole.
+    """
 
     def _optimize_functions(self, module: Any) -> None:
-        """Tidy each function by itself, all with the same passes; Numba makes them anew for each, also for those that
-        are only declared."""
+        """Simplify each function by itself, all with the same pass manager; Numba makes a new one for each."""
         module.data_layout = self._codegen._data_layout
         passes, builder = self._codegen._function_pass_manager()
         for function in module.functions:
@@ -183,23 +188,23 @@ class _PartLibrary(_Library):
 
     @property
     def codegen(self) -> Any:
-        """What Numba asks, with the code in place, to note its Python environment there; here it is in no place."""
+        """Stand-in for the code generator: there is no machine code to store the Python environment in."""
         return SimpleNamespace(set_env=lambda name, environment: None)
 
 
 class _KernelLibrary(_Library):
-    """The code of a kernel with all its parts; nobody else can call them, so arguments that go unused are dropped.
+    """The code of a kernel with all its parts; nothing else calls these, so that unused arguments are dropped.
 
     A mechanism by value is more than fifty arguments, of which most parts use a few. Optimised once: Numba does it
-    twice, for the sake of counts of references, of which there are hardly any here; that is a sixth of all its time.
+    twice, for the sake of reference counts, of which there are hardly any here; that takes a sixth of its time.
     """
 
     _optimize_functions = _PartLibrary._optimize_functions
 
     def finalize(self) -> None:
-        """Take in the parts, and the parts of these, each once; Numba takes them in again at every step up to here."""
+        """Link the parts, and the parts of these, each once; Numba links them again at every step up to here."""
         taken = self._linking_libraries
-        for library in taken:  # which grows meanwhile
+        for library in taken:  # which grows in the loop
             if isinstance(library, _PartLibrary):
                 taken += [each for each in library._linking_libraries if each not in taken]
         super().finalize()
@@ -213,10 +218,10 @@ class _KernelLibrary(_Library):
 
 
 class _SearchLibrary(_KernelLibrary):
-    """The code of a search, whose large parts are called where they are used, and not taken in whole at each place."""
+    """The code of a search, with large parts called and not inlined."""
 
     def _optimize_functions(self, module: Any) -> None:
-        """Nothing yet: what is the search's own is optimised with all it takes in, and has no loop to be vectors."""
+        """Defer: the search is optimised with all its parts, and has no loop that vectorises."""
         module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
@@ -227,7 +232,7 @@ class _SearchLibrary(_KernelLibrary):
 
 
 class _StackedOptions(_Flags):
-    """Options of a function being compiled, equal to themselves alone."""
+    """Options of a function under compilation, compared by identity."""
 
     __hash__ = object.__hash__
     __eq__ = object.__eq__
@@ -237,22 +242,22 @@ _STACKED: dict[str, _StackedOptions] = {}
 
 
 class _Options(_Flags):
-    """Options of a function, which give one object for all that are equal.
+    """Options of a function, one object for all that are equal.
 
-    Numba takes a copy along while it compiles the function, and compares it, option by option, for every expression
-    and everything that the expression could mean: a tenth of its time.
+    Numba takes a copy while it compiles the function, and compares it option by option for every expression and every
+    candidate of it: a tenth of its time.
     """
 
     def copy(self) -> Any:
         return _STACKED.setdefault(self.summary(), _StackedOptions(self))
 
 
-_NEEDLESS = {"WithLifting", "InlineClosureLikes", "InlineInlinables", "InlineOverloads", "NopythonRewrites"}
-"""Numba's passes for what no kernel has: `with`, closures and comprehensions, arithmetic of whole arrays."""
+_UNUSED_PASSES = {"WithLifting", "InlineClosureLikes", "InlineInlinables", "InlineOverloads", "NopythonRewrites"}
+"""Numba's passes for constructs that no kernel has: `with`, closures, comprehensions, array expressions."""
 
 
 class KernelCompiler(_Compiler):
-    """Numba's compiler, which otherwise optimises a part by itself and again in every function above it."""
+    """Numba's compiler without the separate optimisation of parts."""
 
     library: Any = _KernelLibrary
 
@@ -266,7 +271,7 @@ class KernelCompiler(_Compiler):
             self.state.library.enable_object_caching()
         pipelines = super().define_pipelines()
         for pipeline in pipelines:
-            pipeline.passes = [each for each in pipeline.passes if each[0].__name__ not in _NEEDLESS]
+            pipeline.passes = [each for each in pipeline.passes if each[0].__name__ not in _UNUSED_PASSES]
             pipeline.finalize()
         return pipelines
 
@@ -280,7 +285,7 @@ class PartCompiler(KernelCompiler):
 
 
 class Part(_Dispatcher):
-    """A part of kernels, compiled for them; Python that calls it has it interpreted."""
+    """A part of kernels, compiled for them; called from Python, it is interpreted."""
 
     def __call__(self, *arguments: Any) -> Any:
         return self.py_func(*arguments)

@@ -1,4 +1,4 @@
-"""Compiling ahead: every kernel that a mechanism's questions lead to, without a mechanism."""
+"""Ahead-of-time compilation of every kernel, without a mechanism."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .lattice import join, number_points
 from .legs.answer import answer
 from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
-from .legs.maps import margins_in_blocks
+from .legs.margin_blocks import margins_in_blocks
+from .platform.any_mode import answer_in_any_mode
+from .platform.evaluate import evaluate_poses
 from .platform.forward import assemble
 from .platform.nearest import nearest_pose
-from .platform.otherwise import answer_otherwise
-from .platform.read import read
 from .reaching import plan as P
 from .reaching.solve import solve_by_passes
 from .timing import fastest, second_derivatives
@@ -34,7 +34,7 @@ _PLAN_RECORDS = (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT)
 
 
 def _values(codes: str) -> list[Any]:
-    """Values of the types that codes stand for: i and f for numbers, followed by their dimensions for arrays."""
+    """Values of the types of the codes: i and f for numbers, followed by the dimensions for arrays."""
     numbers = {"i": 0, "f": 0.0}
     return [numbers[c] if len(c) == 1 else np.zeros((0,) * int(c[1]), c[0] + "8") for c in codes.split()]
 
@@ -58,10 +58,10 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (close, (*_values("i i i"), ClosureProblem(*_values("f1 i f3 i f i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
-    (read, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
+    (evaluate_poses, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
     (first_order, (*_values("i i"), PLAN, _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
-    (answer_otherwise, _ANSWERS),
+    (answer_in_any_mode, _ANSWERS),
     (nearest_pose, tuple(_values("i i i f3 f2 f3 f2 f2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i f2 i i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i f3 f3 f2 i f1 i1"))),
@@ -70,7 +70,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (second_derivatives, tuple(_values("f1 f2 f2"))),
     (fastest, (*_values("f1 f2 f2 f1 f1"), True, np.zeros(0))),
 )
-"""Every kernel with arguments of the types it takes, what most questions need first."""
+"""Every kernel with arguments of its types, the most used first."""
 
 
 def compile_all(report: Callable[[str, float], None] | None = None) -> None:
@@ -78,7 +78,7 @@ def compile_all(report: Callable[[str, float], None] | None = None) -> None:
 
     Parameters
     ----------
-    report : called after each kernel with its name and the seconds it took.
+    report : called after each kernel with its name and the seconds taken.
     """
     if _config.DISABLE_JIT:
         return

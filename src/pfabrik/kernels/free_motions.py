@@ -1,4 +1,4 @@
-"""Motions that equations leave free: elimination, and what is known of a configuration in terms of them."""
+"""Free motions: the null space of the equations at a configuration, found by elimination."""
 
 from __future__ import annotations
 
@@ -12,59 +12,60 @@ from .qp import QP, factorise, solve_qp
 from .sqp import Linearisation, new_linearisation
 
 DEPENDENT = 1e-6
-"""What is left of an equation that follows from the others: descriptions are typed with as many digits."""
+"""Largest entry left of an equation that follows from the others: descriptions are typed with as many digits."""
 
 LOOSE = 4.0
-"""The same where equations are open, at most, in units of the gap."""
+"""Largest entry left of such an equation where equations are not met, in units of the gap."""
 
 SHARED = 0.01
-"""By what entries of unknowns that legs have in common count less as pivots: they couple the legs' equations."""
+"""Factor for pivots of unknowns that legs have in common: they would couple the legs' equations."""
 
 
 class FreeMotions(NamedTuple):
-    """The motions that equations leave free at a configuration, and objective and limits linearised in them."""
+    """Free motions at a configuration, with the objective and the limits linearised in them."""
 
     linear: Linearisation
-    basis: Floats  # (unknowns, unknowns): free motions, one a column
-    shift: Floats  # (unknowns,): what would meet the equations
-    transform: Floats  # (rows, rows): how pivot rows are made of the equations
-    pivots: Ints  # (rows,): column of each
-    free: Ints  # (unknowns,): the column that is a free motion's own, which no other moves
+    basis: Floats  # (unknowns, unknowns): free motions, by columns
+    shift: Floats  # (unknowns,): the step that meets the equations
+    transform: Floats  # (rows, rows): pivot rows as combinations of the equations
+    pivots: Ints  # (rows,): unknown of each pivot row
+    free: Ints  # (unknowns,): the unknown that only this free motion moves
 
 
 class Elimination(NamedTuple):
-    """Equations being solved."""
+    """Equations under elimination."""
 
     A: Floats  # (rows, unknowns + 1 + rows): equations, right-hand side, identity
-    taken: Floats  # (unknowns,): 1 for pivot columns, and for what does not move
-    filled: Ints  # (unknowns + 1 + rows,): where a row of A is not zero: legs have few unknowns in common
-    used: Ints  # (unknowns,): 0 for what does not move, more than 1 for what legs have in common
+    taken: Floats  # (unknowns,): 1 for pivots, and for fixed unknowns
+    filled: Ints  # (unknowns + 1 + rows,): columns where a row of A is not zero
+    used: Ints  # (unknowns,): 0 for fixed unknowns, more than 1 for those that legs have in common
 
 
 def new_free_motions(n: int, rows: int, limits: int) -> FreeMotions:
-    """Memory for what is known of one configuration."""
+    """Allocate the free motions of a configuration."""
     linear = new_linearisation(n, limits)
-    columns, own = np.zeros(rows, np.int64), np.zeros(n, np.int64)
-    return FreeMotions(linear, np.zeros((n, n)), np.zeros(n), np.zeros((rows, rows)), columns, own)
+    pivots, free = np.zeros(rows, np.int64), np.zeros(n, np.int64)
+    return FreeMotions(linear, np.zeros((n, n)), np.zeros(n), np.zeros((rows, rows)), pivots, free)
 
 
 def new_elimination(n: int, rows: int) -> Elimination:
-    """Memory for equations; `used` is to be filled."""
+    """Allocate equations; `used` is to be filled."""
     width = n + 1 + rows
     return Elimination(np.zeros((rows, width)), np.zeros(n), np.zeros(width, np.int64), np.zeros(n, np.int64))
 
 
 @routine
 def eliminate(rows: int, elimination: Elimination, reduced: FreeMotions, first: int, implied: int) -> None:
-    """Gauss-Jordan elimination, the largest entry of each row its pivot: free motions, and what meets the equations.
+    """Solve the equations for the free motions and the step that meets them, by Gauss-Jordan elimination.
 
-    An equation f = a f1 + b f2 that follows from others where these are met does so no more where they are open: what
-    is left of its slope then is of the first order in the gap. Such an equation would bar motions that there are.
+    The pivot of a row is its largest entry. An equation f = a f1 + b f2 that follows from others if these are met no
+    longer does so when they are open: its slope then keeps a part of first order in the gap, and would wrongly bar free
+    motions.
 
     Parameters
     ----------
-    first, implied : so many of the first equations follow from others in general. Of these equations those that seem to
-        follow from the others at this gap wait, and as many as do in general are left out.
+    first, implied : of the first equations, this many follow from others in general. Those of them that seem to follow
+        from the others at this gap are postponed, and as many as do so in general are left out.
     """
     A, taken, used = elimination.A, elimination.taken, elimination.used
     basis, shift, pivots = reduced.basis, reduced.shift, reduced.pivots
@@ -72,12 +73,12 @@ def eliminate(rows: int, elimination: Elimination, reduced: FreeMotions, first: 
     for j in range(n):
         shift[j] = 0.0
         taken[j] = 0.0 if used[j] > 0 else 1.0
-    least, again = DEPENDENT, 0
+    least, n_postponed = DEPENDENT, 0
     if implied > 0:
-        least, again = max(DEPENDENT, LOOSE * reduced.linear.totals[0]["gap"]), first
-    for turn in range(rows + again):
-        row = turn if turn < first else turn - first if turn < first + again else turn - again
-        if not first <= turn < first + again or rank <= min(row, first - implied - 1):
+        least, n_postponed = max(DEPENDENT, LOOSE * reduced.linear.totals[0]["gap"]), first
+    for turn in range(rows + n_postponed):
+        row = turn if turn < first else turn - first if turn < first + n_postponed else turn - n_postponed
+        if not first <= turn < first + n_postponed or rank <= min(row, first - implied - 1):
             rank += solve_row(row, rank, rows, least if turn < first else DEPENDENT, elimination, reduced)
     motions = 0
     for j in range(n):
@@ -99,8 +100,8 @@ def eliminate(rows: int, elimination: Elimination, reduced: FreeMotions, first: 
 
 @routine
 def solve_row(row: int, rank: int, rows: int, least: float, elimination: Elimination, reduced: FreeMotions) -> int:
-    """Eliminate an unknown by a row, which becomes that of the `rank`; 0 where it follows from those before, else 1."""
-    A, taken, filled_at, used = elimination.A, elimination.taken, elimination.filled, elimination.used
+    """Solve a row for its pivot unknown, as pivot row number `rank`; 1, or 0 if it follows from those before."""
+    A, taken, columns, used = elimination.A, elimination.taken, elimination.filled, elimination.used
     n, largest, pivot = used.shape[0], 0.0, -1
     for j in range(n):
         size = abs(A[row, j])
@@ -110,17 +111,17 @@ def solve_row(row: int, rank: int, rows: int, least: float, elimination: Elimina
                 largest, pivot = size, j
     if pivot < 0:
         return 0
-    factor, filled = 1.0 / A[row, pivot], 0
+    factor, n_filled = 1.0 / A[row, pivot], 0
     for j in range(n + 1 + rows):
         A[row, j], A[rank, j] = A[rank, j], factor * A[row, j]
         if A[rank, j] != 0.0:
-            filled_at[filled] = j
-            filled += 1
+            columns[n_filled] = j
+            n_filled += 1
     for i in range(rows):
-        share = A[i, pivot]
-        if i != rank and share != 0.0:
-            for k in range(filled):
-                A[i, filled_at[k]] -= share * A[rank, filled_at[k]]
+        entry = A[i, pivot]
+        if i != rank and entry != 0.0:
+            for k in range(n_filled):
+                A[i, columns[k]] -= entry * A[rank, columns[k]]
             A[i, pivot] = 0.0
     taken[pivot] = 1.0
     reduced.pivots[rank] = pivot
@@ -129,7 +130,7 @@ def solve_row(row: int, rank: int, rows: int, least: float, elimination: Elimina
 
 @routine
 def put_multipliers(gradient: Floats, reduced: FreeMotions, multipliers: Floats) -> float:
-    """Multipliers with which the equations balance a gradient at the pivot unknowns; the sum of their sizes."""
+    """Fill the multipliers of the equations that balance a gradient at the pivot unknowns; the sum of their sizes."""
     totals, pivots, transform, total = reduced.linear.totals[0], reduced.pivots, reduced.transform, 0.0
     for i in range(multipliers.shape[0]):
         multipliers[i] = 0.0
@@ -143,7 +144,7 @@ def put_multipliers(gradient: Floats, reduced: FreeMotions, multipliers: Floats)
 
 @routine
 def project(gradient: Floats, reduced: FreeMotions, out: Floats) -> None:
-    """A gradient in the free motions, (motions,), from that in the unknowns."""
+    """Project a gradient in the unknowns onto the free motions, (motions,)."""
     basis, pivots, free, totals = reduced.basis, reduced.pivots, reduced.free, reduced.linear.totals[0]
     motions = totals["motions"]
     for a in range(motions):
@@ -157,7 +158,7 @@ def project(gradient: Floats, reduced: FreeMotions, out: Floats) -> None:
 
 @routine
 def project_gradient(force: Floats, reduced: FreeMotions) -> None:
-    """The gradient of the objective in the free motions, from that in the unknowns, and the metric."""
+    """Fill the gradient of the objective in the free motions, from that in the unknowns, and the metric."""
     basis, metric, pivots, totals = reduced.basis, reduced.linear.metric, reduced.pivots, reduced.linear.totals[0]
     totals["closing"] = along_shift(force, reduced)
     project(force, reduced, reduced.linear.g)
@@ -172,7 +173,7 @@ def project_gradient(force: Floats, reduced: FreeMotions) -> None:
 
 @routine
 def along_shift(gradient: Floats, reduced: FreeMotions) -> float:
-    """What meeting the equations does to something with a gradient in the unknowns."""
+    """Change of a quantity with this gradient by the step that meets the equations."""
     total = 0.0
     for r in range(reduced.linear.totals[0]["rank"]):
         total += gradient[reduced.pivots[r]] * reduced.shift[reduced.pivots[r]]
@@ -181,7 +182,7 @@ def along_shift(gradient: Floats, reduced: FreeMotions) -> float:
 
 @routine
 def put_step(x: Floats, reduced: FreeMotions, step: Floats) -> None:
-    """A step of the unknowns, from one of the free motions, and with it one that meets the equations."""
+    """Fill a step of the unknowns: one of the free motions plus the one that meets the equations."""
     basis, pivots, free, totals = reduced.basis, reduced.pivots, reduced.free, reduced.linear.totals[0]
     for j in range(step.shape[0]):
         step[j] = 0.0
@@ -196,7 +197,7 @@ def put_step(x: Floats, reduced: FreeMotions, step: Floats) -> None:
 
 @routine
 def add_limit(k: int, h: float, number: int, slope: Floats, reduced: FreeMotions) -> int:
-    """Note a limit by its excess, its number and its derivative by the unknowns; how many are noted then."""
+    """Add a limit by its excess, its number and its derivative by the unknowns; the number of limits then."""
     linear = reduced.linear
     linear.drift[k] = along_shift(slope, reduced)
     project(slope, reduced, linear.G[k])
@@ -206,10 +207,10 @@ def add_limit(k: int, h: float, number: int, slope: Floats, reduced: FreeMotions
 
 @routine
 def restoring_step(reduced: FreeMotions, by_all: bool, p: QP) -> bool:
-    """The shortest step within all limits, into `p.x`, besides `shift`, which meets the equations; False where there is
-    none.
+    """Fill `p.x` with the shortest step of the free motions within all limits, to be added to `shift`; False if none.
 
-    Shortest by itself; or, if equations are to be met by all unknowns and not by pivots alone, together with `shift`.
+    Shortest by itself or, if `by_all`, in sum with `shift`: equations are then met by all unknowns, not by pivots
+    alone.
     """
     linear = reduced.linear
     motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]

@@ -1,4 +1,4 @@
-"""What Python gives kernels of a machine: an address."""
+"""Arguments of kernels in memory, passed by address."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays, and of such N
 
 
 class Handle(Generic[R]):
-    """A NamedTuple of arrays kept in memory as compiled code has it.
+    """A NamedTuple of arrays in memory, laid out as in compiled code.
 
-    A kernel takes its `address`, a number, and opens it; from Python that costs a tenth of what the arrays would. The
-    arrays are kept alive, and may be written to; whoever hands the address over keeps the handle until the kernel is
-    done.
+    A kernel takes its `address`, a number, and opens it: from Python that costs a tenth of passing the arrays. The
+    handle keeps the arrays alive, and they may be written to; the caller keeps the handle until the kernel returns.
     """
 
     def __init__(self, record: R) -> None:
@@ -28,24 +27,24 @@ class Handle(Generic[R]):
         self.address: Any = record if config.DISABLE_JIT else self._memory.ctypes.data
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy has arrays of its own, and their addresses."""
+        """Copies get new arrays and their addresses."""
         return Handle, (self.record,)
 
 
 class Scratch(local, Generic[R]):
-    """Scratch memory of kernels: each thread has its own, for calls that it makes itself."""
+    """Scratch memory of kernels, one per thread, for the thread's own calls."""
 
-    def __init__(self, new: Callable[..., R], *asked: Any) -> None:
-        """`new` is called, with what it is asked, by each thread that comes to need the address."""
-        self._handle = Handle(new(*asked))
+    def __init__(self, new: Callable[..., R], *arguments: Any) -> None:
+        """Each thread that accesses this object calls `new` with the arguments."""
+        self._handle = Handle(new(*arguments))
         self.address = self._handle.address
 
 
 def _descriptors(record: tuple[Any, ...]) -> Iterator[int]:
-    """Arrays as Numba has them in memory: no owner, size, bytes of an element, where it is, shape, strides."""
-    for each in record:
-        if isinstance(each, tuple):
-            yield from _descriptors(each)
+    """Arrays in Numba's memory layout: no owner, size, bytes of an element, address, shape, strides."""
+    for item in record:
+        if isinstance(item, tuple):
+            yield from _descriptors(item)
         else:
-            assert each.flags.c_contiguous and each.flags.writeable
-            yield from (0, 0, each.size, each.itemsize, each.ctypes.data, *each.shape, *each.strides)
+            assert item.flags.c_contiguous and item.flags.writeable
+            yield from (0, 0, item.size, item.itemsize, item.ctypes.data, *item.shape, *item.strides)

@@ -1,41 +1,41 @@
-"""Points of a lattice: numbered in the order in which they are met, and joined to what hangs together."""
+"""Lattice points: numbered in the order of discovery, and joined into connected components."""
 
 from __future__ import annotations
 
 from ..arrays import Ints
 from ._jit import kernel, routine
 
-# A code has the places on three axes, or on two, in so many bits each.
+# A code holds the coordinates on two or three axes, in this many bits each.
 BITS = 20
-# Points that lie near each other are near each other in the table too: bricks of so many to a side are together.
+# Neighbouring points are neighbours in the hash table: bricks of 2^BRICK_BITS points a side are stored together.
 BRICK_BITS = 2
 _BRICK = (1 << BRICK_BITS) - 1
 _AXIS = (1 << (BITS - BRICK_BITS)) - 1
-# Large primes that spread bricks over the table; their products with 18 bits fit into an integer.
+# Large primes that spread bricks over the table; their products with 18 bits fit into 64.
 _SPREAD = (73856093, 19349663, 83492791)
 
 
 @routine
 def slot_of(code: int) -> int:
-    """Where a code is looked for first, to be taken modulo the size of the table."""
+    """Slot where the search for a code starts, before the modulus by the table's size."""
     brick, within = 0, 0
     for axis in range(3):
-        place = code >> (BITS * axis)
-        brick ^= ((place >> BRICK_BITS) & _AXIS) * _SPREAD[axis]
-        within |= (place & _BRICK) << (BRICK_BITS * axis)
+        coordinate = code >> (BITS * axis)
+        brick ^= ((coordinate >> BRICK_BITS) & _AXIS) * _SPREAD[axis]
+        within |= (coordinate & _BRICK) << (BRICK_BITS * axis)
     return (brick << (3 * BRICK_BITS)) | within
 
 
 @kernel
-def number_points(codes: Ints, table: Ints, known: Ints, count: int, adds: bool, numbers: Ints) -> int:
-    """Fill the number of each code (n,); how many are known then.
+def number_points(codes: Ints, table: Ints, known: Ints, count: int, is_adding: bool, numbers: Ints) -> int:
+    """Fill the number of each code (n,); the number of known codes then.
 
     Parameters
     ----------
-    table : numbers of codes, -1 where there is none; its size is a power of two, and it is never more than half full.
-    known : codes by their numbers, with room for what may come.
-    count : how many are known before.
-    adds : whether unknown codes are numbered on from there; or are -1.
+    table : hash table of numbers, -1 in empty slots; its size is a power of two, and at most half of it is filled.
+    known : codes by their numbers, with space for new ones.
+    count : number of known codes before.
+    is_adding : True to number unknown codes from there on; otherwise they get -1.
     """
     mask = table.shape[0] - 1
     for i in range(codes.shape[0]):
@@ -45,7 +45,7 @@ def number_points(codes: Ints, table: Ints, known: Ints, count: int, adds: bool,
             if table[slot] < 0 or known[table[slot]] == code:
                 break
             slot = (slot + 1) & mask
-        if table[slot] < 0 and adds:
+        if table[slot] < 0 and is_adding:
             table[slot], known[count] = count, code
             count += 1
         numbers[i] = table[slot]
@@ -54,7 +54,7 @@ def number_points(codes: Ints, table: Ints, known: Ints, count: int, adds: bool,
 
 @kernel
 def join(pairs: Ints, lowest: Ints) -> None:
-    """Note that two points each, (n, 2), hang together: from each, `lowest` leads to the lowest that it does with."""
+    """Join pairs of points (n, 2) into components: `lowest` leads from each point to the lowest of its component."""
     for i in range(pairs.shape[0]):
         a, b = root(lowest, pairs[i, 0]), root(lowest, pairs[i, 1])
         lowest[max(a, b)] = min(a, b)
@@ -62,7 +62,7 @@ def join(pairs: Ints, lowest: Ints) -> None:
 
 @routine
 def root(lowest: Ints, i: int) -> int:
-    """Where a point leads to in the end; the way there is halved for whoever comes next."""
+    """The lowest point of a component; the path to it is halved on the way."""
     for _ in range(lowest.shape[0]):
         if lowest[i] == i:
             break

@@ -1,4 +1,4 @@
-"""Small dense algebra, in place."""
+"""Small dense linear systems, solved in place."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ._jit import routine
 
 @routine
 def solve_spd(A: Floats, n: int, damping: float) -> bool:
-    """Solve the symmetric positive system A[:n, :n] x = A[:n, n] by Cholesky; x replaces A[:n, n].
+    """Solve the symmetric positive definite system A[:n, :n] x = A[:n, n] by Cholesky; x replaces A[:n, n].
 
-    `damping` times the largest diagonal entry is added to the diagonal first. False, with x zero, when the matrix is
-    not positive all the same. The lower triangle of A is overwritten.
+    `damping` times the largest diagonal entry is added to the diagonal first. False, with x zero, if the matrix is
+    still not positive definite. The lower triangle of A is overwritten.
     """
     largest = 0.0
     for i in range(n):
@@ -48,9 +48,9 @@ def solve_spd(A: Floats, n: int, damping: float) -> bool:
 
 @routine
 def solve_square(A: Floats, n: int) -> bool:
-    """Solve A[:n, :n] x = A[:n, n] by elimination with pivots from each column; x replaces A[:n, n].
+    """Solve A[:n, :n] x = A[:n, n] by Gaussian elimination with partial pivoting; x replaces A[:n, n].
 
-    False where a column has no pivot. A is overwritten.
+    False if a column has no pivot. A is overwritten.
     """
     for j in range(n):
         best = j

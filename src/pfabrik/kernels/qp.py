@@ -1,7 +1,7 @@
-"""Small convex quadratic programmes: where a quadratic is least, within linear limits.
+"""Small convex quadratic programmes: a quadratic minimised within linear limits.
 
-The dual active-set method of Goldfarb and Idnani: from the free minimum, violated limits are taken up one after the
-other, the worst first, and those that a new one makes needless are dropped again.
+The dual active-set method of Goldfarb and Idnani: starting from the unconstrained minimum, the limit violated most is
+made active, and active limits whose multipliers would become negative are dropped.
 """
 
 from __future__ import annotations
@@ -14,30 +14,30 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ._jit import routine
 
-# A limit violated by no more counts as kept, and one that rounding alone violates by no more ends the search; a
-# gradient that has no more of its square left beside the active ones depends on them.
+# Violation up to which a limit counts as kept; violation that may remain when no more limit can be made active; share
+# of a gradient's square, orthogonal to the active gradients, below which it counts as dependent on them.
 KEPT, ROUNDED, DEPENDENT = 1e-14, 1e-9, 1e-12
 
 
 class QP(NamedTuple):
-    """Least x . H x / 2 + g . x with G x + h <= 0, for n unknowns and k limits, and room to solve it."""
+    """Minimise x . H x / 2 + g . x subject to G x + h <= 0, for n unknowns and k limits, with scratch memory."""
 
     H: Floats  # (n, n)
     g: Floats  # (n,)
     G: Floats  # (k, n)
     h: Floats  # (k,)
     x: Floats  # (n,): the solution
-    multipliers: Floats  # (k,): of the limits, >= 0; 0 for those that do not matter
-    factor: Floats  # (n, n): Cholesky factor, one over its diagonal there
-    pull: Floats  # (n + 1, n): H^-1 times the gradients of the active limits, and of the next, one a row
-    system: Floats  # (n + 1, n + 1): Cholesky factor of these times the gradients, one over its diagonal there
+    multipliers: Floats  # (k,): of the limits, >= 0; 0 for inactive ones
+    factor: Floats  # (n, n): Cholesky factor of H, with the inverse of its diagonal
+    pull: Floats  # (n + 1, n): H^-1 times the gradients of the active limits, and of the next one, by rows
+    system: Floats  # (n + 1, n + 1): Cholesky factor of G H^-1 G^T of these, with the inverse of its diagonal
     step: Floats  # (n,)
-    share: Floats  # (n,)
-    active: Ints  # (n,)
+    share: Floats  # (n,): coefficients of a limit in the active ones
+    active: Ints  # (n,): indices of the active limits
 
 
 def new_qp(n: int, k: int) -> QP:
-    """Memory for up to n unknowns and k limits."""
+    """Allocate a programme of up to n unknowns and k limits."""
     return QP(
         np.zeros((n, n)),
         np.zeros(n),
@@ -56,7 +56,7 @@ def new_qp(n: int, k: int) -> QP:
 
 @routine
 def factorise(H: Floats, n: int, damping: float, L: Floats) -> bool:
-    """Cholesky factor of H + damping; False if that is not positive."""
+    """Cholesky factor of H + damping I; False if that is not positive definite."""
     for i in range(n):
         for j in range(i + 1):
             value = H[i, j] + (damping if i == j else 0.0)
@@ -88,7 +88,7 @@ def apply_inverse(L: Floats, n: int, b: Floats, x: Floats) -> None:
 
 @routine
 def worst_violated(p: QP, n: int, k: int) -> tuple[int, float]:
-    """The limit violated most, or -1; and by how much."""
+    """The limit violated most, or -1; and its violation."""
     worst, most = -1, KEPT
     G, x = p.G, p.x
     for c in range(k):
@@ -102,12 +102,12 @@ def worst_violated(p: QP, n: int, k: int) -> tuple[int, float]:
 
 @routine
 def divide(p: QP, n: int, m: int, c: int) -> float:
-    """How limit `c` is made of the m active ones (`share`), and the direction that lowers it alone (`step`).
+    """Decompose limit `c` into the m active ones (`share`) and the direction that lowers it alone (`step`).
 
-    Returns how fast it falls along that direction; 0 where it depends on the active ones.
+    Returns the rate at which it falls along that direction; 0 if it depends on the active ones.
     """
     system, pull, step, share = p.system, p.pull, p.step, p.share
-    own, rate = put_pull(p, n, m, c)
+    full_rate, rate = put_pull(p, n, m, c)
     for a in range(m - 1, -1, -1):
         value = system[m, a]
         for b in range(a + 1, m):
@@ -117,19 +117,21 @@ def divide(p: QP, n: int, m: int, c: int) -> float:
         step[i] = pull[m, i]
         for a in range(m):
             step[i] -= share[a] * pull[a, i]
-    return rate if m < n and rate > DEPENDENT * own else 0.0
+    return rate if m < n and rate > DEPENDENT * full_rate else 0.0
 
 
 @routine
 def put_pull(p: QP, n: int, m: int, c: int) -> tuple[float, float]:
-    """Fill the m-th row of `pull` and of `system` with limit `c`; how fast it falls along what its own gradient asks
-    for, and how fast with the active ones kept."""
+    """Fill the m-th rows of `pull` and `system` with limit `c`.
+
+    Returns the rates at which it falls along its own natural gradient H^-1 G_c, and with the active ones kept.
+    """
     G, system, pull, active = p.G, p.system, p.pull, p.active
     apply_inverse(p.factor, n, G[c], pull[m])
-    own = 0.0
+    full_rate = 0.0
     for i in range(n):
-        own += pull[m, i] * G[c, i]
-    rate = own
+        full_rate += pull[m, i] * G[c, i]
+    rate = full_rate
     for a in range(m):
         value = 0.0
         for i in range(n):
@@ -139,12 +141,12 @@ def put_pull(p: QP, n: int, m: int, c: int) -> tuple[float, float]:
         system[m, a] = value * system[a, a]
         rate -= system[m, a] * system[m, a]
     system[m, m] = 1.0 / math.sqrt(max(rate, 1e-300))
-    return own, rate
+    return full_rate, rate
 
 
 @routine
 def drop(p: QP, n: int, m: int, a: int) -> None:
-    """Take the a-th of m active limits out."""
+    """Remove the a-th of m active limits."""
     p.multipliers[p.active[a]] = 0.0
     for b in range(a, m - 1):
         p.active[b] = p.active[b + 1]
@@ -153,14 +155,14 @@ def drop(p: QP, n: int, m: int, a: int) -> None:
 
 @routine
 def take_up(p: QP, n: int, m: int, c: int, violation: float) -> int:
-    """Make limit `c` active; how many are active then, -1 if it contradicts the others."""
+    """Make limit `c` active; the number of active limits, or -1 if it contradicts the others."""
     multiplier = 0.0
     for _change in range(4 * n + 4):
         rate = divide(p, n, m, c)
-        first, limit = -1, math.inf
+        leaving, limit = -1, math.inf
         for a in range(m):
             if p.share[a] > 0.0 and p.multipliers[p.active[a]] < limit * p.share[a]:
-                first, limit = a, p.multipliers[p.active[a]] / p.share[a]
+                leaving, limit = a, p.multipliers[p.active[a]] / p.share[a]
         full = violation / rate if rate > 0.0 else math.inf
         length = min(limit, full)
         if length == math.inf:
@@ -176,14 +178,14 @@ def take_up(p: QP, n: int, m: int, c: int, violation: float) -> int:
             p.active[m] = c
             p.multipliers[c] = multiplier
             return m + 1
-        drop(p, n, m, first)
+        drop(p, n, m, leaving)
         m -= 1
     return -1
 
 
 @routine
 def solve_qp(p: QP, n: int, k: int) -> bool:
-    """Solve a programme whose H is factorised; False where no x keeps all limits."""
+    """Solve a programme with factorised H; False if no x keeps all limits."""
     for c in range(k):
         p.multipliers[c] = 0.0
     apply_inverse(p.factor, n, p.g, p.x)

@@ -1,4 +1,4 @@
-"""NamedTuples of arrays by reference: how parts of kernels take them, and how kernels get them from a `Handle`."""
+"""NamedTuples of arrays by reference: arguments of parts of kernels, and the contents of a `Handle`."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays
 
 
 class Reference(_types.Type):
-    """Numba's type of a NamedTuple of arrays taken by reference: a pointer to what its owner keeps alive.
+    """Numba's type of a NamedTuple of arrays by reference: a pointer to memory that its owner keeps alive.
 
-    In compiled code it reads like the NamedTuple; whoever calls a part with one converts it. By value, every array
-    would be seven or more arguments of every function that it goes through.
+    Compiled code reads it like the NamedTuple, and converts one into it at calls. By value, every array would be seven
+    or more arguments of every function on the way.
     """
 
     def __init__(self, record: Any) -> None:
@@ -52,29 +52,29 @@ class _ReferenceAttribute(_AttributeTemplate):
 
 @_extending.lower_getattr_generic(Reference)
 def _load_field(context: Any, builder: Any, reference: Any, pointer: Any, name: str) -> Any:
-    place = reference.record.fields.index(name)
-    own, field = reference.record.types[place], _cgutils.gep_inbounds(builder, pointer, 0, place)
-    if isinstance(own, _types.BaseNamedTuple):
+    index = reference.record.fields.index(name)
+    field_type, field = reference.record.types[index], _cgutils.gep_inbounds(builder, pointer, 0, index)
+    if isinstance(field_type, _types.BaseNamedTuple):
         return field
-    return _imputils.impl_ret_borrowed(context, builder, own, builder.load(field))
+    return _imputils.impl_ret_borrowed(context, builder, field_type, builder.load(field))
 
 
 @_extending.lower_cast(_types.BaseNamedTuple, Reference)
 def _refer(context: Any, builder: Any, record: Any, reference: Any, value: Any) -> Any:
-    """Where a NamedTuple is, if it was loaded from somewhere; LLVM takes long to copy it, array by array."""
+    """Address that a NamedTuple was loaded from, if any; LLVM takes long to copy it, array by array."""
     if isinstance(value, _ir.LoadInstr) and isinstance(value.operands[0], _ir.AllocaInstr):
         return value.operands[0]
     return _cgutils.alloca_once_value(builder, value)
 
 
 def argument_type(given: Any) -> Any:
-    """The type by which a part takes an argument: a number's value is not part of it, a NamedTuple is a reference."""
+    """Type by which a part takes an argument: literals lose their value, a NamedTuple becomes a reference."""
     given = _types.unliteral(given)
     return Reference(given) if isinstance(given, _types.BaseNamedTuple) else given
 
 
 def opener(sample: R) -> Callable[[Any], R]:
-    """What compiled code calls to get from the address of a `Handle` to the NamedTuple, of the types of a sample."""
+    """Compiled function from the address of a `Handle` to its NamedTuple, with the types of a sample."""
     if _config.DISABLE_JIT:
         return lambda record: record
     reference = Reference(_typeof(sample))

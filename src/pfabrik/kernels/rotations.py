@@ -1,4 +1,4 @@
-"""Rotations of the closure kernel: quaternions (w, x, y, z) for ball joints, rotation vectors for differences."""
+"""Rotations of kernels: quaternions (w, x, y, z) for ball joints, rotation vectors for differences, yaw about z."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import math
 from ..arrays import Floats
 from ._jit import inlined, routine
 
-# Below these squares of a half angle [rad] and of its sine, power series replace trigonometry: their first terms left
-# out are below 1e-17, and most steps of a search are as small.
+# Squares of a half angle [rad] and of its sine below which power series replace trigonometry: the first omitted terms
+# are below 1e-17, and most steps of a search are as small.
 SMALL_ANGLE, SMALL_SINE = 0.01, 0.0025
 
 
@@ -70,7 +70,7 @@ def rotate_by(R: Floats, w: float, x: float, y: float, z: float) -> None:
 
 @routine
 def difference(R: Floats, S: Floats, out: Floats) -> None:
-    """out = rotation vector of R S^T [rad], whatever its angle; the first three columns of both."""
+    """out = rotation vector of R S^T [rad], for any angle; the first three columns of both."""
     m00 = R[0, 0] * S[0, 0] + R[0, 1] * S[0, 1] + R[0, 2] * S[0, 2]
     m01 = R[0, 0] * S[1, 0] + R[0, 1] * S[1, 1] + R[0, 2] * S[1, 2]
     m02 = R[0, 0] * S[2, 0] + R[0, 1] * S[2, 1] + R[0, 2] * S[2, 2]
@@ -95,9 +95,9 @@ def difference(R: Floats, S: Floats, out: Floats) -> None:
 
 @inlined
 def yaw_of(X: Floats) -> float:
-    """The twist of a rotation about z [rad], within half a turn: of R = S Rz(yaw), where S turns z the shortest way.
+    """The yaw of a rotation [rad], in (-pi, pi]: of R = S Rz(yaw), where S tilts z the shortest way.
 
-    The first three columns of X. Undefined where it turns z upside down; near that from entries that do not cancel.
+    Reads the first three columns of X. Undefined if z is upside down; near that from entries that do not cancel.
     """
     if X[2, 2] >= 0.0:
         return math.atan2(X[1, 0] - X[0, 1], X[0, 0] + X[1, 1])
@@ -110,14 +110,14 @@ def yaw_of(X: Floats) -> float:
 
 @inlined
 def yaw_difference(X: Floats, Y: Floats) -> float:
-    """The twist about z of one rotation less that of another [rad], within half a turn."""
+    """The yaw of one rotation minus that of another [rad], within half a turn."""
     angle = yaw_of(X) - yaw_of(Y)
     return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
 
 
 @inlined
 def turn_about_z(X: Floats, angle: float) -> None:
-    """Turn a rotation about the base's z axis, in place: its twist about z grows by the angle."""
+    """Turn a rotation about the base's z axis, in place: its yaw grows by the angle [rad]."""
     cosine, sine = math.cos(angle), math.sin(angle)
     for j in range(3):
         x, y = X[0, j], X[1, j]
@@ -125,4 +125,4 @@ def turn_about_z(X: Floats, angle: float) -> None:
 
 
 UPSIDE_DOWN = 1e-12
-"""Length of the sum of two z axes below which one is the other upside down, and there is no twist about them."""
+"""Length of the sum of two z axes below which they count as opposite, and the yaw as undefined."""

@@ -1,4 +1,4 @@
-"""The answers of a batch, row by row: what kernels fill and Python reads."""
+"""Results of a batch, row by row: filled by kernels, read by Python."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Mask
 
-# Status of a row; the same numbers as the public Status.
+# Status of a row, numbered as the public Status.
 REACHED, PROJECTED, EXCEEDED, FAILED, INVALID, PENDING = 0, 1, 2, 3, 4, 9
-# Of rows on their way: within reach, but legs close only once what the target leaves open is completed, if they do; and
-# reached by some leg at a dead point, as far as can be told.
+# Intermediate: within reach, but legs close only once the unset coordinates are completed, if at all; and solved to
+# half the digits, for a leg is at a dead point.
 OPEN, UNSURE = 8, 10
-# What a projection holds.
+# Held part of the target in a projection.
 HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION = 0, 1, 2
-# Added to that where it is certain that no feasible pose is nearer.
+# Added to it if a certificate proves that no feasible pose is nearer.
 CERTAIN = 4
 # Columns of Rows.counters, and of Rows.measures.
 ITERATIONS, ROUNDS, HOLD, N_COUNTERS = 0, 1, 2, 3
@@ -23,20 +23,20 @@ POSITION_ERROR, ROTATION_ERROR, RESIDUAL, LIMIT_EXCESS, ACTUATOR_ERROR = 0, 1, 2
 
 
 class Rows(NamedTuple):
-    """The answers of a batch."""
+    """Results of a batch."""
 
     status: Ints  # (n,)
-    counters: Ints  # (n, N_COUNTERS): iterations, rounds, what a projection held (HOLD_...)
+    counters: Ints  # (n, N_COUNTERS): iterations, rounds, held part of a projection (HOLD_...)
     poses: Floats  # (n, 4, 4)
     actuators: Floats  # (n, n_actuators)
     measures: Floats  # (n, 5): position error, rotation error, residual, limit excess, actuator error
 
     @property
     def holds(self) -> Ints:
-        """What projections hold, (n,): HOLD_..."""
+        """Held parts of projections, (n,): HOLD_..."""
         return self.counters[:, HOLD] % CERTAIN
 
     @property
     def certain(self) -> Mask:
-        """Whether it is certain that no feasible pose is nearer than a projection, (n,)."""
+        """True where a certificate proves that no feasible pose is nearer than the projection, (n,)."""
         return np.asarray(self.counters[:, HOLD] >= CERTAIN)

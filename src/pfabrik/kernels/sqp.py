@@ -1,9 +1,9 @@
-"""Descending to the nearest feasible configuration: what every such search does, whatever its unknowns are.
+"""Descent to the nearest feasible configuration: sequential quadratic programming, independent of the unknowns.
 
-Sequential quadratic programming: at a configuration the distance is modelled to second order, loops and limits to
-first; the step that this asks for, and that closes what is open, is taken, and kept if it led down in an exact penalty:
-the distance, and what is open times more than all multipliers. Where it did not, what it left open is closed first.
-Damping shortens steps where the model is poor, and vanishes where it is good (Nocedal and Wright, chapter 18).
+At a configuration the objective is modelled to second order, loops and limits to first. The step that minimises this
+model and closes the loops is taken, and accepted if it reduces an exact penalty: the objective plus the violation times
+more than the sum of all multipliers. If it does not, its violation is corrected first. Damping shortens steps where the
+model is poor, and vanishes where it is good (Nocedal and Wright, chapter 18).
 
 With g and H the gradient of the objective f and the Hessian of the Lagrangian f + sum_k m_k h_k, G the gradients of
 the limits h <= 0 and M the metric of the unknowns, a step x solves the quadratic programme
@@ -24,106 +24,106 @@ from ..arrays import Floats, Ints, Record, Records
 from ._jit import routine
 from .qp import QP, factorise, solve_qp
 
-LONGEST_STEP, AT_FIRST = 0.4, 0.1
-"""Longest step of any unknown [rad or L]: beyond it the quadratic model says little. And the damping to begin with, as
-a share of what would make the first step so long."""
+LONGEST_STEP, FIRST_DAMPING = 0.4, 0.1
+"""Longest step of any unknown [rad or L], beyond which the quadratic model is not trusted; and the initial damping, as
+a share of what would make the first step that long."""
 
 REACH = 1.0
 """Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
 
 CLOSED, NEARLY_CLOSED = 1e-13, 1e-10
-"""Gaps and excesses of a feasible configuration, and of one that nothing makes more so [rad or L]: loops that are
-overconstrained close no better than their description is exact. The second is a tenth of what is promised."""
+"""Gaps and excesses of a feasible configuration, and of one that no step improves [rad or L]: overconstrained loops
+close only as exactly as their description. The second is a tenth of the tolerance of solutions."""
 
 OPEN = 0.01
-"""Share of what a step promises to which what it left open is closed: where it did not lead down, and on joint
-coordinates always, for there a step may end where loops no longer close."""
+"""Violation to which a step is corrected, as a share of its predicted reduction: a rejected step, and on joint
+coordinates every step, for there a step may end where loops no longer close."""
 
 FINE, ROUNDING = 1e-11, 1e-13
-"""Shares of the objective: of a step that promises less than the first it is not asked whether it led down, only that
-it did not lead up by more than the second, or than it costs to close what counts as closed: it is known no better."""
+"""Shares of the objective: a step with a predicted reduction below the first need not reduce the merit, but may raise
+it by no more than the second, or than it costs to close what counts as closed: rounding hides anything finer."""
 
 LAST, NEXT, CONVERGING = 1e-18, 1e-20, 1e-2
-"""Share of the objective that the last step promises: its length is a billionth of the distance. That a step after it
-would promise. And, of a fine step, share of what the one before promised: if it is more, what moves is rounding."""
+"""Predicted reductions that end a descent, as shares of the objective: of the last step, whose length is then a
+billionth of the distance; of the step that would follow. And, for fine steps, as a share of the prediction before: if
+it is more, the steps are rounding."""
 
 PROBE = 1e-6
-"""How far curvature is felt for along each motion [rad or L]."""
+"""Step of the differences that give the Hessian along each motion [rad or L]."""
 
 RESTORING, CORRECTIONS = 8, 1
-"""Steps to bring a configuration back within its limits; and to close what a step left open that did not lead down."""
+"""Most steps to restore feasibility; and to correct the violation of a rejected step."""
 
 LEAST_WEIGHT = 1.0
-"""What the penalty counts a gap at least, in units of the gradient: where the objective has none along an equation, its
-multiplier says nothing of how much may be left open."""
+"""Least weight of the violation in the merit, in units of the gradient: if the objective has no gradient along an
+equation, its multiplier does not say how much violation is acceptable."""
 
-ENOUGH, GOOD, EXACT = 1e-4, 0.5, 0.1
-"""Shares of what a step promised that make it worth keeping, and the model good enough for less damping; and by how
-much it may be off where the model, at the end of a whole step, is good enough for far less."""
+SUFFICIENT, GOOD, EXACT = 1e-4, 0.5, 0.1
+"""Actual reduction as a share of the predicted: least of an accepted step, and least of one that lowers the damping;
+and largest relative difference of the two for which a full step lowers it much."""
 
-WORTH, MUCH = 0.01, 0.1
-"""Damping, in units of curvature: at least, after a step that did not lead down; and more than a good step takes back
-at once."""
+LEAST_DAMPING, LARGE_DAMPING = 0.01, 0.1
+"""Damping, in units of curvature: least after a rejected step; largest that an exact step divides by 100, not 10."""
 
 SOLVABLE = 1e-8
-"""Damping, in units of curvature, for a programme that is not solved: rounding then weighs less than what it asks."""
+"""Least damping, in units of curvature, for a programme that rounding keeps from its solution."""
 
-STEEPEST = 1e8
-"""Damping, in units of curvature, that ends a search: no step however short leads down."""
+MOST_DAMPING = 1e8
+"""Damping, in units of curvature, that ends a search: no step, however short, is accepted."""
 
 TOTALS = np.dtype(
     [
         ("value", "f8"),  # of the objective
-        ("gap", "f8"),  # the largest of a loop, or of what is held
-        ("excess", "f8"),  # the largest over a limit
-        ("closing", "f8"),  # what closing the loops adds to the objective
-        ("motions", "i8"),  # how many are free
-        ("limits", "i8"),  # how many are noted
+        ("gap", "f8"),  # largest open loop or error of the held part
+        ("excess", "f8"),  # largest excess over a limit
+        ("closing", "f8"),  # change of the objective by closing the loops
+        ("motions", "i8"),  # number of free motions
+        ("limits", "i8"),  # number of limits in the programme
         ("rank", "i8"),  # of the equations
-        ("rows", "i8"),  # how many equations
+        ("rows", "i8"),  # number of equations
     ]
 )
-"""A configuration in numbers."""
+"""Summary of a linearisation."""
 
 CONTROL = np.dtype(
     [
         ("damping", "f8"),
-        ("largest", "f8"),  # curvature
-        ("predicted", "f8"),  # what the last step promised
-        ("predicted_before", "f8"),  # and the one before
+        ("largest", "f8"),  # largest curvature
+        ("predicted", "f8"),  # predicted reduction of the last step
+        ("predicted_before", "f8"),  # and of the one before
         ("equation_multipliers", "f8"),  # sum of the multipliers of the equations
-        ("weight", "f8"),  # what the penalty counts the largest gap or excess
+        ("weight", "f8"),  # weight of the violation in the merit
         ("steps", "i8"),  # taken
-        ("is_done", "i8"),  # 1 where none is worth taking any more
-        ("is_rejected", "i8"),  # 1 where the last did not lead down
-        ("is_exact", "i8"),  # 1 where it gained what it promised
-        ("is_restoring", "i8"),  # 1 where steps that left something open were lost
+        ("is_done", "i8"),  # 1 if the descent is over
+        ("is_rejected", "i8"),  # 1 if the last step was rejected
+        ("is_exact", "i8"),  # 1 if its actual reduction was as predicted
+        ("is_restoring", "i8"),  # 1 if feasibility is restored after each step
     ]
 )
-"""Step control: how long the next step may be, and whether there is one."""
+"""State of the step control."""
 
 
 class Linearisation(NamedTuple):
-    """What the unknowns do to first order at a configuration."""
+    """Objective and limits to first order in the unknowns, at a configuration."""
 
-    metric: Floats  # (n, n): squares of their steps, lower triangle
-    g: Floats  # (n,): of the objective
-    G: Floats  # (k, n): of the limits
+    metric: Floats  # (n, n): of the unknowns' steps, lower triangle
+    g: Floats  # (n,): gradient of the objective
+    G: Floats  # (k, n): gradients of the limits
     h: Floats  # (k,): excess over each, negative inside
-    drift: Floats  # (k,): what closing the loops adds to it
-    which: Ints  # (k,): its number
+    drift: Floats  # (k,): change of the excess by closing the loops
+    which: Ints  # (k,): numbers of the limits
     totals: Records  # (1,): TOTALS
 
 
 class Hessian(NamedTuple):
-    """What they do to second order, and what of the limits enters there."""
+    """Hessian of the Lagrangian, with the multipliers of the limits in it."""
 
     H: Floats  # (n, n)
-    multipliers: Floats  # one for every limit, by its number
+    multipliers: Floats  # of all limits, by their numbers
 
 
 def new_linearisation(n: int, k: int) -> Linearisation:
-    """Room for n unknowns and k limits."""
+    """Allocate a linearisation for n unknowns and k limits."""
     return Linearisation(
         np.zeros((n, n)),
         np.zeros(n),
@@ -136,12 +136,13 @@ def new_linearisation(n: int, k: int) -> Linearisation:
 
 
 def new_hessian(n: int, k: int) -> Hessian:
+    """Allocate a Hessian for n unknowns and k limits."""
     return Hessian(np.zeros((n, n)), np.zeros(k))
 
 
 @routine
 def longest(step: Floats, n: int) -> float:
-    """The largest of the first n entries."""
+    """The largest absolute value of the first n entries."""
     most = 0.0
     for j in range(n):
         most = max(most, abs(step[j]))
@@ -150,7 +151,7 @@ def longest(step: Floats, n: int) -> float:
 
 @routine
 def symmetrise(H: Floats, n: int) -> float:
-    """Take the mean of a matrix and its transpose; the largest on its diagonal."""
+    """Replace a matrix by the mean of itself and its transpose; the largest entry of its diagonal."""
     largest = 0.0
     for a in range(n):
         largest = max(largest, abs(H[a, a]))
@@ -160,8 +161,8 @@ def symmetrise(H: Floats, n: int) -> float:
 
 
 @routine
-def sum_of(multipliers: Floats, k: int) -> float:
-    """The sum of the first k."""
+def sum_of_multipliers(multipliers: Floats, k: int) -> float:
+    """Sum of the first k multipliers."""
     total = 0.0
     for c in range(k):
         total += multipliers[c]
@@ -170,29 +171,32 @@ def sum_of(multipliers: Floats, k: int) -> float:
 
 @routine
 def allowed_violation(control: Record, share: float) -> float:
-    """How far loops may be open after a share of the step planned."""
+    """Largest violation that is left after a share of the planned step."""
     return max(CLOSED, OPEN * share * control["predicted"])
 
 
 @routine
 def violation(linear: Linearisation) -> float:
-    """How far loops are open, or limits exceeded; nothing where that counts as closed."""
+    """The largest gap or excess; zero if it counts as closed."""
     return 0.0 if is_closed(linear, CLOSED) else max(linear.totals[0]["gap"], linear.totals[0]["excess"])
 
 
 @routine
 def is_closed(linear: Linearisation, tolerance: float) -> bool:
-    """Whether loops are closed and limits kept."""
+    """True if loops are closed and limits kept, to a tolerance."""
     return bool(linear.totals[0]["gap"] <= tolerance and linear.totals[0]["excess"] <= tolerance)
 
 
 @routine
-def solve_within(linear: Linearisation, closed: bool, p: QP) -> bool:
-    """Solve the programme whose H is factorised: what limits are exceeded by is closed or, where it cannot be, taken as
-    if it were just met; as is what is open by rounding where all is `closed`."""
+def solve_within(linear: Linearisation, is_feasible: bool, p: QP) -> bool:
+    """Solve the programme with factorised H; False if it has no solution.
+
+    Exceeded limits are to be met or, if that has no solution, not to be exceeded any further. The latter goes for all
+    limits if the configuration is feasible: excesses are rounding then.
+    """
     motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
     for c in range(k):
-        p.h[c] = min(linear.h[c], 0.0) if closed else linear.h[c] + linear.drift[c]
+        p.h[c] = min(linear.h[c], 0.0) if is_feasible else linear.h[c] + linear.drift[c]
     if solve_qp(p, motions, k):
         return True
     for c in range(k):
@@ -204,14 +208,14 @@ def solve_within(linear: Linearisation, closed: bool, p: QP) -> bool:
 def solve_subproblem(
     linear: Linearisation, hessian: Hessian, damping: float, largest: float, p: QP
 ) -> tuple[float, float]:
-    """The step that the damped programme asks for, into `p.x`: what it takes from the objective, and the damping.
+    """Solve the damped programme for the step, into `p.x`; the predicted reduction of the objective, and the damping.
 
-    Where curvature is not positive, that across active limits counts more: there is no room to move there. Where that
-    is not enough, damping grows. So it does where rounding keeps a programme from its solution: at a corner, where some
-    motions have hardly any curvature.
+    If H is not positive definite, curvature across active limits is added first: there is no room to move there. If
+    that does not suffice, damping grows. It also grows if rounding keeps a programme from its solution: at a vertex of
+    the limits, where some motions have hardly any curvature.
     """
     motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
-    closed, stiff, is_solved = is_closed(linear, CLOSED), 0.0, False
+    is_feasible, stiff, is_solved = is_closed(linear, CLOSED), 0.0, False
     for c in range(k):
         for a in range(motions):
             p.G[c, a] = linear.G[c, a]
@@ -226,7 +230,7 @@ def solve_subproblem(
                     for b in range(a + 1):
                         p.H[a, b] += stiff * p.G[c, a] * p.G[c, b]
         if factorise(p.H, motions, 1e-300, p.factor):
-            is_solved = solve_within(linear, closed, p)
+            is_solved = solve_within(linear, is_feasible, p)
             if is_solved:
                 break
             damping = max(10.0 * damping, SOLVABLE * largest)
@@ -236,7 +240,7 @@ def solve_subproblem(
             damping = max(2.0 * damping, 1e-3 * largest)
     if not is_solved:
         return -math.inf, damping
-    predicted = 0.0 if closed else -linear.totals[0]["closing"]
+    predicted = 0.0 if is_feasible else -linear.totals[0]["closing"]
     for a in range(motions):
         predicted -= linear.g[a] * p.x[a]
         for b in range(motions):
@@ -245,36 +249,34 @@ def solve_subproblem(
 
 
 @routine
-def is_last(linear: Linearisation, other: Linearisation, predicted: float, before: float) -> bool:
-    """Whether a step from one linear to another promised so little that none is worth taking after it.
+def is_last(linear: Linearisation, other: Linearisation, predicted: float, previous: float) -> bool:
+    """True if a step had so small a predicted reduction that no further step is worth taking.
 
-    Where it left nothing open, the next is taken to promise less by the factor by which this one promised less than the
-    one `predicted_before`.
+    If it left no violation, the prediction of the next step is extrapolated: it falls by the same factor as the last.
     """
     value = linear.totals[0]["value"]
-    if predicted <= LAST * value or (before <= FINE * value and predicted > CONVERGING * before):
+    if predicted <= LAST * value or (previous <= FINE * value and predicted > CONVERGING * previous):
         return True
-    return before < math.inf and predicted * predicted <= NEXT * value * before and is_closed(other, CLOSED)
+    return previous < math.inf and predicted * predicted <= NEXT * value * previous and is_closed(other, CLOSED)
 
 
 @routine
 def merit(linear: Linearisation, weight: float) -> float:
-    """The objective, and what it would cost to close what is open: an exact penalty, whose weight is more than the sum
-    of all multipliers."""
+    """The objective plus the weighted violation: an exact penalty, its weight above the sum of all multipliers."""
     return linear.totals[0]["value"] + weight * violation(linear)
 
 
 @routine
 def is_sufficient(linear: Linearisation, actual: float, predicted: float, weight: float) -> bool:
-    """Whether a step that promised so much gained enough."""
+    """True if the actual reduction of a step is sufficient for its predicted reduction."""
     if predicted <= FINE * linear.totals[0]["value"]:
         return actual >= -ROUNDING * linear.totals[0]["value"] - weight * CLOSED
-    return actual > ENOUGH * predicted
+    return actual > SUFFICIENT * predicted
 
 
 @routine
 def note_multipliers(linear: Linearisation, p: QP, hessian: Hessian) -> None:
-    """Keep the multipliers of a programme by the limits' own numbers."""
+    """Store the multipliers of a programme by the numbers of the limits."""
     for c in range(len(hessian.multipliers)):
         hessian.multipliers[c] = 0.0
     for c in range(linear.totals[0]["limits"]):
@@ -283,7 +285,7 @@ def note_multipliers(linear: Linearisation, p: QP, hessian: Hessian) -> None:
 
 @routine
 def scale_objective(linear: Linearisation) -> float:
-    """Choose the unit of the objective, 1 until now, so that its gradient is of order one; the unit."""
+    """Scale the objective, unscaled until now, so that its gradient is of order one; the scale."""
     unit = 1.0 / max(math.sqrt(2.0 * linear.totals[0]["value"]), 1e-12)
     linear.totals[0]["value"] *= unit
     linear.totals[0]["closing"] *= unit
@@ -294,38 +296,38 @@ def scale_objective(linear: Linearisation) -> float:
 
 @routine
 def begin_descent(linear: Linearisation, hessian: Hessian, control: Record) -> None:
-    """Start at a feasible configuration."""
+    """Initialise the step control at a feasible configuration."""
     for c in range(len(hessian.multipliers)):
         hessian.multipliers[c] = 0.0
-    control["damping"] = AT_FIRST * longest(linear.g, linear.totals[0]["motions"]) / LONGEST_STEP
+    control["damping"] = FIRST_DAMPING * longest(linear.g, linear.totals[0]["motions"]) / LONGEST_STEP
     control["predicted"], control["weight"] = math.inf, 0.0
     control["steps"] = control["is_done"] = control["is_rejected"] = control["is_exact"] = 0
 
 
 @routine
 def is_stuck_infeasible(linear: Linearisation, is_accepted: bool, most_steps: int, control: Record) -> bool:
-    """Whether no step leads down where something is open."""
+    """True if no step is accepted at an infeasible configuration."""
     return not is_accepted and not is_closed(linear, NEARLY_CLOSED) and control["steps"] <= most_steps
 
 
 @routine
 def resume(control: Record) -> None:
-    """Ask anew whether a step is worth taking, now that what was open is closed."""
+    """Continue a descent after feasibility was restored."""
     control["predicted"] = math.inf
     control["is_done"] = 0
 
 
 @routine
 def plan_step(linear: Linearisation, hessian: Hessian, control: Record, most_steps: int, p: QP) -> bool:
-    """The next step to try, into `p.x`; False where none is worth trying."""
+    """Plan the next step, into `p.x`; False if the descent is over."""
     control["steps"] += 1
     control["predicted_before"] = control["predicted"]
     predicted, damping = solve_subproblem(linear, hessian, control["damping"], control["largest"], p)
-    multipliers = control["equation_multipliers"] + sum_of(p.multipliers, linear.totals[0]["limits"])
+    multipliers = control["equation_multipliers"] + sum_of_multipliers(p.multipliers, linear.totals[0]["limits"])
     control["weight"] = max(LEAST_WEIGHT, 2.0 * multipliers)
     predicted += control["weight"] * violation(linear)
     control["predicted"], control["damping"] = predicted, damping
-    if predicted <= 0.0 or damping > STEEPEST * control["largest"] or control["steps"] > most_steps:
+    if predicted <= 0.0 or damping > MOST_DAMPING * control["largest"] or control["steps"] > most_steps:
         control["is_done"] = 1
         return False
     note_multipliers(linear, p, hessian)
@@ -334,14 +336,14 @@ def plan_step(linear: Linearisation, hessian: Hessian, control: Record, most_ste
 
 @routine
 def actual_reduction(linear: Linearisation, other: Linearisation, control: Record) -> float:
-    """By how much the penalty is less at another configuration."""
+    """Reduction of the merit from one configuration to another."""
     weight = control["weight"]
     return merit(linear, weight) - merit(other, weight)
 
 
 @routine
 def needs_correction(linear: Linearisation, other: Linearisation, share: float, control: Record) -> bool:
-    """Whether a share of the step planned did not lead down, perhaps for what it left open."""
+    """True if a share of the planned step does not reduce the merit enough, and left a violation to correct."""
     predicted = share * control["predicted"]
     actual = actual_reduction(linear, other, control)
     return not is_sufficient(linear, actual, predicted, control["weight"]) and not is_closed(
@@ -350,10 +352,10 @@ def needs_correction(linear: Linearisation, other: Linearisation, share: float, 
 
 
 @routine
-def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, share: float, control: Record) -> bool:
-    """Whether a share of the step planned led from one linear down to another; damping follows how well it did."""
+def judge_step(linear: Linearisation, other: Linearisation, is_feasible: bool, share: float, control: Record) -> bool:
+    """True if a share of the planned step is accepted; updates damping by its actual and predicted reduction."""
     predicted, actual = share * control["predicted"], actual_reduction(linear, other, control)
-    is_accepted = feasible and is_sufficient(linear, actual, predicted, control["weight"])
+    is_accepted = is_feasible and is_sufficient(linear, actual, predicted, control["weight"])
     if is_last(linear, other, predicted, control["predicted_before"]):
         control["is_done"] = 1
     control["predicted"], control["is_exact"] = (
@@ -362,9 +364,9 @@ def judge_step(linear: Linearisation, other: Linearisation, feasible: bool, shar
     )
     damping, largest = control["damping"], control["largest"]
     if not is_accepted:
-        control["damping"] = max(4.0 * damping, WORTH * largest)
+        control["damping"] = max(4.0 * damping, LEAST_DAMPING * largest)
     elif actual > GOOD * predicted and control["is_rejected"] == 0:
-        damping *= 0.01 if damping < MUCH * largest and share == 1.0 and control["is_exact"] == 1 else 0.1
+        damping *= 0.01 if damping < LARGE_DAMPING * largest and share == 1.0 and control["is_exact"] == 1 else 0.1
         control["damping"] = damping if damping > 1e-8 * largest else 0.0
     control["is_rejected"] = 0 if is_accepted else 1
     return is_accepted

@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 def n_cores() -> int:
-    """Cores this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -26,7 +26,7 @@ if hasattr(os, "register_at_fork"):  # threads do not survive a fork: the child 
 
 
 def in_blocks(run: Callable[[slice], T], n: int, rows_a_block: int) -> list[T]:
-    """What `run` returns for the blocks of n rows, in order; it must release the GIL for other cores to help."""
+    """Results of `run` for blocks of n rows, in order, on all cores; `run` must release the GIL."""
     blocks = [slice(start, start + rows_a_block) for start in range(0, n, rows_a_block)]
     if len(blocks) <= 1 or n_cores() == 1:
         return [run(block) for block in blocks]

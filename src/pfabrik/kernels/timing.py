@@ -1,8 +1,8 @@
-"""How fast a path may be followed: splines through samples, and the fastest speed within limits.
+"""Time-optimal timing of a path: splines through samples, and the fastest speed within limits.
 
-With s along the path and q(s) the actuators, x = s'^2 and u = s'' make their rates q' sqrt(x) and their accelerations
-q' u + q'' x, both linear in (x, u); x + 2 u (step) is the next x. Backward, the largest x at every point from which the
-end can be reached; forward, the largest u that stays below it.
+With s along the path, q(s) the actuators, x = s'^2 and u = s'', their velocities are q' sqrt(x) and their accelerations
+q' u + q'' x, linear in (x, u); the next x is x + 2 u (step). Backward pass: the largest x at every point from which the
+end can be reached; forward pass: the largest u that stays below it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ._jit import kernel, routine
 
 @kernel
 def second_derivatives(s: Floats, values: Floats, curves: Floats) -> None:
-    """Fill those of the cubic splines through values (n, m) at s (n,), straight at both ends."""
+    """Fill the second derivatives of natural cubic splines through values (n, m) at s (n,)."""
     n, m = values.shape
     share = np.zeros(n)
     for j in range(m):
@@ -35,21 +35,21 @@ def second_derivatives(s: Floats, values: Floats, curves: Floats) -> None:
 
 
 @routine
-def put_line(place: int, rate: float, curve: float, most: float, lines: Floats) -> tuple[int, float]:
-    """Note |rate u + curve x| <= most as bounds of u, lines[k] = (low, high, slope by x); the count, a bound of x."""
+def put_line(k: int, rate: float, curve: float, most: float, lines: Floats) -> tuple[int, float]:
+    """Add |rate u + curve x| <= most as bounds of u, lines[k] = (low, high, slope by x); the count, a bound of x."""
     if most == math.inf:
-        return place, math.inf
+        return k, math.inf
     if abs(rate) * 1e12 <= abs(curve) or rate == 0.0:
-        return place, most / abs(curve) if curve != 0.0 else math.inf
-    lines[place, 0] = -most / abs(rate)
-    lines[place, 1] = most / abs(rate)
-    lines[place, 2] = -curve / rate
-    return place + 1, math.inf
+        return k, most / abs(curve) if curve != 0.0 else math.inf
+    lines[k, 0] = -most / abs(rate)
+    lines[k, 1] = most / abs(rate)
+    lines[k, 2] = -curve / rate
+    return k + 1, math.inf
 
 
 @routine
 def put_lines(i: int, step: float, slopes: Floats, curves: Floats, most: Floats, lines: Floats) -> tuple[int, float]:
-    """The bounds of u from point i to the next, as seen from both ends; how many, and the largest x they allow."""
+    """Fill the bounds of u from point i to the next, at both ends; their number, and the largest x they allow."""
     count, largest = 0, math.inf
     for j in range(most.shape[0]):
         count, bound = put_line(count, slopes[i, j], curves[i, j], most[j], lines)
@@ -67,9 +67,9 @@ def fastest(s: Floats, slopes: Floats, curves: Floats, most: Floats, caps: Float
     Parameters
     ----------
     slopes, curves : first and second derivatives of the actuators by s, (n, m).
-    most : their accelerations, (m,); infinite where there is no limit.
-    caps : largest x by speeds, (n,).
-    at_rest : whether the path begins and ends so.
+    most : largest accelerations of the actuators, (m,); infinite without a limit.
+    caps : largest x by the velocity limits, (n,).
+    at_rest : True if the path begins and ends at rest.
     """
     n = s.shape[0]
     reach, lines = np.zeros(n), np.zeros((2 * most.shape[0] + 1, 3))

@@ -1,4 +1,4 @@
-"""Vectors of three numbers as tuples: they live in registers, and cost nothing to pass around."""
+"""Vectors of three numbers as tuples, which compiled code keeps in registers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..arrays import Floats
 from ._jit import routine
 
 Vec: TypeAlias = tuple[float, float, float]
-# An angle beyond the end of its range by no more than this [rad] is on it, not a turn away.
+# Excess over the end of a range up to which an angle counts as on it, not a turn away [rad].
 ON_BOUND = 1e-9
 
 
@@ -27,14 +27,14 @@ def put(a: Floats, v: Vec) -> None:
 
 @routine
 def copy_row(source: Floats, to: Floats) -> None:
-    """Copy one-dimensional memory; a slice assignment would want to allocate."""
+    """Copy a one-dimensional array; a slice assignment would allocate."""
     for i in range(source.shape[0]):
         to[i] = source[i]
 
 
 @routine
 def copy_table(source: Floats, to: Floats) -> None:
-    """Copy two-dimensional memory."""
+    """Copy a two-dimensional array."""
     for i in range(source.shape[0]):
         for j in range(source.shape[1]):
             to[i, j] = source[i, j]
@@ -100,7 +100,7 @@ def move(T: Floats, a: Vec) -> Vec:
 
 @routine
 def rotate(a: Vec, axis: Vec, angle: float) -> Vec:
-    """Rodrigues' formula: `a` turned about the unit vector `axis`."""
+    """`a` turned about the unit vector `axis`, by Rodrigues' formula."""
     c, s = math.cos(angle), math.sin(angle)
     return along(along(scale(c, a), s, cross(axis, a)), (1.0 - c) * dot(axis, a), axis)
 
@@ -119,13 +119,13 @@ def angle_about(axis: Vec, a: Vec, b: Vec) -> float:
 
 @routine
 def wrap(angle: float, centre: float) -> float:
-    """The same angle within half a turn of `centre`."""
+    """An angle moved by whole turns to within half a turn of `centre`."""
     return angle - 2.0 * math.pi * math.floor((angle - centre) / (2.0 * math.pi) + 0.5)
 
 
 @routine
 def wrap_into(angle: float, lo: float, hi: float) -> float:
-    """The same angle where a range has it: near its middle, or near 0 (home) where it spans more than a turn."""
+    """An angle moved by whole turns into a range: near its middle, or near 0 (home) if it spans more than a turn."""
     if hi - lo <= 2.0 * math.pi:
         return wrap(angle, 0.5 * (lo + hi))
     angle = wrap(angle, 0.0)

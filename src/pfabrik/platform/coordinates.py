@@ -80,8 +80,8 @@ def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats, q_pr
     ----------
     carriers : as of `settled`.
     """
-    from ..kernels.platform.read import read
+    from ..kernels.platform.evaluate import evaluate_poses
 
     legs, given = reading_table(table), NO_ROWS if q_proximal is None else q_proximal
     own = np.require(poses, requirements=["C", "W"])
-    read(legs.address, reading_of(table).address, own, sides, given, found, NO_ROWS, NO_SLOPES)
+    evaluate_poses(legs.address, reading_of(table).address, own, sides, given, found, NO_ROWS, NO_SLOPES)

@@ -20,7 +20,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
-from ..kernels.platform.records import Found, Starts
+from ..kernels.platform.records import PoseSolutions, Starts
 from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION, PROJECTED, REACHED
 from ..options import Options
 from ..tolerances import TOLERANCES
@@ -36,7 +36,7 @@ def project(
     options: Options,
     targets: Floats,
     own: Starts,
-    found: Found,
+    found: PoseSolutions,
     *,
     seeds: bool,
     stays: bool,
@@ -127,7 +127,7 @@ def _search(
     return NearestPose(mechanism, table, way.weights, {**settings, **held}, starts)
 
 
-def _reach_otherwise(search: NearestPose, targets: Floats, own: Starts, found: Found) -> None:
+def _reach_otherwise(search: NearestPose, targets: Floats, own: Starts, found: PoseSolutions) -> None:
     """Answer the rows that another way to project reaches: near singularities each misses others."""
     is_open = (found.status == PROJECTED) & (found.counters[:, HOLD] < CERTAIN)
     asked = (is_open & (found.distances < np.inf)).nonzero()[0]
@@ -140,7 +140,7 @@ def _reach_otherwise(search: NearestPose, targets: Floats, own: Starts, found: F
     found.put(asked[reached], some.at(reached))
 
 
-def _may_be_far(asked: Asked, targets: Floats, own: Starts, found: Found) -> bool:
+def _may_be_far(asked: Asked, targets: Floats, own: Starts, found: PoseSolutions) -> bool:
     """Whether a row may be farther from its target than where it starts; not of one whose position is nearer with its
     orientation held, which is told at once."""
     if len(targets) > 1 or asked.ways[0].hold != HOLD_ORIENTATION or not all(task_of(asked.mechanism).axes):
@@ -150,7 +150,7 @@ def _may_be_far(asked: Asked, targets: Floats, own: Starts, found: Found) -> boo
     return bool(found.distances[0] * scale > hypot(x - a * scale, y - b * scale, z - c * scale))
 
 
-def _let_go(asked: Asked, targets: Floats, own: Starts, found: Found) -> None:
+def _let_go(asked: Asked, targets: Floats, own: Starts, found: PoseSolutions) -> None:
     """Hold nothing where what was held leads farther from targets than the start is, and nothing held does not: see
     `Way.is_too_far`."""
     held, nothing = asked.ways
@@ -192,7 +192,7 @@ def _weighing(mechanism: Mechanism, table: LegTable, way: Way) -> NearestPose:
     return NearestPose(mechanism, table, way.weights, {"steps": 0}, no_starts(table))
 
 
-def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, seeds: bool) -> Found:
+def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, seeds: bool) -> PoseSolutions:
     """Feasible configurations whose actuators are nearest to values (n, n_a), deviations from home [L or rad]."""
     poses = in_lengths(own.poses, mechanism.characteristic_length)
     poses = poses if len(poses) == len(values) else np.repeat(poses, len(values), axis=0)
@@ -236,7 +236,7 @@ def move_redundant(
     return places[placed], found.poses[placed]
 
 
-def _nearest_redundant(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> Found:
+def _nearest_redundant(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> PoseSolutions:
     """Feasible configurations at targets (n, 4, 4) [length] whose arms are near to where the starts (n,) have them.
 
     Searches start there alone: what they miss, projections from elsewhere find. Where one set of arms has no place the

@@ -16,7 +16,7 @@ from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
-from ..kernels.platform.records import SETTINGS, Found, Plan, Starts
+from ..kernels.platform.records import SETTINGS, Plan, PoseSolutions, Starts
 from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
@@ -102,13 +102,13 @@ class NearestPose:
 
         return Scratch(new_nearest_scratch, self._legs.record, self._plan.record)
 
-    def find(self, targets: Floats, own: Starts, values: Floats | None = None) -> Found:
+    def find(self, targets: Floats, own: Starts, values: Floats | None = None) -> PoseSolutions:
         """Where searches for targets (n, 4, 4) [length] end; see `fill`."""
         found = new_found(len(targets), self._table)
         self.fill(targets, own, found, values)
         return found
 
-    def fill(self, targets: Floats, own: Starts, found: Found, values: Floats | None = None) -> int:
+    def fill(self, targets: Floats, own: Starts, found: PoseSolutions, values: Floats | None = None) -> int:
         """Search for targets (n, 4, 4) [length], on all cores; how many rows have no answer.
 
         Parameters
@@ -134,7 +134,7 @@ class NearestPose:
         self._run(targets, present, new_found(len(targets), self._table), self._no_values, weights)
         return weights
 
-    def _run(self, targets: Floats, own: Starts, found: Found, values: Floats, weights: Floats) -> int:
+    def _run(self, targets: Floats, own: Starts, found: PoseSolutions, values: Floats, weights: Floats) -> int:
         kernel, machine, plan, scratch = self._kernel, self._legs.address, self._plan.address, self._scratch
         if len(targets) <= ROWS_A_BLOCK:
             return kernel(machine, plan, scratch.address, targets, values, *own, *found, weights)
@@ -164,9 +164,9 @@ def _agreements(table: LegTable) -> int:
     )
 
 
-def new_found(n: int, table: LegTable) -> Found:
+def new_found(n: int, table: LegTable) -> PoseSolutions:
     legs, actuators = len(table.legs), len(table.driven)
-    return Found(
+    return PoseSolutions(
         np.full(n, np.inf),
         np.zeros((n, 4, 4)),
         np.zeros((n, legs)),

@@ -20,7 +20,7 @@ from .nearest_pose import home_start, no_starts
 from .table import local_table, machine, resting_at_home, search_table
 
 if TYPE_CHECKING:
-    from ..kernels.platform.forward import Newton
+    from ..kernels.platform.forward import NewtonScratch
 
 
 class OneTarget:
@@ -117,7 +117,7 @@ class OneAssembly:
         return assemble
 
     @cached_property
-    def _scratch(self) -> Scratch[Newton]:
+    def _scratch(self) -> Scratch[NewtonScratch]:
         return scratch_of(*self._scratched)
 
     def new_ends(self) -> Ends:
@@ -125,7 +125,7 @@ class OneAssembly:
         return Ends(np.empty((1, self._n_actuators)), np.empty((1, self._n_legs)), np.empty((1, self._n_legs)))
 
     def prepared(
-        self, own: Handle[Starts], scratch: Handle[Newton] | Scratch[Newton], rows: Rows, ends: Ends
+        self, own: Handle[Starts], scratch: Handle[NewtonScratch] | Scratch[NewtonScratch], rows: Rows, ends: Ends
     ) -> Callable[[], int]:
         """A call that assembles what stands in `rows.actuators` from one start within all limits, as long as the start,
         the scratch memory and this object are kept; it returns 0 where it does."""
@@ -137,15 +137,15 @@ class OneAssembly:
         return self.prepared(own, self._scratch, rows, ends)() == 0
 
 
-def new_scratch(mechanism: Mechanism, table: LegTable) -> Newton:
+def new_scratch(mechanism: Mechanism, table: LegTable) -> NewtonScratch:
     """Scratch memory of assembly."""
-    from ..kernels.platform.forward import new_newton
+    from ..kernels.platform.forward import new_newton_scratch
 
-    return new_newton(search_table(table).record, not mechanism.end_effector_is_joint)
+    return new_newton_scratch(search_table(table).record, not mechanism.end_effector_is_joint)
 
 
 @lru_cache(maxsize=64)
-def scratch_of(mechanism: Mechanism, table: LegTable) -> Scratch[Newton]:
+def scratch_of(mechanism: Mechanism, table: LegTable) -> Scratch[NewtonScratch]:
     """The same for each thread."""
     return Scratch(new_scratch, mechanism, table)
 

@@ -114,13 +114,13 @@ def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
 
     Where arms follow, without what these give way to. Of the poses, those that legs reach short of dead points.
     """
-    from ..kernels.platform.read import read
+    from ..kernels.platform.evaluate import evaluate_poses
 
     n_rows = table.task[0]["rows"]
     rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6 + len(table.redundant)))
     legs = machine(table)
     own, nothing = np.require(poses, requirements=["C", "W"]), np.zeros((0, 0))
-    read(legs.address, reading_of(table).address, own, table.home_sides, nothing, nothing, rows, slopes)
+    evaluate_poses(legs.address, reading_of(table).address, own, table.home_sides, nothing, nothing, rows, slopes)
     known = np.isfinite(slopes).all(axis=(1, 2))
     rows, by_pose, by_arms = rows[known], slopes[known, :, :6], slopes[known, :, 6:]
     return rows, by_pose - by_arms @ (np.linalg.pinv(by_arms) @ by_pose) if table.task["redundant"][0] else by_pose

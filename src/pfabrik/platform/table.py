@@ -16,7 +16,7 @@ from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
-    from ..kernels.platform.read import Reading
+    from ..kernels.platform.evaluate import EvaluationScratch
 
 Machine: TypeAlias = Handle[K.Table]
 
@@ -85,11 +85,11 @@ def reading_table(table: LegTable) -> Machine:
 
 
 @lru_cache(maxsize=64)
-def reading_of(table: LegTable) -> Scratch[Reading]:
+def reading_of(table: LegTable) -> Scratch[EvaluationScratch]:
     """Memory to read what legs tell at poses."""
-    from ..kernels.platform.read import new_reading
+    from ..kernels.platform.evaluate import new_evaluation_scratch
 
-    return Scratch(new_reading, kernel_table(table))
+    return Scratch(new_evaluation_scratch, kernel_table(table))
 
 
 @lru_cache(maxsize=64)

@@ -15,7 +15,7 @@ from ..closure.configurations import new_rows, put_rows, rows_at
 from ..closure.parasitic import strays
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..kernels.platform.records import Found, Starts
+from ..kernels.platform.records import PoseSolutions, Starts
 from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options
@@ -85,9 +85,9 @@ def _answer() -> Callable[..., int]:
 
 @cache
 def _answer_otherwise() -> Callable[..., int]:
-    from ..kernels.platform.otherwise import answer_otherwise
+    from ..kernels.platform.any_mode import answer_in_any_mode
 
-    return answer_otherwise
+    return answer_in_any_mode
 
 
 def answer_unreached(question: Question, some: Unreached) -> None:
@@ -167,7 +167,7 @@ def _project(question: Question, some: Unreached) -> None:
     targets, begins, sides, q_proximal, rows = some
     n, own = len(targets), starts_at(mechanism, table, begins, sides[: len(begins)])
     ends = rows.poses, np.empty_like(q_proximal), np.empty_like(sides)
-    found = Found(np.empty(n), *ends, rows.counters, rows.actuators, rows.measures, rows.status)
+    found = PoseSolutions(np.empty(n), *ends, rows.counters, rows.actuators, rows.measures, rows.status)
     left = project(mechanism, options, targets, own, found, seeds=not nearby, stays=keep_mode, has_start=has_start)
     if left == n:
         return

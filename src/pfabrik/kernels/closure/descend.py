@@ -11,7 +11,7 @@ import math
 from ...arrays import Floats
 from .._jit import routine, search
 from ..free_motions import FreeMotions, project, put_multipliers, put_step, restoring_step
-from ..holding import balance
+from ..holding import limit_multipliers
 from ..rotations import turn_ball
 from ..sqp import (
     CLOSED,
@@ -195,7 +195,7 @@ def nearest_configuration(
         linearise(loops, row, objective, best, scratch, first)
         if objective.pose.max_iterations == 0:
             scale_objective(first.linear)
-            for c in range(balance(first.linear, objective.pose.near, scratch.p, scratch.pulls)):
+            for c in range(limit_multipliers(first.linear, objective.pose.near, scratch.p, scratch.pulls)):
                 weights[row, first.linear.which[c]] = scratch.p.x[c]
             continue
         if restore_feasibility(loops, row, objective, best, CLOSED, scratch, first):

@@ -1,1 +1,1 @@
-"""Legs in closed form: what each says of a pose, and poses completed until all legs close."""
+"""Legs in closed form: coordinates and constraints at a pose, and poses completed until all legs close."""

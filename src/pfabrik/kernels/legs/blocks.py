@@ -1,4 +1,4 @@
-"""Poses answered in blocks by rods in closed form: what their limits, drivers and constraints need, and no more."""
+"""Inverse kinematics of rods in closed form, by blocks of poses: constraints, limits and actuators only."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...arrays import Floats, Ints, Record
 from .._jit import inlined, kernel, routine
 from ..rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL
 from ..vectors import ON_BOUND, Vec, add, along, copy_row, cross, dot, scale, sub, vec, wrap
-from .answer import CLOSE, CLOSED, KEPT
+from .answer import CLOSED, KEPT, NEARLY_CLOSED
 from .columns import (
     AX,
     AY,
@@ -22,8 +22,8 @@ from .columns import (
     COS,
     EXCESS,
     INVERSE,
+    IS_REGULAR,
     LENGTH,
-    MARGIN,
     MORE,
     OFF,
     PX,
@@ -37,13 +37,13 @@ from .columns import (
     Y,
     Z,
     arctangent,
-    lay_along_carried,
-    lay_along_turned,
-    lay_carried,
-    lay_inverse,
-    lay_moved,
-    lay_out,
-    lay_turned,
+    fill_base_direction,
+    fill_inverse,
+    fill_platform_direction,
+    fill_platform_point,
+    fill_poses,
+    project_on_base_direction,
+    project_on_platform_direction,
 )
 from .endings import LEAST_MARGIN
 from .poses import ROUNDED
@@ -54,129 +54,130 @@ TURN = 2.0 * math.pi
 
 
 @routine
-def lay_rod(rod: Record, proximal: Record, n: int, S: Floats) -> None:
-    """Columns of a rod: its line, its values, and what its constraints add to ROW.
+def fill_rod(rod: Record, proximal: Record, n: int, S: Floats) -> None:
+    """Fill the line and the values of a rod, and add its constraints to ROW.
 
     Parameters
     ----------
-    carrier : the rod whose carrier it is on, laid before; itself if it shares none.
+    proximal : the rod whose proximal joint it is on, filled before; itself if it shares none.
     """
     platform_end, point = vec(rod["platform_end_point"]), vec(proximal["proximal_point"])
     if proximal["proximal"] == CRANK:
-        axis, arm = vec(proximal["proximal_axis"]), sub(vec(rod["base_end_point"]), point)
-        rest = scale(dot(axis, arm), axis)
-        lay_moved(platform_end, add(point, rest), n, S)
+        axis, lever = vec(proximal["proximal_axis"]), sub(vec(rod["base_end_point"]), point)
+        axial = scale(dot(axis, lever), axis)
+        fill_platform_point(platform_end, add(point, axial), n, S)
         if rod["proximal"] == CRANK:
-            lay_crank(rod, n, S)
-        leave_arm(sub(arm, rest), cross(axis, arm), n, S)
+            fill_crank(rod, n, S)
+        subtract_crank(sub(lever, axial), cross(axis, lever), n, S)
     else:
-        lay_moved(platform_end, vec(rod["base_end_point"]), n, S)
+        fill_platform_point(platform_end, vec(rod["base_end_point"]), n, S)
         if rod["proximal"] == CARRIAGE:
-            lay_carriage(rod, n, S)
+            fill_carriage(rod, n, S)
         if proximal["proximal"] == CARRIAGE:
-            leave_slide(vec(proximal["proximal_axis"]), n, S)
-    lay_length(rod["length"], n, S)
+            subtract_carriage(vec(proximal["proximal_axis"]), n, S)
+    fill_length(rod["length"], n, S)
     if rod["slides"] == 0 and (rod["proximal"] == NO_PROXIMAL or rod["proximal"] == SHARED):
-        note_row(VALUES + SLIDE, n, S)
-    lay_hinges(rod, proximal, n, S)
+        track_constraint(VALUES + SLIDE, n, S)
+    fill_hinges(rod, proximal, n, S)
 
 
 @routine
-def lay_crank(rod: Record, n: int, S: Floats) -> None:
-    """Turn a crank until its rod reaches the head; see `rods.solve_proximal`."""
+def fill_crank(rod: Record, n: int, S: Floats) -> None:
+    """Solve the crank angle at which the rod reaches its platform end, as `rods.solve_proximal` does."""
     crank, across = vec(rod["crank"]), vec(rod["crank_across"])
-    more = dot(crank, crank) - rod["length"] * rod["length"]
+    constant = dot(crank, crank) - rod["length"] * rod["length"]
     for i in range(n):
         x, y, z = S[X, i], S[Y, i], S[Z, i]
         A = crank[0] * x + crank[1] * y + crank[2] * z
         B = across[0] * x + across[1] * y + across[2] * z
-        C = 0.5 * (x * x + y * y + z * z + more)
+        C = 0.5 * (x * x + y * y + z * z + constant)
         square = A * A + B * B
-        rest = square - C * C
+        discriminant = square - C * C
         farthest = math.sqrt(square)
         C = farthest if farthest < C else (-farthest if -farthest > C else C)
-        root, inverse = S[SIDE, i] * math.sqrt(rest if rest > 0.0 else 0.0), 1.0 / square
+        root, inverse = S[SIDE, i] * math.sqrt(discriminant if discriminant > 0.0 else 0.0), 1.0 / square
         cosine, sine = (A * C - B * root) * inverse, (B * C + A * root) * inverse
-        S[MARGIN, i] = S[MARGIN, i] if rest > LEAST_MARGIN * LEAST_MARGIN * square else 0.0
+        S[IS_REGULAR, i] = S[IS_REGULAR, i] if discriminant > LEAST_MARGIN * LEAST_MARGIN * square else 0.0
         S[COS, i], S[SIN, i] = cosine, sine
         S[VALUES + Q_PROXIMAL, i] = arctangent(sine, cosine)
 
 
 @routine
-def leave_arm(plain: Vec, across: Vec, n: int, S: Floats) -> None:
-    """Take the arm of a crank, as it has turned, from the line."""
+def subtract_crank(radial: Vec, across: Vec, n: int, S: Floats) -> None:
+    """Subtract the turned lever of a crank from the line."""
     for i in range(n):
         cosine, sine = S[COS, i], S[SIN, i]
-        S[X, i] -= cosine * plain[0] + sine * across[0]
-        S[Y, i] -= cosine * plain[1] + sine * across[1]
-        S[Z, i] -= cosine * plain[2] + sine * across[2]
+        S[X, i] -= cosine * radial[0] + sine * across[0]
+        S[Y, i] -= cosine * radial[1] + sine * across[1]
+        S[Z, i] -= cosine * radial[2] + sine * across[2]
 
 
 @routine
-def lay_carriage(rod: Record, n: int, S: Floats) -> None:
-    """Move a carriage until its rod reaches the head; see `rods.solve_proximal`."""
+def fill_carriage(rod: Record, n: int, S: Floats) -> None:
+    """Solve the carriage position at which the rod reaches its platform end, as `rods.solve_proximal` does."""
     axis, square = vec(rod["proximal_axis"]), rod["length"] * rod["length"]
     for i in range(n):
         x, y, z = S[X, i], S[Y, i], S[Z, i]
         middle = x * axis[0] + y * axis[1] + z * axis[2]
-        rest = square - (x * x + y * y + z * z) + middle * middle
-        S[MARGIN, i] = S[MARGIN, i] if rest > LEAST_MARGIN * LEAST_MARGIN * square else 0.0
-        S[VALUES + Q_PROXIMAL, i] = middle + S[SIDE, i] * math.sqrt(rest if rest > 0.0 else 0.0)
+        discriminant = square - (x * x + y * y + z * z) + middle * middle
+        S[IS_REGULAR, i] = S[IS_REGULAR, i] if discriminant > LEAST_MARGIN * LEAST_MARGIN * square else 0.0
+        S[VALUES + Q_PROXIMAL, i] = middle + S[SIDE, i] * math.sqrt(discriminant if discriminant > 0.0 else 0.0)
 
 
 @routine
-def leave_slide(axis: Vec, n: int, S: Floats) -> None:
-    """Take the way of a carriage from the line."""
+def subtract_carriage(axis: Vec, n: int, S: Floats) -> None:
+    """Subtract the travel of a carriage from the line."""
     for i in range(n):
-        way = S[VALUES + Q_PROXIMAL, i]
-        S[X, i] -= way * axis[0]
-        S[Y, i] -= way * axis[1]
-        S[Z, i] -= way * axis[2]
+        travel = S[VALUES + Q_PROXIMAL, i]
+        S[X, i] -= travel * axis[0]
+        S[Y, i] -= travel * axis[1]
+        S[Z, i] -= travel * axis[2]
 
 
 @routine
-def lay_length(length: float, n: int, S: Floats) -> None:
+def fill_length(length: float, n: int, S: Floats) -> None:
+    """Fill the length of the line, and the slide: that minus the rod's length at home."""
     for i in range(n):
         present = math.sqrt(S[X, i] * S[X, i] + S[Y, i] * S[Y, i] + S[Z, i] * S[Z, i])
         S[LENGTH, i], S[VALUES + SLIDE, i] = present, present - length
 
 
 @routine
-def lay_hinges(rod: Record, proximal: Record, n: int, S: Floats) -> None:
-    """Constraints and angles of single hinges at the ends of a rod, and that they do not twist."""
+def fill_hinges(rod: Record, proximal: Record, n: int, S: Floats) -> None:
+    """Fill the constraints and angles of single hinges at the ends of a rod, and its twist constraint."""
     base_end, platform_end, home = vec(rod["base_end_axes"][0]), vec(rod["platform_end_axes"][0]), vec(rod["line"])
     if rod["base_end"] == HINGE:
-        lay_along_carried(base_end, proximal, VALUE, n, S)
-        note_row(VALUE, n, S)
+        project_on_base_direction(base_end, proximal, VALUE, n, S)
+        track_constraint(VALUE, n, S)
     if rod["platform_end"] == HINGE:
-        lay_along_turned(platform_end, VALUE, n, S)
-        note_row(VALUE, n, S)
+        project_on_platform_direction(platform_end, VALUE, n, S)
+        track_constraint(VALUE, n, S)
     if rod["twists"] == 1:
-        lay_carried(base_end, proximal, n, S)
-        lay_turned(platform_end, n, S)
-        lay_inverse(n, S)
-        lay_twist(rod["twist"], n, S)
-        note_row(VALUE, n, S)
+        fill_base_direction(base_end, proximal, n, S)
+        fill_platform_direction(platform_end, n, S)
+        fill_inverse(n, S)
+        fill_twist(rod["twist"], n, S)
+        track_constraint(VALUE, n, S)
     if rod["base_end_aimed"] == 1:
-        lay_along_carried(cross(base_end, home), proximal, AY, n, S)
-        lay_along_carried(along(home, -dot(base_end, home), base_end), proximal, AX, n, S)
-        lay_angle(VALUES + BASE_END, n, S)
+        project_on_base_direction(cross(base_end, home), proximal, AY, n, S)
+        project_on_base_direction(along(home, -dot(base_end, home), base_end), proximal, AX, n, S)
+        fill_angle(VALUES + BASE_END, n, S)
     if rod["platform_end_aimed"] == 1:
-        lay_along_turned(cross(platform_end, home), AY, n, S)
-        lay_along_turned(along(home, -dot(platform_end, home), platform_end), AX, n, S)
-        lay_angle(VALUES + PLATFORM_END, n, S)
+        project_on_platform_direction(cross(platform_end, home), AY, n, S)
+        project_on_platform_direction(along(home, -dot(platform_end, home), platform_end), AX, n, S)
+        fill_angle(VALUES + PLATFORM_END, n, S)
 
 
 @routine
-def lay_angle(to: int, n: int, S: Floats) -> None:
-    """An angle whose cosine goes as AX, and its sine as AY."""
+def fill_angle(to: int, n: int, S: Floats) -> None:
+    """Fill an angle with cosine proportional to AX and sine proportional to AY."""
     for i in range(n):
         S[to, i] = arctangent(S[AY, i], S[AX, i])
 
 
 @routine
-def lay_twist(home: float, n: int, S: Floats) -> None:
-    """Fill VALUE with the angle about the line from BX, BY, BZ to AX, AY, AZ, less home's."""
+def fill_twist(home: float, n: int, S: Floats) -> None:
+    """Fill VALUE with the angle about the line from BX, BY, BZ to AX, AY, AZ, minus that at home."""
     for i in range(n):
         scaled = S[INVERSE, i]
         u, v, w = scaled * S[X, i], scaled * S[Y, i], scaled * S[Z, i]
@@ -184,12 +185,12 @@ def lay_twist(home: float, n: int, S: Floats) -> None:
         d, e, f = S[BX, i], S[BY, i], S[BZ, i]
         sine = u * (e * c - f * b) + v * (f * a - d * c) + w * (d * b - e * a)
         cosine = d * a + e * b + f * c - (u * d + v * e + w * f) * (u * a + v * b + w * c)
-        S[VALUE, i] = turned_into(arctangent(sine, cosine) - home, -0.5 * TURN, 0.5 * TURN)
+        S[VALUE, i] = wrap_between(arctangent(sine, cosine) - home, -0.5 * TURN, 0.5 * TURN)
 
 
 @routine
-def note_row(column: int, n: int, S: Floats) -> None:
-    """A constraint: ROW is the largest, infinite where one is not a number."""
+def track_constraint(column: int, n: int, S: Floats) -> None:
+    """Raise ROW to the absolute value of a constraint; to infinity if it is not a number."""
     for i in range(n):
         size = abs(S[column, i])
         size = size if size < math.inf else math.inf
@@ -197,8 +198,8 @@ def note_row(column: int, n: int, S: Floats) -> None:
 
 
 @routine
-def turns_of(coordinate: Record) -> Vec:
-    """What is added to a coordinate, and the bounds that it is counted into then; see `answer.deviation`."""
+def counting_range(coordinate: Record) -> Vec:
+    """A shift to add to a coordinate and the bounds that it is then wrapped between, as in `answer.deviation`."""
     if coordinate["turns"] == 0:
         return 0.0, -math.inf, math.inf
     lo, hi = coordinate["lo"], coordinate["hi"]
@@ -209,18 +210,18 @@ def turns_of(coordinate: Record) -> Vec:
 
 
 @inlined
-def turned_into(angle: float, below: float, above: float) -> float:
-    """An angle less than a turn beyond either of two bounds, counted into them."""
+def wrap_between(angle: float, below: float, above: float) -> float:
+    """An angle less than a turn beyond either of two bounds, moved between them by a whole turn."""
     return angle - TURN if angle > above else (angle + TURN if angle < below else angle)
 
 
 @routine
-def note_range(coordinate: Record, n: int, S: Floats) -> None:
-    """The excess of a coordinate over its range."""
+def track_range(coordinate: Record, n: int, S: Floats) -> None:
+    """Raise EXCESS to the excess of a coordinate over its range."""
     lo, hi, sense, place = coordinate["lo"], coordinate["hi"], coordinate["sense"], VALUES + coordinate["place"]
-    more, least, most = turns_of(coordinate)
+    shift, lowest, highest = counting_range(coordinate)
     for i in range(n):
-        value = turned_into(sense * S[place, i] + more, least, most)
+        value = wrap_between(sense * S[place, i] + shift, lowest, highest)
         below, above = lo - value, value - hi
         excess = below if below > above else above
         excess = excess if excess < math.inf else math.inf
@@ -228,19 +229,19 @@ def note_range(coordinate: Record, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_along_cone(cone: Record, proximal: Record, n: int, S: Floats) -> None:
-    """Fill VALUE with the share of the rod's line along the axis of a cone."""
+def project_on_cone_axis(cone: Record, proximal: Record, n: int, S: Floats) -> None:
+    """Fill VALUE with the component of the rod's line along the axis of a cone."""
     if cone["place"] == BASE_LINE:
-        lay_along_carried(vec(cone["axis"]), proximal, VALUE, n, S)
+        project_on_base_direction(vec(cone["axis"]), proximal, VALUE, n, S)
     else:
-        lay_along_turned(vec(cone["axis"]), VALUE, n, S)
+        project_on_platform_direction(vec(cone["axis"]), VALUE, n, S)
 
 
 @routine
-def note_cone(cone: Record, proximal: Record, n: int, S: Floats) -> None:
-    """The excess of a rod over a cone at one of its ends: only that it is more than is kept."""
+def track_cone(cone: Record, proximal: Record, n: int, S: Floats) -> None:
+    """Raise EXCESS to 2 `KEPT` where a rod is outside the cone at one of its ends."""
     least = cone["least_cosine"]
-    lay_along_cone(cone, proximal, n, S)
+    project_on_cone_axis(cone, proximal, n, S)
     for i in range(n):
         length, before = S[LENGTH, i], S[EXCESS, i]
         is_kept = (S[VALUE, i] >= least * length) & (length > 0.0)
@@ -259,80 +260,81 @@ def answer_blocks(
     actuators: Floats,
     measures: Floats,
 ) -> int:
-    """Answer as `answer.answer` does where all legs are rods that blocks serve; how many targets are not reached.
+    """Solve targets as `answer.answer` does, for legs that are all rods in block form; the number not reached.
 
-    Those that close once what they leave open is completed may be reached too: they are OPEN, the others PENDING.
+    Rows that may close once their unset coordinates are completed are OPEN, the others PENDING.
     """
     table = open_table(machine)
     legs, limited, cones, driven, task = table.legs, table.limited, table.cones, table.driven, table.task
-    S, pose, left = np.empty((MORE, BLOCK)), np.zeros((4, 4)), 0
-    copy_row(targets.reshape(-1), poses.reshape(-1))  # at once: that also fetches targets faster than reading blocks
+    S, pose, n_unreached = np.empty((MORE, BLOCK)), np.zeros((4, 4)), 0
+    copy_row(targets.reshape(-1), poses.reshape(-1))  # in one pass, which also brings targets into the cache
     for first in range(0, targets.shape[0], BLOCK):
         n = min(BLOCK, targets.shape[0] - first)
-        lay_out(targets, begins, task[0], first, n, pose, S)
-        main, a, b, c = 0, 0, 0, 0
+        fill_poses(targets, begins, task[0], first, n, pose, S)
+        owner, a, b, c = 0, 0, 0, 0
         for k in range(legs.shape[0]):
             if legs[k]["proximal"] != SHARED:
-                main = k
+                owner = k
             if legs[k]["proximal"] == CRANK or legs[k]["proximal"] == CARRIAGE:
-                lay_sides(sides, k, first, n, S)
-            lay_rod(legs[k], legs[main], n, S)
+                fill_sides(sides, k, first, n, S)
+            fill_rod(legs[k], legs[owner], n, S)
             while a < limited.shape[0] and limited[a]["leg"] == k:
-                note_range(limited[a], n, S)
+                track_range(limited[a], n, S)
                 a += 1
             while b < cones.shape[0] and cones[b]["leg"] == k:
-                note_cone(cones[b], legs[main], n, S)
+                track_cone(cones[b], legs[owner], n, S)
                 b += 1
             while c < driven.shape[0] and driven[c]["leg"] == k:
                 write_actuator(driven[c], first, n, S, actuators)
                 c += 1
-        left += write_status(task[0], first, n, S, status, measures)
+        n_unreached += write_status(task[0], first, n, S, status, measures)
         write_poses(task[0], first, n, S, poses)
-    return left
+    return n_unreached
 
 
 @routine
-def lay_sides(sides: Floats, k: int, first: int, n: int, S: Floats) -> None:
+def fill_sides(sides: Floats, k: int, first: int, n: int, S: Floats) -> None:
+    """Fill SIDE with the sides of leg `k`."""
     for i in range(n):
         S[SIDE, i] = sides[first + i if sides.shape[0] > 1 else 0, k]
 
 
 @routine
 def write_status(task: Record, first: int, n: int, S: Floats, status: Ints, measures: Floats) -> int:
-    """Write which rows are reached, and what is measured of them; how many are not."""
-    length, enough, left = task["length"], CLOSED if task["unset"] > 0 else CLOSE, 0
+    """Write status and measures of a block; the number of rows not reached."""
+    length, tolerance, n_unreached = task["length"], CLOSED if task["unset"] > 0 else NEARLY_CLOSED, 0
     status, measures = status[first : first + n], measures[first : first + n]
     for i in range(n):
-        is_closed = S[ROW, i] <= enough
-        is_reached = (S[MARGIN, i] == 1.0) & is_closed & (S[EXCESS, i] <= KEPT)
-        is_open = (S[MARGIN, i] == 1.0) & (not is_closed) & (task["unset"] > 0)
+        is_closed = S[ROW, i] <= tolerance
+        is_reached = (S[IS_REGULAR, i] == 1.0) & is_closed & (S[EXCESS, i] <= KEPT)
+        is_open = (S[IS_REGULAR, i] == 1.0) & (not is_closed) & (task["unset"] > 0)
         status[i] = REACHED if is_reached else (OPEN if is_open else PENDING)
-        left += 0 if is_reached else 1
+        n_unreached += 0 if is_reached else 1
         measures[i, RESIDUAL] = S[ROW, i] * length
         measures[i, LIMIT_EXCESS] = max(S[EXCESS, i], 0.0)
-    return left
+    return n_unreached
 
 
 @routine
 def write_poses(task: Record, first: int, n: int, S: Floats, poses: Floats) -> None:
-    """Write what targets do not set of poses, and rotations that had to be made orthonormal."""
-    length, is_set, own = task["length"], task["rotations"] == 3, poses[first : first + n]
+    """Write the pose coordinates that targets do not set, and rotations that were made orthonormal."""
+    length, is_set, block = task["length"], task["rotations"] == 3, poses[first : first + n]
     for i in range(n):
         if not is_set or S[OFF, i] > ROUNDED:
             for j in range(9):
-                own[i, j // 3, j % 3] = S[XX + j, i]
+                block[i, j // 3, j % 3] = S[XX + j, i]
     for j in range(3):
         if task["axes"][j] == 0:
             for i in range(n):
-                own[i, j, 3] = S[PX + j, i] * length
+                block[i, j, 3] = S[PX + j, i] * length
 
 
 @routine
 def write_actuator(driven: Record, first: int, n: int, S: Floats, actuators: Floats) -> None:
-    """Write the values of an actuator."""
+    """Write the values of an actuator [length or rad]."""
     home, unit, sense, place = driven["home"], driven["unit"], driven["sense"], VALUES + driven["place"]
-    (more, least, most), own = turns_of(driven), actuators[first : first + n, driven["column"]]
+    (shift, lowest, highest), column = counting_range(driven), actuators[first : first + n, driven["column"]]
     for i in range(n):
-        S[VALUE, i] = home + turned_into(sense * S[place, i] + more, least, most) * unit
+        S[VALUE, i] = home + wrap_between(sense * S[place, i] + shift, lowest, highest) * unit
     for i in range(n):
-        own[i] = S[VALUE, i]
+        column[i] = S[VALUE, i]

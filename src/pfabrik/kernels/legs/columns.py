@@ -1,4 +1,4 @@
-"""A block of poses side by side, a column of a table for each: every line of arithmetic serves them all."""
+"""A block of poses, one per column of a table: loops over columns vectorise."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, cross, dot, scale, sub, vec
-from .poses import NOT_A_ROTATION, ROUNDED, make_exact
+from .poses import NOT_A_ROTATION, ROUNDED, orthonormalise
 from .records import CRANK
 
-# Few enough for the nearest cache, many enough to pay for what is read once a block.
+# Few enough for the first-level cache, many enough to amortise what is read once a block.
 BLOCK = 64
 
-# Rows of the table: rotation and position of the platform [L]; how far the rotation was from orthonormal, whether the
-# row is a pose and all solutions are sure, its largest constraint, its largest excess; sides that rods take.
+# Rows of the table: rotation and position of the platform [L]; deviation of the rotation from orthonormal; 1 if it is a
+# pose and all solutions are regular; largest constraint; largest excess; side of the rod.
 XX, XY, XZ, YX, YY, YZ, ZX, ZY, ZZ, PX, PY, PZ = range(12)
-OFF, MARGIN, ROW, EXCESS, SIDE = range(12, 17)
-# Of one rod: from foot to head, its length and the inverse of that, the carrier's angle, two directions, a number.
+OFF, IS_REGULAR, ROW, EXCESS, SIDE = range(12, 17)
+# Of one rod: its line from base end to platform end, length, inverse length, crank angle; two directions; a number.
 X, Y, Z, LENGTH, INVERSE, COS, SIN = range(17, 24)
 AX, AY, AZ, BX, BY, BZ, VALUE = range(24, 31)
-# Then its values in the places that `records` gives them, as far as HEAD; then as many more as the caller needs.
+# Then the values of the rod, in the order of `records`, up to PLATFORM_END; then rows for the caller.
 VALUES, MORE = 31, 37
 
-# Coefficients of atan t = t (1 + z P(z)), z = t^2, for |t| <= tan(pi / 8): Chebyshev's, off by 6e-18 at most.
+# Coefficients of atan t = t (1 + z P(z)), z = t^2, for |t| <= tan(pi / 8): Chebyshev's, error at most 6e-18.
 ATAN = (
     -0.01917688711906225899,
     0.0392316582955871913,
@@ -42,7 +42,7 @@ TAN_EIGHTH = 0.41421356237309503
 
 @routine
 def arctangent(y: float, x: float) -> float:
-    """atan2, without branches: loops that call it vectorise."""
+    """atan2 without branches, so that loops over it vectorise."""
     a, b = abs(x), abs(y)
     larger, smaller = (a, b) if a > b else (b, a)
     is_steep = smaller > TAN_EIGHTH * larger
@@ -61,35 +61,39 @@ def arctangent(y: float, x: float) -> float:
 
 
 @routine
-def lay_out(targets: Floats, begins: Floats, task: Record, first: int, n: int, pose: Floats, S: Floats) -> None:
-    """Columns of the poses of n targets (4, 4) [length] from the `first` on; what they do not set is as in `begins`.
+def fill_poses(targets: Floats, begins: Floats, task: Record, first: int, n: int, pose: Floats, S: Floats) -> None:
+    """Fill the poses of n targets (4, 4) [length] from index `first` on; unset coordinates are taken from `begins`.
 
-    `pose` is room for one.
+    `pose` is scratch memory for one pose.
     """
-    shrink, own = 1.0 / task["length"], targets[first : first + n]
+    scale_factor, block = 1.0 / task["length"], targets[first : first + n]
     for i in range(n):
-        target = own[i]
+        target = block[i]
         S[XX, i], S[XY, i], S[XZ, i] = target[0, 0], target[0, 1], target[0, 2]
         S[YX, i], S[YY, i], S[YZ, i] = target[1, 0], target[1, 1], target[1, 2]
         S[ZX, i], S[ZY, i], S[ZZ, i] = target[2, 0], target[2, 1], target[2, 2]
-        S[PX, i], S[PY, i], S[PZ, i] = shrink * target[0, 3], shrink * target[1, 3], shrink * target[2, 3]
+        S[PX, i], S[PY, i], S[PZ, i] = (
+            scale_factor * target[0, 3],
+            scale_factor * target[1, 3],
+            scale_factor * target[2, 3],
+        )
         S[OFF, i] = abs(target[3, 0]) + abs(target[3, 1]) + abs(target[3, 2]) + abs(target[3, 3] - 1.0)
     check_poses(n, S)
     if task["rotations"] == 3:
         for i in range(n):
-            if S[OFF, i] > ROUNDED and S[MARGIN, i] == 1.0:
-                straighten(i, pose, S)
+            if S[OFF, i] > ROUNDED and S[IS_REGULAR, i] == 1.0:
+                orthonormalise_column(i, pose, S)
     else:
         for j in range(9):
-            lay_begins(begins[:, j // 3, j % 3], 1.0, first, n, XX + j, S)
+            fill_starts(begins[:, j // 3, j % 3], 1.0, first, n, XX + j, S)
     for j in range(3):
         if task["axes"][j] == 0:
-            lay_begins(begins[:, j, 3], shrink, first, n, PX + j, S)
+            fill_starts(begins[:, j, 3], scale_factor, first, n, PX + j, S)
 
 
 @routine
-def lay_begins(begins: Floats, factor: float, first: int, n: int, to: int, S: Floats) -> None:
-    """Fill a column with what one for each row, or one for all, begins with, times a factor."""
+def fill_starts(begins: Floats, factor: float, first: int, n: int, to: int, S: Floats) -> None:
+    """Fill a row with a factor times the start values: one value for all columns, or one for each."""
     if begins.shape[0] == 1:
         value = factor * begins[0]
         for i in range(n):
@@ -101,7 +105,7 @@ def lay_begins(begins: Floats, factor: float, first: int, n: int, to: int, S: Fl
 
 @routine
 def check_poses(n: int, S: Floats) -> None:
-    """Start IS_SURE with whether a column is a pose, whose last row is off by OFF; then that is for the rotation."""
+    """Set IS_REGULAR where a column is a pose, given OFF of its last row; then OFF of its rotation."""
     for i in range(n):
         xx, xy, xz = S[XX, i], S[XY, i], S[XZ, i]
         yx, yy, yz = S[YX, i], S[YY, i], S[YZ, i]
@@ -112,23 +116,23 @@ def check_poses(n: int, S: Floats) -> None:
         volume = xx * (yy * zz - yz * zy) - xy * (yx * zz - yz * zx) + xz * (yx * zy - yy * zx)
         farthest = abs(S[PX, i]) + abs(S[PY, i]) + abs(S[PZ, i])
         is_pose = (off + S[OFF, i] <= NOT_A_ROTATION) & (volume > 0.0) & (farthest < math.inf)
-        S[MARGIN, i], S[ROW, i], S[EXCESS, i] = (1.0 if is_pose else 0.0), 0.0, -math.inf
+        S[IS_REGULAR, i], S[ROW, i], S[EXCESS, i] = (1.0 if is_pose else 0.0), 0.0, -math.inf
         S[OFF, i] = off
 
 
 @routine
-def straighten(i: int, pose: Floats, S: Floats) -> None:
+def orthonormalise_column(i: int, pose: Floats, S: Floats) -> None:
     """Make the rotation of column `i` orthonormal."""
     for j in range(9):
         pose[j // 3, j % 3] = S[XX + j, i]
-    make_exact(pose)
+    orthonormalise(pose)
     for j in range(9):
         S[XX + j, i] = pose[j // 3, j % 3]
 
 
 @routine
-def lay_moved(point: Vec, origin: Vec, n: int, S: Floats) -> None:
-    """Fill X, Y, Z with a point of the platform, less a point of the base."""
+def fill_platform_point(point: Vec, origin: Vec, n: int, S: Floats) -> None:
+    """Fill X, Y, Z with a point of the platform minus a point of the base."""
     for i in range(n):
         S[X, i] = S[XX, i] * point[0] + S[XY, i] * point[1] + S[XZ, i] * point[2] + (S[PX, i] - origin[0])
         S[Y, i] = S[YX, i] * point[0] + S[YY, i] * point[1] + S[YZ, i] * point[2] + (S[PY, i] - origin[1])
@@ -136,15 +140,15 @@ def lay_moved(point: Vec, origin: Vec, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_inverse(n: int, S: Floats) -> None:
-    """Fill INVERSE with that of the rod's length."""
+def fill_inverse(n: int, S: Floats) -> None:
+    """Fill INVERSE with one over the rod's length."""
     for i in range(n):
         S[INVERSE, i] = 1.0 / S[LENGTH, i]
 
 
 @routine
-def lay_turned(direction: Vec, n: int, S: Floats) -> None:
-    """Fill AX, AY, AZ with a direction of the platform."""
+def fill_platform_direction(direction: Vec, n: int, S: Floats) -> None:
+    """Fill AX, AY, AZ with a direction fixed in the platform."""
     for i in range(n):
         S[AX, i] = S[XX, i] * direction[0] + S[XY, i] * direction[1] + S[XZ, i] * direction[2]
         S[AY, i] = S[YX, i] * direction[0] + S[YY, i] * direction[1] + S[YZ, i] * direction[2]
@@ -152,8 +156,8 @@ def lay_turned(direction: Vec, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_along_turned(direction: Vec, to: int, n: int, S: Floats) -> None:
-    """Fill a column with the share of the rod's line along a direction of the platform."""
+def project_on_platform_direction(direction: Vec, to: int, n: int, S: Floats) -> None:
+    """Fill a row with the component of the rod's line along a direction fixed in the platform."""
     for i in range(n):
         x = S[XX, i] * direction[0] + S[XY, i] * direction[1] + S[XZ, i] * direction[2]
         y = S[YX, i] * direction[0] + S[YY, i] * direction[1] + S[YZ, i] * direction[2]
@@ -162,38 +166,38 @@ def lay_along_turned(direction: Vec, to: int, n: int, S: Floats) -> None:
 
 
 @routine
-def lay_carried(direction: Vec, proximal: Record, n: int, S: Floats) -> None:
-    """Fill BX, BY, BZ with a direction of the body that the foot is on."""
+def fill_base_direction(direction: Vec, proximal: Record, n: int, S: Floats) -> None:
+    """Fill BX, BY, BZ with a direction fixed in the body of the base end."""
     if proximal["proximal"] != CRANK:
         for i in range(n):
             S[BX, i], S[BY, i], S[BZ, i] = direction[0], direction[1], direction[2]
         return
-    rest, plain, across = split(direction, vec(proximal["proximal_axis"]))
+    axial, radial, across = split(direction, vec(proximal["proximal_axis"]))
     for i in range(n):
         cosine, sine = S[COS, i], S[SIN, i]
-        S[BX, i] = rest[0] + cosine * plain[0] + sine * across[0]
-        S[BY, i] = rest[1] + cosine * plain[1] + sine * across[1]
-        S[BZ, i] = rest[2] + cosine * plain[2] + sine * across[2]
+        S[BX, i] = axial[0] + cosine * radial[0] + sine * across[0]
+        S[BY, i] = axial[1] + cosine * radial[1] + sine * across[1]
+        S[BZ, i] = axial[2] + cosine * radial[2] + sine * across[2]
 
 
 @routine
-def lay_along_carried(direction: Vec, proximal: Record, to: int, n: int, S: Floats) -> None:
-    """Fill a column with the share of the rod's line along a direction of the body that the foot is on."""
+def project_on_base_direction(direction: Vec, proximal: Record, to: int, n: int, S: Floats) -> None:
+    """Fill a row with the component of the rod's line along a direction fixed in the body of the base end."""
     if proximal["proximal"] != CRANK:
         for i in range(n):
             S[to, i] = direction[0] * S[X, i] + direction[1] * S[Y, i] + direction[2] * S[Z, i]
         return
-    rest, plain, across = split(direction, vec(proximal["proximal_axis"]))
+    axial, radial, across = split(direction, vec(proximal["proximal_axis"]))
     for i in range(n):
         cosine, sine = S[COS, i], S[SIN, i]
-        x = rest[0] + cosine * plain[0] + sine * across[0]
-        y = rest[1] + cosine * plain[1] + sine * across[1]
-        z = rest[2] + cosine * plain[2] + sine * across[2]
+        x = axial[0] + cosine * radial[0] + sine * across[0]
+        y = axial[1] + cosine * radial[1] + sine * across[1]
+        z = axial[2] + cosine * radial[2] + sine * across[2]
         S[to, i] = x * S[X, i] + y * S[Y, i] + z * S[Z, i]
 
 
 @routine
 def split(direction: Vec, axis: Vec) -> tuple[Vec, Vec, Vec]:
-    """What of a direction an axis keeps that it turns about, what it turns, and that a quarter turn on."""
-    rest = scale(dot(axis, direction), axis)
-    return rest, sub(direction, rest), cross(axis, direction)
+    """A direction's parts along and normal to an axis, and the normal part turned by a quarter turn."""
+    axial = scale(dot(axis, direction), axis)
+    return axial, sub(direction, axial), cross(axis, direction)

@@ -1,7 +1,7 @@
-"""What legs are made of: angles of hinges that turn one direction into another, and derivatives by the pose.
+"""Angles of the hinges at an ending: closed forms that turn one direction into another.
 
-Two crossed hinges a, b bring a direction u to w where a . Rot(b, q) u = a . w, which is A cos q + B sin q = C: two
-solutions, told apart by a side; then one hinge does the rest (Paden-Kahan subproblems 1 and 4).
+Two crossed hinges a, b turn u into w where a . Rot(b, q) u = a . w, which has the form A cos q + B sin q = C: two
+solutions, distinguished by a side of +1 or -1. One hinge does the rest (Paden-Kahan subproblems 1 and 4).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from ...arrays import Floats
 from .._jit import routine
 from ..vectors import Vec, along, angle_between, cross, dot, scale
 
-# Sine of the angle from a dead point, or from aligned hinges, below which a solution is not sure to half its digits.
+# Sine of the angle to a dead point, or to aligned hinges, below which a solution loses half of its digits.
 LEAST_MARGIN = 1e-6
 
 
@@ -34,33 +34,33 @@ def turned_back(T: Floats, v: Vec) -> Vec:
 
 @routine
 def angle_to(axis: Vec, u: Vec, w: Vec) -> float:
-    """Angle from `u` to `w` about a unit vector, right-handed, in (-pi, pi]; what lies along it does not count."""
+    """Angle from `u` to `w` about a unit vector, right-handed, in (-pi, pi]; components along it are ignored."""
     return math.atan2(dot(axis, cross(u, w)), dot(u, w) - dot(axis, u) * dot(axis, w))
 
 
 @routine
-def either_angle(A: float, B: float, C: float, side: float) -> tuple[float, float, float]:
-    """Cosine and sine of one of the two solutions of A cos q + B sin q = C, and how sure they are.
+def solve_angle(A: float, B: float, C: float, side: float) -> tuple[float, float, float]:
+    """Cosine and sine of one of the two solutions of A cos q + B sin q = C, and its singularity margin.
 
-    q = atan2(B, A) + side acos(C / h), h = hypot(A, B). The last number is the square of the sine of the angle to the
-    double root, negative where there is no solution: then the angle is that of the double root.
+    q = atan2(B, A) + side acos(C / h), h = hypot(A, B). The margin is the squared sine of the angle to the double root;
+    it is negative where no solution exists, and the angle is then that of the double root.
     """
     square = A * A + B * B
     if not square > 0.0:
         return 1.0, 0.0, -1.0
-    rest = square - C * C
-    if rest < 0.0:
+    discriminant = square - C * C
+    if discriminant < 0.0:
         C = math.copysign(math.sqrt(square), C)
-    root = side * math.sqrt(max(rest, 0.0))
-    return (A * C - B * root) / square, (B * C + A * root) / square, rest / square
+    root = side * math.sqrt(max(discriminant, 0.0))
+    return (A * C - B * root) / square, (B * C + A * root) / square, discriminant / square
 
 
 @routine
-def aim(axes: Floats, u: Vec, w: Vec, side: float, angles: Floats) -> float:
-    """Angles of two crossed hinges that turn `u`, given at home, into `w`, into angles[:2]; how sure they are."""
+def universal_angles(axes: Floats, u: Vec, w: Vec, side: float, angles: Floats) -> float:
+    """Fill angles[:2] of two crossed hinges that turn `u`, given at home, into `w`; the singularity margin."""
     a, b = (axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])
     bu = dot(b, u)
-    cosine, sine, singularity_margin = either_angle(
+    cosine, sine, singularity_margin = solve_angle(
         dot(a, along(u, -bu, b)), dot(a, cross(b, u)), dot(a, w) - dot(a, b) * bu, side
     )
     angles[0] = angle_to(a, turned(u, b, cosine, sine), w)
@@ -69,8 +69,8 @@ def aim(axes: Floats, u: Vec, w: Vec, side: float, angles: Floats) -> float:
 
 
 @routine
-def missed_by(axes: Floats, u: Vec, w: Vec, angles: Floats) -> float:
-    """Angle from where two crossed hinges, at such angles, turn `u` to `w`: what `aim` leaves where they cannot."""
+def pointing_error(axes: Floats, u: Vec, w: Vec, angles: Floats) -> float:
+    """Angle between `w` and the direction into which two crossed hinges at these angles turn `u`."""
     a, b = (axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])
     by_last = turned(u, b, math.cos(angles[1]), math.sin(angles[1]))
     return angle_between(w, turned(by_last, a, math.cos(angles[0]), math.sin(angles[0])))

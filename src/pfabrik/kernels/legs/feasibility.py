@@ -1,4 +1,4 @@
-"""How far poses are inside, or beyond, the limits of legs in closed form."""
+"""Margins of poses to the limits of legs in closed form; negative beyond a limit."""
 
 from __future__ import annotations
 
@@ -10,43 +10,43 @@ from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
 from ..rotations import difference, turn_about_z, yaw_difference
 from ..vectors import angle_between, copy_row, scale, vec
-from .answer import CLOSE, KEPT, complete, deviation, end_of_rows, new_completion, put_rows
-from .endings import missed_by
-from .poses import lean_to, load, put_pose, turn_pose
+from .answer import KEPT, NEARLY_CLOSED, complete_pose, deviation, end_of_rows, new_completion, put_rows
+from .endings import pointing_error
+from .poses import put_pose, read_target, tilt_to, turn_pose
 from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, CROSS, PIVOT, PLATFORM_END, PLATFORM_LINE, ROD, SLIDE, TRIPLE
 from .table import open_table
 
 PARTS, MORE_PARTS = 4, 16
-"""Parts of the way from the start in which a pose is completed where, all at once, it does not close within limits; and
-where in so many it did not close, or led arms beyond limits, which near where these are singular turn far at once."""
+"""Steps of the continuation from the start to a target, tried where a pose completed in one step is not feasible. The
+larger number is tried where the smaller did not close, and with implicit joints, which turn fast near singularities."""
 
 
 @routine
-def share_of(off: float, room: float) -> float:
-    """Distance from a bound as a share of the room there is: of half the range, or of a cone's half angle.
+def relative_margin(distance: float, half_range: float) -> float:
+    """Distance from a bound as a share of half the range, or of a cone's half angle.
 
-    A locked joint has none: 0 on its value, infinite off it.
+    For a locked joint, without a range: 0 on its value, infinite off it.
     """
-    if room > KEPT:
-        return off / room
-    return 0.0 if abs(off) <= KEPT else math.copysign(math.inf, off)
+    if half_range > KEPT:
+        return distance / half_range
+    return 0.0 if abs(distance) <= KEPT else math.copysign(math.inf, distance)
 
 
 @routine
 def least_margin(limited: Records, cones: Records, values: Floats) -> tuple[float, int]:
-    """The least share of any limit, and which it is: two of each range, then cones; -1 where there is none."""
+    """The least relative margin of all limits, and its index: two per range, then the cones; -1 if none."""
     least, binding = math.inf, -1
     for i in range(limited.shape[0]):
         lo, hi, value = limited[i]["lo"], limited[i]["hi"], deviation(limited[i], values)
-        below, above = share_of(value - lo, 0.5 * (hi - lo)), share_of(hi - value, 0.5 * (hi - lo))
+        below, above = relative_margin(value - lo, 0.5 * (hi - lo)), relative_margin(hi - value, 0.5 * (hi - lo))
         if min(below, above) < least:
             least, binding = min(below, above), 2 * i + (1 if above < below else 0)
     for i in range(cones.shape[0]):
-        own, place = values[cones[i]["leg"]], cones[i]["place"]
-        angle = angle_between(vec(cones[i]["axis"]), (own[place], own[place + 1], own[place + 2]))
-        share = share_of(cones[i]["half_angle"] - angle, cones[i]["half_angle"])
-        if share < least:
-            least, binding = share, 2 * limited.shape[0] + i
+        leg_values, place = values[cones[i]["leg"]], cones[i]["place"]
+        angle = angle_between(vec(cones[i]["axis"]), (leg_values[place], leg_values[place + 1], leg_values[place + 2]))
+        margin = relative_margin(cones[i]["half_angle"] - angle, cones[i]["half_angle"])
+        if margin < least:
+            least, binding = margin, 2 * limited.shape[0] + i
     return least, binding
 
 
@@ -59,100 +59,105 @@ def feasibility(
     margins: Floats,
     bindings: Ints,
 ) -> None:
-    """Fill the least margin of each target (n, 4, 4) [length], and which limit it is of.
+    """Fill the least margin of each target (n, 4, 4) [length], and the index of its limit.
 
-    After the limits of `least_margin` come, for each leg, that it reaches (margin: minus the gap, as a share of the
-    rod) and, for each, that it closes (minus its largest constraint, or the angle by which crossed hinges cannot point
-    where they should). NaN and -1 where a target is no pose.
+    After the limits of `least_margin` come two more for each leg: first for all legs, that the leg reaches (minus the
+    gap, as a share of the rod); then for all legs, that it closes (minus the largest constraint, or the angle by which
+    crossed hinges miss their direction). NaN and -1 if a target is no pose.
     """
     table = open_table(machine)
     scratch, legs, task, limited, cones = new_completion(table), table.legs, table.task, table.limited, table.cones
-    before, toward, n_legs = np.zeros((4, 4)), np.zeros((4, 4)), legs.shape[0]
-    own, turn = np.zeros(n_legs), np.zeros(3)
+    start, target, n_legs = np.zeros((4, 4)), np.zeros((4, 4)), legs.shape[0]
+    row_sides, turn = np.zeros(n_legs), np.zeros(3)
     n_limits = 2 * limited.shape[0] + cones.shape[0]
     for row in range(targets.shape[0]):
         margins[row], bindings[row] = math.nan, -1
-        is_pose, closed = True, False
+        is_pose, is_closed = True, False
         for parts in (1, PARTS, MORE_PARTS):
             if parts > 1 and not (margins[row] < 0.0 and task[0]["unset"] + task[0]["implicit"] > 0):
                 break
-            if parts == MORE_PARTS and closed and task[0]["implicit"] == 0:
+            if parts == MORE_PARTS and is_closed and task[0]["implicit"] == 0:
                 break
-            aim(begins[0], begins[0], 1.0, task[0], before, turn)
-            copy_row(sides[0], own)
+            interpolate_target(begins[0], begins[0], 1.0, task[0], start, turn)
+            copy_row(sides[0], row_sides)
             for part in range(1, parts + 1):
-                aim(targets[row], begins[0], part / parts, task[0], toward, turn)
-                is_pose = load(toward, before, task[0], scratch.pose)
-                closed = is_pose and complete(table, own, scratch)
-                if not closed:
+                interpolate_target(targets[row], begins[0], part / parts, task[0], target, turn)
+                is_pose = read_target(target, start, task[0], scratch.pose)
+                is_closed = is_pose and complete_pose(table, row_sides, scratch)
+                if not is_closed:
                     break
-                put_pose(scratch.pose, task[0]["length"], before)
-                copy_row(scratch.sides, own)
+                put_pose(scratch.pose, task[0]["length"], start)
+                copy_row(scratch.sides, row_sides)
             if not is_pose:
                 break
-            if parts > 1 and not closed:
+            if parts > 1 and not is_closed:
                 continue
             least, binding = least_margin(limited, cones, scratch.values)
-            if not closed:
+            if not is_closed:
                 put_rows(legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
                 for k in range(n_legs):
-                    share = reach_of(legs[k], scratch.values[k])
-                    if share < -CLOSE and share < least:
-                        least, binding = share, n_limits + k
-                    share = -max(largest_row(legs, scratch.rows, k), missed_by_ends(legs[k], scratch.values[k]))
-                    if share < -CLOSE and share < least:
-                        least, binding = share, n_limits + n_legs + k
+                    margin = reach_margin(legs[k], scratch.values[k])
+                    if margin < -NEARLY_CLOSED and margin < least:
+                        least, binding = margin, n_limits + k
+                    margin = -max(
+                        largest_constraint(legs, scratch.rows, k), largest_pointing_error(legs[k], scratch.values[k])
+                    )
+                    if margin < -NEARLY_CLOSED and margin < least:
+                        least, binding = margin, n_limits + n_legs + k
             if parts == 1 or least > margins[row]:
                 margins[row], bindings[row] = least, binding
 
 
 @routine
-def aim(target: Floats, begin: Floats, share: float, task: Record, toward: Floats, turn: Floats) -> None:
-    """Fill a target that is a share of the way from another pose, (4, 4) [length] each."""
+def interpolate_target(target: Floats, start: Floats, share: float, task: Record, out: Floats, turn: Floats) -> None:
+    """Fill a target that is a share of the way from a start to a target, (4, 4) [length] each."""
     for i in range(4):
         for j in range(4):
-            toward[i, j] = target[i, j]
+            out[i, j] = target[i, j]
     if share == 1.0:
         return
     for i in range(3):
-        toward[i, 3] = begin[i, 3] + share * (target[i, 3] - begin[i, 3])
+        out[i, 3] = start[i, 3] + share * (target[i, 3] - start[i, 3])
         for j in range(3):
-            toward[i, j] = begin[i, j]
+            out[i, j] = start[i, j]
     if task["rotations"] == 3:
-        difference(target, begin, turn)
-        turn_pose(toward, scale(share, vec(turn)))
+        difference(target, start, turn)
+        turn_pose(out, scale(share, vec(turn)))
     elif task["rotations"] == 2:
-        lean_to(target, share, toward)
+        tilt_to(target, share, out)
     elif task["rotations"] == 1:
-        turn_about_z(toward, share * yaw_difference(target, begin))
+        turn_about_z(out, share * yaw_difference(target, start))
 
 
 @routine
-def reach_of(leg: Record, own: Floats) -> float:
-    """Minus the gap that a leg leaves where its carrier does not reach, as a share of its rod."""
+def reach_margin(leg: Record, values: Floats) -> float:
+    """Minus the gap that a rod leaves where its proximal joint does not reach, as a share of its length."""
     if leg["kind"] == ROD and (leg["proximal"] == CRANK or leg["proximal"] == CARRIAGE):
-        return -abs(own[SLIDE]) / leg["length"]
+        return -abs(values[SLIDE]) / leg["length"]
     return 0.0
 
 
 @routine
-def missed_by_ends(leg: Record, own: Floats) -> float:
-    """The largest angle by which crossed hinges of a leg, or the first two of three, cannot point where they should."""
+def largest_pointing_error(leg: Record, values: Floats) -> float:
+    """The largest angle by which crossed hinges of a leg, or the first two of three, miss their direction [rad]."""
     if leg["kind"] == PIVOT and leg["base_end"] == TRIPLE:
         axes = leg["base_end_axes"]
-        return missed_by(axes, vec(axes[2]), vec(own[BASE_LINE:]), own[BASE_END:])
+        return pointing_error(axes, vec(axes[2]), vec(values[BASE_LINE:]), values[BASE_END:])
     worst = 0.0
     if leg["kind"] == ROD and leg["base_end_aimed"] == 1 and leg["base_end"] == CROSS:
-        worst = missed_by(leg["base_end_axes"], vec(leg["line"]), vec(own[BASE_LINE:]), own[BASE_END:])
+        worst = pointing_error(leg["base_end_axes"], vec(leg["line"]), vec(values[BASE_LINE:]), values[BASE_END:])
     if leg["kind"] == ROD and leg["platform_end_aimed"] == 1 and leg["platform_end"] == CROSS:
         worst = max(
-            worst, missed_by(leg["platform_end_axes"], vec(leg["line"]), vec(own[PLATFORM_LINE:]), own[PLATFORM_END:])
+            worst,
+            pointing_error(
+                leg["platform_end_axes"], vec(leg["line"]), vec(values[PLATFORM_LINE:]), values[PLATFORM_END:]
+            ),
         )
     return worst
 
 
 @routine
-def largest_row(legs: Records, rows: Floats, k: int) -> float:
+def largest_constraint(legs: Records, rows: Floats, k: int) -> float:
     """The largest constraint of a leg [L or rad]."""
     worst = 0.0
     for i in range(legs[k]["first_row"], end_of_rows(legs, k, rows.shape[0])):

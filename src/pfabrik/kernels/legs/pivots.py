@@ -1,7 +1,7 @@
-"""A leg of no length, at a pose: slides, then one ending whose centre the platform keeps in place.
+"""Pivots: legs without length, made of slides and then one ending with its centre fixed in the platform.
 
-Constraints, with d the displacement of the centre and R the rotation of the platform: d does not leave the slides; of
-two hinges a . R b keeps its value; of one hinge R a = a; of a weld R = I.
+Constraints, with d the displacement of the centre and R the rotation of the platform: d stays in the span of the
+slides; a . R b is constant for two hinges, R a = a for one hinge, R = I for a weld.
 """
 
 from __future__ import annotations
@@ -11,38 +11,38 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, cross, dot, move, put, sub, turn, vec
-from .endings import aim, angle_to, spin_angle, turned
-from .frames import NOWHERE, put_pose_slope
+from .endings import angle_to, spin_angle, turned, universal_angles
+from .frames import ZERO, put_pose_slope
 from .records import BASE_END, BASE_LINE, CROSS, HINGE, PLATFORM_END, PLATFORM_LINE, TRIPLE
 
-# What is added to conditions that an axis meets also where it is turned over.
+# Added to conditions that an axis also meets when it is turned over.
 TURNED_OVER = 2.0
 
 
 @routine
-def place_pivot(pivot: Record, frame: Floats, side: float, own: Floats) -> float:
-    """Fill a pivot's values; how sure they are, see `LEAST_MARGIN`."""
+def place_pivot(pivot: Record, frame: Floats, side: float, values: Floats) -> float:
+    """Fill the values of a pivot at a pose; the singularity margin."""
     offset = sub(move(frame, vec(pivot["platform_end_point"])), vec(pivot["base_end_point"]))
     for i in range(pivot["slides"]):
-        own[PLATFORM_END + i] = dot(vec(pivot["slide_rows"][i]), offset)
+        values[PLATFORM_END + i] = dot(vec(pivot["slide_rows"][i]), offset)
     axes = pivot["base_end_axes"]
     if pivot["base_end"] == HINGE:
-        own[BASE_END] = spin_angle(frame, vec(axes[0]))
+        values[BASE_END] = spin_angle(frame, vec(axes[0]))
     elif pivot["base_end"] == CROSS:
-        own[BASE_END] = angle_to(vec(axes[0]), vec(axes[1]), turn(frame, vec(axes[1])))
-        own[BASE_END + 1] = last_angle(frame, axes, own[BASE_END], 0.0, 1)
+        values[BASE_END] = angle_to(vec(axes[0]), vec(axes[1]), turn(frame, vec(axes[1])))
+        values[BASE_END + 1] = last_angle(frame, axes, values[BASE_END], 0.0, 1)
     elif pivot["base_end"] == TRIPLE:
         last = vec(axes[2])
-        put(own[BASE_LINE:PLATFORM_LINE], turn(frame, last))
-        singularity_margin = aim(axes, last, vec(own[BASE_LINE:]), side, own[BASE_END:PLATFORM_END])
-        own[BASE_END + 2] = last_angle(frame, axes, own[BASE_END], own[BASE_END + 1], 2)
+        put(values[BASE_LINE:PLATFORM_LINE], turn(frame, last))
+        singularity_margin = universal_angles(axes, last, vec(values[BASE_LINE:]), side, values[BASE_END:PLATFORM_END])
+        values[BASE_END + 2] = last_angle(frame, axes, values[BASE_END], values[BASE_END + 1], 2)
         return singularity_margin
     return 1.0
 
 
 @routine
 def last_angle(frame: Floats, axes: Floats, first: float, second: float, last: int) -> float:
-    """Angle about the last of two or three hinges, once those before it have turned."""
+    """Angle of the last of two or three hinges, from the angles of those before it."""
     axis = vec(axes[last])
     across = any_across(axis)
     back = turned(turn(frame, across), vec(axes[0]), math.cos(first), -math.sin(first))
@@ -53,7 +53,7 @@ def last_angle(frame: Floats, axes: Floats, first: float, second: float, last: i
 
 @routine
 def any_across(v: Vec) -> Vec:
-    """Some direction square to a unit vector."""
+    """A direction normal to a unit vector."""
     x, y, z = abs(v[0]), abs(v[1]), abs(v[2])
     if x <= y and x <= z:
         return cross(v, (1.0, 0.0, 0.0))
@@ -62,26 +62,26 @@ def any_across(v: Vec) -> Vec:
 
 @routine
 def pivot_rows(pivot: Record, frame: Floats, rows: Floats) -> None:
-    """Fill a pivot's constraints."""
+    """Fill the constraints of a pivot."""
     n, n_fixed = pivot["first_row"], 3 - pivot["slides"]
     offset = sub(move(frame, vec(pivot["platform_end_point"])), vec(pivot["base_end_point"]))
     for i in range(n_fixed):
         rows[n + i] = dot(vec(pivot["fixed_rows"][i]), offset)
-    over = 0.0
+    penalty = 0.0
     for i in range(pivot["upright"]):
         axis = vec(pivot["base_end_axes"][i])
-        over = TURNED_OVER if dot(axis, turn(frame, axis)) < 0.0 else over
+        penalty = TURNED_OVER if dot(axis, turn(frame, axis)) < 0.0 else penalty
     for i in range(pivot["axis_rows"]):
         kept, moved = vec(pivot["kept"][i]), turn(frame, vec(pivot["moved"][i]))
-        rows[n + n_fixed + i] = dot(kept, moved) - pivot["value"][i] + over
+        rows[n + n_fixed + i] = dot(kept, moved) - pivot["value"][i] + penalty
 
 
 @routine
 def pivot_slopes(pivot: Record, frame: Floats, slopes: Floats) -> None:
-    """Fill the derivatives of a pivot's constraints."""
+    """Fill the derivatives of the constraints of a pivot."""
     n, n_fixed = pivot["first_row"], 3 - pivot["slides"]
     for i in range(n_fixed):
-        put_pose_slope(pivot, frame, vec(pivot["fixed_rows"][i]), NOWHERE, slopes[n + i])
+        put_pose_slope(pivot, frame, vec(pivot["fixed_rows"][i]), ZERO, slopes[n + i])
     for i in range(pivot["axis_rows"]):
         kept, moved = vec(pivot["kept"][i]), turn(frame, vec(pivot["moved"][i]))
-        put_pose_slope(pivot, frame, NOWHERE, cross(moved, kept), slopes[n + n_fixed + i])
+        put_pose_slope(pivot, frame, ZERO, cross(moved, kept), slopes[n + n_fixed + i])

@@ -1,4 +1,4 @@
-"""Poses: targets read, completed with what they leave open, and made exact; platforms turned."""
+"""Poses: targets read, completed with what they leave open, and made orthonormal; rotations of the platform."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..rotations import UPSIDE_DOWN, turn_about_z, yaw_of
 from ..vectors import Vec, cross, dot, norm, scale, turn, vec
 from .endings import LEAST_MARGIN, turned
 
-# Deviation from an orthonormal matrix up to which a target is a pose, and from which on it is not made one.
+# Largest deviation from an orthonormal matrix that a target may have, and the smallest that is corrected.
 NOT_A_ROTATION, ROUNDED = 1e-6, 1e-14
 
 
@@ -29,16 +29,16 @@ def turn_pose(pose: Floats, spin: Vec) -> None:
 
 @routine
 def middle_of(pose: Floats, task: Record) -> Vec:
-    """The middle of the joints on the platform, from its reference point, which may be far away."""
+    """Vector from the reference point, which may be far away, to the centre of the joints on the platform."""
     return turn(pose, vec(task["centre"]))
 
 
 @routine
-def load(target: Floats, begin: Floats, task: Record, pose: Floats) -> bool:
-    """A target [length] as a pose [L], what it does not set as in another; False where it is no pose, or turned over.
+def read_target(target: Floats, begin: Floats, task: Record, pose: Floats) -> bool:
+    """Convert a target [length] to a pose [L], unset coordinates from `begin`; False if it is no pose or upside down.
 
-    Of the rotation the nearest is taken: two steps of R <- R (3 - R^T R) / 2. Where the direction of the z axis is
-    all that is set of it, it is brought there by the shortest turn; where the yaw is, by a turn about z.
+    The rotation is made orthonormal by two steps of R <- R (3 - R^T R) / 2. If the target sets only the direction of
+    the z axis, the z axis of `begin` is brought there by the shortest turn; if it sets only the yaw, by a turn about z.
     """
     if not is_pose(target):
         return False
@@ -48,33 +48,33 @@ def load(target: Floats, begin: Floats, task: Record, pose: Floats) -> bool:
         for j in range(3):
             pose[i, j] = target[i, j] if rotations == 3 or rotations == 1 else begin[i, j]
     if rotations == 3 or rotations == 1:
-        make_exact(pose)
+        orthonormalise(pose)
     if rotations == 2:
-        return lean_to(target, 1.0, pose)
+        return tilt_to(target, 1.0, pose)
     if rotations == 1:
         yaw = yaw_of(pose)
         is_upright = 1.0 + min(pose[2, 2], begin[2, 2]) > UPSIDE_DOWN
         for i in range(3):
             for j in range(3):
                 pose[i, j] = begin[i, j]
-        bring_yaw(pose, yaw)
+        set_yaw(pose, yaw)
         return is_upright
     return True
 
 
 @routine
-def bring_yaw(pose: Floats, yaw: float) -> None:
-    """Turn a pose about the base's z axis until its yaw is this."""
+def set_yaw(pose: Floats, yaw: float) -> None:
+    """Turn a pose about the base's z axis until it has this yaw [rad]."""
     turn_about_z(pose, yaw - yaw_of(pose))
 
 
 @routine
-def lean_to(target: Floats, share: float, pose: Floats) -> bool:
-    """Bring the z axis of a pose to a target's by the shortest turn, or a share of the way; False where turned over."""
-    now, wanted = (pose[0, 2], pose[1, 2], pose[2, 2]), (target[0, 2], target[1, 2], target[2, 2])
-    wanted = scale(1.0 / norm(wanted), wanted)
-    across = cross(now, wanted)
-    sine, cosine = norm(across), dot(now, wanted)
+def tilt_to(target: Floats, share: float, pose: Floats) -> bool:
+    """Turn the z axis of a pose a share of the shortest way to a target's; False if they are opposite."""
+    axis, target_axis = (pose[0, 2], pose[1, 2], pose[2, 2]), (target[0, 2], target[1, 2], target[2, 2])
+    target_axis = scale(1.0 / norm(target_axis), target_axis)
+    across = cross(axis, target_axis)
+    sine, cosine = norm(across), dot(axis, target_axis)
     if sine > 0.0:
         turn_pose(pose, scale(share * math.atan2(sine, cosine) / sine, across))
     return cosine > LEAST_MARGIN - 1.0
@@ -82,14 +82,15 @@ def lean_to(target: Floats, share: float, pose: Floats) -> bool:
 
 @routine
 def is_pose(target: Floats) -> bool:
-    worst, finite = abs(target[3, 3] - 1.0), 0.0
+    """True if the matrix (4, 4) is finite, with a proper rotation and last row 0 0 0 1, to NOT_A_ROTATION."""
+    deviation, size = abs(target[3, 3] - 1.0), 0.0
     for i in range(3):
-        worst += abs(target[3, i])
-        finite += target[i, 3]
+        deviation += abs(target[3, i])
+        size += target[i, 3]
         for j in range(i, 3):
-            worst += abs(gram(target, i, j))
+            deviation += abs(gram(target, i, j))
     x, y, z = column(target, 0), column(target, 1), column(target, 2)
-    return worst <= NOT_A_ROTATION and dot(cross(x, y), z) > 0.0 and abs(finite) < math.inf
+    return deviation <= NOT_A_ROTATION and dot(cross(x, y), z) > 0.0 and abs(size) < math.inf
 
 
 @routine
@@ -104,8 +105,8 @@ def gram(T: Floats, i: int, j: int) -> float:
 
 
 @routine
-def make_exact(pose: Floats) -> None:
-    """Make the rotation of a pose the nearest that is orthonormal."""
+def orthonormalise(pose: Floats) -> None:
+    """Replace the rotation of a pose by the nearest orthonormal one."""
     for _ in range(2):
         xx, yy, zz = gram(pose, 0, 0), gram(pose, 1, 1), gram(pose, 2, 2)
         xy, yz, zx = gram(pose, 0, 1), gram(pose, 1, 2), gram(pose, 2, 0)
@@ -120,7 +121,7 @@ def make_exact(pose: Floats) -> None:
 
 @routine
 def load_pose(pose: Floats, length: float, to: Floats) -> None:
-    """A pose [length], as one [L]."""
+    """Fill a pose [L] from one in [length]."""
     for i in range(3):
         to[i, 3] = pose[i, 3] / length
         for j in range(3):
@@ -129,7 +130,7 @@ def load_pose(pose: Floats, length: float, to: Floats) -> None:
 
 @routine
 def put_pose(pose: Floats, length: float, to: Floats) -> None:
-    """A pose [L], (4, 4), as one [length]."""
+    """Fill a pose [length], (4, 4), from one in [L]."""
     for i in range(3):
         to[i, 3] = pose[i, 3] * length
         for j in range(3):

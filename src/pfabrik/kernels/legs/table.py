@@ -1,4 +1,4 @@
-"""The table of a machine's legs, as kernels open it."""
+"""The kernel table of a machine's legs, opened from its address."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .records import CONE, COORDINATE, LEG, TASK, Table
 _RECORDS = (LEG, COORDINATE, CONE, COORDINATE, COORDINATE, TASK, np.dtype(np.int64))
 
 SAMPLE = Table._make(np.zeros(1, record) for record in _RECORDS)
-"""A table of the types that kernels are compiled for."""
+"""A table of the array types that kernels are compiled for."""
 
 open_table = opener(SAMPLE)
-"""The table of a mechanism, of which a kernel is given the address of a `Handle`."""
+"""The table at the address of a `Handle`."""

@@ -1,1 +1,1 @@
-"""Configurations of legs in closed form in few unknowns: the pose of the platform, and what carries each rod."""
+"""Solvers for legs in closed form in few unknowns: the platform's pose, proximal and redundant coordinates."""

@@ -9,32 +9,39 @@ from ..free_motions import FreeMotions, add_limit, eliminate, project_gradient
 from ..legs.answer import deviation
 from ..legs.records import Table
 from ..vectors import dot, vec
-from .equations import PlatformState, place, put_slopes
+from .equations import PlatformState, evaluate_legs, put_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .records import PlatformObjective
-from .search import Search, put_objective
+from .search import SearchScratch, put_objective
 
 
 @routine
 def linearise(
-    table: Table, row: int, objective: PlatformObjective, state: PlatformState, search: Search, reduced: FreeMotions
+    table: Table,
+    row: int,
+    objective: PlatformObjective,
+    state: PlatformState,
+    search: SearchScratch,
+    reduced: FreeMotions,
 ) -> None:
-    """Look at a configuration."""
+    """Fill the reduced linearisation at a configuration."""
     totals, errors = reduced.linear.totals[0], search.gradient.errors
-    gap = place(table, state, search.leg_eval)
+    gap = evaluate_legs(table, state, search.leg_eval)
     put_slopes(table, search.leg_eval)
     totals["value"], held = put_objective(table, row, objective, state, search)
     for k in range(held):
         gap = max(gap, abs(errors[k]))
     totals["gap"] = gap
-    eliminate(lay_out(held, search), search.elimination, reduced, search.leg_eval.rows.shape[0], objective.implied)
-    project_gradient(search.force, reduced)
+    eliminate(
+        put_equations(held, search), search.elimination, reduced, search.leg_eval.rows.shape[0], objective.implied
+    )
+    project_gradient(search.objective_gradient, reduced)
     linearise_limits(table, objective.pose.margin, search, reduced)
 
 
 @routine
-def lay_out(held: int, search: Search) -> int:
-    """The equations of the legs and of what is held, with an identity beside them; how many."""
+def put_equations(held: int, search: SearchScratch) -> int:
+    """Fill the equations of the legs and of the held part, with an identity beside them; their number."""
     A, rows, slopes = search.elimination.A, search.leg_eval.rows, search.leg_eval.slopes
     errors, holds = search.gradient.errors, search.gradient.holds
     m, n = slopes.shape
@@ -54,10 +61,16 @@ def lay_out(held: int, search: Search) -> int:
 
 
 @routine
-def linearise_limits(table: Table, margin: float, search: Search, reduced: FreeMotions) -> None:
-    """Excess and gradient of every limit within reach, and of dead points that are not to be passed."""
-    slope, values, kept, k, excess = search.leg_eval.slope, search.leg_eval.values, search.kept, 0, -math.inf
-    near, halves = search.near[0], search.half_angles
+def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced: FreeMotions) -> None:
+    """Fill excess and gradient of every limit within reach, and of dead points that are not to be passed."""
+    slope, values, kept_sides, k, excess = (
+        search.leg_eval.slope,
+        search.leg_eval.values,
+        search.kept_sides,
+        0,
+        -math.inf,
+    )
+    near, half_angles = search.near[0], search.half_angles
     cosine, sine = math.cos(near), math.sin(near)
     for i in range(table.limited.shape[0]):
         limited = table.limited[i]
@@ -73,21 +86,24 @@ def linearise_limits(table: Table, margin: float, search: Search, reduced: FreeM
             for j in range(slope.shape[0]):
                 slope[j] = -slope[j]
             k = add_limit(k, below, 2 * i, search.leg_eval.slope, reduced)
-    for i in range(halves.shape[0]):
+    for i in range(half_angles.shape[0]):
         cone = table.cones[i]
         line = vec(values[cone["leg"], cone["place"] :])
-        if halves[i, 0] <= near or dot(vec(cone["axis"]), line) <= halves[i, 1] * cosine + halves[i, 2] * sine:
+        if (
+            half_angles[i, 0] <= near
+            or dot(vec(cone["axis"]), line) <= half_angles[i, 1] * cosine + half_angles[i, 2] * sine
+        ):
             over = cone_slope(table, cone, search.leg_eval) - cone["half_angle"] + margin
             excess = max(excess, over)
             k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.leg_eval.slope, reduced)
-    first = 2 * table.limited.shape[0] + table.cones.shape[0]
-    for leg in range(kept.shape[0]):
-        if kept[leg] != 0.0:
-            over = kept[leg] * dead_point_slope(table, leg, search.leg_eval)
+    offset = 2 * table.limited.shape[0] + table.cones.shape[0]
+    for leg in range(kept_sides.shape[0]):
+        if kept_sides[leg] != 0.0:
+            over = kept_sides[leg] * dead_point_slope(table, leg, search.leg_eval)
             if over > -near:
                 excess = max(excess, over)
                 for j in range(slope.shape[0]):
-                    slope[j] *= kept[leg]
-                k = add_limit(k, over, first + leg, search.leg_eval.slope, reduced)
+                    slope[j] *= kept_sides[leg]
+                k = add_limit(k, over, offset + leg, search.leg_eval.slope, reduced)
     reduced.linear.totals[0]["limits"] = k
     reduced.linear.totals[0]["excess"] = excess

@@ -1,4 +1,4 @@
-"""Rows of targets answered by the nearest feasible configurations that descents from several starts find."""
+"""The nearest feasible pose of each target, by a multistart of descents."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
-from ..holding import balance
+from ..holding import limit_multipliers
 from ..legs.answer import deviation, excess_of
-from ..legs.poses import make_exact
+from ..legs.poses import orthonormalise
 from ..legs.records import REDUNDANT, Table
 from ..legs.table import SAMPLE, open_table
 from ..qp import QP, new_qp
@@ -35,51 +35,49 @@ from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global
 from .descend import descend
-from .equations import PlatformState, has_proximal, new_platform_state, place
+from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
 from .linearise import linearise
-from .records import SETTINGS, Along, Found, Plan, PlatformObjective, Starts
-from .search import Search, copy_platform_state, fix, new_search
-from .starts import begin, load_target, nearest_start, put_held, put_sides, take_along, way_along
+from .records import SETTINGS, Along, Plan, PlatformObjective, PoseSolutions, Starts
+from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch
+from .starts import load_start, load_target, nearest_start, place_held, put_sides, take_along, way_along
 
 LARGEST_NUMBER = 1.7976931348623157e308
-"""Distances are finite, however far a target is."""
+"""Upper bound of position errors: finite, however far the target."""
 
 HOLDABLE = 1e-3
-"""How near a search for what is held must come for its end to be tried with it held [L or rad]."""
+"""Largest phase 1 distance from which a search with the held part held is started [L or rad]."""
 
-SAME = 1e-7
-"""Share by which a later start must come nearer to be preferred to an earlier one."""
+SAME_DISTANCE = 1e-7
+"""Relative difference of distances below which two searches agree."""
 
 TALLY = np.dtype(
     [
-        ("least", "f8"),  # distance met [L]
-        ("agreements", "f8"),  # how often it was; infinite where none is nearer
-        ("disagreements", "f8"),  # how often a search ended farther away
-        ("is_unbroken", "i8"),  # 1 where a search was not lost on its way
+        ("least", "f8"),  # least distance [L]
+        ("agreements", "f8"),  # searches that ended there; infinite if certified the nearest
+        ("disagreements", "f8"),  # searches that ended farther away
+        ("is_unbroken", "i8"),  # 1 if some search needed no second descent with restoration
     ]
 )
-"""Where searches for a row have ended."""
+"""Agreement counts of the searches for a row."""
 
 
 class NearestScratch(NamedTuple):
     """Scratch memory of one thread."""
 
-    search: Search
+    search: SearchScratch
     best: PlatformState
     best_tally: Records  # (1,): TALLY
-    phase1_tally: Records  # (1,): TALLY of searches that did not come to what is held
-    distances_to_held: (
-        Floats  # (1 + starts,): how far the first start, and each other, is from that; infinite where one is not lost
-    )
-    held: Floats  # (6,): what is held, alone, as the weights of an objective
-    p: QP  # to weigh limits
-    pulls: Floats  # (limits, n)
+    phase1_tally: Records  # (1,): TALLY of phase 1 searches that ended away from the held part
+    distances_to_held: Floats  # (1 + seeds,): of starts whose search was infeasible, to the held part; else infinite
+    held: Floats  # (6,): weights of the phase 1 objective, 1 for held components
+    p: QP  # for the multipliers of limits
+    natural_gradients: Floats  # (limits, n): inverse metric times the gradients of active limits
 
 
 def new_nearest_scratch(table: Table, plan: Plan) -> NearestScratch:
-    """Scratch memory of one thread."""
+    """Allocate the scratch memory of one thread."""
     setting, starts = plan.settings[0], plan.poses.shape[0]
-    search, best = new_search(table, setting["cones"]), new_platform_state(table.legs.shape[0])
+    search, best = new_search_scratch(table, setting["cones"]), new_platform_state(table.legs.shape[0])
     k, n = search.first.linear.G.shape
     k, n = (k, n) if setting["steps"] == 0 else (0, 0)
     tallies = np.zeros(1, TALLY), np.zeros(1, TALLY)
@@ -91,36 +89,45 @@ def new_nearest_scratch(table: Table, plan: Plan) -> NearestScratch:
 _STAYS = Along(np.zeros((3, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
 _PLAN = Plan(np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), _STAYS)
 open_plan, open_scratch = opener(_PLAN), opener(new_nearest_scratch(SAMPLE, _PLAN))
-"""What `nearest_pose` is asked, and its scratch memory: it is given the addresses of their handles."""
+"""The plan and scratch memory of `nearest_pose` at the addresses of their handles."""
 
 
 @routine
-def write(table: Table, row: int, objective: PoseObjective, search: Search, best: PlatformState, found: Found) -> None:
-    """Write a configuration, and what is measured of it."""
-    leg_eval, task, own = search.leg_eval, table.task[0], objective.targets[row]
-    pose, measures, length = found.poses[row], found.measures[row], task["length"]
-    make_exact(best.pose)
-    measures[RESIDUAL] = place(table, best, leg_eval) * length
+def write_solution(
+    table: Table,
+    row: int,
+    objective: PoseObjective,
+    search: SearchScratch,
+    best: PlatformState,
+    solutions: PoseSolutions,
+) -> None:
+    """Write a configuration and its measures."""
+    leg_eval, task, target = search.leg_eval, table.task[0], objective.targets[row]
+    pose, measures, length = solutions.poses[row], solutions.measures[row], task["length"]
+    orthonormalise(best.pose)
+    measures[RESIDUAL] = evaluate_legs(table, best, leg_eval) * length
     measures[LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, leg_eval.values), 0.0)
-    copy_row(best.q, found.q[row])
-    copy_row(best.sides, found.sides[row])
+    copy_row(best.q, solutions.q[row])
+    copy_row(best.sides, solutions.sides[row])
     for i in range(table.driven.shape[0]):
         driven = table.driven[i]
-        found.actuators[row, driven["column"]] = driven["home"] + deviation(driven, leg_eval.values) * driven["unit"]
+        solutions.actuators[row, driven["column"]] = (
+            driven["home"] + deviation(driven, leg_eval.values) * driven["unit"]
+        )
     copy_table(best.pose, pose)
-    phase1_tally = 0.0
+    distance = 0.0
     for i in range(3):
         pose[i, 3] *= length
         pose[3, i] = 0.0
-        phase1_tally = math.hypot(phase1_tally, pose[i, 3] - own[i, 3] if task["axes"][i] == 1 else 0.0)
+        distance = math.hypot(distance, pose[i, 3] - target[i, 3] if task["axes"][i] == 1 else 0.0)
     pose[3, 3] = 1.0
-    measures[POSITION_ERROR] = min(phase1_tally, LARGEST_NUMBER)
+    measures[POSITION_ERROR] = min(distance, LARGEST_NUMBER)
     measures[ROTATION_ERROR] = turned_by(task["rotations"], best.pose, search)
 
 
 @routine
-def turned_by(rotations: int, pose: Floats, search: Search) -> float:
-    """The angle by which a pose is turned from the target, in what counts."""
+def turned_by(rotations: int, pose: Floats, search: SearchScratch) -> float:
+    """Angle of a pose from the target, in the rotations that the task sets [rad]."""
     if rotations == 3:
         difference(pose, search.target, search.gradient.turn)
         return norm(vec(search.gradient.turn))
@@ -132,58 +139,58 @@ def turned_by(rotations: int, pose: Floats, search: Search) -> float:
 
 @routine
 def holds_all(objective: PoseObjective) -> bool:
-    """Whether the whole pose is held."""
-    free = 0
+    """True if the whole pose is held."""
+    n_free = 0
     for i in range(6):
-        free += 0 if objective.platform[i] == LOCKED else 1
-    return objective.frame == BASE_AXES and free == 0
+        n_free += 0 if objective.platform[i] == LOCKED else 1
+    return objective.frame == BASE_AXES and n_free == 0
 
 
 @routine
-def is_other_mode(legs: Records, first: Floats, sides: Floats) -> bool:
-    """Whether some leg takes its other solution."""
+def is_other_mode(legs: Records, own_sides: Floats, sides: Floats) -> bool:
+    """True if some leg takes its other side."""
     for k in range(sides.shape[0]):
-        if (legs[k]["kind"] != REDUNDANT or legs[k]["orients"] == 1) and first[k] * sides[k] < 0.0:
+        if (legs[k]["kind"] != REDUNDANT or legs[k]["orients"] == 1) and own_sides[k] * sides[k] < 0.0:
             return True
     return False
 
 
 @routine
 def holds_some(table: Table, objective: PlatformObjective, weights: Floats) -> bool:
-    """Whether some of what a target sets is to be held; what is held, alone, as the weights (6,) of an objective."""
-    held, turns = 0, table.task[0]["rotations"] > 0
+    """True if part of the target is held; fills the weights (6,) of the phase 1 objective."""
+    n_held, turns = 0, table.task[0]["rotations"] > 0
     for i in range(6):
         is_held = objective.pose.platform[i] == LOCKED and (i < 3 or turns)
         weights[i] = 1.0 if is_held else 0.0
-        held += 1 if is_held else 0
-    return held > 0 and objective.values.shape[0] == 0
+        n_held += 1 if is_held else 0
+    return n_held > 0 and objective.values.shape[0] == 0
 
 
 @routine
-def clear(tally: Record) -> None:
-    """Begin a tally."""
+def clear_tally(tally: Record) -> None:
+    """Reset a tally."""
     tally["least"], tally["agreements"], tally["disagreements"], tally["is_unbroken"] = math.inf, 0.0, 0.0, 0
 
 
 @routine
-def count_ending(distance: float, tally: Record, search: Search, best: PlatformState) -> None:
-    """Take over where a search has ended if it is nearer, and count it."""
+def count_ending(distance: float, tally: Record, search: SearchScratch, best: PlatformState) -> None:
+    """Count the end of a search in a tally, and keep its configuration in `best` if it is nearer."""
     least = tally["least"]
-    if distance < (1.0 - SAME) * least:
+    if distance < (1.0 - SAME_DISTANCE) * least:
         tally["disagreements"] += tally["agreements"]
         tally["least"], tally["agreements"] = distance, 1.0
         copy_platform_state(search.best, best)
-        for k in range(search.holding.shape[0]):
-            search.holding[k] = search.pulled[k]
-    elif distance <= (1.0 + SAME) * least and least < math.inf:
+        for k in range(search.blocking.shape[0]):
+            search.blocking[k] = search.involved[k]
+    elif distance <= (1.0 + SAME_DISTANCE) * least and least < math.inf:
         tally["agreements"] += 1.0
     else:
         tally["disagreements"] += 1.0
 
 
 @routine
-def is_enough(tally: Record, agreements: int) -> bool:
-    """Whether searches agree often enough: as often as asked for, and once more for each that ended elsewhere."""
+def is_agreed(tally: Record, agreements: int) -> bool:
+    """True if enough searches agree: as many as asked for, plus one for each that ended elsewhere."""
     return bool(tally["agreements"] >= agreements + tally["disagreements"])
 
 
@@ -194,15 +201,15 @@ def search_from(
     objective: PlatformObjective,
     sides: Floats,
     stays: int,
-    search: Search,
+    search: SearchScratch,
     best: PlatformState,
     best_tally: Record,
 ) -> bool:
-    """Search from where `search.best` is, and take it over if it is nearer; whether it is lost.
+    """Descend from `search.best` and count the end, as of `count_ending`; True if no feasible configuration was found.
 
     Parameters
     ----------
-    sides : of the working mode that is to be kept, if one is.
+    sides : of the working mode to be kept, if `stays` is 1.
     """
     distance = descend(table, row, objective, best_tally["least"], best, search)
     is_infeasible = distance == math.inf and (best_tally["least"] == math.inf or search.control[0]["steps"] == 0)
@@ -226,19 +233,19 @@ def search_row(
     row: int,
     objective: PlatformObjective,
     phase1_objective: PlatformObjective,
-    own: Starts,
-    others: Starts,
+    starts: Starts,
+    seeds: Starts,
     along: Along,
     agreements: int,
     stays: int,
     scratch: NearestScratch,
 ) -> float:
-    """The nearest configuration of a row, into `scratch.best`, and how far it is [L]; see `nearest_pose`.
+    """The nearest configuration of a row, into `scratch.best`, and its distance [L].
 
-    What is held is put in its place at once where searches may start anywhere, and no arms would be left behind, or
-    nothing else has a place; and else brought there step by step. The other way too, where that finds nothing, or only
-    after it was lost on the way. Where too few agree, searches from starts that were lost go for what is held alone,
-    and then on with it held: from a feasible configuration there are more ways to it than the shortest.
+    The held part is put in place at once if it is the whole pose, or if there are seeds and no implicit joints;
+    otherwise descents bring it there. The other of the two ways is tried last, if the first finds nothing or needed
+    restoration. If too few searches agree, starts that were infeasible are searched in two phases: phase 1 for the held
+    part alone, then a search with it held.
     """
     search, best, best_tally, phase1_tally, distances_to_held = (
         scratch.search,
@@ -247,52 +254,56 @@ def search_row(
         scratch.phase1_tally[0],
         scratch.distances_to_held,
     )
-    target, n = search.target, others.poses.shape[0]
-    near, by = -1, way_along(table, objective.pose, target, along)
-    first, kept = row if own.poses.shape[0] > 1 else 0, search.kept
-    sides = own.sides[first]
-    for k in range(kept.shape[0]):
-        kept[k] = sides[k] if stays == 1 and has_proximal(table.legs[k]) else 0.0
-    at_once = holds_all(objective.pose) or (n > 0 and table.task[0]["implicit"] == 0)
-    clear(best_tally)
-    clear(phase1_tally)
-    for i in range(n + 1):
+    target, n_seeds = search.target, seeds.poses.shape[0]
+    nearest_seed, by = -1, way_along(table, objective.pose, target, along)
+    own_start, kept_sides = row if starts.poses.shape[0] > 1 else 0, search.kept_sides
+    sides = starts.sides[own_start]
+    for k in range(kept_sides.shape[0]):
+        kept_sides[k] = sides[k] if stays == 1 and has_proximal(table.legs[k]) else 0.0
+    is_placed_first = holds_all(objective.pose) or (n_seeds > 0 and table.task[0]["implicit"] == 0)
+    clear_tally(best_tally)
+    clear_tally(phase1_tally)
+    for i in range(n_seeds + 1):
         distances_to_held[i] = math.inf
-    for start in range(n + 2):
-        if is_enough(best_tally, agreements) or (start == n + 1 and best_tally["is_unbroken"] == 1):
+    for start in range(n_seeds + 2):
+        if is_agreed(best_tally, agreements) or (start == n_seeds + 1 and best_tally["is_unbroken"] == 1):
             break
-        near = nearest_start(objective.pose, by, others, search) if start == 1 else near
-        place = -1 if start == 0 or start == n + 1 else near if start == 1 else start - 2 + int(start - 2 >= near)
-        begin(table, own if place < 0 else others, first if place < 0 else place, search)
-        if place >= 0:
+        nearest_seed = nearest_start(objective.pose, by, seeds, search) if start == 1 else nearest_seed
+        seed = -1
+        if 0 < start <= n_seeds:
+            seed = nearest_seed if start == 1 else start - 2 + int(start - 2 >= nearest_seed)
+        load_start(table, starts if seed < 0 else seeds, own_start if seed < 0 else seed, search)
+        if seed >= 0:
             take_along(by, along, search.best)
         if stays == 1 and is_other_mode(table.legs, sides, search.best.sides):
             continue
-        in_place = (start <= n) == at_once
-        fix(objective.pose, in_place, search)
-        if in_place:
-            put_held(table, objective.pose, target, search.leg_eval, search.best)
+        is_in_place = (start <= n_seeds) == is_placed_first
+        fix_held(objective.pose, is_in_place, search)
+        if is_in_place:
+            place_held(table, objective.pose, target, search.leg_eval, search.best)
         if (
             search_from(table, row, objective, sides, stays, search, best, best_tally)
             and phase1_objective.pose.max_iterations > 0
         ):
             search.gradient.unit[0] = 1.0
-            begun = own.poses[first] if place < 0 else others.poses[place]
-            distances_to_held[place + 1], _ = pose_gradient(phase1_objective.pose, target, begun, search.gradient, True)
-    fix(phase1_objective.pose, False, search)
+            start_pose = starts.poses[own_start] if seed < 0 else seeds.poses[seed]
+            distances_to_held[seed + 1], _ = pose_gradient(
+                phase1_objective.pose, target, start_pose, search.gradient, True
+            )
+    fix_held(phase1_objective.pose, False, search)
     while (
         phase1_objective.pose.max_iterations > 0
-        and not is_enough(best_tally, agreements)
-        and (best_tally["least"] < math.inf or not is_enough(phase1_tally, agreements))
+        and not is_agreed(best_tally, agreements)
+        and (best_tally["least"] < math.inf or not is_agreed(phase1_tally, agreements))
     ):
-        place = -1
-        for i in range(n):
-            place = i if distances_to_held[i + 1] < distances_to_held[place + 1] else place
-        if distances_to_held[place + 1] == math.inf:
+        seed = -1
+        for i in range(n_seeds):
+            seed = i if distances_to_held[i + 1] < distances_to_held[seed + 1] else seed
+        if distances_to_held[seed + 1] == math.inf:
             break
-        distances_to_held[place + 1] = math.inf
-        begin(table, own if place < 0 else others, first if place < 0 else place, search)
-        if place >= 0:
+        distances_to_held[seed + 1] = math.inf
+        load_start(table, starts if seed < 0 else seeds, own_start if seed < 0 else seed, search)
+        if seed >= 0:
             take_along(by, along, search.best)
         distance = descend(
             table,
@@ -311,35 +322,37 @@ def search_row(
 
 
 @routine
-def judge(own: Record, row: int, found: Found) -> None:
-    """Tell whether what counts is REACHED, and what of the target an answer has of what it was to hold, by how far it
-    is: targets out of sight were not sought."""
-    position, rotation = found.measures[row, POSITION_ERROR], found.measures[row, ROTATION_ERROR]
-    is_there = position <= own["position"] and rotation <= own["rotation"]
-    is_held = position <= own["held_position"] and rotation <= own["held_rotation"]
-    found.status[row] = REACHED if is_there else PROJECTED
-    found.counters[row, HOLD] = own["hold"] if is_held else HOLD_NOTHING
+def set_status(setting: Record, row: int, solutions: PoseSolutions) -> None:
+    """Set the status of a row; record whether the held part is met within tolerance.
+
+    Both go by the measured errors, for targets beyond sight are brought nearer before the search.
+    """
+    position, rotation = solutions.measures[row, POSITION_ERROR], solutions.measures[row, ROTATION_ERROR]
+    is_reached = position <= setting["position"] and rotation <= setting["rotation"]
+    is_held = position <= setting["held_position"] and rotation <= setting["held_rotation"]
+    solutions.status[row] = REACHED if is_reached else PROJECTED
+    solutions.counters[row, HOLD] = setting["hold"] if is_held else HOLD_NOTHING
 
 
 @routine
-def weigh(
-    table: Table, row: int, objective: PlatformObjective, own: Starts, scratch: NearestScratch, weights: Floats
+def put_limit_multipliers(
+    table: Table, row: int, objective: PlatformObjective, starts: Starts, scratch: NearestScratch, weights: Floats
 ) -> None:
-    """Fill how hard every limit holds a row back where it starts, see `nearest_pose`."""
+    """Fill the multipliers of all limits where a row starts, as of `nearest_pose`."""
     search, linear = scratch.search, scratch.search.first.linear
-    begin(table, own, row, search)
-    fix(objective.pose, True, search)
+    load_start(table, starts, row, search)
+    fix_held(objective.pose, True, search)
     search.gradient.unit[0] = 1.0
     linearise(table, row, objective, search.best, search, search.first)
     scale_objective(linear)
-    for c in range(balance(linear, objective.pose.near, scratch.p, scratch.pulls)):
+    for c in range(limit_multipliers(linear, objective.pose.near, scratch.p, scratch.natural_gradients)):
         weights[linear.which[c]] = scratch.p.x[c]
 
 
 @search
 def nearest_pose(
     machine: int,
-    plan: int,
+    plan_address: int,
     scratch_address: int,
     targets: Floats,
     values: Floats,
@@ -358,33 +371,32 @@ def nearest_pose(
 ) -> int:
     """Fill the nearest feasible configuration of every row.
 
-    With no steps to take, fill `weights` instead, (n, 2 ranges + cones + legs): how hard every limit holds each row
-    back where it starts, as of `closure.descend.nearest_pose`.
+    With no steps to take, fill `weights` instead, (n, 2 ranges + cones + legs): the multipliers of the limits where
+    each row starts, as in `closure.descend.nearest_configuration`.
 
     Parameters
     ----------
-    machine : see `open_table`.
-    plan : the address of a `Plan`.
-    scratch : that of `NearestScratch`, made for both.
-    targets, values : see `PlatformObjective`.
-    begins, q, sides : the first start of each row, or one for all, as of `Starts`; the others follow until the nearest
-        configuration has been met often enough: `is_enough`.
-    distances, ends, ends_q, ends_sides, counters, actuators, measures, status : `Found`.
+    machine, plan_address : addresses of the kernel table and of `Plan`.
+    scratch_address : that of `NearestScratch`, allocated for both.
+    targets, values : as in `PlatformObjective`.
+    begins, q, sides : the own start of each row, or one for all, as in `Starts`; the seeds of the plan follow until
+        enough searches agree, as in `is_agreed`.
+    distances, ends, ends_q, ends_sides, counters, actuators, measures, status : as in `PoseSolutions`.
 
     Returns
     -------
-    How many rows have no answer.
+    The number of rows without a solution.
     """
-    table, asked = open_table(machine), open_plan(plan)
-    setting, own, left = asked.settings[0], Starts(begins, q, sides), 0
-    others, found = (
-        Starts(asked.poses, asked.q, asked.sides),
-        Found(distances, ends, ends_q, ends_sides, counters, actuators, measures, status),
+    table, plan = open_table(machine), open_plan(plan_address)
+    setting, starts, n_unsolved = plan.settings[0], Starts(begins, q, sides), 0
+    seeds, solutions = (
+        Starts(plan.poses, plan.q, plan.sides),
+        PoseSolutions(distances, ends, ends_q, ends_sides, counters, actuators, measures, status),
     )
-    along, scratch = asked.along, open_scratch(scratch_address)
+    scratch = open_scratch(scratch_address)
     search, best, held = scratch.search, scratch.best, scratch.held
-    frame, margin, near, weighs = setting["frame"], setting["margin"], setting["near"], setting["steps"] == 0
-    pose = PoseObjective(targets, asked.weights, frame, margin, near, setting["steps"])
+    frame, margin, near, weighs_limits = setting["frame"], setting["margin"], setting["near"], setting["steps"] == 0
+    pose = PoseObjective(targets, plan.weights, frame, margin, near, setting["steps"])
     objective = PlatformObjective(pose, values, setting["implied"])
     steps = setting["steps"] if holds_some(table, objective, held) else 0
     phase1_objective = PlatformObjective(
@@ -393,19 +405,19 @@ def nearest_pose(
     for row in range(distances.shape[0]):
         distances[row] = math.inf
         if not load_target(table, pose, row, search):
-            left += 1
+            n_unsolved += 1
             continue
-        if weighs:
-            weigh(table, row, objective, own, scratch, weights[row])
+        if weighs_limits:
+            put_limit_multipliers(table, row, objective, starts, scratch, weights[row])
             continue
         least = search_row(
             table,
             row,
             objective,
             phase1_objective,
-            own,
-            others,
-            along,
+            starts,
+            seeds,
+            plan.along,
             setting["agreements"],
             setting["stays"],
             scratch,
@@ -413,9 +425,9 @@ def nearest_pose(
         distances[row] = least
         if least < math.inf:
             counters[row, ITERATIONS] = search.control[0]["steps"]
-            write(table, row, pose, search, best, found)
-            judge(setting, row, found)
+            write_solution(table, row, pose, search, best, solutions)
+            set_status(setting, row, solutions)
             counters[row, HOLD] += CERTAIN if scratch.best_tally[0]["agreements"] == math.inf else 0
         else:
-            left += 1
-    return left
+            n_unsolved += 1
+    return n_unsolved

@@ -1,4 +1,4 @@
-"""What the kernels in the platform's pose are given and what they fill; lengths in L, angles in radians."""
+"""Inputs and results of the kernels in the platform's pose; lengths in L, angles in radians."""
 
 from __future__ import annotations
 
@@ -11,48 +11,49 @@ from ...arrays import Floats, Ints, Mask, Records
 from ..closure.loops import PoseObjective
 
 STRETCHED = 1e-4
-"""Difference of a carrier's two solutions below which it is at a dead point, and its side is the start's [L or rad]."""
+"""Difference of the two solutions of a proximal joint below which it is at a dead point, and keeps its side [L or rad].
+"""
 
 
 class PlatformObjective(NamedTuple):
-    """What is to come near: the pose of the platform, or the values of actuators."""
+    """Objective of a search: the pose of the platform, or the values of actuators."""
 
     pose: PoseObjective  # its targets in [length]
-    values: Floats  # (n, n_a): deviations from home [L or rad] that `driven` are to have; no rows if that is no aim
-    implied: int  # how many of the legs' equations follow from the others
+    values: Floats  # (n, n_a): wished deviations of the actuators from home [L or rad]; no rows if not wished
+    implied: int  # number of leg equations that follow from the others
 
 
 class Starts(NamedTuple):
-    """Configurations that searches start from: poses [L], coordinates of carriers and sides, as of `PlatformState`."""
+    """Configurations that searches start from: poses [L], coordinates and sides, as in `PlatformState`."""
 
     poses: Floats  # (s, 4, 4)
-    q: Floats  # (s, legs); no rows where they are what poses and sides tell
+    q: Floats  # (s, legs); no rows if they follow from poses and sides
     sides: Floats  # (s, legs)
 
     def at(self, places: NDArray[np.intp] | Mask | slice) -> Starts:
-        """Those at some places."""
+        """The starts at some indices."""
         return Starts(self.poses[places], self.q[places] if len(self.q) else self.q, self.sides[places])
 
     def of(self, rows: NDArray[np.intp] | Mask | slice) -> Starts:
-        """Those of some rows, if there is one for each; else the one for all."""
+        """The starts of some rows; the common start if there is only one."""
         return self if len(self.poses) == 1 else self.at(rows)
 
 
 SETTINGS = np.dtype(
     [
-        ("frame", "i8"),  # as of `PoseObjective`
+        ("frame", "i8"),  # as in `PoseObjective`
         ("margin", "f8"),
         ("near", "f8"),
-        ("steps", "i8"),  # of a search at most; 0 to weigh limits alone
-        ("implied", "i8"),  # as of `PlatformObjective`
-        ("agreements", "i8"),  # how often the nearest configuration is to be met: see `is_enough`
-        ("stays", "i8"),  # 1 for configurations in the working mode of a row's first start alone
-        ("cones", "i8"),  # how many of the cones searches mind, the first ones; excesses over all of them are told
-        ("position", "f8"),  # what is REACHED [length]
-        ("rotation", "f8"),  # likewise [rad]
-        ("hold", "i8"),  # what of the target is held
-        ("held_position", "f8"),  # how far off it has it all the same [length]
-        ("held_rotation", "f8"),  # likewise [rad]
+        ("steps", "i8"),  # most steps of a search; 0 to compute the multipliers of limits only
+        ("implied", "i8"),  # as in `PlatformObjective`
+        ("agreements", "i8"),  # agreements that end a multistart, as counted by `is_agreed`
+        ("stays", "i8"),  # 1 to keep the working mode of a row's own start
+        ("cones", "i8"),  # number of cones that searches constrain, the first ones; the excess is that of all cones
+        ("position", "f8"),  # tolerance of REACHED [length]
+        ("rotation", "f8"),  # tolerance of REACHED [rad]
+        ("hold", "i8"),  # held part of the target: HOLD_...
+        ("held_position", "f8"),  # tolerance of the held part [length]
+        ("held_rotation", "f8"),  # tolerance of the held part [rad]
     ]
 )
 
@@ -66,33 +67,33 @@ class Along(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What searches are to bring near, and how, whatever the rows."""
+    """Objective weights, settings and seeds of searches, common to all rows."""
 
-    weights: Floats  # (6,): of the pose, as of `PoseObjective`
+    weights: Floats  # (6,): of the pose, as in `PoseObjective`
     settings: Records  # (1,): SETTINGS
-    poses: Floats  # starts that follow a row's own, for any row, as of `Starts`
+    poses: Floats  # seeds after a row's own start, for any row, as in `Starts`
     q: Floats
     sides: Floats
     along: Along
 
 
-class Found(NamedTuple):
-    """Where the searches of each row ended; of rows without an answer, distances alone are told."""
+class PoseSolutions(NamedTuple):
+    """Solutions of the searches of all rows; rows without a solution have a distance only."""
 
-    distances: Floats  # (n,) [L]; infinite where nothing feasible was found, and where the target is no pose
+    distances: Floats  # (n,) [L]; infinite if no feasible pose was found, or the target is no pose
     poses: Floats  # (n, 4, 4) [length]
     q: Floats  # (n, legs)
     sides: Floats  # (n, legs)
-    counters: Ints  # (n, N_COUNTERS): steps and what is held, as of `Rows`
+    counters: Ints  # (n, N_COUNTERS): steps and the held part, as in `Rows`
     actuators: Floats  # (n, n_a)
     measures: Floats  # (n, 5): distances from the target [length, rad], the largest equation [length], limit excess
     status: Ints  # (n,): REACHED or PROJECTED
 
-    def at(self, places: NDArray[np.intp] | Mask | slice) -> Found:
-        """Those of some rows."""
-        return Found._make(array[places] for array in self)
+    def at(self, places: NDArray[np.intp] | Mask | slice) -> PoseSolutions:
+        """The solutions of some rows."""
+        return PoseSolutions._make(array[places] for array in self)
 
-    def put(self, places: NDArray[np.intp] | Mask, others: Found) -> None:
-        """Write others at some places."""
-        for array, own in zip(self, others, strict=True):
-            array[places] = own
+    def put(self, places: NDArray[np.intp] | Mask, solutions: PoseSolutions) -> None:
+        """Write other solutions into some rows."""
+        for array, block in zip(self, solutions, strict=True):
+            array[places] = block

@@ -1,7 +1,6 @@
-"""Legs that, with all actuators at their values, are points of the platform on spheres, as those of most machines are.
+"""Legs that, with all actuators given, keep points of the platform on spheres, as those of most machines do.
 
-Nothing but these points and spheres enters the equations then: |R h + p - f| = l, with h in the platform, and f and l
-what actuators make them.
+The equations are then |R h + p - f| = l, with h in the platform, and the centres f and radii l set by the actuators.
 """
 
 from __future__ import annotations
@@ -18,22 +17,22 @@ from ..legs.frames import AXES, place_redundant, set_frames
 from ..legs.records import COSINE, FROM_BASE, HINGE, IDLE, NO_PROXIMAL, Q_PROXIMAL, REDUNDANT, ROD, SINE, SLIDE, Table
 from ..legs.rods import base_end_of
 from ..vectors import add, cross, dot, put, scale, sub, turn, vec
-from .equations import LegEvaluation, PlatformState, has_proximal, main_of
+from .equations import LegEvaluation, PlatformState, has_proximal, owner_of
 
 
 class Spheres(NamedTuple):
-    """One for each equation."""
+    """Spheres of the equations, one each."""
 
-    legs: Ints  # (e,): the rod that is its radius
-    drivers: Ints  # (e,): the actuator that makes the rod longer; -1 if none does
+    legs: Ints  # (e,): the rod along the radius
+    drivers: Ints  # (e,): the actuator that changes the radius; -1 if none
     platform_ends: Floats  # (e, 3): points of the platform
     base_ends: Floats  # (e, 3): centres
     lengths: Floats  # (e,): radii
 
 
 def new_spheres(table: Table) -> Spheres:
-    """Room for them; none where equations are not all such."""
-    driven = {(each["leg"], each["place"]): i for i, each in enumerate(table.driven)}
+    """Allocate the spheres; none unless all equations are spheres."""
+    driven = {(actuator["leg"], actuator["place"]): i for i, actuator in enumerate(table.driven)}
     radii = [
         k for k, leg in enumerate(table.legs) if leg["kind"] == ROD and (leg["slides"] == 0 or (k, SLIDE) in driven)
     ]
@@ -44,10 +43,13 @@ def new_spheres(table: Table) -> Spheres:
 
 
 def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
-    """Whether legs leave the platform nothing but points at distances, and all that carries them is driven, on the
-    base."""
+    """True if all equations are spheres.
+
+    Legs are then rods without hinges or twist constraints, read from the base; their proximal and redundant joints are
+    actuated, and no other joints but slides.
+    """
     for k, leg in enumerate(table.legs):
-        is_loose = leg["proximal"] != NO_PROXIMAL and (main_of(table, k), Q_PROXIMAL) not in driven
+        is_loose = leg["proximal"] != NO_PROXIMAL and (owner_of(table, k), Q_PROXIMAL) not in driven
         turns = leg["kind"] != REDUNDANT and (
             leg["base_end"] == HINGE or leg["platform_end"] == HINGE or leg["twists"] == 1
         )
@@ -59,24 +61,27 @@ def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
         )
         if leg["kind"] != IDLE and (is_loose or turns or not is_read):
             return False
-    return all(place in (Q_PROXIMAL, SLIDE) for _, place in driven)
+    return all(entry in (Q_PROXIMAL, SLIDE) for _, entry in driven)
 
 
 @routine
 def set_spheres(table: Table, values: Floats, state: PlatformState, leg_eval: LegEvaluation, spheres: Spheres) -> None:
-    """Fill centres and radii where carriers and arms are, actuators at values (n_a,), deviations from home [L]."""
-    legs, own, q, frames, pose = table.legs, leg_eval.values, state.q, leg_eval.frames, state.pose
+    """Fill centres and radii at the state's proximal and redundant coordinates and the actuators' values.
+
+    Values (n_actuators,) are deviations from home [L or rad].
+    """
+    legs, leg_values, q, frames, pose = table.legs, leg_eval.values, state.q, leg_eval.frames, state.pose
     p = (pose[0, 3], pose[1, 3], pose[2, 3])
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         if legs[k]["kind"] == REDUNDANT:
-            place_redundant(legs[k], q[k], leg_eval.frames, own[k])
+            place_redundant(legs[k], q[k], leg_eval.frames, leg_values[k])
         elif has_proximal(legs[k]):
-            own[k, Q_PROXIMAL], own[k, COSINE], own[k, SINE] = q[k], math.cos(q[k]), math.sin(q[k])
+            leg_values[k, Q_PROXIMAL], leg_values[k, COSINE], leg_values[k, SINE] = q[k], math.cos(q[k]), math.sin(q[k])
     for e in range(spheres.legs.shape[0]):
         k, i = spheres.legs[e], spheres.drivers[e]
-        leg, main = legs[k], main_of(table, k)
-        base_end = base_end_of(leg, legs[main], own[main])
+        leg, owner = legs[k], owner_of(table, k)
+        base_end = base_end_of(leg, legs[owner], leg_values[owner])
         if leg["redundant"] >= 0:
             frame = frames[leg["frame"]]
             base_end = add(p, turn(frame[AXES:], sub(base_end, (frame[0, 3], frame[1, 3], frame[2, 3]))))
@@ -88,18 +93,17 @@ def set_spheres(table: Table, values: Floats, state: PlatformState, leg_eval: Le
 
 @routine
 def put_spheres(pose: Floats, spheres: Spheres, equations: Floats) -> float:
-    """Fill the equations (e, m + 1), right-hand side last, at a pose; the largest residual, infinite where one is
-    not a number."""
+    """Fill the equations (e, m + 1), right-hand side last, at a pose; the largest residual, infinite if not finite."""
     platform_ends, base_ends, lengths, worst = spheres.platform_ends, spheres.base_ends, spheres.lengths, 0.0
     p, m = (pose[0, 3], pose[1, 3], pose[2, 3]), equations.shape[1] - 1
     for e in range(lengths.shape[0]):
-        arm, own = turn(pose, vec(platform_ends[e])), equations[e]
-        x = sub(add(arm, p), vec(base_ends[e]))
+        lever, equation = turn(pose, vec(platform_ends[e])), equations[e]
+        x = sub(add(lever, p), vec(base_ends[e]))
         length = math.sqrt(dot(x, x))
         u, off = scale(1.0 / length, x), length - lengths[e]
-        put(own, u)
+        put(equation, u)
         if m > 3:
-            put(own[3:], cross(arm, u))
-        own[m] = -off
+            put(equation[3:], cross(lever, u))
+        equation[m] = -off
         worst = max(worst, abs(off)) if abs(off) < math.inf else math.inf
     return worst

@@ -1,4 +1,4 @@
-"""Where searches in the pose of the platform begin: targets read, platforms and carriers put in their places."""
+"""Starts of searches in the pose of the platform: targets, platforms and proximal joints put in place."""
 
 from __future__ import annotations
 
@@ -8,52 +8,52 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import pose_gradient
-from ..legs.frames import NOWHERE, orienting_coordinate, place_redundant, q_redundant_of, set_frames
-from ..legs.poses import bring_yaw, column, is_pose, make_exact, middle_of, turn_pose
+from ..legs.frames import ZERO, orienting_coordinate, place_redundant, q_redundant_of, set_frames
+from ..legs.poses import column, is_pose, middle_of, orthonormalise, set_yaw, turn_pose
 from ..legs.records import CRANK, Q_PROXIMAL, REDUNDANT, Table
 from ..legs.rods import solve_proximal
 from ..rotations import yaw_of
 from ..vectors import Vec, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec, wrap
-from .equations import LegEvaluation, PlatformState, branch_of_redundant, has_proximal
+from .equations import LegEvaluation, PlatformState, has_proximal, redundant_side
 from .records import STRETCHED, Along, Starts
-from .search import Search
+from .search import SearchScratch
 
 BENT = 1e-2
-"""How far rods that are stretched out are bent where a search starts [L or rad]."""
+"""Displacement of a proximal joint from its dead point where a search starts [L or rad]."""
 
 AROUND = 2.5
-"""Targets farther from home than this [L], along carriages that take a whole machine there, are searched for from
-other starts as nearer ones are: starts are as far apart as this, and where all are on one side of a target, all
-searches lead to it alike, and may agree on a pose that is not the nearest."""
+"""Distance from home beyond which seeds are taken along to a target [L], if carriages can displace the whole machine.
+Seeds are about as far apart; if all lie on one side of a target, their searches may agree on a pose that is not the
+nearest."""
 
 
 @routine
-def load_target(table: Table, objective: PoseObjective, row: int, search: Search) -> bool:
-    """Put the target of a row into `search.target`, near enough to be told from others there; False if it is no pose.
+def load_target(table: Table, objective: PoseObjective, row: int, search: SearchScratch) -> bool:
+    """Fill `search.target` with the target of a row, brought within range of sight; False if it is no pose.
 
-    Of a platform that cannot turn, and is not asked to, the rotation is home's.
+    For a platform that cannot turn and whose rotation is held, the rotation of the target is home's.
     """
-    own, target, task = objective.targets[row], search.target, table.task[0]
-    if not is_pose(own):
+    given, target, task = objective.targets[row], search.target, table.task[0]
+    if not is_pose(given):
         return False
-    most = 0.0
+    farthest = 0.0
     for i in range(3):
-        most = max(most, abs(own[i, 3] / task["length"] - task["reference"][i]))
+        farthest = max(farthest, abs(given[i, 3] / task["length"] - task["reference"][i]))
         for j in range(3):
-            target[i, j] = own[i, j]
+            target[i, j] = given[i, j]
     if task["rotations"] == 0 and objective.platform[3] == LOCKED:
         for i in range(9):
             target[i // 3, i % 3] = 1.0 if i % 4 == 0 else 0.0
     for i in range(3):
         home = task["reference"][i]
-        target[i, 3] = home + (own[i, 3] / task["length"] - home) * min(1.0, SIGHT / max(most, SIGHT))
-    make_exact(target)
+        target[i, 3] = home + (given[i, 3] / task["length"] - home) * min(1.0, SIGHT / max(farthest, SIGHT))
+    orthonormalise(target)
     return True
 
 
 @routine
-def begin(table: Table, starts: Starts, start: int, search: Search) -> None:
-    """Put a start into `search.best`."""
+def load_start(table: Table, starts: Starts, start: int, search: SearchScratch) -> None:
+    """Fill `search.best` with a start."""
     copy_table(starts.poses[start], search.best.pose)
     copy_row(starts.sides[start], search.best.sides)
     if starts.q.shape[0] > 0:
@@ -64,7 +64,7 @@ def begin(table: Table, starts: Starts, start: int, search: Search) -> None:
 
 @routine
 def way_along(table: Table, objective: PoseObjective, target: Floats, along: Along) -> Vec:
-    """By how much other starts are to be taken along for a target."""
+    """The displacement by which seeds are taken along for a target [L]."""
     home = table.task[0]["reference"]
     off = (
         target[0, 3] - home[0] if objective.platform[0] != 0.0 else 0.0,
@@ -77,7 +77,7 @@ def way_along(table: Table, objective: PoseObjective, target: Floats, along: Alo
 
 @routine
 def take_along(by: Vec, along: Along, state: PlatformState) -> None:
-    """Take a configuration along, as far as the ranges of carriages let it."""
+    """Displace a configuration and its carriages, as far as the ranges of these allow."""
     pose, q, share = state.pose, state.q, 1.0
     for k in range(q.shape[0]):
         step = dot(vec(along.rates[k]), by)
@@ -92,35 +92,39 @@ def take_along(by: Vec, along: Along, state: PlatformState) -> None:
 
 @routine
 def place_proximal(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> None:
-    """Put carriers and arms where the pose and the sides have them.
+    """Put proximal and redundant joints where the pose and the sides have them.
 
-    Rods that are stretched out over what carries them are bent a little to their sides: stretched out, nothing says to
-    first order that they could bend, and a search would stay there.
+    Joints at dead points are displaced a little to their sides: at a dead point the gradient does not show that they
+    can move, and a search would stay there.
     """
     q, sides = state.q, state.sides
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
-        leg, own = table.legs[k], leg_eval.values[k]
+        leg, values = table.legs[k], leg_eval.values[k]
         q[k] = q_redundant_of(table.legs, k, sides) if leg["kind"] == REDUNDANT else 0.0
         if leg["orients"] == 1:
             q[k], _ = orienting_coordinate(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], sides[k])
         if leg["kind"] == REDUNDANT:
-            place_redundant(leg, q[k], leg_eval.frames, own)
+            place_redundant(leg, q[k], leg_eval.frames, values)
         if has_proximal(leg):
             platform_end = move(leg_eval.frames[leg["frame"]], vec(leg["platform_end_point"]))
-            solve_proximal(leg, platform_end, -sides[k], own)
-            other = own[Q_PROXIMAL]
-            solve_proximal(leg, platform_end, sides[k], own)
-            q[k] = own[Q_PROXIMAL] if abs(own[Q_PROXIMAL] - other) >= STRETCHED else own[Q_PROXIMAL] + BENT * sides[k]
+            solve_proximal(leg, platform_end, -sides[k], values)
+            other_solution = values[Q_PROXIMAL]
+            solve_proximal(leg, platform_end, sides[k], values)
+            q[k] = (
+                values[Q_PROXIMAL]
+                if abs(values[Q_PROXIMAL] - other_solution) >= STRETCHED
+                else values[Q_PROXIMAL] + BENT * sides[k]
+            )
 
 
 @routine
-def put_held(
+def place_held(
     table: Table, objective: PoseObjective, target: Floats, leg_eval: LegEvaluation, state: PlatformState
 ) -> None:
-    """Place the platform as it is to be held, and carriers where rods then put them.
+    """Move the platform to the held part of the target, and proximal joints to the nearest solutions there.
 
-    It turns about its middle, but where legs complete the position: they do so from where it was.
+    The platform turns about the centre of its joints; if legs complete the position, about its reference point.
     """
     pose, q, middle = state.pose, state.q, middle_of(state.pose, table.task[0])
     for i in range(3):
@@ -133,10 +137,10 @@ def put_held(
         if sine > 0.0:
             turn_pose(state.pose, scale(math.atan2(sine, dot(column(state.pose, 2), column(target, 2))) / sine, axis))
     if objective.frame == HALF_WAY and objective.platform[5] == LOCKED:
-        bring_yaw(state.pose, yaw_of(target))
-    off = sub(middle, middle_of(pose, table.task[0])) if table.task[0]["unset"] == 0 else NOWHERE
+        set_yaw(state.pose, yaw_of(target))
+    shift = sub(middle, middle_of(pose, table.task[0])) if table.task[0]["unset"] == 0 else ZERO
     for i in range(3):
-        pose[i, 3] = target[i, 3] if objective.platform[i] == LOCKED else pose[i, 3] + off[i]
+        pose[i, 3] = target[i, 3] if objective.platform[i] == LOCKED else pose[i, 3] + shift[i]
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         leg = table.legs[k]
@@ -149,33 +153,33 @@ def put_held(
 
 
 @routine
-def nearest_q_proximal(leg: Record, frame: Floats, present: float, own: Floats) -> float:
-    """Of the two coordinates at which a carrier's rod reaches its head, or comes nearest, the one nearer to this."""
+def nearest_q_proximal(leg: Record, frame: Floats, current: float, values: Floats) -> float:
+    """Of the coordinates at which a rod reaches its platform end, or comes nearest, the nearest to `current`."""
     platform_end, best = move(frame, vec(leg["platform_end_point"])), math.inf
     for i in range(2):
-        solve_proximal(leg, platform_end, 2.0 * i - 1.0, own)
-        found: float = own[Q_PROXIMAL]
+        solve_proximal(leg, platform_end, 2.0 * i - 1.0, values)
+        candidate: float = values[Q_PROXIMAL]
         if leg["proximal"] == CRANK:
-            found = wrap(found, present)
-        if abs(found - present) < abs(best - present):
-            best = found
+            candidate = wrap(candidate, current)
+        if abs(candidate - current) < abs(best - current):
+            best = candidate
     return best
 
 
 @routine
-def nearest_orienting(arm: Record, rod: Record, frame: Floats, present: float) -> float:
-    """Of the coordinates at which an arm has its rod's plane hold the head, the one nearer to this."""
-    found, _ = orienting_coordinate(arm, rod, frame, 1.0)
-    if arm["proximal"] != CRANK:
-        return found
-    other, _ = orienting_coordinate(arm, rod, frame, -1.0)
-    found, other = wrap(found, present), wrap(other, present)
-    return found if abs(found - present) <= abs(other - present) else other
+def nearest_orienting(joint: Record, rod: Record, frame: Floats, current: float) -> float:
+    """Of the coordinates of an orienting joint that face its rod to the platform end, the nearest to `current`."""
+    candidate, _ = orienting_coordinate(joint, rod, frame, 1.0)
+    if joint["proximal"] != CRANK:
+        return candidate
+    other, _ = orienting_coordinate(joint, rod, frame, -1.0)
+    candidate, other = wrap(candidate, current), wrap(other, current)
+    return candidate if abs(candidate - current) <= abs(other - current) else other
 
 
 @routine
 def put_sides(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> None:
-    """Tell which of their two solutions legs take, and where arms are."""
+    """Fill the sides of legs, and the coordinates of redundant joints without sides, from a configuration."""
     set_frames(state.pose, table.task[0], leg_eval.frames)
     sides, q = state.sides, state.q
     for k in range(q.shape[0]):
@@ -184,23 +188,23 @@ def put_sides(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> No
             if leg["orients"] == 0:
                 sides[k] = q[k]
             elif sides[k] != 0.0:
-                sides[k] = branch_of_redundant(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
+                sides[k] = redundant_side(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
             place_redundant(leg, q[k], leg_eval.frames, leg_eval.values[k])
         if has_proximal(leg):
             frame = leg_eval.frames[leg["frame"]]
             platform_end = move(frame, vec(leg["platform_end_point"]))
-            off = (0.0, 0.0)
+            distances = (0.0, 0.0)
             for side in (-1.0, 1.0):
                 solve_proximal(leg, platform_end, side, leg_eval.values[k])
-                away = leg_eval.values[k, Q_PROXIMAL] - q[k]
-                off = (off[1], abs(wrap(away, 0.0) if leg["proximal"] == CRANK else away))
-            if abs(off[1] - off[0]) > STRETCHED:
-                sides[k] = 1.0 if off[1] < off[0] else -1.0
+                difference = leg_eval.values[k, Q_PROXIMAL] - q[k]
+                distances = (distances[1], abs(wrap(difference, 0.0) if leg["proximal"] == CRANK else difference))
+            if abs(distances[1] - distances[0]) > STRETCHED:
+                sides[k] = 1.0 if distances[1] < distances[0] else -1.0
 
 
 @routine
-def nearest_start(objective: PoseObjective, by: Vec, starts: Starts, search: Search) -> int:
-    """The start whose pose, taken along, is nearest to the target; -1 where there is none."""
+def nearest_start(objective: PoseObjective, by: Vec, starts: Starts, search: SearchScratch) -> int:
+    """Index of the start whose pose, taken along by `by`, is nearest to the target; -1 if there are none."""
     nearest, least, target, gradient = -1, math.inf, search.trial.pose, search.gradient
     copy_table(search.target, target)
     for i in range(3):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .._jit import routine
-from ..legs.poses import make_exact, turn_pose
+from ..legs.poses import orthonormalise, turn_pose
 from ..linear import solve_spd
 from ..vectors import Vec, add, along, cross, dot, move, norm, scale, sub, turn, vec
 from .frames import move_carriers
@@ -93,7 +93,7 @@ def turn_to_fit(plan: Plan, now: Configuration, about_reference: bool) -> None:
         w = scale(LARGEST_TURN / size, w)
     fixed = add(p, turn(now.pose, centre))
     turn_pose(now.pose, w)
-    make_exact(now.pose)
+    orthonormalise(now.pose)
     moved = sub(fixed, turn(now.pose, centre))
     for i in range(3):
         now.pose[i, 3] = moved[i]

@@ -1,4 +1,4 @@
-"""What legs in closed form tell at poses: the coordinates of their joints, and the constraints that are left."""
+"""Joint coordinates and constraints of legs in closed form, at poses of the platform."""
 
 from __future__ import annotations
 
@@ -17,48 +17,50 @@ from ..legs.records import Table
 from ..legs.table import SAMPLE, open_table
 from ..references import opener
 from ..vectors import copy_row
-from .equations import LegEvaluation, PlatformState, new_leg_evaluation, new_platform_state, place
+from .equations import LegEvaluation, PlatformState, evaluate_legs, new_leg_evaluation, new_platform_state
 
 
-class Reading(NamedTuple):
+class EvaluationScratch(NamedTuple):
     """Scratch memory of one thread."""
 
     state: PlatformState
     leg_eval: LegEvaluation
-    proximal_slopes: Floats  # (legs, 6): derivatives of carriers' coordinates
+    proximal_slopes: Floats  # (legs, 6): derivatives of proximal coordinates by the pose
 
 
-def new_reading(table: Table) -> Reading:
-    """Scratch memory of one thread."""
-    return Reading(new_platform_state(len(table.legs)), new_leg_evaluation(table), np.zeros((len(table.legs), 6)))
+def new_evaluation_scratch(table: Table) -> EvaluationScratch:
+    """Allocate the scratch memory of one thread."""
+    return EvaluationScratch(
+        new_platform_state(len(table.legs)), new_leg_evaluation(table), np.zeros((len(table.legs), 6))
+    )
 
 
-open_reading = opener(new_reading(SAMPLE))
+open_evaluation_scratch = opener(new_evaluation_scratch(SAMPLE))
 
 
 @search
-def read(
+def evaluate_poses(
     machine: int,
     scratch_address: int,
     poses: Floats,
     sides: Floats,
     q_proximal: Floats,
-    found: Floats,
+    coordinates: Floats,
     rows: Floats,
     slopes: Floats,
 ) -> None:
-    """Tell what is asked for of legs at poses (n, 4, 4) [length].
+    """Evaluate legs at poses (n, 4, 4) [length]: coordinates, constraints and derivatives, whichever have rows.
 
     Parameters
     ----------
-    machine, scratch : see `open_table` and `new_reading`.
-    sides : which of its two solutions each leg takes, (n or 1, legs).
-    carriers : coordinates of the legs' carriers, (n or 0, legs) [L or rad]; NaN to ask closed forms.
-    found : filled with the coordinates that legs tell, deviations from home, (n or 0, columns) [length or rad].
+    machine, scratch_address : addresses of the kernel table and of `EvaluationScratch`.
+    sides : side of each leg, (n or 1, legs).
+    q_proximal : coordinates of proximal joints, (n or 0, legs) [L or rad]; NaN to solve them in closed form.
+    coordinates : filled with the joint coordinates of legs, deviations from home, (n or 0, columns) [length or rad].
     rows, slopes : filled with the constraints of all legs, (n or 0, rows), and their derivatives by the pose and by
-        arms, (n or 0, rows, 6 + arms) [L, rad]: NaN where a leg is at a dead point, or beyond.
+        redundant joints, (n or 0, rows, 6 + n_redundant) [L, rad]: NaN if a leg with rows is at or beyond a dead point.
     """
-    table, scratch = open_table(machine), open_reading(scratch_address)
+    table, scratch = open_table(machine), open_evaluation_scratch(scratch_address)
     state, leg_eval, legs, known = scratch.state, scratch.leg_eval, table.legs, table.known
     for row in range(poses.shape[0]):
         load_pose(poses[row], table.task[0]["length"], state.pose)
@@ -71,12 +73,12 @@ def read(
                 total += state.q[k]
         margin_of_rows = 1.0
         if abs(total) < math.inf:
-            place(table, state, leg_eval)
+            evaluate_legs(table, state, leg_eval)
         else:
             set_frames(state.pose, table.task[0], leg_eval.frames)
             _, margin_of_rows = place_legs(legs, leg_eval.frames, state.sides, leg_eval.values, leg_eval.lines)
-        for i in range(known.shape[0] if found.shape[0] > 0 else 0):
-            found[row, known[i]["column"]] = deviation(known[i], leg_eval.values) * known[i]["unit"]
+        for i in range(known.shape[0] if coordinates.shape[0] > 0 else 0):
+            coordinates[row, known[i]["column"]] = deviation(known[i], leg_eval.values) * known[i]["unit"]
         if rows.shape[0] > 0:
             put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
             put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.proximal_slopes, slopes[row])

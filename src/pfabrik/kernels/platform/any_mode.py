@@ -1,0 +1,139 @@
+"""Inverse kinematics by legs in closed form in any working mode, other than the start's if need be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from .._jit import routine, search
+from ..legs.answer import (
+    KEPT,
+    Completion,
+    complete_pose,
+    cone_cosine,
+    deviation,
+    excess_of,
+    new_completion,
+    place_legs,
+    put_rows,
+    write_answer,
+)
+from ..legs.endings import LEAST_MARGIN
+from ..legs.feasibility import largest_constraint
+from ..legs.frames import set_frames
+from ..legs.poses import read_target
+from ..legs.records import REDUNDANT, Table
+from ..legs.table import open_table
+from ..rows import PENDING, REACHED, UNSURE
+from ..vectors import copy_row
+from .equations import owner_of
+
+NEARLY = 1e-6
+"""Tolerance of closure and limits for legs at dead points, where closed forms lose half of their digits [rad or L]."""
+
+MOST_CHOICES = 8
+"""Most legs with two sides of which all combinations are tried, if the legs complete the pose together."""
+
+
+@routine
+def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) -> None:
+    """Mark the legs that do not close on a pose within their limits, by the owners of their proximal joints."""
+    for k in range(misfits.shape[0]):
+        misfits[k] = 0.0
+    for k in range(misfits.shape[0]):
+        if largest_constraint(table.legs, rows, k) > KEPT:
+            misfits[owner_of(table, k)] = 1.0
+    for i in range(table.limited.shape[0]):
+        limited = table.limited[i]
+        value = deviation(limited, values)
+        if not max(limited["lo"] - value, value - limited["hi"]) <= KEPT:
+            misfits[owner_of(table, limited["leg"])] = 1.0
+    for i in range(table.cones.shape[0]):
+        if not cone_cosine(table.cones[i], values) >= table.cones[i]["least_cosine"]:
+            misfits[owner_of(table, table.cones[i]["leg"])] = 1.0
+    for k in range(misfits.shape[0]):
+        if table.legs[k]["orients"] == 1:
+            misfits[k] = misfits[k + 1] = max(misfits[k], misfits[k + 1])
+
+
+@routine
+def is_singular(table: Table, sides: Floats, scratch: Completion) -> bool:
+    """True if legs on these sides reach a pose to within `NEARLY`, one of them at a dead point."""
+    set_frames(scratch.pose, table.task[0], scratch.frames)
+    singularity_margin, _ = place_legs(table.legs, scratch.frames, sides, scratch.values, scratch.lines)
+    if singularity_margin > LEAST_MARGIN * LEAST_MARGIN or singularity_margin < -NEARLY * NEARLY:
+        return False
+    residual = put_rows(table.legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
+    return bool(residual <= NEARLY and excess_of(table.limited, table.cones, scratch.values) <= NEARLY)
+
+
+@routine
+def note_choices(table: Table, sides: Floats, choices: Ints) -> int:
+    """List the legs that have two sides; their number."""
+    legs, n = table.legs, 0
+    for k in range(legs.shape[0]):
+        if sides[k] != 0.0 and (legs[k]["kind"] != REDUNDANT or legs[k]["orients"] == 1):
+            choices[n] = k
+            n += 1
+    return n
+
+
+@search
+def answer_in_any_mode(
+    machine: int,
+    targets: Floats,
+    begins: Floats,
+    sides: Floats,
+    status: Ints,
+    poses: Floats,
+    actuators: Floats,
+    measures: Floats,
+) -> int:
+    """Solve targets (n, 4, 4) [length] by legs on any sides, within all limits; the others are PENDING, or UNSURE.
+
+    If a target sets the whole pose, each leg takes the side that fits it; if legs complete the pose together, all
+    combinations of their sides are tried.
+
+    Parameters
+    ----------
+    machine : address of the kernel table.
+    begins : poses that targets are completed from, (n or 1, 4, 4) [length].
+    sides : sides to start from, (n, legs); filled with the solution's.
+
+    Returns
+    -------
+    The number of rows not reached.
+    """
+    table = open_table(machine)
+    scratch, legs, n_legs, task, n_unreached = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
+    misfits, choices, n_passes = np.zeros(n_legs), np.zeros(n_legs, np.int64), 1
+    for k in range(n_legs):
+        n_passes = 3 if legs[k]["orients"] == 1 else n_passes
+    n_choices = note_choices(table, sides[0], choices) if sides.shape[0] > 0 else 0
+    is_coupled = task["unset"] + task["implicit"] > 0
+    n_tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if is_coupled else n_passes
+    for row in range(targets.shape[0]):
+        status[row], begin = PENDING, begins[row if begins.shape[0] > 1 else 0]
+        for attempt in range(1, n_tries + 1):
+            if not is_coupled and read_target(targets[row], begin, task, scratch.pose):
+                set_frames(scratch.pose, task, scratch.frames)
+                place_legs(legs, scratch.frames, sides[row], scratch.values, scratch.lines)
+                put_rows(legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
+                note_misfits(table, scratch.values, scratch.rows, misfits)
+            for c in range(n_choices):
+                k = choices[c]
+                is_flipped = (attempt ^ (attempt - 1)) >> c & 1 == 1
+                if not is_coupled:  # a rod first, then its orienting joint, then the rod again
+                    is_flipped = misfits[k] == 1.0 and (legs[k]["orients"] == 1) == (attempt == 2)
+                sides[row, k] = -sides[row, k] if is_flipped else sides[row, k]
+            if not read_target(targets[row], begin, task, scratch.pose):
+                break
+            if complete_pose(table, sides[row], scratch):
+                if write_answer(table, scratch, poses[row], actuators[row], measures[row]) == REACHED:
+                    status[row] = REACHED
+                    copy_row(scratch.sides, sides[row])
+                    break
+            elif task["unset"] == 0 and is_singular(table, sides[row], scratch):
+                status[row] = UNSURE
+        n_unreached += 0 if status[row] == REACHED else 1
+    return n_unreached
