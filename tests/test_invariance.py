@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pfabrik.platform.corners import corners_of
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik import Joint, Mechanism, Solution, Status
-from pfabrik.platform.corners import corners_of
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 ROWS = 2 if INTERPRETED else 12

@@ -16,7 +16,7 @@ from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism
 from .kernels.threads import in_blocks
 from .platform.answers import sides_at
-from .platform.table import machine
+from .platform.table import table_handle
 from .targets import Target, as_targets
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
@@ -78,7 +78,7 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
 def _margins(mechanism: Mechanism, table: LegTable, poses: Floats, begin: Floats, sides: Floats) -> tuple[Floats, Ints]:
     """Margins (n,) of poses (n, 4, 4), and which limits they are of: in blocks, and one by one what these leave."""
     margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
-    legs, rest = machine(table), np.arange(len(poses))
+    legs, rest = table_handle(table), np.arange(len(poses))
     if table.is_for_blocks:
         from .kernels.legs.maps import margins_in_blocks
 
