@@ -85,7 +85,7 @@ def redundant(mechanism: pf.Mechanism) -> list[int]:
     """Places of the arms' actuators."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    own = [form.items[0].joint.name for form in table.forms if isinstance(form, RedundantJoint)]
+    own = [form.elements[0].joint.name for form in table.forms if isinstance(form, RedundantJoint)]
     return [mechanism.actuator_names.index(name) for name in own]
 
 

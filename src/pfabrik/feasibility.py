@@ -108,12 +108,12 @@ def _limits(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
     table = table_of_poses(mechanism)
     assert isinstance(table, LegTable)
     reach = tuple((_carrier(form), "reach") for form in table.forms)
-    closed = tuple((form.items[0].joint.name if form.items else "", "closed") for form in table.forms)
+    closed = tuple((form.elements[0].joint.name if form.elements else "", "closed") for form in table.forms)
     return table.limits + reach + closed
 
 
 def _carrier(form: LegForm) -> str:
     """The joint that carries a leg, or its first one."""
     proximal = form.proximal if isinstance(form, Rod) else None
-    items = (proximal,) if proximal is not None else form.items
+    items = (proximal,) if proximal is not None else form.elements
     return items[0].joint.name if items else ""

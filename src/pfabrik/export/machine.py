@@ -150,7 +150,7 @@ def _legs(mechanism: Mechanism, table: LegTable) -> list[Leg]:
             numbers = _rod_numbers(form, record, length)
         else:
             numbers = (_arm_numbers if isinstance(form, RedundantJoint) else _pivot_numbers)(record, length)
-        legs.append(Leg(main, record, numbers, tuple(dict.fromkeys(item.joint.name for item in form.items))))
+        legs.append(Leg(main, record, numbers, tuple(dict.fromkeys(element.joint.name for element in form.elements))))
     return legs
 
 
