@@ -31,7 +31,7 @@ class Split:
     @property
     def steps(self) -> tuple[Step, ...]:
         """All its joints, path by path."""
-        return tuple(step for way in self.ways for part in way for step in part.steps)
+        return tuple(step for path in self.ways for part in path for step in part.steps)
 
     def __str__(self) -> str:
         if self.parallelogram and self.parallelogram.pinned:
@@ -119,8 +119,8 @@ def _parallelograms(parts: Sequence[Part]) -> Iterator[Parallelogram]:
         if isinstance(part, Split):
             if part.parallelogram:
                 yield part.parallelogram
-            for way in part.ways:
-                yield from _parallelograms(way)
+            for path in part.ways:
+                yield from _parallelograms(path)
 
 
 def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
@@ -184,10 +184,10 @@ def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
     """The reasons why positions alone cannot express a mechanism: of sub-chains, or motors in none of them."""
     chains = decompose(mechanism)
     reasons = tuple(f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None)
-    known = {step.joint.name for chain in chains for step in chain.trunk}
-    known |= {joint for chain in chains for form in chain.branch_forms for joint in form.determined}
+    expressed = {step.joint.name for chain in chains for step in chain.trunk}
+    expressed |= {joint for chain in chains for form in chain.branch_forms for joint in form.determined}
     driven = dict.fromkeys(drive.joint.name for drive in mechanism.drives)
-    missing = (f"actuated joint {name} is in no sub-chain" for name in driven if name not in known)
+    missing = (f"actuated joint {name} is in no sub-chain" for name in driven if name not in expressed)
     return reasons or tuple(missing)
 
 

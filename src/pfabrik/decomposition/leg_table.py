@@ -155,7 +155,7 @@ def _table(mechanism: Mechanism) -> LegTable:
         (leg, element, place) for leg, form in enumerate(forms) for element, place in closed_form_coordinates(form)
     ]
     _require_all(mechanism, {(element.joint.name, element.place) for _, element, _ in coordinates})
-    known = np.array([_coordinate(mechanism, *each) for each in coordinates], K.COORDINATE)
+    known = np.array([_coordinate(mechanism, *coordinate) for coordinate in coordinates], K.COORDINATE)
     joints = [element.joint for _, element, _ in coordinates]
     limited = known[[joint.range is not None for joint in joints]]
     drives = {drive.column: number for number, drive in enumerate(mechanism.drives)}

@@ -124,7 +124,9 @@ def _with_parallelogram(mechanism: Mechanism, chain: SubChain, split: Split) -> 
     before, after = (
         elementary_joints(mechanism, _steps_of(parts)) for parts in (chain.parts[:place], chain.parts[place + 1 :])
     )
-    (inner, outer), (inner_beside, outer_beside) = (elementary_joints(mechanism, _steps_of(way)) for way in split.ways)
+    (inner, outer), (inner_beside, outer_beside) = (
+        elementary_joints(mechanism, _steps_of(path)) for path in split.ways
+    )
     reasons = []
     for is_reversed in (False, True):
         if is_reversed:
@@ -240,18 +242,18 @@ def _on_orienting_joint(elements: list[ElementaryJoint], n_proximal: int, is_rev
 
     The joint moves the plane across the hinge at the rod's base end until it contains the platform end.
     """
-    first, rod = elements[0], _rod_on_proximal(elements[1:], n_proximal, is_reversed)
-    if first.kind == "S" or rod.base_ending.kind != "hinge" or (rod.proximal is None and rod.slide is None):
+    element, rod = elements[0], _rod_on_proximal(elements[1:], n_proximal, is_reversed)
+    if element.kind == "S" or rod.base_ending.kind != "hinge" or (rod.proximal is None and rod.slide is None):
         raise NoLeg("several joints carry its rod")
     axis = rod.base_ending.elements[0].axis
-    deviation_of_axis = abs(first.axis @ axis) if first.kind == "P" else area(first.axis, axis)
+    deviation_of_axis = abs(element.axis @ axis) if element.kind == "P" else area(element.axis, axis)
     if deviation_of_axis <= TOLERANCES.alignment:
         raise NoLeg("several joints carry its rod")
     if rod.proximal is not None:
         deviation = area(rod.proximal.axis, axis) if rod.proximal.kind == "R" else abs(rod.proximal.axis @ axis)
         if deviation > TOLERANCES.implied:
             raise NoLeg("several joints carry its rod")
-    redundant_joint = RedundantJoint(first, is_reversed, orients=True)
+    redundant_joint = RedundantJoint(element, is_reversed, orients=True)
     return redundant_joint, *placed_on(redundant_joint, [rod])
 
 
@@ -369,7 +371,7 @@ def _checked_rod(
             raise NoLeg("a proximal joint below a sliding rod")
         if proximal.kind == "R" and area(proximal.axis, start - proximal.point) <= TOLERANCES.alignment:
             raise NoLeg("a crank of no length")
-    slide, twist = (found[0] if found else None for found in (slides, twists))
+    slide, twist = (along_rod[0] if along_rod else None for along_rod in (slides, twists))
     return Rod(proximal, base_end, slide, twist, platform_end, start, end, is_reversed)
 
 

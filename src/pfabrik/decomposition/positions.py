@@ -161,19 +161,19 @@ def _classify(draft: _Draft) -> None:
         draft.normal = joint_nodes[0].axis
         while draft.planar < len(joint_nodes) and _is_parallel(joint_nodes[draft.planar].axis, draft.normal):
             draft.planar += 1
-    others = joint_nodes[draft.planar :]
+    middle = joint_nodes[draft.planar :]
     if joint_nodes[-1].kind == "point":
         draft.planar = min(draft.planar, len(joint_nodes) - 1)
-        others = joint_nodes[draft.planar : -1]
-    elif not others:
+        middle = joint_nodes[draft.planar : -1]
+    elif not middle:
         draft.align = True
     elif all(joint_node.kind != "S" for joint_node in joint_nodes):
         names = "-".join(joint_node.kind for joint_node in joint_nodes)
         raise NotExpressible(f"carries orientation to the end effector ({names}): no spherical joint frees the twist")
-    elif others[-1].kind == "R" and len(others) > 1:
+    elif middle[-1].kind == "R" and len(middle) > 1:
         draft.ends_in_plane = True
-        others = others[:-1]
-    for joint_node in others:
+        middle = middle[:-1]
+    for joint_node in middle:
         if joint_node.kind == "R":
             raise NotExpressible(
                 f"revolute joint {joint_node.steps[0].joint.name} turns about an axis that a moving link carries"

@@ -1,6 +1,6 @@
-/* What every exported file has in common: it reads legs out of tables. `source.py` puts what is the machine's own in
-   place of the three files that are included, keeps the blocks between #if and #endif that a machine has a use for, and
-   writes names and numbers with the prefix and in the precision that are asked for. */
+/* The routines of every exported file; they read legs from tables. `source.py` puts the machine's constants, tables
+   and checks in place of the three included files, keeps the blocks between #if and #endif whose conditions hold, and
+   writes names and numbers with the prefix and in the precision asked for. */
 
 #ifndef PFK_H
 #define PFK_H
@@ -16,8 +16,8 @@ typedef struct {
     pfk_real R[3][3];
 } pfk_pose;
 
-/* What functions return: 0 where all is well, the number of the limit that is exceeded most, PFK_LEG + the number of a
-   leg that does not reach or close, or one of those below. */
+/* Return codes: 0 on success, the number of the limit that is exceeded most, PFK_LEG + the number of a leg that does
+   not reach or close, or one of those below. */
 enum {
     PFK_LEG = 1000,
     PFK_NO_POSE = -1,      /* not finite, or not a rotation */
@@ -33,25 +33,24 @@ void pfk_home(pfk_pose *pose);
 void pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose *pose);
 /* The angles of a pose: roll, pitch, yaw [rad]. */
 void pfk_rpy(const pfk_pose *pose, pfk_real angles[3]);
-/* What a code that was returned means, in words. */
+/* The meaning of a return code, in words. */
 const char *pfk_what(int code);
 #if IK
 /* Actuators for a target. `pose` must hold a pose, the last one or home: what the task leaves open is completed from
-   there, and it becomes the pose that is reached. Nothing is written unless 0 is returned. */
+   there, and `pose` becomes the pose reached. Nothing is written unless 0 is returned. */
 int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS]);
 #endif
 #if TURNS
-/* Counts actuators that may turn more than once on from where they were. */
+/* Adds whole turns to actuators that may turn more than once: nearest to those before. */
 void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS]);
 #endif
 #if LIMITS
-/* Fills how far a whole pose is inside each of PFK_LIMITS limits, negative beyond it [length or rad]. */
+/* Fills the slack of a whole pose in each of PFK_LIMITS limits, negative beyond it [length or rad]. */
 int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
 #endif
 #if FK
-/* The pose at which actuators are, by Newton's method from `pose`, in at most 40 steps; `steps` may be 0, or is set to
-   how many there were. Limits are not asked for. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is
-   returned. */
+/* The pose at given actuators, by Newton's method from `pose`, in at most 40 steps; `steps` may be 0, or is set to
+   their number. Limits are not checked. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is returned. */
 int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #endif
 
@@ -68,29 +67,28 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #define PFK_TURN 6.283185307179586
 #define PFK_LONGEST_STEP 0.5 /* [L or rad] */
 #define PFK_FAR 1e30
-#define PFK_MODE_APART 1e-3  /* nearer to each other actuators of two working modes meet [L or rad] */
+#define PFK_MODE_APART 1e-3  /* two working modes meet where their actuators are nearer [L or rad] */
 enum {
     PFK_IK_STEPS = 20,
     PFK_PARTS = 16, /* continuation steps to a target that is not completed at once */
     PFK_FK_STEPS = 40
 };
 
-/* A rod is [what carries it] + ending of its base end + rigid or sliding rod + ending of its platform end; a pivot
-   is [slides] + one ending of no length; a redundant joint is a hinge or slide that other legs are on. A leg is read
-   from the base to the platform, or, its base end there, from the platform to the base: then its numbers are as the
-   platform sees them. */
+/* A rod is [proximal joint] + base ending + rigid or sliding rod + platform ending; a pivot is [slides] + one ending of
+   no length; a redundant joint is a hinge or slide that other legs are on. A leg is read from the base to the platform;
+   or in reverse, its base end on the platform: then its numbers are in the platform's frame. */
 enum { PFK_ROD, PFK_PIVOT, PFK_REDUNDANT };
 /* Frames that legs are read in; the redundant joints' follow. */
 enum { PFK_FROM_BASE, PFK_FROM_PLATFORM, PFK_FROM_ITSELF };
-/* What carries a base end: nothing, a hinge, a slide, or what carries the rod before. */
+/* The proximal joint of a leg: none, a hinge, a slide, or that of the rod before. */
 enum { PFK_NO_PROXIMAL, PFK_CRANK, PFK_CARRIAGE, PFK_SHARED };
 /* Endings: a weld, a hinge, two hinges that cross, three through a point, a ball. */
 enum { PFK_WELD, PFK_HINGE, PFK_CROSS, PFK_TRIPLE, PFK_BALL };
-/* Coordinates of a leg: of what carries it, angles at its base end, how much longer it is, angles at its platform
-   end or slides. */
+/* Coordinates of a leg: of its proximal joint, angles at its base end, its extension, angles at its platform end or
+   slides. */
 enum { PFK_Q_PROXIMAL = 0, PFK_BASE_END = 1, PFK_SLIDE = 4, PFK_PLATFORM_END = 5, PFK_VALUES = 8 };
 
-/* What a leg is, at home. */
+/* A leg, at home. */
 typedef struct {
     int kind, frame;
     int is_back; /* 1: its base end is on the platform */
@@ -98,20 +96,20 @@ typedef struct {
     int proximal, slides;
     int twists; /* 1: both ends keep the rod from spinning about itself */
     int base_ending, platform_ending;
-    int base_end_aimed, platform_end_aimed; /* 1: the angles of this end are asked for */
+    int base_end_aimed, platform_end_aimed; /* 1: the angles of this ending are computed */
     pfk_real base_end[3];
     pfk_real platform_end[3]; /* from the reference point; of a leg read from the platform, from the base's origin */
     pfk_real length, line[3]; /* the direction from base end to platform end */
     pfk_real base_end_axes[3][3], platform_end_axes[3][3]; /* hinges, from the body that the end is on */
     pfk_real base_end_side, platform_end_side; /* which of two solutions of crossed hinges is home's */
     pfk_real twist; /* angle about the line between marks of the two ends */
-    pfk_real axis[3]; /* of what carries it */
+    pfk_real axis[3]; /* of the proximal joint */
     pfk_real centre[3], crank[3], across[3]; /* of a crank: from centre to the base end, and that a quarter turn on */
     pfk_real reach[3]; /* from centre, or from the base end on a carriage, to the platform end */
     pfk_real side; /* which of two solutions is home's */
 #if PIVOTS
-    pfk_real rows[3][3]; /* from the centre's displacement: first what slides say, then what has to stay 0 */
-    int pairs, upright; /* how many of: conditions kept . R moved; hinges that must not turn over */
+    pfk_real rows[3][3]; /* of the centre's displacement: first the slides, then what must stay 0 */
+    int pairs, upright; /* number of conditions kept . R moved; of hinges that must not turn over */
     pfk_real kept[3][3], moved[3][3];
     pfk_real square[3]; /* to the last hinge */
 #endif
@@ -120,7 +118,7 @@ typedef struct {
     int is_inner; /* 1: it is between intermediate platforms, and constrains nothing of the pose */
     /* of a redundant joint */
     int makes; /* the frame that it makes */
-    int column; /* which coordinate of redundant joints it has: its own, or that of another where `is_mirror` */
+    int column; /* of its coordinate; a mirror has that of another joint */
     int is_mirror;
     int at_platform_end; /* 1: it moves the body that platform ends are on; 0: the one that base ends are on */
     int orients; /* 1: it brings the hinge at the base end of the rod after it to face the platform end */
@@ -136,7 +134,7 @@ typedef struct {
 } pfk_coordinate;
 
 #if CONES
-/* A rod keeps within a half angle of an axis of what its base end, or its platform end, is on. */
+/* The half angle of a rod about an axis fixed to the body that its base end, or its platform end, is on. */
 typedef struct {
     int leg, is_platform_end;
     pfk_real axis[3], half_angle;
@@ -150,16 +148,16 @@ typedef struct {
     pfk_real R[3][3], p[3];
     pfk_real moved[3]; /* p less what it is at home */
     pfk_real centre[3]; /* about which the platform turns */
-    pfk_real base_axes[3][3]; /* turns directions of what the base ends are on to those of the base */
+    pfk_real base_axes[3][3]; /* turns directions of the body of the base ends to those of the base */
 } pfk_frame;
 
-/* Where a leg is. */
+/* The state of a leg. */
 typedef struct {
     pfk_real base_end[3], platform_end[3], span[3], u[3], length;
-    pfk_real base_line[3], platform_line[3]; /* u as what the base end, or the platform end, is on sees it */
+    pfk_real base_line[3], platform_line[3]; /* u in the frame of the body that the end is on */
     pfk_real value[PFK_VALUES], cosine, sine;
-    int is_given; /* 1: what carries it has the coordinate that it is given */
-    int is_held; /* 1: what carries it does not follow the platform end */
+    int is_given; /* 1: the proximal coordinate is given */
+    int is_held; /* 1: the proximal joint does not follow the platform end */
     /* derivative of the proximal coordinate by the pose; of a redundant joint, the velocity and the angular velocity of
        the platform that would change as much in its frame */
     pfk_real follow[6];
@@ -264,7 +262,7 @@ static void pfk_frames(const pfk_pose *pose, pfk_frame frame[PFK_FRAMES])
     }
 }
 
-/* How far a point of the platform has moved since home. */
+/* The displacement of a point of the platform from home. */
 static void pfk_displaced(const pfk_frame *frame, const pfk_real point[3], pfk_real out[3])
 {
     int i;
@@ -291,7 +289,7 @@ static void pfk_about_angle(const pfk_real v[3], const pfk_real axis[3], pfk_rea
 }
 
 #endif
-/* Angle from u to w about a unit vector; what lies along it does not count. */
+/* Angle from u to w about a unit vector; components along it do not count. */
 static pfk_real pfk_angle(const pfk_real axis[3], const pfk_real u[3], const pfk_real w[3])
 {
     pfk_real across[3];
@@ -299,14 +297,14 @@ static pfk_real pfk_angle(const pfk_real axis[3], const pfk_real u[3], const pfk
     return atan2(pfk_dot(axis, across), pfk_dot(u, w) - pfk_dot(axis, u) * pfk_dot(axis, w));
 }
 
-/* The same angle within half a turn of `centre`. */
+/* An angle plus whole turns, within half a turn of `centre`. */
 static pfk_real pfk_wrap(pfk_real angle, pfk_real centre)
 {
     return angle - PFK_TURN * floor((angle - centre) / PFK_TURN + 0.5);
 }
 
-/* One of the two solutions of A cos q + B sin q = C, where over = A - C; how far it is from the double root, negative
-   where there is none: then the angle is that of the double root. */
+/* One of the two solutions of A cos q + B sin q = C, where over = A - C. Returns the singularity margin: the
+   distance from the double root, negative without a solution; then the angle is that of the double root. */
 static pfk_real pfk_either(pfk_real A, pfk_real B, pfk_real C, pfk_real over, pfk_real side, pfk_real *cosine,
                            pfk_real *sine)
 {
@@ -401,7 +399,7 @@ static void pfk_carried(const pfk_leg *main, const pfk_placed *main_state, pfk_r
         pfk_copy(v, out);
 }
 
-/* Where a base end is, on what carries it. */
+/* The place of a base end on its proximal joint. */
 static void pfk_place_base_end(const pfk_leg *rod, const pfk_leg *main, const pfk_placed *main_state,
                                pfk_real base_end[3])
 {
@@ -431,7 +429,7 @@ static pfk_real pfk_aim_end(int end, const pfk_real axes[3][3], const pfk_real h
 }
 
 #if TWISTS
-/* A direction that goes with an end of a rod, as what the end is on sees it: its last hinge. */
+/* The mark of an end of a rod, in the frame of the body that it is on: its last hinge. */
 static void pfk_mark(int end, const pfk_real axes[3][3], const pfk_real angles[], pfk_real out[3])
 {
     if (end == PFK_HINGE)
@@ -453,9 +451,9 @@ static pfk_real pfk_twist(const pfk_frame *frame, const pfk_leg *rod, const pfk_
 }
 
 #endif
-/* Fills where a rod is at a pose; how far it is from reaching [L]. `main_state` is that of the leg with its proximal
-   joint. Two crossed hinges point a rod by either of two solutions, half a turn about it apart: those of home, unless
-   the two ends then hold the rod the other way around. */
+/* Fills the state of a rod at a pose; returns the gap by which it does not reach [L]. `main_state` is that of the
+   leg with its proximal joint. Two crossed hinges point a rod by either of two solutions, half a turn about it apart:
+   those of home, unless the two ends then hold the rod the other way around. */
 static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const pfk_placed *main_state, pfk_placed *own)
 {
     const pfk_leg *main = &pfk_legs[rod->main];
@@ -509,7 +507,7 @@ static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const 
 }
 
 #if PIVOTS
-/* Fills where a pivot is at a pose; how far it is from reaching. */
+/* Fills the state of a pivot at a pose; returns the gap by which it does not reach. */
 static pfk_real pfk_place_pivot(const pfk_frame *frame, const pfk_leg *pivot, pfk_placed *own)
 {
     pfk_real last[3], margin, *angles = &own->value[PFK_BASE_END];
@@ -535,8 +533,8 @@ static pfk_real pfk_place_pivot(const pfk_frame *frame, const pfk_leg *pivot, pf
 
 #endif
 #if REDUNDANT
-/* Brings a redundant joint to where the hinge n at the base end F of the rod after it faces the platform end H; the
-   singularity margin, see pfk_either. With the redundant joint's axis a through o: (Rot n) . (H - o) = n . (F - o), or
+/* Turns or shifts a redundant joint until the hinge n at the base end F of the rod after it faces the platform end H;
+   returns the singularity margin, as pfk_either. With the joint's axis a through o: (Rot n) . (H - o) = n . (F - o), or
    n . (H - F - q a) = 0; at home n . (H - F) = 0. */
 static pfk_real pfk_orient(const pfk_frame *frame, const pfk_leg *joint, const pfk_leg *rod, pfk_real *q)
 {
@@ -613,7 +611,7 @@ static void pfk_place_redundant(const pfk_frame *before, const pfk_leg *joint, p
     }
 }
 
-/* Arms are found from where they are at home. */
+/* Redundant joints start at home. */
 static void pfk_start(pfk_state *state)
 {
     int i;
@@ -913,8 +911,8 @@ static pfk_row *pfk_hinge_row(const pfk_state *state, int k, int place, pfk_real
 }
 
 #if PIVOTS
-/* The same of hinges a, b, c of a pivot, R = Rot(a) [Rot(b) [Rot(c)]]: kept . R moved = value, with one of both turned
-   by the angle. */
+/* The equation of hinges a, b, c of a pivot, R = Rot(a) [Rot(b) [Rot(c)]]: kept . R moved = value, with one of both
+   turned by the angle. */
 static pfk_row *pfk_pivot_hinge_row(const pfk_state *state, int k, int place, pfk_real given, pfk_row *row)
 {
     const pfk_leg *pivot = &pfk_legs[k];
@@ -1097,11 +1095,10 @@ static void pfk_turn_back(const pfk_pose *start, pfk_pose *pose)
             pose->R[i][j] = turned.R[i][j];
 }
 
-/* What moves until legs close: nothing of the pose, what the task leaves open of it, all of it; and redundant
-   joints. */
-enum { PFK_REDUNDANT_ALONE, PFK_WHAT_IS_LEFT, PFK_ALL };
+/* Unknowns: redundant joints, with nothing of the pose, what the task leaves open of it, or all of it. */
+enum { PFK_REDUNDANT_ALONE, PFK_UNSET, PFK_ALL };
 
-/* Fills the motions of what moves of a pose: how many. */
+/* Fills the motions of the unknowns of a pose; returns their number. */
 static int pfk_motions(const pfk_pose *pose, int moves, pfk_real motion[PFK_UNKNOWNS][PFK_COLUMNS])
 {
     int i, j, count = 0;
@@ -1111,15 +1108,15 @@ static int pfk_motions(const pfk_pose *pose, int moves, pfk_real motion[PFK_UNKN
     for (i = 0; i < 3 && moves != PFK_REDUNDANT_ALONE; ++i)
         if (moves == PFK_ALL || !pfk_axes[i])
             motion[count++][i] = PFK_SIZE;
-    if ((moves == PFK_ALL && PFK_TURNING) || (moves == PFK_WHAT_IS_LEFT && PFK_ROTATIONS == 0)) {
+    if ((moves == PFK_ALL && PFK_TURNING) || (moves == PFK_UNSET && PFK_ROTATIONS == 0)) {
         for (i = 0; i < 3; ++i)
             motion[count++][3 + i] = 1.0;
-    } else if (moves == PFK_WHAT_IS_LEFT && PFK_ROTATIONS == 2) {
+    } else if (moves == PFK_UNSET && PFK_ROTATIONS == 2) {
         for (i = 0; i < 3; ++i)
             motion[count][3 + i] = pose->R[i][2];
         ++count;
 #if YAW
-    } else if (moves == PFK_WHAT_IS_LEFT) { /* about axes square to the mean of both z axes it turns without yaw */
+    } else if (moves == PFK_UNSET) { /* about axes square to the mean of both z axes it turns without yaw */
         const pfk_real mean[3] = {pose->R[0][2], pose->R[1][2], pose->R[2][2] + 1.0}, x[3] = {1.0, 0.0, 0.0};
         pfk_real *first = motion[count++] + 3, *second = motion[count++] + 3;
         pfk_cross(x, mean, first);
@@ -1132,7 +1129,7 @@ static int pfk_motions(const pfk_pose *pose, int moves, pfk_real motion[PFK_UNKN
 }
 
 #if REDUNDANT
-/* Adds those of redundant joints that are not given to so many of the pose: how many there are now. */
+/* Adds the motions of redundant joints that are not given to `count` of the pose; returns their number. */
 static int pfk_arm_motions(const pfk_state *state, int count, pfk_real motion[PFK_UNKNOWNS][PFK_COLUMNS])
 {
     int k;
@@ -1184,8 +1181,8 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
             }
             system[i][count] = -row[i].off;
         }
-        if (pfk_least_squares(system, rows, count, x) && moves != PFK_WHAT_IS_LEFT)
-            return open; /* what a task leaves open may stay where it is */
+        if (pfk_least_squares(system, rows, count, x) && moves != PFK_UNSET)
+            return open; /* unknowns of the task may stay */
         for (k = 0; k < PFK_COLUMNS; ++k) {
             twist[k] = 0.0;
             for (j = 0; j < count; ++j)
@@ -1209,7 +1206,7 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
             twist[k] *= share;
         pfk_along(pose->p, 1.0, twist, pose->p);
 #if YAW
-        if (moves == PFK_WHAT_IS_LEFT) {
+        if (moves == PFK_UNSET) {
             const pfk_real yaw = pfk_yaw(pose);
             pfk_spin(pose, twist + 3);
             pfk_bring_yaw(pose, yaw);
@@ -1486,7 +1483,7 @@ int pfk_limits(const pfk_pose *pose, pfk_real slack[])
 
 #endif
 #if IK || FK
-/* What the actuators are where legs are placed. */
+/* The actuators at the state of the legs. */
 static void pfk_read(const pfk_state *state, pfk_real actuators[PFK_ACTUATORS])
 {
     int i;
@@ -1515,7 +1512,7 @@ int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUAT
     begin = *pose;
     if (pfk_make_exact(&begin))
         return PFK_NO_POSE;
-    code = pfk_reach(&wanted, &begin, PFK_WHAT_IS_LEFT, &own, &state);
+    code = pfk_reach(&wanted, &begin, PFK_UNSET, &own, &state);
     if (code < 0)
         return code;
 #else

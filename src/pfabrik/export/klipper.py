@@ -95,9 +95,9 @@ def _delta(mechanism: Mechanism, towers: list[Tower]) -> str:
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
     lines = [*_begun(mechanism, "delta"), f"delta_radius: {radii[0]:.9g}"]
     speeds = [mechanism.joint(name).max_speed for name in mechanism.actuator_names]
-    known = [speed for speed in speeds if speed is not None]
+    given = [speed for speed in speeds if speed is not None]
     lines.append(
-        f"# the carriages' own: at most {min(known):.9g} a second" if known else "# max_velocity, max_accel: yours"
+        f"# the carriages' own: at most {min(given):.9g} a second" if given else "# max_velocity, max_accel: yours"
     )
     for letter, tower in zip(LETTERS, towers, strict=True):
         lines += ["", f"[stepper_{letter}]", f"arm_length: {tower.rod:.9g}", f"angle: {angle_of(tower.place):.9g}"]

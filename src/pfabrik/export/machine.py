@@ -95,8 +95,8 @@ class Machine:
             raise UnsupportedMechanism(mechanism.name, [reason], "exported")
         self.legs = _legs(mechanism, table)
         drives = table.driven[np.argsort(table.driven["column"])]
-        self.limited = [_coordinate(each, mechanism.coordinates[each["column"]].kind) for each in table.limited]
-        self.driven = [_coordinate(each, mechanism.drives[each["column"]].kind) for each in drives]
+        self.limited = [_coordinate(record, mechanism.coordinates[record["column"]].kind) for record in table.limited]
+        self.driven = [_coordinate(record, mechanism.drives[record["column"]].kind) for record in drives]
         self.equations = sum(row_counts(table.legs)) + sum(leg.keeps_its_length for leg in self.legs)
 
     @property

@@ -34,7 +34,7 @@ def features(machine: Machine, parts: Sequence[str]) -> set[str]:
         "REDUNDANT": machine.n_redundant > 0,
         "IMPLICIT": machine.has_implicit_joints,
         "YAW": completes and machine.rotations == 1,
-        "TURNS": "ik" in parts and any(each.may_turn for each in machine.driven),
+        "TURNS": "ik" in parts and any(driven.may_turn for driven in machine.driven),
         "PIVOTS": any(record["kind"] == K.PIVOT for record in records),
         "CONES": "limits" in parts and len(machine.cones) > 0,
         "TWISTS": any(record["twists"] for record in records),
