@@ -93,29 +93,28 @@ class LegsEngine:
             q_proximal = np.empty_like(sides)
             q_proximal[:] = np.nan
             start_poses = self._single.home if start is None else start.rows.poses
-            question = Request(self.mechanism, self._table, options, keep_mode, nearby)
+            request = Request(self.mechanism, self._table, options, keep_mode, nearby)
             unreached = Unreached(targets, start_poses, sides, q_proximal, rows)
             is_unsolved = rows.status != REACHED
             if start is not None and self._table.has_sides:
-                is_unsolved &= ~self._starts_there(targets, start.rows.poses)
-            unreached.answer(is_unsolved, partial(answer_unreached, question))
+                is_unsolved &= ~self._starts_on_target(targets, start.rows.poses)
+            unreached.answer(is_unsolved, partial(answer_unreached, request))
             if start is not None:
                 self._count_turns(start.rows.actuators, rows)
-        is_pending = (
-            (rows.status == PENDING) | (rows.status == UNSURE) if q_proximal is not None else rows.status != REACHED
-        )
+        is_pending = rows.status != REACHED
+        if q_proximal is not None:
+            is_pending = (rows.status == PENDING) | (rows.status == UNSURE)
         unsolved = is_pending.nonzero()[0]
         if len(unsolved):
-            block_start = (
-                start if start is None or len(start) == 1 or len(unsolved) == len(start) else start.at(unsolved)
-            )
-            fallback = self._joint_space.answer(targets[unsolved], block_start, options, keep_mode=keep_mode)
-            is_kept = self._stay(rows_at(rows, unsolved), fallback.rows, options)
+            fallback_start = start
+            if start is not None and len(start) not in (1, len(unsolved)):
+                fallback_start = start.at(unsolved)
+            fallback = self._joint_space.answer(targets[unsolved], fallback_start, options, keep_mode=keep_mode)
+            is_kept = self._kept_projections(rows_at(rows, unsolved), fallback.rows, options)
             rows.status[unsolved[is_kept]] = PROJECTED
-            unsolved, fallback = (
-                unsolved[~is_kept],
-                fallback if not is_kept.any() else fallback.at(np.flatnonzero(~is_kept)),
-            )
+            unsolved = unsolved[~is_kept]
+            if is_kept.any():
+                fallback = fallback.at(np.flatnonzero(~is_kept))
             if len(unsolved) == len(targets):
                 return fallback
             put_rows(rows, unsolved, fallback.rows)
@@ -125,7 +124,7 @@ class LegsEngine:
                 q_proximal[unsolved] = np.nan
         return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
 
-    def _stay(self, rows: Rows, fallback: Rows, options: Options) -> Mask:
+    def _kept_projections(self, rows: Rows, fallback: Rows, options: Options) -> Mask:
         """The UNSURE projections to keep: the fallback neither reaches their targets nor comes nearer."""
         length = options.rotation_length or self.mechanism.rotation_length
         projected, other = (
@@ -280,7 +279,7 @@ class LegsEngine:
             rows, solution = outputs = self._single.new_rows(), self._single_forward.new_outputs()
             rows.actuators[:] = values
             if self._single_forward.assemble(self._forward_start(start, start_sides), rows, solution):
-                return self._answer_one(rows, solution, start, start_sides)
+                return self._single_answer(rows, solution, start, start_sides)
         rows, q_proximal, sides = forward_kinematics(
             self.mechanism, self._table, values, start, start_sides, tolerance, outputs
         )
@@ -310,7 +309,7 @@ class LegsEngine:
             return self._single_forward.home
         return Handle(starts_at(self.mechanism, self._table, start.rows.poses, sides))
 
-    def _starts_there(self, targets: Floats, poses: Floats) -> Mask:
+    def _starts_on_target(self, targets: Floats, poses: Floats) -> Mask:
         """True for rows whose start, one of as many poses or the only one, is on the target already, (n,).
 
         At a dead point closed forms may miss these targets; joint coordinates do not.
@@ -329,7 +328,7 @@ class LegsEngine:
         """The side of each leg at a start, (n or 1, legs)."""
         return self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
 
-    def _answer_one(
+    def _single_answer(
         self, rows: Rows, solution: AssemblyOutputs, start: Configurations | None, start_sides: Floats
     ) -> LegAnswers:
         """One assembled row as an answer, from a start with the sides `start_sides`."""
@@ -378,7 +377,7 @@ class LegsEngine:
         legs = local_table(self._table) if keep_mode else table_handle(self._table)
         if self._table.has_implicit_joints:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
-        n_unsolved = 1 if is_tried else self._reach_as_they_are(start is None, legs, targets, start_poses, sides, rows)
+        n_unsolved = 1 if is_tried else self._reach_at_start(start is None, legs, targets, start_poses, sides, rows)
         if n_unsolved and self._table.is_for_blocks and self._table.task["unset"][0]:
             n_unsolved -= self._complete(legs, targets, start_poses, sides, rows)
         if n_unsolved and self._table.has_free_redundant:
@@ -390,7 +389,7 @@ class LegsEngine:
             self._count_turns(start.rows.actuators, rows)
         return n_unsolved, sides
 
-    def _reach_as_they_are(
+    def _reach_at_start(
         self, from_home: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
     ) -> int:
         """Solve the rows that legs reach while free redundant joints stay; return the number of unsolved rows."""
