@@ -40,7 +40,7 @@ range = [-40, 40]
 [[joint]]
 name = "foot{leg}"
 type = "universal"
-connects = ["{foot}", "cylinder{leg}"]
+connects = ["{base_end}", "cylinder{leg}"]
 at = [{x}, {y}, 0]
 
 [[joint]]
@@ -54,9 +54,9 @@ range = [170, 250]
 [[joint]]
 name = "head{leg}"
 type = "spherical"
-connects = ["rod{leg}", "{head}"]
+connects = ["rod{leg}", "{platform_end}"]
 at = [{u}, {v}, 200]
-cone = {{ axis = [0, 0, -1], half_angle = 45, fixed_to = "{head}" }}
+cone = {{ axis = [0, 0, -1], half_angle = 45, fixed_to = "{platform_end}" }}
 """
 
 
@@ -85,7 +85,7 @@ def redundant(mechanism: pf.Mechanism) -> list[int]:
     """Places of the arms' actuators."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    own = [form.items[0].joint.name for form in table.forms if isinstance(form, RedundantJoint)]
+    own = [form.elements[0].joint.name for form in table.forms if isinstance(form, RedundantJoint)]
     return [mechanism.actuator_names.index(name) for name in own]
 
 

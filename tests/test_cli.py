@@ -439,7 +439,7 @@ def test_what_is_printed_asks_for_no_joints_that_it_does_not_show(
     def unasked(*_: object) -> None:
         raise AssertionError("joint coordinates are worked out")
 
-    monkeypatch.setattr("pfabrik.platform.coordinates.read_into", unasked)
+    monkeypatch.setattr("pfabrik.platform.coordinates.read_coordinates", unasked)
     monkeypatch.setattr("pfabrik.platform.coordinates._closed", unasked)
     assert run(*line.split()).exit_code in (0, 1)
 

@@ -304,7 +304,7 @@ def test_a_file_checks_itself_with_poses_that_have_one_answer_alone(tmp_path: Pa
 @needs_compiler
 def test_a_self_test_fails_where_the_machine_is_another(tmp_path: Path) -> None:
     text = c_source(machine("stewart"))
-    place = text.index("/* foot */ {") + len("/* foot */ {")
+    place = text.index("/* base_end */ {") + len("/* base_end */ {")
     wrong = text[:place] + "1.0 + " + text[place:]
     run = subprocess.run([str(compiled(tmp_path, wrong, COMPILERS[0], driver=None))], capture_output=True, text=True)
     assert run.returncode == 1

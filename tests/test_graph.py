@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pfabrik import Joint
-from pfabrik.decomposition.stages import is_tree, stages
+from pfabrik.decomposition.graph_blocks import blocks_between, is_tree
 from pfabrik.description.graph import Edge, components
 
 START, GOAL = "start", "goal"
@@ -41,25 +41,28 @@ def ways(edges: list[Edge], passed: tuple[str, ...] = (START,)) -> Iterator[tupl
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_stages_are_what_every_way_passes_in_that_order(seed: int) -> None:
+def test_blocks_are_what_every_path_passes_in_that_order(seed: int) -> None:
     random = np.random.default_rng(seed)
     for _ in range(20):
         edges = random_edges(random)
         all_ways = list(ways(edges))
         common = set.intersection(*(set(bodies) for bodies, _ in all_ways))
         in_turn = [body for body in all_ways[0][0] if body in common]
-        found = stages(edges, START, GOAL)
-        assert [(stage.inward, stage.outward) for stage in found] == list(pairwise(in_turn))
-        for stage in found:
+        blocks = blocks_between(edges, START, GOAL)
+        assert [(block.inward, block.outward) for block in blocks] == list(pairwise(in_turn))
+        for block in blocks:
             passed = set()
             for bodies, joints in all_ways:
-                passed |= set(joints[bodies.index(stage.inward) : bodies.index(stage.outward)])
-            assert [edge.joint.name for edge in stage.edges] == [e.joint.name for e in edges if e.joint.name in passed]
+                passed |= set(joints[bodies.index(block.inward) : bodies.index(block.outward)])
+            assert [edge.joint.name for edge in block.edges] == [e.joint.name for e in edges if e.joint.name in passed]
 
 
 def test_what_hangs_on_a_way_without_leading_anywhere_is_left_out() -> None:
     edges = edges_of((START, "a"), ("a", "b"), ("b", "c"), ("c", "a"), ("a", GOAL), (GOAL, "d"))
-    assert [[edge.joint.name for edge in stage.edges] for stage in stages(edges, START, GOAL)] == [["j0"], ["j4"]]
+    assert [[edge.joint.name for edge in block.edges] for block in blocks_between(edges, START, GOAL)] == [
+        ["j0"],
+        ["j4"],
+    ]
 
 
 def test_groups_keep_the_order_of_the_description() -> None:

@@ -18,14 +18,13 @@ from pfabrik.description.home_mobility import end_effector_freedom
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.feasibility import _margins
-from pfabrik.kernels.platform.evaluate import evaluate_poses
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
 from pfabrik.platform.answers import sides_at
-from pfabrik.platform.coordinates import read_into
+from pfabrik.platform.coordinates import read_coordinates
 from pfabrik.platform.solve import LegsEngine
-from pfabrik.platform.table import machine as legs_of
-from pfabrik.platform.table import reading_of
+from pfabrik.platform.table import reading_scratch
+from pfabrik.platform.table import table_handle as legs_of
 
 SERVED = [name for name in pf.catalog() if isinstance(table_of_poses(pf.load(name)), LegTable)]
 IN_FRONT = [name for name in SERVED if isinstance(engine_of(pf.load(name)), LegsEngine)]
@@ -76,7 +75,7 @@ def both(name: str) -> tuple[np.ndarray, Any, Any]:
     targets = targets_around_home(name, TARGETS, 0.25, 0.45)
     rows = new_rows(machine(name), TARGETS)
     engine._reach(targets, None, engine._table.home_sides, False, rows)
-    return targets, rows, engine._inner.answer(targets, None, Options(), keep_mode=False)
+    return targets, rows, engine._joint_space.answer(targets, None, Options(), keep_mode=False)
 
 
 def off(name: str, actuators: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -92,7 +91,7 @@ def constraints(name: str, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     rows = np.zeros((len(poses), own.task["rows"][0]))
     slopes = np.zeros((*rows.shape, 6 + len(own.redundant)))
     none = np.zeros((0, 0))
-    evaluate_poses(legs_of(own).address, reading_of(own).address, poses, own.home_sides, none, none, rows, slopes)
+    evaluate_poses(legs_of(own).address, reading_scratch(own).address, poses, own.home_sides, none, none, rows, slopes)
     return rows, slopes[:, :, :6]
 
 
@@ -122,7 +121,7 @@ def test_coordinates_told_by_legs_are_those_of_closed_loops(name: str) -> None:
     at_home = np.asarray(answers.status) == pf.Status.REACHED
     poses = np.ascontiguousarray(answers.pose[at_home])
     told = np.zeros((len(poses), len(mechanism.coordinate_names)))
-    read_into(own, poses, own.home_sides, told)
+    read_coordinates(own, poses, own.home_sides, told)
     columns = own.known["column"]
     closed = answers.q[at_home] - home_coordinates(mechanism)
     away = (told - closed)[:, columns] / own.known["unit"]
@@ -183,7 +182,7 @@ def test_a_start_keeps_its_working_mode(name: str) -> None:
     assert isinstance(engine, LegsEngine)
     rows = new_rows(mechanism, len(near))
     engine._reach(near, start._found, sides_at(mechanism, engine._table, start._found), True, rows)
-    behind = engine._inner.answer(near, start._found, Options(), keep_mode=True)
+    behind = engine._joint_space.answer(near, start._found, Options(), keep_mode=True)
     assert (rows.status == pf.Status.REACHED).all()
     assert off(name, rows.actuators, behind.rows.actuators).max() <= 1e-9
     answers = pf.solve_ik(mechanism, near, start=start)

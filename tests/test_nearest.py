@@ -715,7 +715,7 @@ def test_hardly_any_answer_to_another_target_is_nearer(name: str) -> None:
 def test_where_no_constraint_follows_from_others_at_home_no_walk_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """Walks take a second or more of a machine with many legs, before its first projection."""
     monkeypatch.setattr(rotation, "around_home", None)
-    assert rotation.implied_rows.__wrapped__(pf.load("stewart")) == 0
+    assert rotation.n_implied_rows.__wrapped__(pf.load("stewart")) == 0
 
 
 @pytest.mark.parametrize(

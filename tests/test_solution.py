@@ -267,10 +267,10 @@ def test_joints_of_a_part_are_found_for_that_part(started: bool, monkeypatch: py
 
     def counting(*told: object) -> object:
         rows.append(len(told[2]))
-        return settled(*told)
+        return compute(*told)
 
-    settled = answers.settled
-    monkeypatch.setattr(answers, "settled", counting)
+    compute = answers.joint_coordinates
+    monkeypatch.setattr(answers, "joint_coordinates", counting)
     targets = np.random.default_rng(0).uniform(-10, 10, (400, 3)) + machine.home_pose[:3, 3]
     start = pf.solve_ik(machine, targets) if started else None
     whole = pf.solve_ik(machine, targets, start=start)
@@ -293,10 +293,10 @@ def test_joints_of_all_rows_one_by_one_are_found_about_once(monkeypatch: pytest.
 
     def counting(*told: object) -> object:
         rows.append(len(told[2]))
-        return settled(*told)
+        return compute(*told)
 
-    settled = answers.settled
-    monkeypatch.setattr(answers, "settled", counting)
+    compute = answers.joint_coordinates
+    monkeypatch.setattr(answers, "joint_coordinates", counting)
     targets = np.random.default_rng(0).uniform(-40, 40, (300, 3)) + machine.home_pose[:3, 3]
     whole = pf.solve_ik(machine, targets)
     apart = np.array([row.q for row in whole])

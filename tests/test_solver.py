@@ -16,7 +16,7 @@ from pfabrik import Options, Status
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.engine import engine_of
 from pfabrik.errors import InvalidArgument
-from pfabrik.platform.table import local_table, machine
+from pfabrik.platform.table import local_table, table_handle
 
 MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]
 
@@ -166,7 +166,7 @@ def test_what_kernels_are_given_is_kept_as_long_as_a_solver(started: bool) -> No
     solver = pf.Solver(mechanism, start=pf.solve_ik(mechanism, home) if started else None)
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    taken = local_table if started else machine
+    taken = local_table if started else table_handle
     given = weakref.ref(taken(table))
     solver.ik(home)
     taken.cache_clear()

@@ -1,4 +1,4 @@
-"""How far targets are inside, or beyond, the limits of a mechanism: for maps, without projecting any."""
+"""Margins of targets from the limits of a mechanism, for maps: nothing is projected."""
 
 from __future__ import annotations
 
@@ -16,28 +16,27 @@ from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism
 from .kernels.threads import in_blocks
 from .platform.answers import sides_at
-from .platform.table import machine
+from .platform.table import table_handle
 from .targets import Target, as_targets
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of a kernel that measures one by one, or in blocks."""
 
 UNKNOWN = -2
-"""Binding of rows whose margin blocks do not tell, see `kernels.legs.margin_blocks`."""
+"""Binding of rows that `kernels.legs.margin_blocks` leaves unsolved."""
 
 
 class Feasibility(NamedTuple):
-    """What keeps targets from being reached, or would first.
+    """The limits that keep targets from being reached, or would first.
 
     Attributes
     ----------
-    margin : the least margin of all limits, (...,): as of `margins` a share of the room there is, 1 in the middle of a
-        range or on the axis of a cone, 0 on a limit, negative beyond it. Where a rod does not reach, minus the gap as a
-        share of its length; where a leg does not close on the target, minus what is left [L or rad]. NaN for rows that
-        are no poses.
+    margin : the least margin of all limits, (...,): as of `margins` a share of the range, 1 in its middle or on the
+        axis of a cone, 0 on a limit, negative beyond it. Where a rod does not reach, minus the gap as a share of its
+        length; where a leg does not close on the target, minus the residual [L or rad]. NaN for rows that are no poses.
     binding : which of `limits` it is the margin of, (...,); -1 where there is none.
-    limits : (joint, bound) of every limit: "min", "max" and "cone", as of `margins`; "reach" of a leg's carrier, and
-        "closed" of its first joint.
+    limits : (joint, bound) of every limit: "min", "max" and "cone", as of `margins`; "reach" of a leg's proximal joint,
+        and "closed" of its first joint.
     """
 
     margin: Any
@@ -46,7 +45,7 @@ class Feasibility(NamedTuple):
 
 
 def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = None) -> Feasibility:
-    """Margins of targets in one working mode, by legs in closed form; nothing is projected or searched for.
+    """Margins of targets in one working mode, by the legs' closed forms; nothing is projected or searched for.
 
     A target whose margin is positive is reached by `solve_ik`; one whose margin is negative may still be, in another
     working mode.
@@ -58,62 +57,66 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
 
     Raises
     ------
-    UnsupportedMechanism : some chain is no leg in closed form; the message says which, and why.
+    UnsupportedMechanism : some chain is no leg in closed form; the message names it, with the reason.
     InvalidArgument : targets of the wrong shape.
     """
     table = table_of_poses(checked_mechanism(mechanism))
     if not isinstance(table, LegTable):
         raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"])
-    begin, sides = mechanism.home_pose[None].copy(), table.home_sides
+    start_pose, sides = mechanism.home_pose[None].copy(), table.home_sides
     if start is not None:
-        found = start_of(mechanism, start, ())
-        assert found is not None
-        begin = np.require(found.rows.poses, requirements=["C", "W"])
-        sides = sides_at(mechanism, table, found)
+        configuration = start_of(mechanism, start, ())
+        assert configuration is not None
+        start_pose = np.require(configuration.rows.poses, requirements=["C", "W"])
+        sides = sides_at(mechanism, table, configuration)
     poses, shape = as_targets(mechanism, targets)
-    margin, binding = _margins(mechanism, table, poses, begin, sides)
+    margin, binding = _margins(mechanism, table, poses, start_pose, sides)
     return Feasibility(shaped(margin, shape), shaped(binding, shape), _limits(mechanism))
 
 
-def _margins(mechanism: Mechanism, table: LegTable, poses: Floats, begin: Floats, sides: Floats) -> tuple[Floats, Ints]:
-    """Margins (n,) of poses (n, 4, 4), and which limits they are of: in blocks, and one by one what these leave."""
+def _margins(
+    mechanism: Mechanism, table: LegTable, poses: Floats, start_pose: Floats, sides: Floats
+) -> tuple[Floats, Ints]:
+    """Margins (n,) of poses (n, 4, 4), and the indices of their limits: in blocks, then unsolved rows one by one."""
     margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
-    legs, rest = machine(table), np.arange(len(poses))
+    legs, unsolved = table_handle(table), np.arange(len(poses))
     if table.is_for_blocks:
         from .kernels.legs.margin_blocks import margins_in_blocks
 
         follows = int(table.task["unset"][0] > 0 and has_parasitic_motion(mechanism))
 
-        def run(own: slice) -> int:
-            return margins_in_blocks(legs.address, poses[own], begin, sides, follows, margin[own], binding[own])
+        def run(block: slice) -> int:
+            return margins_in_blocks(
+                legs.address, poses[block], start_pose, sides, follows, margin[block], binding[block]
+            )
 
         if not sum(in_blocks(run, len(poses), ROWS_A_RUN)):
             return margin, binding
-        rest = np.flatnonzero(binding == UNKNOWN)
+        unsolved = np.flatnonzero(binding == UNKNOWN)
     from .kernels.legs.feasibility import feasibility as measure
 
-    left, margins, bindings = poses[rest], np.empty(len(rest)), np.empty(len(rest), np.int64)
+    unsolved_poses, margins, bindings = poses[unsolved], np.empty(len(unsolved)), np.empty(len(unsolved), np.int64)
 
-    def run_rest(own: slice) -> None:
-        measure(legs.address, left[own], begin, sides, margins[own], bindings[own])
+    def run_rest(block: slice) -> None:
+        measure(legs.address, unsolved_poses[block], start_pose, sides, margins[block], bindings[block])
 
-    in_blocks(run_rest, len(rest), ROWS_A_BLOCK)
-    margin[rest], binding[rest] = margins, bindings
+    in_blocks(run_rest, len(unsolved), ROWS_A_BLOCK)
+    margin[unsolved], binding[unsolved] = margins, bindings
     return margin, binding
 
 
 @lru_cache(maxsize=64)
 def _limits(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
-    """Limits in the order of the kernel: ranges and cones, then whether legs reach, then whether they close."""
+    """Limits in the order of the kernel: ranges and cones, then the reach of legs, then their closure."""
     table = table_of_poses(mechanism)
     assert isinstance(table, LegTable)
-    reach = tuple((_carrier(form), "reach") for form in table.forms)
-    closed = tuple((form.items[0].joint.name if form.items else "", "closed") for form in table.forms)
+    reach = tuple((_proximal_joint(form), "reach") for form in table.forms)
+    closed = tuple((form.elements[0].joint.name if form.elements else "", "closed") for form in table.forms)
     return table.limits + reach + closed
 
 
-def _carrier(form: LegForm) -> str:
-    """The joint that carries a leg, or its first one."""
+def _proximal_joint(form: LegForm) -> str:
+    """The proximal joint of a leg, or its first one."""
     proximal = form.proximal if isinstance(form, Rod) else None
-    items = (proximal,) if proximal is not None else form.items
+    items = (proximal,) if proximal is not None else form.elements
     return items[0].joint.name if items else ""

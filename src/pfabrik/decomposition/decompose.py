@@ -1,4 +1,4 @@
-"""TDS, the topological decomposition: the mechanism's graph falls apart into serial or branched sub-chains."""
+"""TDS, the topological decomposition of a mechanism's graph into serial or branched sub-chains."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import TypeAlias
 
 from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism, checked_mechanism
+from .graph_blocks import TIP, Block, blocks_between, graph_of, is_connected, is_tree
+from .joint_nodes import NotExpressible
 from .parallelograms import Parallelogram, parallelogram_of
 from .positions import BranchForm, express_branch, express_trunk
-from .spots import NotExpressible
-from .stages import TIP, Stage, graph_of, is_tree, leads, stages
 
 
 @dataclass(frozen=True)
 class Split:
-    """Several ways from one body to another: branches, if that is the end effector, or a loop within the sub-chain.
+    """Several paths from one body to another: branches, if that is the end effector, or a loop within the sub-chain.
 
     Attributes
     ----------
-    ways : the parts of each way in order, from the base outward.
-    parallelogram : what the ways form, if they are two equal and parallel rods.
+    ways : the parts of each path in order, from the base outward.
+    parallelogram : the one that the paths form, if they are two equal and parallel rods.
     """
 
     ways: tuple[tuple[Part, ...], ...]
@@ -30,13 +30,13 @@ class Split:
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """All its joints, way by way."""
-        return tuple(step for way in self.ways for part in way for step in part.steps)
+        """All its joints, path by path."""
+        return tuple(step for path in self.ways for part in path for step in part.steps)
 
     def __str__(self) -> str:
         if self.parallelogram and self.parallelogram.pinned:
             return "Pa" + "*" * any(step.joint.actuated for step in self.steps)
-        return f"[{', '.join(map(_written, self.ways))}]"
+        return f"[{', '.join(map(_to_text, self.ways))}]"
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class SubChain:
 
     @property
     def parallelograms(self) -> tuple[Parallelogram, ...]:
-        """Those in it, branches that end on the end effector included."""
+        """Its parallelograms, those of branches that end on the end effector included."""
         return tuple(_parallelograms(self.parts))
 
     @property
@@ -92,10 +92,10 @@ class SubChain:
         return tuple(step.joint.name for step in self.steps)
 
     def __str__(self) -> str:
-        return _written(self.parts)
+        return _to_text(self.parts)
 
 
-def _written(parts: Sequence[Part]) -> str:
+def _to_text(parts: Sequence[Part]) -> str:
     return "-".join(map(str, parts))
 
 
@@ -119,17 +119,17 @@ def _parallelograms(parts: Sequence[Part]) -> Iterator[Parallelogram]:
         if isinstance(part, Split):
             if part.parallelogram:
                 yield part.parallelogram
-            for way in part.ways:
-                yield from _parallelograms(way)
+            for path in part.ways:
+                yield from _parallelograms(path)
 
 
 def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
     """Split a mechanism into its sub-chains, in the order of their first joints.
 
     The graph is cut at the base and at the end effector (a joint end effector is cut in two, and stands for a point).
-    Every connected rest that leads from one to the other is a sub-chain. It is decomposed again, the same way, between
-    the bodies that all its ways pass: where several ways leave a body, they are branches if they end at the end
-    effector, else a loop of its own. Each sub-chain says why positions alone cannot express it, if so.
+    Every connected component that joins the two is a sub-chain. It is decomposed likewise between the bodies that all
+    its paths pass: several paths out of a body are branches if they end at the end effector, else a loop within the
+    sub-chain. A sub-chain that positions alone cannot express has the reason.
 
     Source: the paper's TDS. Which chains positions can express: `decomposition.positions`.
     """
@@ -140,8 +140,8 @@ def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
 
 
 def _sub_chain(mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str) -> SubChain:
-    """The sub-chain made of edges that hang together, one of them at least on the base."""
-    if not leads(edges, base, end):
+    """The sub-chain of connected edges, at least one of them on the base."""
+    if not is_connected(edges, base, end):
         return SubChain(tuple(Step(edge.joint) for edge in edges), "does not lead to the end effector")
     parts = parts_between(mechanism, edges, base, end)
     if not is_tree(edges, base, end):
@@ -150,25 +150,25 @@ def _sub_chain(mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str)
 
 
 def parts_between(mechanism: Mechanism, edges: Sequence[Edge], start: str, goal: str) -> tuple[Part, ...]:
-    """What lies between two bodies, in series."""
-    return tuple(_part(mechanism, stage) for stage in stages(edges, start, goal))
+    """The parts between two bodies, in series."""
+    return tuple(_part(mechanism, block) for block in blocks_between(edges, start, goal))
 
 
-def _part(mechanism: Mechanism, stage: Stage) -> Part:
-    """A joint alone; ways side by side, each decomposed again; or a mesh, if they cannot be told apart."""
-    steps = tuple(Step(edge.joint, edge.bodies[0] == stage.inward, TIP in edge.bodies) for edge in stage.edges)
+def _part(mechanism: Mechanism, block: Block) -> Part:
+    """A single joint; parallel paths, each decomposed again; or a mesh, if paths share joints."""
+    steps = tuple(Step(edge.joint, edge.bodies[0] == block.inward, TIP in edge.bodies) for edge in block.edges)
     if len(steps) == 1:
         return steps[0]
-    ways = components(stage.edges, stage.inward, stage.outward)
-    if len(ways) == 1:
+    groups = components(block.edges, block.inward, block.outward)
+    if len(groups) == 1:
         return Mesh(steps)
-    parts = tuple(parts_between(mechanism, way, stage.inward, stage.outward) for way in ways)
-    joints = [[step.joint for step in _steps(way)] for way in parts]
+    parts = tuple(parts_between(mechanism, group, block.inward, block.outward) for group in groups)
+    joints = [[step.joint for step in _steps(group)] for group in parts]
     return Split(parts, parallelogram_of(joints, mechanism.characteristic_length))
 
 
 def _express(mechanism: Mechanism, chain: SubChain) -> SubChain:
-    """A tree in positions, or with the reason why not."""
+    """A tree-like sub-chain with its branches expressed in positions, or with the reason why they cannot be."""
     splits = [part for part in chain.parts if isinstance(part, Split)]
     try:
         if splits and not chain.trunk:
@@ -181,17 +181,17 @@ def _express(mechanism: Mechanism, chain: SubChain) -> SubChain:
 
 
 def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
-    """Why positions alone cannot express a mechanism: sub-chains with their reasons, or motors in none of them."""
+    """The reasons why positions alone cannot express a mechanism: of sub-chains, or motors in none of them."""
     chains = decompose(mechanism)
     reasons = tuple(f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None)
-    known = {step.joint.name for chain in chains for step in chain.trunk}
-    known |= {joint for chain in chains for form in chain.branch_forms for joint in form.told}
+    expressed = {step.joint.name for chain in chains for step in chain.trunk}
+    expressed |= {joint for chain in chains for form in chain.branch_forms for joint in form.determined}
     driven = dict.fromkeys(drive.joint.name for drive in mechanism.drives)
-    missing = (f"actuated joint {name} is in no sub-chain" for name in driven if name not in known)
+    missing = (f"actuated joint {name} is in no sub-chain" for name in driven if name not in expressed)
     return reasons or tuple(missing)
 
 
 @lru_cache(maxsize=64)
 def positions_express(mechanism: Mechanism) -> bool:
-    """Whether positions alone express all chains of a mechanism, and its task sets the whole pose."""
+    """True if positions alone express all chains of a mechanism, and its task sets the whole pose."""
     return mechanism.task == mechanism.whole_task and not beyond_positions(mechanism)

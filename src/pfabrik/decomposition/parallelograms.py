@@ -21,7 +21,7 @@ class Parallelogram:
     rods : names of the joints at the inner and the outer end of either rod.
     length : of the rods [length].
     width : between the joints of either body [length].
-    pinned : whether its joints are revolutes with parallel axes: it then moves in its plane alone, and its outer body
+    pinned : its joints are revolutes with parallel axes: it then moves in its plane alone, and its outer body
         only shifts, along a circle whose radius is the rods' length. With ball joints the outer body may also turn.
     """
 
@@ -36,34 +36,34 @@ class Parallelogram:
         return self.rods[0] + self.rods[1]
 
 
-def parallelogram_of(ways: Sequence[Sequence[Joint]], length: float) -> Parallelogram | None:
-    """The parallelogram that the ways between two bodies form at home, or None.
+def parallelogram_of(paths: Sequence[Sequence[Joint]], length: float) -> Parallelogram | None:
+    """The parallelogram that the paths between two bodies form at home, or None.
 
     Parameters
     ----------
-    ways : the joints of each way, from the inner body outward.
-    length : of the mechanism [length]; what points and axes may be off is measured by it.
+    paths : the joints of each path, from the inner body outward.
+    length : characteristic length of the mechanism [length]; tolerances are relative to it.
     """
-    if len(ways) != 2 or any(len(way) != 2 for way in ways):
+    if len(paths) != 2 or any(len(path) != 2 for path in paths):
         return None
-    types = {joint.type for way in ways for joint in way}
+    types = {joint.type for path in paths for joint in path}
     if not (types == {"revolute"} or types <= {"universal", "spherical"}):
         return None
     pinned = types == {"revolute"}
-    axis = np.array(ways[0][0].axis) if pinned else np.zeros(3)
-    if pinned and any(_area(np.array(joint.axis), axis) > TOLERANCES.alignment for way in ways for joint in way):
+    axis = np.array(paths[0][0].axis) if pinned else np.zeros(3)
+    if pinned and any(_area(np.array(joint.axis), axis) > TOLERANCES.alignment for path in paths for joint in path):
         return None
-    (a, b), (c, d) = ([_off(np.array(joint.at), axis) for joint in way] for way in ways)
+    (a, b), (c, d) = ([_across(np.array(joint.at), axis) for joint in path] for path in paths)
     rod, side = b - a, c - a
     if np.linalg.norm((d - c) - rod) > TOLERANCES.alignment * length or not _spans(rod, side):
         return None
-    (one, end), (other, other_end) = ways
-    rods = ((one.name, end.name), (other.name, other_end.name))
+    (inner, outer), (inner_beside, outer_beside) = paths
+    rods = ((inner.name, outer.name), (inner_beside.name, outer_beside.name))
     return Parallelogram(rods, float(np.linalg.norm(rod)), float(np.linalg.norm(side)), pinned)
 
 
-def _off(point: Floats, axis: Floats) -> Floats:
-    """A point without its part along an axis: where on its axis a pin sits does not matter."""
+def _across(point: Floats, axis: Floats) -> Floats:
+    """A point without its component along an axis: where on its axis a pin is does not matter."""
     return np.asarray(point - (point @ axis) * axis)
 
 
@@ -73,5 +73,5 @@ def _area(a: Floats, b: Floats) -> float:
 
 
 def _spans(rod: Floats, side: Floats) -> bool:
-    """Whether two sides are not in one line: a flat parallelogram may open into one whose rods cross."""
+    """True if two sides are not parallel: a flat parallelogram may open into one whose rods cross."""
     return _area(rod, side) > TOLERANCES.alignment * max(float(rod @ rod), float(side @ side))

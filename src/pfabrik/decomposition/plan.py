@@ -1,4 +1,4 @@
-"""Sub-chains to arrays: what the kernels are given, and the names of what they read."""
+"""Sub-chains as arrays for the kernels of `reaching`, with the names that go with them."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from .positions import BranchForm, express_trunk
 
 @dataclass(frozen=True)
 class JointPoint:
-    """Where a joint's centre is read: a node, moved by `shift` along the axis of its hinge."""
+    """A joint's centre: a node, moved by `shift` along the axis of its hinge."""
 
     joint: str
     node: int
     shift: float
     axis: Floats
-    carrier: int  # what the axis turns with: a carrier, or -1 for the platform
+    carrier: int  # the body that the axis turns with: as of `kernels.reaching.plan`, or -1 for the platform
 
 
 @dataclass(frozen=True)
 class CompiledPlan:
-    """A mechanism as arrays, and the names that go with them.
+    """A mechanism as arrays, with the names that go with them.
 
     Attributes
     ----------
     plan : the arrays.
-    points : how the centres of joints follow from nodes.
+    points : the centres of joints, as they follow from nodes.
     trunk_joints : names of the plan's trunk joints.
     trunk_points : those of them that have a centre, with their places among the plan's.
-    home_seed : where home is, (1, ...).
+    home_seed : home, (1, ...).
     """
 
     plan: P.Plan
@@ -49,7 +49,7 @@ class CompiledPlan:
 
 @lru_cache(maxsize=64)
 def compile_plan(mechanism: Mechanism) -> CompiledPlan:
-    """Compile a mechanism; `UnsupportedMechanism` names every sub-chain that positions cannot express."""
+    """Compile a mechanism; `UnsupportedMechanism` names each sub-chain that positions cannot express."""
     reasons = beyond_positions(mechanism)
     if reasons:
         raise UnsupportedMechanism(mechanism.name, reasons)
@@ -80,20 +80,20 @@ def compile_plan(mechanism: Mechanism) -> CompiledPlan:
     )
 
 
-def _starts(parts: Iterable[Sized]) -> Ints:
-    """Where each of some parts begins where all are in a row, and where the last one ends."""
+def _offsets(parts: Iterable[Sized]) -> Ints:
+    """The offset of each part in their concatenation, and the end of the last."""
     return np.cumsum([0, *map(len, parts)])
 
 
 def _spans(parts: Sequence[Sized], dtype: np.dtype[np.void]) -> Records:
-    """Records of the first of each of some parts, and the one after its last."""
-    spans, starts = np.zeros(len(parts), dtype), _starts(parts)
+    """Records of the first element of each part, and the one after its last."""
+    spans, starts = np.zeros(len(parts), dtype), _offsets(parts)
     spans["first"], spans["last"] = starts[:-1], starts[1:]
     return spans
 
 
 def _nodes(forms: Sequence[BranchForm]) -> Records:
-    """The nodes of all branches, those that are stored counted."""
+    """The nodes of all branches; those that are stored are numbered."""
     nodes = np.concatenate([form.nodes for form in forms])
     stored = nodes["stored"] >= 0
     nodes["stored"][stored] = np.arange(stored.sum())
@@ -101,23 +101,23 @@ def _nodes(forms: Sequence[BranchForm]) -> Records:
 
 
 def _cones(forms: Sequence[BranchForm]) -> Records:
-    """The cones of all branches, at nodes counted over all of them."""
+    """The cones of all branches, with nodes numbered over all of them."""
     cones = np.concatenate([form.cones for form in forms])
-    cones["node"] += np.repeat(_starts(form.nodes for form in forms)[:-1], [len(form.cones) for form in forms])
+    cones["node"] += np.repeat(_offsets(form.nodes for form in forms)[:-1], [len(form.cones) for form in forms])
     return cones
 
 
 def _branches(forms: Sequence[BranchForm], carried_by: Ints) -> Records:
-    """All branches, with what carries them and where their parts are."""
+    """The records of all branches, with the trunks that carry them and the offsets of their parts."""
     branches = np.array([form.record for form in forms], P.BRANCH)
-    nodes, cones = _starts(form.nodes for form in forms), _starts(form.cones for form in forms)
+    nodes, cones = _offsets(form.nodes for form in forms), _offsets(form.cones for form in forms)
     branches["first"], branches["last"], branches["carrier"] = nodes[:-1], nodes[1:] - 1, carried_by
     branches["cone_first"], branches["cone_last"] = cones[:-1], cones[1:]
     return branches
 
 
 def _points(forms: Sequence[BranchForm], branches: Records) -> Iterator[JointPoint]:
-    """How the centres of all joints follow from nodes."""
+    """The centres of all joints, as they follow from nodes."""
     for form, branch in zip(forms, branches, strict=True):
         for node, (names, shift) in enumerate(zip(form.joints, form.shifts.tolist(), strict=True), branch["first"]):
             at_end = node == branch["last"] and branch["end_normal"].any()

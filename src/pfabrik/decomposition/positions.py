@@ -1,9 +1,9 @@
-"""What a chain of joints means for the positions of its joint centres: nodes, segments, and restrictions on them.
+"""Sub-chains in positions: nodes at joint centres, segments between them, and restrictions on them.
 
 A sub-chain is expressible when every arrangement of nodes that keeps the restrictions can be assembled: leading
 parallel revolutes keep the first nodes in a plane, universal joints let the next link point anywhere, a spherical joint
 frees the twist, a last revolute keeps the last link in a plane of the platform, a first prismatic joint is a rail.
-Anything else carries orientation through the chain, and is said not to be expressible, with the reason.
+Any other chain carries orientation, and is rejected with the reason.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..description.graph import Step
 from ..description.mechanism import Joint, Mechanism
 from ..kernels.reaching import plan as P
 from ..tolerances import TOLERANCES
-from .spots import NotExpressible, Spot, spots_along
+from .joint_nodes import JointNode, NotExpressible, joint_nodes_along
 
 Interval: TypeAlias = tuple[float, float]
 FREE: Interval = (-math.inf, math.inf)
@@ -28,14 +28,14 @@ FREE: Interval = (-math.inf, math.inf)
 
 @dataclass(frozen=True, eq=False)
 class BranchForm:
-    """One branch as the kernels have it, at home, in base coordinates, its parts counted within the branch.
+    """One branch as the kernels take it, at home, in base coordinates; its parts are numbered within the branch.
 
     Attributes
     ----------
-    joints : those with their centres at each node; several where they act as one.
-    shifts : how far the centre of each node's joints is along the axis of its hinge, (nodes,) [length].
+    joints : names of the joints at each node; several where they act as one.
+    shifts : from each node to the centre of its joints, along the axis of its hinge, (nodes,) [length].
     nodes, record, cones : as of `kernels.reaching.plan`; a node that is stored has the place 0.
-    told : joints whose value follows.
+    determined : joints whose value follows from the nodes.
     """
 
     joints: tuple[tuple[str, ...], ...]
@@ -43,7 +43,7 @@ class BranchForm:
     nodes: Records
     record: Record
     cones: Records
-    told: tuple[str, ...]
+    determined: tuple[str, ...]
 
 
 @dataclass
@@ -52,11 +52,11 @@ class _Draft:
 
     Attributes
     ----------
-    joints : those with their centres at each spot; of a tip that is cut, the end effector itself.
-    nodes, shifts : see `BranchForm`.
+    joints : names of the joints at each joint node; of a tip that is cut, the end effector itself.
+    nodes, shifts : as of `BranchForm`.
     """
 
-    spots: list[Spot]
+    joint_nodes: list[JointNode]
     joints: tuple[tuple[str, ...], ...]
     nodes: Records
     shifts: Floats
@@ -65,43 +65,50 @@ class _Draft:
     normal: Floats = field(default_factory=lambda: np.zeros(3))
     ends_in_plane: bool = False
     align: bool = False
-    told: list[str] = field(default_factory=list)
+    determined: list[str] = field(default_factory=list)
 
 
 def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> Records:
     """The trunk of a branched chain: revolute and prismatic joints in any order, as records of `TRUNK_JOINT`."""
-    found = np.zeros(len(steps), P.TRUNK_JOINT)
-    for record, step in zip(found, steps, strict=True):
+    records = np.zeros(len(steps), P.TRUNK_JOINT)
+    for record, step in zip(records, steps, strict=True):
         joint = step.joint
         if joint.type not in ("revolute", "prismatic"):
             raise NotExpressible(f"joint {joint.name}, below a branching body, is {joint.type}")
         record["kind"] = P.SLIDE if joint.type == "prismatic" else P.TURN
         record["point"], record["axis"] = joint.at or 0.0, np.array(mechanism.home_axis(joint.name)) * step.sign
         record["lo"], record["hi"] = _from_home(mechanism, joint)
-    return found
+    return records
 
 
 def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -> BranchForm:
     """One branch, from the base (or from the body it hangs on) to the end effector."""
-    spots = spots_along(mechanism, steps)
-    joints = tuple(tuple(step.joint.name for step in spot.steps) or (mechanism.end_effector,) for spot in spots)
-    draft = _Draft(spots, joints, np.zeros(len(spots), P.NODE), np.zeros(len(spots)))
-    if steps[0].joint.type == "prismatic" and len(spots) > 0:
+    joint_nodes = joint_nodes_along(mechanism, steps)
+    joints = tuple(
+        tuple(step.joint.name for step in joint_node.steps) or (mechanism.end_effector,) for joint_node in joint_nodes
+    )
+    draft = _Draft(joint_nodes, joints, np.zeros(len(joint_nodes), P.NODE), np.zeros(len(joint_nodes)))
+    if steps[0].joint.type == "prismatic" and len(joint_nodes) > 0:
         if not on_base:
             raise NotExpressible(f"joint {steps[0].joint.name} slides on a moving body")
-        draft.rail, spots[0].slider = spots[0].slider, None
+        draft.rail, joint_nodes[0].slide = joint_nodes[0].slide, None
     _classify(draft)
     _place_nodes(mechanism, draft)
-    if (draft.align or draft.ends_in_plane) and len(spots) > 1:
-        draft.told.append(spots[-1].steps[0].joint.name)
-    near = TOLERANCES.alignment * mechanism.characteristic_length
-    cones = [_cone(draft, k, step, near) for k, spot in enumerate(spots) for step in spot.steps if step.joint.cone]
+    if (draft.align or draft.ends_in_plane) and len(joint_nodes) > 1:
+        draft.determined.append(joint_nodes[-1].steps[0].joint.name)
+    tolerance = TOLERANCES.alignment * mechanism.characteristic_length
+    cones = [
+        _cone(draft, k, step, tolerance)
+        for k, joint_node in enumerate(joint_nodes)
+        for step in joint_node.steps
+        if step.joint.cone
+    ]
     record = _record(mechanism, draft)
-    return BranchForm(joints, draft.shifts, draft.nodes, record, np.array(cones, P.CONE), tuple(draft.told))
+    return BranchForm(joints, draft.shifts, draft.nodes, record, np.array(cones, P.CONE), tuple(draft.determined))
 
 
 def _record(mechanism: Mechanism, draft: _Draft) -> Record:
-    """What counts for the branch as a whole."""
+    """The record of the branch as a whole."""
     record, places = np.zeros((), P.BRANCH), draft.nodes["home"]
     record["planar"], record["normal"] = draft.planar, draft.normal
     if len(places) > 1 and draft.planar:
@@ -109,11 +116,11 @@ def _record(mechanism: Mechanism, draft: _Draft) -> Record:
     record["end"] = places[-1] - mechanism.reference_point
     record["end_plane"] = draft.ends_in_plane
     if draft.align or draft.ends_in_plane:
-        record["end_normal"] = draft.normal if draft.align else draft.spots[-1].axis
+        record["end_normal"] = draft.normal if draft.align else draft.joint_nodes[-1].axis
     record["rail_lo"], record["rail_hi"] = FREE
     if draft.rail is not None:
         joint = draft.rail.joint
-        draft.told.append(joint.name)
+        draft.determined.append(joint.name)
         record["rail"], record["rail_axis"] = 1, np.array(mechanism.home_axis(joint.name)) * draft.rail.sign
         record["rail_lo"], record["rail_hi"] = _from_home(mechanism, joint)
     return record
@@ -134,7 +141,7 @@ def _from_home(mechanism: Mechanism, joint: Joint) -> Interval:
 
 
 def _limits(joint: Joint, home: float) -> Interval:
-    """The range of a joint, which contains home: a description may be off by the rounding of its numbers."""
+    """The range of a joint, widened to contain home: a description has rounded numbers."""
     if joint.range is None:
         return FREE
     lo, hi = joint.range
@@ -144,30 +151,32 @@ def _limits(joint: Joint, home: float) -> Interval:
 
 
 def _classify(draft: _Draft) -> None:
-    """Count the leading hinges, and see that nothing else carries orientation through the chain."""
-    spots = draft.spots
-    if len(spots) == 1 and spots[0].kind in ("R", "U"):
-        raise NotExpressible(f"joint {spots[0].steps[0].joint.name} ties the end effector to the base by orientation")
-    if spots[0].axis is not None:
-        draft.normal = spots[0].axis
-        while draft.planar < len(spots) and _is_parallel(spots[draft.planar].axis, draft.normal):
+    """Count the leading parallel hinges; raise if another joint carries orientation through the chain."""
+    joint_nodes = draft.joint_nodes
+    if len(joint_nodes) == 1 and joint_nodes[0].kind in ("R", "U"):
+        raise NotExpressible(
+            f"joint {joint_nodes[0].steps[0].joint.name} ties the end effector to the base by orientation"
+        )
+    if joint_nodes[0].axis is not None:
+        draft.normal = joint_nodes[0].axis
+        while draft.planar < len(joint_nodes) and _is_parallel(joint_nodes[draft.planar].axis, draft.normal):
             draft.planar += 1
-    rest = spots[draft.planar :]
-    if spots[-1].kind == "point":
-        draft.planar = min(draft.planar, len(spots) - 1)
-        rest = spots[draft.planar : -1]
-    elif not rest:
+    middle = joint_nodes[draft.planar :]
+    if joint_nodes[-1].kind == "point":
+        draft.planar = min(draft.planar, len(joint_nodes) - 1)
+        middle = joint_nodes[draft.planar : -1]
+    elif not middle:
         draft.align = True
-    elif all(spot.kind != "S" for spot in spots):
-        names = "-".join(spot.kind for spot in spots)
+    elif all(joint_node.kind != "S" for joint_node in joint_nodes):
+        names = "-".join(joint_node.kind for joint_node in joint_nodes)
         raise NotExpressible(f"carries orientation to the end effector ({names}): no spherical joint frees the twist")
-    elif rest[-1].kind == "R" and len(rest) > 1:
+    elif middle[-1].kind == "R" and len(middle) > 1:
         draft.ends_in_plane = True
-        rest = rest[:-1]
-    for spot in rest:
-        if spot.kind == "R":
+        middle = middle[:-1]
+    for joint_node in middle:
+        if joint_node.kind == "R":
             raise NotExpressible(
-                f"revolute joint {spot.steps[0].joint.name} turns about an axis that a moving link carries"
+                f"revolute joint {joint_node.steps[0].joint.name} turns about an axis that a moving link carries"
             )
 
 
@@ -176,18 +185,18 @@ def _is_parallel(axis: Floats | None, normal: Floats) -> bool:
 
 
 def _place_nodes(mechanism: Mechanism, draft: _Draft) -> None:
-    """The nodes: centres of hinges moved along their axes into one plane, segments with their strokes."""
-    spots, planar, nodes = draft.spots, draft.planar, draft.nodes
-    nodes["home"] = [spot.at for spot in spots]
+    """Fill the nodes: centres of hinges moved along their axes into one plane, and segments with their strokes."""
+    joint_nodes, planar, nodes = draft.joint_nodes, draft.planar, draft.nodes
+    nodes["home"] = [joint_node.at for joint_node in joint_nodes]
     nodes["stored"][-1], nodes["angle_lo"], nodes["angle_hi"] = -1, *FREE
-    nodes["hinge"][: min(planar, len(spots) - 1)] = 1
+    nodes["hinge"][: min(planar, len(joint_nodes) - 1)] = 1
     if draft.rail is None:
         nodes["stored"][0] = -1
-    in_plane = spots[min(planar, len(spots) - 1)].at if not draft.align else spots[0].at
+    in_plane = joint_nodes[min(planar, len(joint_nodes) - 1)].at if not draft.align else joint_nodes[0].at
     for k in range(planar):
         _shift(draft, k, draft.normal, in_plane)
     if draft.ends_in_plane:
-        axis = spots[-1].axis
+        axis = joint_nodes[-1].axis
         assert axis is not None
         _shift(draft, -1, axis, nodes["home"][-2])
     for k in range(1, len(nodes)):
@@ -197,23 +206,23 @@ def _place_nodes(mechanism: Mechanism, draft: _Draft) -> None:
 
 
 def _shift(draft: _Draft, k: int, axis: Floats, level: Floats) -> None:
-    """Move node k along its axis to where another place is."""
-    centre = draft.spots[k].at
+    """Move node k along its axis to the height of a point."""
+    centre = draft.joint_nodes[k].at
     draft.shifts[k] = shift = float(axis @ (centre - level))
     draft.nodes["home"][k] = centre - shift * axis
 
 
 def _stroke(mechanism: Mechanism, draft: _Draft, k: int) -> Interval:
-    """Lengths allowed between nodes k - 1 and k."""
+    """The least and largest length between nodes k - 1 and k."""
     step, (before, after) = draft.nodes["home"][k] - draft.nodes["home"][k - 1], draft.joints[k - 1 : k + 1]
     length = float(np.linalg.norm(step))
-    slider = draft.spots[k].slider
+    slide = draft.joint_nodes[k].slide
     if length <= TOLERANCES.alignment * mechanism.characteristic_length:
         raise NotExpressible(f"joints {before[0]} and {after[0]} coincide")
-    if slider is None:
+    if slide is None:
         return length, length
-    joint = slider.joint
-    cosine = float(np.array(mechanism.home_axis(joint.name)) @ step) / length * slider.sign
+    joint = slide.joint
+    cosine = float(np.array(mechanism.home_axis(joint.name)) @ step) / length * slide.sign
     if abs(cosine) < math.cos(2.0 * TOLERANCES.alignment):
         raise NotExpressible(f"prismatic joint {joint.name} does not point from {before[0]} to {after[0]}")
     sign = math.copysign(1.0, cosine)
@@ -224,16 +233,16 @@ def _stroke(mechanism: Mechanism, draft: _Draft, k: int) -> Interval:
             raise NotExpressible(f"prismatic joint {joint.name} is measured along joints that are not its neighbours")
         sign = 1.0
     offset = home - sign * length
-    draft.told.append(joint.name)
+    draft.determined.append(joint.name)
     lo, hi = sorted(((limits[0] - offset) * sign, (limits[1] - offset) * sign))
     return max(lo, 0.0), hi
 
 
 def _range_hinge(mechanism: Mechanism, draft: _Draft, k: int) -> None:
-    """The range of the hinge in node k, as deviation from home about the branch's normal."""
-    step, node, places = draft.spots[k].steps[0], draft.nodes[k], draft.nodes["home"]
+    """Fill the range of the hinge in node k: deviations from home, about the branch's normal."""
+    step, node, places = draft.joint_nodes[k].steps[0], draft.nodes[k], draft.nodes["home"]
     sense = _sense(step, draft.normal)
-    draft.told.append(step.joint.name)
+    draft.determined.append(step.joint.name)
     node["angle_lo"], node["angle_hi"] = sorted(bound * sense for bound in _from_home(mechanism, step.joint))
     node["ranged"] = np.isfinite([node["angle_lo"], node["angle_hi"]]).any()
     if k > 0:
@@ -249,15 +258,15 @@ def _angle_about(normal: Floats, a: Floats, b: Floats) -> float:
     return math.atan2(float(normal @ np.cross(a, b)), float(a @ b))
 
 
-def _cone(draft: _Draft, k: int, step: Step, near: float) -> tuple[int, int, Floats, float]:
+def _cone(draft: _Draft, k: int, step: Step, tolerance: float) -> tuple[int, int, Floats, float]:
     """The cone of the joint at node k, a record of `CONE`."""
     cone, name, places = step.joint.cone, step.joint.name, draft.nodes["home"]
     assert cone is not None
     axis, last = np.array(cone.axis), len(places) - 1
-    seen = k - 1 if cone.fixed_to != step.inward else k + 1
-    if 0 <= seen <= last and abs(draft.shifts[seen]) > near:
+    line_end = k - 1 if cone.fixed_to != step.inward else k + 1
+    if 0 <= line_end <= last and abs(draft.shifts[line_end]) > tolerance:
         raise NotExpressible(
-            f"the cone of joint {name} is about a line to {draft.joints[seen][0]}, off the chain's plane"
+            f"the cone of joint {name} is about a line to {draft.joints[line_end][0]}, off the chain's plane"
         )
     outward = places[k + 1] - places[k] if k < last else None
     if cone.fixed_to != step.inward:

@@ -1,4 +1,4 @@
-"""Legs on arms that stay where they are: as good as legs on the base."""
+"""Legs on redundant joints at rest, which are as good as legs on the base."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .leg_table import LegTable
 
 @dataclass(frozen=True)
 class Resting:
-    """A table of legs without the arms that they are on.
+    """A table of legs without the redundant joints that they are on.
 
     Attributes
     ----------
-    table : the other legs, as they stand while the arms are where they are.
-    actuators : the values of those that move arms, NaN for the others, (n_a,) [length or rad].
+    table : the legs, displaced as the redundant joints have them.
+    actuators : values of those that drive redundant joints, NaN for the others, (n_a,) [length or rad].
     """
 
     table: LegTable
@@ -27,13 +27,13 @@ class Resting:
 
 
 def at_rest(table: LegTable, sides: Floats) -> Resting | None:
-    """Legs on arms of the base which are where `sides` (legs,) say.
+    """Legs on redundant joints at the base, whose coordinates are in `sides` (legs,).
 
-    None if they are not all such legs, a task leaves something open, or an arm is beyond its range.
+    None if some leg is not like that, the task leaves some of the pose open, or a redundant joint is beyond its range.
     """
     legs = table.legs
-    redundant = legs["kind"] == K.REDUNDANT
-    is_otherwise = (legs["frame"] != K.FROM_BASE) & (legs["redundant"] < 0) & ~redundant
+    is_redundant = legs["kind"] == K.REDUNDANT
+    is_otherwise = (legs["frame"] != K.FROM_BASE) & (legs["redundant"] < 0) & ~is_redundant
     is_otherwise |= (
         (legs["at_platform_end"] == 1) | (legs["orients"] == 1) | (legs["reversed"] == 1) | (legs["inner"] == 1)
     )
@@ -41,54 +41,56 @@ def at_rest(table: LegTable, sides: Floats) -> Resting | None:
         table.task["unset"][0]
         or is_otherwise.any()
         or legs["platform_end_aimed"].any()
-        or not _are_within(table, sides)
+        or not _are_within_ranges(table, sides)
     ):
         return None
-    moved = _moved(legs, sides)
-    of_arms = {name: redundant[getattr(table, name)["leg"]] for name in ("limited", "cones", "driven", "known")}
-    numbers = np.cumsum(~redundant) - 1
-    parts = {name: getattr(table, name)[~own] for name, own in of_arms.items()}
+    displacements = _displacements(legs, sides)
+    on_redundant = {name: is_redundant[getattr(table, name)["leg"]] for name in ("limited", "cones", "driven", "known")}
+    numbers = np.cumsum(~is_redundant) - 1
+    parts = {name: getattr(table, name)[~mask] for name, mask in on_redundant.items()}
     cones = parts["cones"]
-    axes = np.einsum("nij,nj->ni", moved[cones["leg"], :3, :3], cones["axis"])
+    axes = np.einsum("nij,nj->ni", displacements[cones["leg"], :3, :3], cones["axis"])
     cones["axis"] = np.where((cones["place"] == K.BASE_LINE)[:, None], axes, cones["axis"])
     for part in parts.values():
         part["leg"] = numbers[part["leg"]]
-    standing = _standing(legs, moved)[~redundant]
-    forms = tuple(form for form, is_arm in zip(table.forms, redundant, strict=True) if not is_arm)
-    resting = replace(table, forms=forms, legs=standing, aimed=standing, limits=(), **parts)
+    displaced = _displaced(legs, displacements)[~is_redundant]
+    forms = tuple(
+        form for form, is_redundant_form in zip(table.forms, is_redundant, strict=True) if not is_redundant_form
+    )
+    resting = replace(table, forms=forms, legs=displaced, aimed=displaced, limits=(), **parts)
     if not resting.is_for_blocks:
         return None
-    driven, actuators = table.driven[of_arms["driven"]], np.full(len(table.driven), np.nan)
+    driven, actuators = table.driven[on_redundant["driven"]], np.full(len(table.driven), np.nan)
     actuators[driven["column"]] = driven["home"] + driven["sense"] * sides[driven["leg"]] * driven["unit"]
     return Resting(resting, actuators)
 
 
-def _are_within(table: LegTable, sides: Floats) -> bool:
-    """Whether arms are within their ranges."""
-    own = table.limited[table.legs["kind"][table.limited["leg"]] == K.REDUNDANT]
-    values = own["sense"] * sides[own["leg"]]
-    return bool(((own["lo"] <= values) & (values <= own["hi"])).all())
+def _are_within_ranges(table: LegTable, sides: Floats) -> bool:
+    """True if redundant joints are within their ranges."""
+    limits = table.limited[table.legs["kind"][table.limited["leg"]] == K.REDUNDANT]
+    values = limits["sense"] * sides[limits["leg"]]
+    return bool(((limits["lo"] <= values) & (values <= limits["hi"])).all())
 
 
-def _moved(legs: Records, sides: Floats) -> Floats:
-    """How the bodies that legs stand on, or that arms make move, are displaced from home, (legs, 4, 4) [L]."""
-    moved = np.repeat(np.eye(4)[None], len(legs), axis=0)
+def _displacements(legs: Records, sides: Floats) -> Floats:
+    """The displacements from home of the bodies that legs are on, or that redundant joints move, (legs, 4, 4) [L]."""
+    displacements = np.repeat(np.eye(4)[None], len(legs), axis=0)
     for k, leg in enumerate(legs):
-        own = np.eye(4)
+        motion = np.eye(4)
         if leg["kind"] == K.REDUNDANT and leg["proximal"] == K.CRANK:
-            own[:3, :3] = from_rotvec(sides[k] * leg["proximal_axis"])
-            own[:3, 3] = leg["proximal_point"] - own[:3, :3] @ leg["proximal_point"]
+            motion[:3, :3] = from_rotvec(sides[k] * leg["proximal_axis"])
+            motion[:3, 3] = leg["proximal_point"] - motion[:3, :3] @ leg["proximal_point"]
         elif leg["kind"] == K.REDUNDANT:
-            own[:3, 3] = sides[k] * leg["proximal_axis"]
-        moved[k] = moved[leg["redundant"]] @ own if leg["redundant"] >= 0 else own
-    return moved
+            motion[:3, 3] = sides[k] * leg["proximal_axis"]
+        displacements[k] = displacements[leg["redundant"]] @ motion if leg["redundant"] >= 0 else motion
+    return displacements
 
 
-def _standing(legs: Records, moved: Floats) -> Records:
-    """Legs with what they stand on as displaced."""
-    legs, rotations = legs.copy(), moved[:, :3, :3]
+def _displaced(legs: Records, displacements: Floats) -> Records:
+    """Legs whose bases are displaced, as legs on the base."""
+    legs, rotations = legs.copy(), displacements[:, :3, :3]
     for name in ("base_end_point", "proximal_point"):
-        legs[name] = np.einsum("nij,nj->ni", rotations, legs[name]) + moved[:, :3, 3]
+        legs[name] = np.einsum("nij,nj->ni", rotations, legs[name]) + displacements[:, :3, 3]
     for name in ("proximal_axis", "crank", "crank_across", "line"):
         legs[name] = np.einsum("nij,nj->ni", rotations, legs[name])
     legs["base_end_axes"] = np.einsum("nij,nkj->nki", rotations, legs["base_end_axes"])

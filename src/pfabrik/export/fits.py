@@ -1,4 +1,4 @@
-"""What a machine is to firmwares that have kinematics of their own: struts, towers or thighs, and their dimensions."""
+"""Machines as firmwares with kinematics of their own describe them: struts, towers or thighs, with dimensions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .machine import Coordinate, Leg, Machine
 
 
 class Tower(NamedTuple):
-    """A rail of a delta, moved inward by where its rods are on the platform.
+    """A rail of a delta, moved inward by the offset of its rods on the platform.
 
     Attributes
     ----------
@@ -33,10 +33,10 @@ class Thigh(NamedTuple):
 
     Attributes
     ----------
-    hip, ankle : (3,) [length]: where the crank's axis is, and the middle of the rods on the platform, against the
-        reference point.
+    hip, ankle : (3,) [length]: the centre of the crank, and the middle of the rods on the platform from the reference
+        point.
     length, shin : of the crank, and of the rods.
-    added : what the actuator counts more than the angle by which the crank hangs down [rad].
+    added : the actuator's value less the angle by which the crank hangs down [rad].
     least : of that angle; infinite without a range.
     """
 
@@ -49,20 +49,20 @@ class Thigh(NamedTuple):
 
 
 def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
-    """Ends of six struts, on the base and on the platform, and what their actuators add to lengths; None for others."""
+    """Base and platform ends of six struts, and their actuators' values less their lengths; None for other machines."""
     mechanism = machine.mechanism
-    whole = not machine.unset and not mechanism.end_effector_is_joint
-    if not whole or len(machine.legs) != 6 or machine.equations:
+    sets_whole_pose = not machine.unset and not mechanism.end_effector_is_joint
+    if not sets_whole_pose or len(machine.legs) != 6 or machine.equations:
         return None
-    legs = [machine.legs[each.leg] for each in machine.driven]
+    legs = [machine.legs[driven.leg] for driven in machine.driven]
     rods = [leg.record["kind"] == K.ROD and leg.record["proximal"] == K.NO_PROXIMAL for leg in legs]
-    if [each.place for each in machine.driven] != [K.SLIDE] * 6 or not all(rods):
+    if [driven.place for driven in machine.driven] != [K.SLIDE] * 6 or not all(rods):
         return None
     if any(leg.record["reversed"] for leg in legs):
         return None
     ends = [(np.asarray(leg.numbers["base_end"]), np.asarray(leg.numbers["platform_end"])) for leg in legs]
-    added = [each.home - _length(leg) for each, leg in zip(machine.driven, legs, strict=True)]
-    return [(*each, more) for each, more in zip(ends, added, strict=True)]
+    offsets = [driven.home - _length(leg) for driven, leg in zip(machine.driven, legs, strict=True)]
+    return [(*driven, offset) for driven, offset in zip(ends, offsets, strict=True)]
 
 
 def _length(leg: Leg) -> float:
@@ -70,7 +70,7 @@ def _length(leg: Leg) -> float:
 
 
 def _pair(machine: Machine, driven: Coordinate, proximal: int) -> tuple[Leg, Leg] | None:
-    """The two rods on what an actuator carries, if that is a crank, or a carriage."""
+    """The two rods on an actuator, if it is the proximal joint asked for: a crank, or a carriage."""
     pair = [leg for leg in machine.legs if leg.main == driven.leg]
     return (pair[0], pair[1]) if len(pair) == 2 and pair[0].record["proximal"] == proximal else None
 
@@ -81,26 +81,26 @@ def towers_of(machine: Machine) -> list[Tower] | None:
     if set(mechanism.task) != {"x", "y", "z"} or len(machine.driven) != 3 or len(machine.legs) != 6:
         return None
     towers = []
-    for each in machine.driven:
-        pair = _pair(machine, each, K.CARRIAGE)
+    for driven in machine.driven:
+        pair = _pair(machine, driven, K.CARRIAGE)
         if pair is None:
             return None
-        axis = np.asarray(pair[0].numbers["axis"]) * each.sense
-        spans = [np.asarray(leg.numbers["base_end"]) - np.asarray(leg.numbers["platform_end"]) for leg in pair]
+        axis = np.asarray(pair[0].numbers["axis"]) * driven.sense
+        offsets = [np.asarray(leg.numbers["base_end"]) - np.asarray(leg.numbers["platform_end"]) for leg in pair]
         lengths = [_length(leg) for leg in pair]
-        off = max(np.abs(spans[0] - spans[1]).max() / size, abs(lengths[0] - lengths[1]) / size)
+        difference = max(np.abs(offsets[0] - offsets[1]).max() / size, abs(lengths[0] - lengths[1]) / size)
         if (
-            off > TOLERANCES.alignment
+            difference > TOLERANCES.alignment
             or np.linalg.norm(np.cross(axis, [0, 0, 1])) > TOLERANCES.alignment
             or axis[2] < 0
         ):
             return None
-        towers.append(Tower(spans[0] - each.home * axis, lengths[0], each.home + each.hi))
+        towers.append(Tower(offsets[0] - driven.home * axis, lengths[0], driven.home + driven.hi))
     return towers
 
 
 def angle_of(place: Floats) -> float:
-    """Where a place (3,) is about the z axis [deg], from 0 to 360."""
+    """The angle of a place (3,) about the z axis [deg], from 0 to 360."""
     return math.degrees(math.atan2(place[1], place[0])) % 360.0
 
 
@@ -112,33 +112,33 @@ def thighs_of(machine: Machine) -> list[Thigh] | None:
     mechanism = machine.mechanism
     if set(mechanism.task) != {"x", "y", "z"} or len(machine.driven) != 3 or len(machine.legs) != 6:
         return None
-    found = [_thigh(machine, each) for each in machine.driven]
-    known = [each for each in found if each is not None]
-    return known if len(known) == len(found) else None
+    thighs = [_thigh(machine, driven) for driven in machine.driven]
+    fitting = [driven for driven in thighs if driven is not None]
+    return fitting if len(fitting) == len(thighs) else None
 
 
 def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
-    size, near = machine.mechanism.characteristic_length, TOLERANCES.alignment
+    size, tolerance = machine.mechanism.characteristic_length, TOLERANCES.alignment
     pair = _pair(machine, driven, K.CRANK)
     if pair is None:
         return None
     axis, crank = (np.asarray(pair[0].numbers[name]) for name in ("axis", "crank"))
     knees = [np.asarray(leg.numbers["base_end"]) for leg in pair]
     ankles = [np.asarray(leg.numbers["platform_end"]) for leg in pair]
-    aside = np.cross(axis, knees[1] - knees[0])
-    off = max(np.abs((knees[1] - knees[0]) - (ankles[1] - ankles[0])).max(), np.linalg.norm(aside)) / size
+    misalignment = np.cross(axis, knees[1] - knees[0])
+    difference = max(np.abs((knees[1] - knees[0]) - (ankles[1] - ankles[0])).max(), np.linalg.norm(misalignment)) / size
     knee, ankle = 0.5 * (knees[0] + knees[1]), 0.5 * (ankles[0] + ankles[1])
     hip = knee - crank
-    outward = np.append(hip[:2], 0.0) / max(float(np.linalg.norm(hip[:2])), near * size)
-    if off > near or max(abs(axis[2]), abs(axis @ outward)) > near:
+    outward = np.append(hip[:2], 0.0) / max(float(np.linalg.norm(hip[:2])), tolerance * size)
+    if difference > tolerance or max(abs(axis[2]), abs(axis @ outward)) > tolerance:
         return None
     down = np.array([0.0, 0.0, -1.0])
     if np.cross(axis * driven.sense, outward) @ down < 0.0:
         return None
-    way = ankle + np.asarray(machine.mechanism.reference_point) - hip
-    is_outside = (way @ down) * (crank @ outward) + (crank @ down) * -(way @ outward) > 0.0
-    if way @ down <= 0.0 or not is_outside:
+    to_ankle = ankle + np.asarray(machine.mechanism.reference_point) - hip
+    is_outside = (to_ankle @ down) * (crank @ outward) + (crank @ down) * -(to_ankle @ outward) > 0.0
+    if to_ankle @ down <= 0.0 or not is_outside:
         return None
-    hangs = math.atan2(crank @ down, crank @ outward)
+    angle = math.atan2(crank @ down, crank @ outward)
     shin = _length(pair[0])
-    return Thigh(hip, ankle, float(np.linalg.norm(crank)), shin, driven.home - hangs, hangs + driven.lo)
+    return Thigh(hip, ankle, float(np.linalg.norm(crank)), shin, driven.home - angle, angle + driven.lo)

@@ -1,6 +1,6 @@
-/* What every exported file has in common: it reads legs out of tables. `source.py` puts what is the machine's own in
-   place of the three files that are included, keeps the blocks between #if and #endif that a machine has a use for, and
-   writes names and numbers with the prefix and in the precision that are asked for. */
+/* The routines of every exported file; they read legs from tables. `source.py` puts the machine's constants, tables
+   and checks in place of the three included files, keeps the blocks between #if and #endif whose conditions hold, and
+   writes names and numbers with the prefix and in the precision asked for. */
 
 #ifndef PFK_H
 #define PFK_H
@@ -16,8 +16,8 @@ typedef struct {
     pfk_real R[3][3];
 } pfk_pose;
 
-/* What functions return: 0 where all is well, the number of the limit that is exceeded most, PFK_LEG + the number of a
-   leg that does not reach or close, or one of those below. */
+/* Return codes: 0 on success, the number of the limit that is exceeded most, PFK_LEG + the number of a leg that does
+   not reach or close, or one of those below. */
 enum {
     PFK_LEG = 1000,
     PFK_NO_POSE = -1,      /* not finite, or not a rotation */
@@ -33,25 +33,24 @@ void pfk_home(pfk_pose *pose);
 void pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose *pose);
 /* The angles of a pose: roll, pitch, yaw [rad]. */
 void pfk_rpy(const pfk_pose *pose, pfk_real angles[3]);
-/* What a code that was returned means, in words. */
+/* The meaning of a return code, in words. */
 const char *pfk_what(int code);
 #if IK
 /* Actuators for a target. `pose` must hold a pose, the last one or home: what the task leaves open is completed from
-   there, and it becomes the pose that is reached. Nothing is written unless 0 is returned. */
+   there, and `pose` becomes the pose reached. Nothing is written unless 0 is returned. */
 int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS]);
 #endif
 #if TURNS
-/* Counts actuators that may turn more than once on from where they were. */
+/* Adds whole turns to actuators that may turn more than once: nearest to those before. */
 void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS]);
 #endif
 #if LIMITS
-/* Fills how far a whole pose is inside each of PFK_LIMITS limits, negative beyond it [length or rad]. */
+/* Fills the slack of a whole pose in each of PFK_LIMITS limits, negative beyond it [length or rad]. */
 int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
 #endif
 #if FK
-/* The pose at which actuators are, by Newton's method from `pose`, in at most 40 steps; `steps` may be 0, or is told
-   how many there were. Limits are not asked for. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is
-   returned. */
+/* The pose at given actuators, by Newton's method from `pose`, in at most 40 steps; `steps` may be 0, or is set to
+   their number. Limits are not checked. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is returned. */
 int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #endif
 
@@ -68,60 +67,62 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #define PFK_TURN 6.283185307179586
 #define PFK_LONGEST_STEP 0.5 /* [L or rad] */
 #define PFK_FAR 1e30
-#define PFK_MODE_APART 1e-3  /* nearer to each other actuators of two working modes meet [L or rad] */
+#define PFK_MODE_APART 1e-3  /* two working modes meet where their actuators are nearer [L or rad] */
 enum {
     PFK_IK_STEPS = 20,
-    PFK_PARTS = 16, /* of the way to a target that is not completed at once */
+    PFK_PARTS = 16, /* continuation steps to a target that is not completed at once */
     PFK_FK_STEPS = 40
 };
 
-/* A rod is [what carries it] + ending of its foot + rigid or sliding rod + ending of its head; a pivot is [slides] +
-   one ending of no length; an arm is a hinge or slide that other legs are on. A leg is read from the base to the
-   platform, or, its foot there, from the platform to the base: then its numbers are as the platform sees them. */
-enum { PFK_ROD, PFK_PIVOT, PFK_ARM };
-/* Frames that legs are read in; the arms' follow. */
+/* A rod is [proximal joint] + base ending + rigid or sliding rod + platform ending; a pivot is [slides] + one ending of
+   no length; a redundant joint is a hinge or slide that other legs are on. A leg is read from the base to the platform;
+   or in reverse, its base end on the platform: then its numbers are in the platform's frame. */
+enum { PFK_ROD, PFK_PIVOT, PFK_REDUNDANT };
+/* Frames that legs are read in; the redundant joints' follow. */
 enum { PFK_FROM_BASE, PFK_FROM_PLATFORM, PFK_FROM_ITSELF };
-/* What carries a foot: nothing, a hinge, a slide, or what carries the rod before. */
-enum { PFK_NO_CARRIER, PFK_CRANK, PFK_CARRIAGE, PFK_SHARED };
+/* The proximal joint of a leg: none, a hinge, a slide, or that of the rod before. */
+enum { PFK_NO_PROXIMAL, PFK_CRANK, PFK_CARRIAGE, PFK_SHARED };
 /* Endings: a weld, a hinge, two hinges that cross, three through a point, a ball. */
 enum { PFK_WELD, PFK_HINGE, PFK_CROSS, PFK_TRIPLE, PFK_BALL };
-/* Coordinates of a leg: of what carries it, angles at its foot, how much longer it is, angles at its head or slides. */
-enum { PFK_CARRIER = 0, PFK_FOOT = 1, PFK_SLIDE = 4, PFK_HEAD = 5, PFK_VALUES = 8 };
+/* Coordinates of a leg: of its proximal joint, angles at its base end, its extension, angles at its platform end or
+   slides. */
+enum { PFK_Q_PROXIMAL = 0, PFK_BASE_END = 1, PFK_SLIDE = 4, PFK_PLATFORM_END = 5, PFK_VALUES = 8 };
 
-/* What a leg is, at home. */
+/* A leg, at home. */
 typedef struct {
     int kind, frame;
-    int is_back; /* 1: its foot is on the platform */
-    int main; /* the leg whose carrier it is on: mostly its own place */
-    int carrier, slides;
+    int is_back; /* 1: its base end is on the platform */
+    int main; /* the leg whose proximal joint it is on: mostly its own place */
+    int proximal, slides;
     int twists; /* 1: both ends keep the rod from spinning about itself */
-    int foot_end, head_end;
-    int foot_aimed, head_aimed; /* 1: the angles of this end are asked for */
-    pfk_real foot[3];
-    pfk_real head[3]; /* seen from the reference point; of a leg read from the platform, from the base's origin */
-    pfk_real length, line[3]; /* the direction from foot to head */
-    pfk_real foot_axes[3][3], head_axes[3][3]; /* hinges, from the body that the end is on */
-    pfk_real foot_side, head_side; /* which of the two ways to aim crossed hinges is home's */
+    int base_ending, platform_ending;
+    int base_end_aimed, platform_end_aimed; /* 1: the angles of this ending are computed */
+    pfk_real base_end[3];
+    pfk_real platform_end[3]; /* from the reference point; of a leg read from the platform, from the base's origin */
+    pfk_real length, line[3]; /* the direction from base end to platform end */
+    pfk_real base_end_axes[3][3], platform_end_axes[3][3]; /* hinges, from the body that the end is on */
+    pfk_real base_end_side, platform_end_side; /* which of two solutions of crossed hinges is home's */
     pfk_real twist; /* angle about the line between marks of the two ends */
-    pfk_real axis[3]; /* of what carries it */
-    pfk_real centre[3], spoke[3], across[3]; /* of a crank: from its centre to the foot, and that a quarter turn on */
-    pfk_real reach[3]; /* from centre, or from the foot on a carriage, to the head */
+    pfk_real axis[3]; /* of the proximal joint */
+    pfk_real centre[3], crank[3], across[3]; /* of a crank: from centre to the base end, and that a quarter turn on */
+    pfk_real reach[3]; /* from centre, or from the base end on a carriage, to the platform end */
     pfk_real side; /* which of two solutions is home's */
 #if PIVOTS
-    pfk_real rows[3][3]; /* from the centre's displacement: first what slides say, then what has to stay 0 */
-    int pairs, upright; /* how many of: conditions kept . R moved; hinges that must not turn over */
+    pfk_real rows[3][3]; /* of the centre's displacement: first the slides, then what must stay 0 */
+    int pairs, upright; /* number of conditions kept . R moved; of hinges that must not turn over */
     pfk_real kept[3][3], moved[3][3];
     pfk_real square[3]; /* to the last hinge */
 #endif
-#if ARMS
-    int on; /* the number of the arm that it is on, 0 if on none */
-    int is_inner; /* 1: it is between bodies that arms on the platform place, and says nothing of the pose */
-    /* of an arm */
+#if REDUNDANT
+    int on; /* the number of the redundant joint that it is on, 0 if on none */
+    int is_inner; /* 1: it is between intermediate platforms, and constrains nothing of the pose */
+    /* of a redundant joint */
     int makes; /* the frame that it makes */
-    int column; /* which coordinate of arms it has: its own, or that of another where `is_twin` */
-    int is_twin, at_head; /* at_head: it moves the body that heads are on, not the one that feet are on */
-    int by_plane; /* 1: it brings the hinge at the foot of the rod after it to face the head */
-    int bears; /* 1: a leg on it has an equation */
+    int column; /* of its coordinate; a mirror has that of another joint */
+    int is_mirror;
+    int at_platform_end; /* 1: it moves the body that platform ends are on; 0: the one that base ends are on */
+    int orients; /* 1: it brings the hinge at the base end of the rod after it to face the platform end */
+    int has_rows; /* 1: a leg on it has an equation */
 #endif
 } pfk_leg;
 
@@ -133,45 +134,46 @@ typedef struct {
 } pfk_coordinate;
 
 #if CONES
-/* A rod keeps within a half angle of an axis of what its foot, or its head, is on. */
+/* The half angle of a rod about an axis fixed to the body that its base end, or its platform end, is on. */
 typedef struct {
-    int leg, is_head;
+    int leg, is_platform_end;
     pfk_real axis[3], half_angle;
 } pfk_cone;
 #endif
 
 #include "tables.h"
 
-/* The platform as a foot on the base sees it, or the base as one on the platform does: points map to R x + p. */
+/* The platform as a base end on the base sees it, or the base as one on the platform does: points map to R x + p. */
 typedef struct {
     pfk_real R[3][3], p[3];
     pfk_real moved[3]; /* p less what it is at home */
     pfk_real centre[3]; /* about which the platform turns */
-    pfk_real feet[3][3]; /* turns directions of what the feet are on to those of the base */
+    pfk_real base_axes[3][3]; /* turns directions of the body of the base ends to those of the base */
 } pfk_frame;
 
-/* Where a leg is. */
+/* The state of a leg. */
 typedef struct {
-    pfk_real foot[3], head[3], span[3], u[3], length;
-    pfk_real foot_line[3], head_line[3]; /* u as what the foot, or the head, is on sees it */
+    pfk_real base_end[3], platform_end[3], span[3], u[3], length;
+    pfk_real base_line[3], platform_line[3]; /* u in the frame of the body that the end is on */
     pfk_real value[PFK_VALUES], cosine, sine;
-    int is_given; /* 1: what carries it has the coordinate that it is given */
-    int is_held; /* 1: what carries it does not follow the head */
-    pfk_real follow[6]; /* derivative of the carrier's coordinate by the pose; of an arm, the velocity and the angular
-                           velocity of the platform that would change as much in its frame */
+    int is_given; /* 1: the proximal coordinate is given */
+    int is_held; /* 1: the proximal joint does not follow the platform end */
+    /* derivative of the proximal coordinate by the pose; of a redundant joint, the velocity and the angular velocity of
+       the platform that would change as much in its frame */
+    pfk_real follow[6];
 } pfk_placed;
 
 typedef struct {
     pfk_frame frame[PFK_FRAMES];
     pfk_placed leg[PFK_LEGS];
-#if ARMS
-    pfk_real arm[PFK_ARMS]; /* their coordinates */
+#if REDUNDANT
+    pfk_real q_redundant[PFK_N_REDUNDANT]; /* their coordinates */
 #endif
 } pfk_state;
 
 #if SOLVES
 /* An equation of a leg, 0 where it closes [L or rad]; its derivative by the velocity and the angular velocity of the
-   platform, then by the coordinates of arms. */
+   platform, then by the coordinates of redundant joints. */
 typedef struct {
     int leg;
     pfk_real off, slope[PFK_COLUMNS];
@@ -233,7 +235,7 @@ static void pfk_map(const pfk_frame *frame, const pfk_real point[3], pfk_real ou
     pfk_along(out, 1.0, frame->p, out);
 }
 
-/* The platform as seen from the base, and the base as seen from the platform; those of arms follow. */
+/* The platform as seen from the base, and the base as seen from the platform; those of redundant joints follow. */
 static void pfk_frames(const pfk_pose *pose, pfk_frame frame[PFK_FRAMES])
 {
     pfk_frame *forward = &frame[PFK_FROM_BASE], *back = &frame[PFK_FROM_PLATFORM];
@@ -246,21 +248,21 @@ static void pfk_frames(const pfk_pose *pose, pfk_frame frame[PFK_FRAMES])
         back->centre[i] = pfk_reference[i];
         back->moved[i] = 0.0;
         for (j = 0; j < 3; ++j) {
-            forward->R[i][j] = back->feet[i][j] = pose->R[i][j];
-            forward->feet[i][j] = i == j ? 1.0 : 0.0;
+            forward->R[i][j] = back->base_axes[i][j] = pose->R[i][j];
+            forward->base_axes[i][j] = i == j ? 1.0 : 0.0;
             back->R[i][j] = pose->R[j][i];
             back->moved[i] -= pose->R[j][i] * moved[j] + (pose->R[j][i] - (i == j ? 1.0 : 0.0)) * pfk_reference[j];
         }
         back->p[i] = back->moved[i];
-#if ARMS
+#if REDUNDANT
         for (j = 0; j < 3; ++j)
-            frame[PFK_FROM_ITSELF].R[i][j] = frame[PFK_FROM_ITSELF].feet[i][j] = i == j ? 1.0 : 0.0;
+            frame[PFK_FROM_ITSELF].R[i][j] = frame[PFK_FROM_ITSELF].base_axes[i][j] = i == j ? 1.0 : 0.0;
         frame[PFK_FROM_ITSELF].p[i] = frame[PFK_FROM_ITSELF].moved[i] = frame[PFK_FROM_ITSELF].centre[i] = 0.0;
 #endif
     }
 }
 
-/* How far a point of the platform has moved since home. */
+/* The displacement of a point of the platform from home. */
 static void pfk_displaced(const pfk_frame *frame, const pfk_real point[3], pfk_real out[3])
 {
     int i;
@@ -287,7 +289,7 @@ static void pfk_about_angle(const pfk_real v[3], const pfk_real axis[3], pfk_rea
 }
 
 #endif
-/* Angle from u to w about a unit vector; what lies along it does not count. */
+/* Angle from u to w about a unit vector; components along it do not count. */
 static pfk_real pfk_angle(const pfk_real axis[3], const pfk_real u[3], const pfk_real w[3])
 {
     pfk_real across[3];
@@ -295,14 +297,14 @@ static pfk_real pfk_angle(const pfk_real axis[3], const pfk_real u[3], const pfk
     return atan2(pfk_dot(axis, across), pfk_dot(u, w) - pfk_dot(axis, u) * pfk_dot(axis, w));
 }
 
-/* The same angle within half a turn of `centre`. */
+/* An angle plus whole turns, within half a turn of `centre`. */
 static pfk_real pfk_wrap(pfk_real angle, pfk_real centre)
 {
     return angle - PFK_TURN * floor((angle - centre) / PFK_TURN + 0.5);
 }
 
-/* One of the two solutions of A cos q + B sin q = C, where over = A - C; how far it is from the double root, negative
-   where there is none: then the angle is that of the double root. */
+/* One of the two solutions of A cos q + B sin q = C, where over = A - C. Returns the singularity margin: the
+   distance from the double root, negative without a solution; then the angle is that of the double root. */
 static pfk_real pfk_either(pfk_real A, pfk_real B, pfk_real C, pfk_real over, pfk_real side, pfk_real *cosine,
                            pfk_real *sine)
 {
@@ -319,21 +321,21 @@ static pfk_real pfk_either(pfk_real A, pfk_real B, pfk_real C, pfk_real over, pf
     return rest / square;
 }
 
-/* Angles of two crossed hinges that turn u, given at home, into w; how sure they are, as above. */
+/* Angles of two crossed hinges that turn u, given at home, into w; the singularity margin, as above. */
 static pfk_real pfk_aim(const pfk_real axes[3][3], const pfk_real u[3], const pfk_real w[3], pfk_real side,
                         pfk_real angles[])
 {
     const pfk_real *a = axes[0], *b = axes[1], bu = pfk_dot(b, u);
-    pfk_real flat[3], across[3], turned[3], A, C, cosine, sine, sure;
+    pfk_real flat[3], across[3], turned[3], A, C, cosine, sine, margin;
     pfk_along(u, -bu, b, flat);
     pfk_cross(b, u, across);
     A = pfk_dot(a, flat);
     C = pfk_dot(a, w) - pfk_dot(a, b) * bu;
-    sure = pfk_either(A, pfk_dot(a, across), C, A - C, side, &cosine, &sine);
+    margin = pfk_either(A, pfk_dot(a, across), C, A - C, side, &cosine, &sine);
     pfk_about(u, b, cosine, sine, turned);
     angles[0] = pfk_angle(a, turned, w);
     angles[1] = atan2(sine, cosine);
-    return sure;
+    return margin;
 }
 
 #if PIVOTS
@@ -352,67 +354,71 @@ static pfk_real pfk_last_angle(const pfk_frame *frame, const pfk_leg *pivot, con
     int i;
     pfk_rotate(frame, pivot->square, now);
     for (i = 0; i < before; ++i) {
-        pfk_about_angle(now, pivot->foot_axes[i], -angles[i], back);
+        pfk_about_angle(now, pivot->base_end_axes[i], -angles[i], back);
         pfk_copy(back, now);
     }
-    return pfk_angle(pivot->foot_axes[before], pivot->square, now);
+    return pfk_angle(pivot->base_end_axes[before], pivot->square, now);
 }
 
 #endif
-/* Turns a crank until its rod reaches the head, or to where it comes nearest; whether it is near a dead point. What
-   the head has moved since home tells more digits than where it is: with x = reach + moved, C = spoke . reach + c. */
+/* Turns a crank until its rod reaches the platform end, or to where it comes nearest; whether it is near a dead
+   point. What the platform end has moved since home tells more digits than where it is: with x = reach + moved, C =
+   crank . reach + c. */
 static int pfk_turn_crank(const pfk_leg *rod, const pfk_real moved[3], pfk_placed *own)
 {
-    const pfk_real a = pfk_dot(rod->spoke, moved), B = pfk_dot(rod->across, rod->reach) + pfk_dot(rod->across, moved);
-    const pfk_real c = pfk_dot(moved, rod->reach) + 0.5 * pfk_dot(moved, moved), A = pfk_dot(rod->spoke, rod->reach);
-    const pfk_real sure = pfk_either(A + a, B, A + c, a - c, rod->side, &own->cosine, &own->sine);
-    own->value[PFK_CARRIER] = atan2(own->sine, own->cosine);
-    return !(sure > PFK_DEAD);
+    const pfk_real a = pfk_dot(rod->crank, moved), B = pfk_dot(rod->across, rod->reach) + pfk_dot(rod->across, moved);
+    const pfk_real c = pfk_dot(moved, rod->reach) + 0.5 * pfk_dot(moved, moved), A = pfk_dot(rod->crank, rod->reach);
+    const pfk_real margin = pfk_either(A + a, B, A + c, a - c, rod->side, &own->cosine, &own->sine);
+    own->value[PFK_Q_PROXIMAL] = atan2(own->sine, own->cosine);
+    return !(margin > PFK_DEAD);
 }
 
-/* Moves a carriage until its rod reaches the head, or to where it comes nearest; whether it is near a dead point. */
+/* Moves a carriage until its rod reaches the platform end, or to where it comes nearest; whether it is near a dead
+   point. */
 static int pfk_move_carriage(const pfk_leg *rod, const pfk_real moved[3], pfk_placed *own)
 {
     const pfk_real middle = pfk_dot(rod->reach, rod->axis) + pfk_dot(moved, rod->axis);
     const pfk_real rest = middle * middle - 2.0 * pfk_dot(moved, rod->reach) - pfk_dot(moved, moved);
-    own->value[PFK_CARRIER] = middle + (rest > 0.0 ? rod->side * sqrt(rest) : 0.0);
+    own->value[PFK_Q_PROXIMAL] = middle + (rest > 0.0 ? rod->side * sqrt(rest) : 0.0);
     return !(rest > PFK_DEAD * rod->length * rod->length);
 }
 
-static int pfk_has_carrier(const pfk_leg *leg)
+static int pfk_has_proximal(const pfk_leg *leg)
 {
-    return leg->carrier == PFK_CRANK || leg->carrier == PFK_CARRIAGE;
+    return leg->proximal == PFK_CRANK || leg->proximal == PFK_CARRIAGE;
 }
 
-/* A direction of what a foot is on, turned with the crank `main`, as `lead` has it; or back (sense -1). */
-static void pfk_carried(const pfk_leg *main, const pfk_placed *lead, pfk_real sense, const pfk_real v[3],
+/* A direction of what a base end is on, turned with the crank `main`, whose state is `main_state`; or back (sense
+   -1). */
+static void pfk_carried(const pfk_leg *main, const pfk_placed *main_state, pfk_real sense, const pfk_real v[3],
                         pfk_real out[3])
 {
-    if (main->carrier == PFK_CRANK)
-        pfk_about(v, main->axis, lead->cosine, sense * lead->sine, out);
+    if (main->proximal == PFK_CRANK)
+        pfk_about(v, main->axis, main_state->cosine, sense * main_state->sine, out);
     else
         pfk_copy(v, out);
 }
 
-/* Where a foot is, on what carries it. */
-static void pfk_place_foot(const pfk_leg *rod, const pfk_leg *main, const pfk_placed *lead, pfk_real foot[3])
+/* The place of a base end on its proximal joint. */
+static void pfk_place_base_end(const pfk_leg *rod, const pfk_leg *main, const pfk_placed *main_state,
+                               pfk_real base_end[3])
 {
-    pfk_real arm[3];
-    if (main->carrier == PFK_CARRIAGE) {
-        pfk_along(rod->foot, lead->value[PFK_CARRIER], main->axis, foot);
-    } else if (main->carrier != PFK_CRANK) {
-        pfk_copy(rod->foot, foot);
-    } else if (rod->carrier == PFK_SHARED) {
-        pfk_along(rod->foot, -1.0, main->centre, arm);
-        pfk_about(arm, main->axis, lead->cosine, lead->sine, foot);
-        pfk_along(foot, 1.0, main->centre, foot);
+    pfk_real lever[3];
+    if (main->proximal == PFK_CARRIAGE) {
+        pfk_along(rod->base_end, main_state->value[PFK_Q_PROXIMAL], main->axis, base_end);
+    } else if (main->proximal != PFK_CRANK) {
+        pfk_copy(rod->base_end, base_end);
+    } else if (rod->proximal == PFK_SHARED) {
+        pfk_along(rod->base_end, -1.0, main->centre, lever);
+        pfk_about(lever, main->axis, main_state->cosine, main_state->sine, base_end);
+        pfk_along(base_end, 1.0, main->centre, base_end);
     } else {
-        pfk_along(rod->centre, lead->cosine, rod->spoke, foot);
-        pfk_along(foot, lead->sine, rod->across, foot);
+        pfk_along(rod->centre, main_state->cosine, rod->crank, base_end);
+        pfk_along(base_end, main_state->sine, rod->across, base_end);
     }
 }
 
-/* Angles of the hinges at an end of a rod that has to point along `line`; how sure they are, see pfk_aim. */
+/* Angles of the hinges at an end of a rod that has to point along `line`; the singularity margin, see pfk_aim. */
 static pfk_real pfk_aim_end(int end, const pfk_real axes[3][3], const pfk_real home[3], const pfk_real line[3],
                             pfk_real side, pfk_real angles[])
 {
@@ -423,7 +429,7 @@ static pfk_real pfk_aim_end(int end, const pfk_real axes[3][3], const pfk_real h
 }
 
 #if TWISTS
-/* A direction that goes with an end of a rod, as what the end is on sees it: its last hinge. */
+/* The mark of an end of a rod, in the frame of the body that it is on: its last hinge. */
 static void pfk_mark(int end, const pfk_real axes[3][3], const pfk_real angles[], pfk_real out[3])
 {
     if (end == PFK_HINGE)
@@ -433,66 +439,67 @@ static void pfk_mark(int end, const pfk_real axes[3][3], const pfk_real angles[]
 }
 
 /* The angle about a rod between the marks of its ends, less home's; fills the marks in base coordinates. */
-static pfk_real pfk_twist(const pfk_frame *frame, const pfk_leg *rod, const pfk_leg *main, const pfk_placed *lead,
-                          const pfk_placed *own, pfk_real foot_mark[3], pfk_real head_mark[3])
+static pfk_real pfk_twist(const pfk_frame *frame, const pfk_leg *rod, const pfk_leg *main, const pfk_placed *main_state,
+                          const pfk_placed *own, pfk_real base_mark[3], pfk_real platform_mark[3])
 {
     pfk_real mark[3];
-    pfk_mark(rod->foot_end, rod->foot_axes, &own->value[PFK_FOOT], mark);
-    pfk_carried(main, lead, 1.0, mark, foot_mark);
-    pfk_mark(rod->head_end, rod->head_axes, &own->value[PFK_HEAD], mark);
-    pfk_rotate(frame, mark, head_mark);
-    return pfk_wrap(pfk_angle(own->u, foot_mark, head_mark) - rod->twist, 0.0);
+    pfk_mark(rod->base_ending, rod->base_end_axes, &own->value[PFK_BASE_END], mark);
+    pfk_carried(main, main_state, 1.0, mark, base_mark);
+    pfk_mark(rod->platform_ending, rod->platform_end_axes, &own->value[PFK_PLATFORM_END], mark);
+    pfk_rotate(frame, mark, platform_mark);
+    return pfk_wrap(pfk_angle(own->u, base_mark, platform_mark) - rod->twist, 0.0);
 }
 
 #endif
-/* Fills where a rod is at a pose; how far it is from reaching [L]. `lead` is where that leg is whose carrier it is on.
-   Two crossed hinges aim a rod in either of two ways, half a turn about it apart: those of home, unless the two ends
-   then hold the rod the other way around. */
-static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const pfk_placed *lead, pfk_placed *own)
+/* Fills the state of a rod at a pose; returns the gap by which it does not reach [L]. `main_state` is that of the
+   leg with its proximal joint. Two crossed hinges point a rod by either of two solutions, half a turn about it apart:
+   those of home, unless the two ends then hold the rod the other way around. */
+static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const pfk_placed *main_state, pfk_placed *own)
 {
     const pfk_leg *main = &pfk_legs[rod->main];
-    pfk_real moved[3], sure, gap = 0.0;
-    pfk_map(frame, rod->head, own->head);
-    if (pfk_has_carrier(rod)) {
+    pfk_real moved[3], margin, gap = 0.0;
+    pfk_map(frame, rod->platform_end, own->platform_end);
+    if (pfk_has_proximal(rod)) {
         if (own->is_given) {
             own->is_held = 1;
-            own->cosine = cos(own->value[PFK_CARRIER]);
-            own->sine = sin(own->value[PFK_CARRIER]);
+            own->cosine = cos(own->value[PFK_Q_PROXIMAL]);
+            own->sine = sin(own->value[PFK_Q_PROXIMAL]);
         } else {
-            pfk_displaced(frame, rod->head, moved);
-            own->is_held = rod->carrier == PFK_CRANK ? pfk_turn_crank(rod, moved, own)
+            pfk_displaced(frame, rod->platform_end, moved);
+            own->is_held = rod->proximal == PFK_CRANK ? pfk_turn_crank(rod, moved, own)
                                                      : pfk_move_carriage(rod, moved, own);
         }
     }
-    pfk_place_foot(rod, main, lead, own->foot);
-    pfk_along(own->head, -1.0, own->foot, own->span);
+    pfk_place_base_end(rod, main, main_state, own->base_end);
+    pfk_along(own->platform_end, -1.0, own->base_end, own->span);
     own->length = pfk_norm(own->span);
     own->value[PFK_SLIDE] = own->length - rod->length;
     if (!(own->length > 0.0))
         return 1.0;
     pfk_along(pfk_zero, 1.0 / own->length, own->span, own->u);
-    pfk_carried(main, lead, -1.0, own->u, own->foot_line);
-    pfk_rotate_back(frame, own->u, own->head_line);
-    if (pfk_has_carrier(rod) && own->is_held && !own->is_given)
+    pfk_carried(main, main_state, -1.0, own->u, own->base_line);
+    pfk_rotate_back(frame, own->u, own->platform_line);
+    if (pfk_has_proximal(rod) && own->is_held && !own->is_given)
         gap = fabs(own->value[PFK_SLIDE]) / PFK_SIZE;
-    if (rod->foot_aimed) {
-        sure = pfk_aim_end(rod->foot_end, rod->foot_axes, rod->line, own->foot_line, rod->foot_side,
-                           &own->value[PFK_FOOT]);
-        gap = -sure > gap ? -sure : gap;
+    if (rod->base_end_aimed) {
+        margin = pfk_aim_end(rod->base_ending, rod->base_end_axes, rod->line, own->base_line, rod->base_end_side,
+                           &own->value[PFK_BASE_END]);
+        gap = -margin > gap ? -margin : gap;
     }
-    if (rod->head_aimed) {
-        sure = pfk_aim_end(rod->head_end, rod->head_axes, rod->line, own->head_line, rod->head_side,
-                           &own->value[PFK_HEAD]);
-        gap = -sure > gap ? -sure : gap;
+    if (rod->platform_end_aimed) {
+        margin = pfk_aim_end(rod->platform_ending, rod->platform_end_axes, rod->line, own->platform_line,
+                             rod->platform_end_side, &own->value[PFK_PLATFORM_END]);
+        gap = -margin > gap ? -margin : gap;
     }
 #if TWISTS
-    if (rod->twists && (rod->foot_end == PFK_CROSS || rod->head_end == PFK_CROSS)) {
-        pfk_real foot_mark[3], head_mark[3];
-        if (fabs(pfk_twist(frame, rod, main, lead, own, foot_mark, head_mark)) > 0.25 * PFK_TURN) {
-            if (rod->head_end == PFK_CROSS)
-                pfk_aim(rod->head_axes, rod->line, own->head_line, -rod->head_side, &own->value[PFK_HEAD]);
+    if (rod->twists && (rod->base_ending == PFK_CROSS || rod->platform_ending == PFK_CROSS)) {
+        pfk_real base_mark[3], platform_mark[3];
+        if (fabs(pfk_twist(frame, rod, main, main_state, own, base_mark, platform_mark)) > 0.25 * PFK_TURN) {
+            if (rod->platform_ending == PFK_CROSS)
+                pfk_aim(rod->platform_end_axes, rod->line, own->platform_line, -rod->platform_end_side,
+                        &own->value[PFK_PLATFORM_END]);
             else
-                pfk_aim(rod->foot_axes, rod->line, own->foot_line, -rod->foot_side, &own->value[PFK_FOOT]);
+                pfk_aim(rod->base_end_axes, rod->line, own->base_line, -rod->base_end_side, &own->value[PFK_BASE_END]);
         }
     }
 #endif
@@ -500,119 +507,121 @@ static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const 
 }
 
 #if PIVOTS
-/* Fills where a pivot is at a pose; how far it is from reaching. */
+/* Fills the state of a pivot at a pose; returns the gap by which it does not reach. */
 static pfk_real pfk_place_pivot(const pfk_frame *frame, const pfk_leg *pivot, pfk_placed *own)
 {
-    pfk_real last[3], sure, *angles = &own->value[PFK_FOOT];
+    pfk_real last[3], margin, *angles = &own->value[PFK_BASE_END];
     int i;
-    pfk_map(frame, pivot->head, own->head);
-    pfk_along(own->head, -1.0, pivot->foot, own->span);
+    pfk_map(frame, pivot->platform_end, own->platform_end);
+    pfk_along(own->platform_end, -1.0, pivot->base_end, own->span);
     for (i = 0; i < pivot->slides; ++i)
-        own->value[PFK_HEAD + i] = pfk_dot(pivot->rows[i], own->span);
-    if (pivot->foot_end == PFK_HINGE) {
-        angles[0] = pfk_spin_angle(frame, pivot->foot_axes[0]);
-    } else if (pivot->foot_end == PFK_CROSS) {
-        pfk_rotate(frame, pivot->foot_axes[1], last);
-        angles[0] = pfk_angle(pivot->foot_axes[0], pivot->foot_axes[1], last);
+        own->value[PFK_PLATFORM_END + i] = pfk_dot(pivot->rows[i], own->span);
+    if (pivot->base_ending == PFK_HINGE) {
+        angles[0] = pfk_spin_angle(frame, pivot->base_end_axes[0]);
+    } else if (pivot->base_ending == PFK_CROSS) {
+        pfk_rotate(frame, pivot->base_end_axes[1], last);
+        angles[0] = pfk_angle(pivot->base_end_axes[0], pivot->base_end_axes[1], last);
         angles[1] = pfk_last_angle(frame, pivot, angles, 1);
-    } else if (pivot->foot_end == PFK_TRIPLE) {
-        pfk_rotate(frame, pivot->foot_axes[2], last);
-        sure = pfk_aim(pivot->foot_axes, pivot->foot_axes[2], last, pivot->side, angles);
+    } else if (pivot->base_ending == PFK_TRIPLE) {
+        pfk_rotate(frame, pivot->base_end_axes[2], last);
+        margin = pfk_aim(pivot->base_end_axes, pivot->base_end_axes[2], last, pivot->side, angles);
         angles[2] = pfk_last_angle(frame, pivot, angles, 2);
-        return sure < 0.0 ? -sure : 0.0;
+        return margin < 0.0 ? -margin : 0.0;
     }
     return 0.0;
 }
 
 #endif
-#if ARMS
-/* Brings an arm to where the hinge n at the foot F of the rod after it faces the head H; how sure it is, see
-   pfk_either. With the arm's axis a through o: (Rot n) . (H - o) = n . (F - o), or n . (H - F - q a) = 0; at home
-   n . (H - F) = 0. */
-static pfk_real pfk_face(const pfk_frame *frame, const pfk_leg *arm, const pfk_leg *rod, pfk_real *q)
+#if REDUNDANT
+/* Turns or shifts a redundant joint until the hinge n at the base end F of the rod after it faces the platform end H;
+   returns the singularity margin, as pfk_either. With the joint's axis a through o: (Rot n) . (H - o) = n . (F - o), or
+   n . (H - F - q a) = 0; at home n . (H - F) = 0. */
+static pfk_real pfk_orient(const pfk_frame *frame, const pfk_leg *joint, const pfk_leg *rod, pfk_real *q)
 {
-    const pfk_real *n = rod->foot_axes[0], lean = pfk_dot(arm->axis, n);
-    pfk_real head[3], moved[3], foot[3], across[3], over, C, cosine, sine, sure;
-    pfk_displaced(frame, rod->head, moved);
+    const pfk_real *n = rod->base_end_axes[0], lean = pfk_dot(joint->axis, n);
+    pfk_real platform_end[3], moved[3], base_end[3], across[3], over, C, cosine, sine, margin;
+    pfk_displaced(frame, rod->platform_end, moved);
     over = pfk_dot(n, moved);
-    if (arm->carrier == PFK_CARRIAGE) {
+    if (joint->proximal == PFK_CARRIAGE) {
         *q = over / lean;
         return 1.0;
     }
-    pfk_map(frame, rod->head, head);
-    pfk_along(head, -1.0, arm->centre, head);
-    pfk_along(rod->foot, -1.0, arm->centre, foot);
-    pfk_cross(arm->axis, n, across);
-    C = pfk_dot(n, foot) - lean * pfk_dot(arm->axis, head);
-    sure = pfk_either(over + C, pfk_dot(across, head), C, over, arm->side, &cosine, &sine);
+    pfk_map(frame, rod->platform_end, platform_end);
+    pfk_along(platform_end, -1.0, joint->centre, platform_end);
+    pfk_along(rod->base_end, -1.0, joint->centre, base_end);
+    pfk_cross(joint->axis, n, across);
+    C = pfk_dot(n, base_end) - lean * pfk_dot(joint->axis, platform_end);
+    margin = pfk_either(over + C, pfk_dot(across, platform_end), C, over, joint->side, &cosine, &sine);
     *q = atan2(sine, cosine);
-    return sure;
+    return margin;
 }
 
-/* Fills the frame that an arm makes, its coordinate given, and how it moves what is in its frame. */
-static void pfk_place_arm(const pfk_frame *before, const pfk_leg *arm, pfk_real q, pfk_frame *after, pfk_placed *own)
+/* Fills the frame that a redundant joint makes, its coordinate given, and how it moves what is in its frame. */
+static void pfk_place_redundant(const pfk_frame *before, const pfk_leg *joint, pfk_real q, pfk_frame *after,
+                                pfk_placed *own)
 {
-    const int is_hinge = arm->carrier == PFK_CRANK;
+    const int is_hinge = joint->proximal == PFK_CRANK;
     const pfk_real cosine = is_hinge ? cos(q) : 1.0, sine = is_hinge ? sin(q) : 0.0;
-    const pfk_real sense = arm->at_head != arm->is_back ? 1.0 : -1.0;
+    const pfk_real sense = joint->at_platform_end != joint->is_back ? 1.0 : -1.0;
     pfk_real axis[3], at[3], turned[3], from[3], velocity[3];
     int i, j;
-    own->value[PFK_CARRIER] = q;
-    pfk_copy(arm->axis, axis);
-    pfk_copy(arm->centre, at);
-    if (arm->at_head) {
-        pfk_rotate(before, arm->axis, axis);
-        pfk_map(before, arm->centre, at);
+    own->value[PFK_Q_PROXIMAL] = q;
+    pfk_copy(joint->axis, axis);
+    pfk_copy(joint->centre, at);
+    if (joint->at_platform_end) {
+        pfk_rotate(before, joint->axis, axis);
+        pfk_map(before, joint->centre, at);
     }
     pfk_along(before->centre, -1.0, at, from);
     pfk_cross(axis, from, velocity);
     for (i = 0; i < 3; ++i) {
-        own->follow[i] = sense * pfk_dot(before->feet[i], is_hinge ? velocity : axis);
-        own->follow[3 + i] = is_hinge ? sense * pfk_dot(before->feet[i], axis) : 0.0;
+        own->follow[i] = sense * pfk_dot(before->base_axes[i], is_hinge ? velocity : axis);
+        own->follow[3 + i] = is_hinge ? sense * pfk_dot(before->base_axes[i], axis) : 0.0;
     }
     *after = *before;
-    /* `axis` and `at` are as the feet's body sees them: a turn there moves heads about them, or feet the other way */
+    /* `axis` and `at` are as the body of the base ends sees them: a turn there moves platform ends about them, or
+       base ends the other way */
     for (j = 0; j < 3; ++j) {
         for (i = 0; i < 3; ++i)
             from[i] = before->R[i][j];
-        pfk_about(from, axis, cosine, arm->at_head ? sine : -sine, turned);
+        pfk_about(from, axis, cosine, joint->at_platform_end ? sine : -sine, turned);
         for (i = 0; i < 3; ++i)
             after->R[i][j] = turned[i];
-        pfk_about(before->feet[j], axis, cosine, -sine, turned);
-        if (!arm->at_head)
-            pfk_copy(turned, after->feet[j]);
+        pfk_about(before->base_axes[j], axis, cosine, -sine, turned);
+        if (!joint->at_platform_end)
+            pfk_copy(turned, after->base_axes[j]);
     }
     if (!is_hinge) {
-        q = arm->at_head ? q : -q;
+        q = joint->at_platform_end ? q : -q;
         pfk_along(before->p, q, axis, after->p);
         pfk_along(before->moved, q, axis, after->moved);
-        if (!arm->at_head)
+        if (!joint->at_platform_end)
             pfk_along(before->centre, q, axis, after->centre);
         return;
     }
     pfk_along(before->p, -1.0, at, from);
-    pfk_about(from, axis, cosine, arm->at_head ? sine : -sine, turned);
+    pfk_about(from, axis, cosine, joint->at_platform_end ? sine : -sine, turned);
     pfk_along(at, 1.0, turned, after->p);
     pfk_along(turned, -1.0, from, turned);
     pfk_along(before->moved, 1.0, turned, after->moved);
-    if (!arm->at_head) {
+    if (!joint->at_platform_end) {
         pfk_along(before->centre, -1.0, at, from);
         pfk_about(from, axis, cosine, -sine, turned);
         pfk_along(at, 1.0, turned, after->centre);
     }
 }
 
-/* Arms are found from where they are at home. */
+/* Redundant joints start at home. */
 static void pfk_start(pfk_state *state)
 {
     int i;
-    for (i = 0; i < PFK_ARMS; ++i)
-        state->arm[i] = 0.0;
+    for (i = 0; i < PFK_N_REDUNDANT; ++i)
+        state->q_redundant[i] = 0.0;
 }
 
 #endif
-/* Places all legs at a pose, with driven carriers as they are given, if they are; 0, or the number of the leg that is
-   farthest from reaching. */
+/* Places all legs at a pose, with driven proximal joints as they are given, if they are; 0, or the number of the leg
+   that is farthest from reaching. */
 static int pfk_place(const pfk_pose *pose, const pfk_real *given, pfk_state *state)
 {
     pfk_real gap, worst = PFK_CLOSE;
@@ -622,24 +631,24 @@ static int pfk_place(const pfk_pose *pose, const pfk_real *given, pfk_state *sta
         state->leg[k].is_given = 0;
     for (i = 0; given && i < PFK_ACTUATORS; ++i) {
         const pfk_coordinate *driven = &pfk_driven[i];
-        if (driven->place == PFK_CARRIER) {
+        if (driven->place == PFK_Q_PROXIMAL) {
             state->leg[driven->leg].is_given = 1;
-            state->leg[driven->leg].value[PFK_CARRIER] = given[i];
-#if ARMS
-            if (pfk_legs[driven->leg].kind == PFK_ARM)
-                state->arm[pfk_legs[driven->leg].column] = given[i];
+            state->leg[driven->leg].value[PFK_Q_PROXIMAL] = given[i];
+#if REDUNDANT
+            if (pfk_legs[driven->leg].kind == PFK_REDUNDANT)
+                state->q_redundant[pfk_legs[driven->leg].column] = given[i];
 #endif
         }
     }
     for (k = 0; k < PFK_LEGS; ++k) {
         const pfk_leg *leg = &pfk_legs[k];
         const pfk_frame *frame = &state->frame[leg->frame];
-#if ARMS
-        if (leg->kind == PFK_ARM) {
-            pfk_real q = state->arm[leg->column];
-            gap = leg->by_plane && !given ? -pfk_face(frame, leg, leg + 1, &q) : 0.0;
-            state->arm[leg->column] = q;
-            pfk_place_arm(frame, leg, q, &state->frame[leg->makes], &state->leg[k]);
+#if REDUNDANT
+        if (leg->kind == PFK_REDUNDANT) {
+            pfk_real q = state->q_redundant[leg->column];
+            gap = leg->orients && !given ? -pfk_orient(frame, leg, leg + 1, &q) : 0.0;
+            state->q_redundant[leg->column] = q;
+            pfk_place_redundant(frame, leg, q, &state->frame[leg->makes], &state->leg[k]);
         } else
 #endif
 #if PIVOTS
@@ -673,16 +682,16 @@ static pfk_real pfk_deviation(const pfk_coordinate *coordinate, const pfk_state 
 }
 
 #if SOLVES
-/* Derivative of a . H + c . w by the velocity and the angular velocity of the platform; H is the head, w the angular
-   velocity of what it is on, as the leg's frame has them. */
-static void pfk_slope(const pfk_leg *leg, const pfk_frame *frame, const pfk_real head[3], const pfk_real a[3],
+/* Derivative of a . H + c . w by the velocity and the angular velocity of the platform; H is the platform end, w the
+   angular velocity of what it is on, as the leg's frame has them. */
+static void pfk_slope(const pfk_leg *leg, const pfk_frame *frame, const pfk_real platform_end[3], const pfk_real a[3],
                       const pfk_real c[3], pfk_real slope[])
 {
     const pfk_real sense = leg->is_back ? -1.0 : 1.0;
-    pfk_real arm[3], spin[3];
+    pfk_real lever[3], spin[3];
     int i;
-    pfk_along(head, -1.0, frame->centre, arm);
-    pfk_cross(arm, a, spin);
+    pfk_along(platform_end, -1.0, frame->centre, lever);
+    pfk_cross(lever, a, spin);
     pfk_along(spin, 1.0, c, spin);
     if (leg->frame == PFK_FROM_BASE) {
         pfk_copy(a, slope);
@@ -690,23 +699,25 @@ static void pfk_slope(const pfk_leg *leg, const pfk_frame *frame, const pfk_real
         return;
     }
     for (i = 0; i < 3; ++i) {
-        slope[i] = sense * pfk_dot(frame->feet[i], a);
-        slope[3 + i] = sense * pfk_dot(frame->feet[i], spin);
+        slope[i] = sense * pfk_dot(frame->base_axes[i], a);
+        slope[3 + i] = sense * pfk_dot(frame->base_axes[i], spin);
     }
 }
 
-/* Derivative of - a . F + b . W by the coordinate of a carrier; F is a foot on it, W its angular velocity. */
-static pfk_real pfk_carrier_rate(const pfk_leg *main, const pfk_real foot[3], const pfk_real a[3], const pfk_real b[3])
+/* Derivative of - a . F + b . W by the coordinate of a proximal joint; F is a base end on it, W its angular
+   velocity. */
+static pfk_real pfk_proximal_rate(const pfk_leg *main, const pfk_real base_end[3], const pfk_real a[3],
+                                  const pfk_real b[3])
 {
-    pfk_real arm[3], moved[3];
-    if (main->carrier == PFK_CARRIAGE)
+    pfk_real lever[3], moved[3];
+    if (main->proximal == PFK_CARRIAGE)
         return -pfk_dot(a, main->axis);
-    pfk_along(foot, -1.0, main->centre, arm);
-    pfk_cross(main->axis, arm, moved);
+    pfk_along(base_end, -1.0, main->centre, lever);
+    pfk_cross(main->axis, lever, moved);
     return pfk_dot(b, main->axis) - pfk_dot(a, moved);
 }
 
-/* Derivative of the coordinate of a carrier that follows the head, so that its rod keeps its length. */
+/* Derivative of the coordinate of a proximal joint that follows the platform end, so that its rod keeps its length. */
 static void pfk_follow(const pfk_frame *frame, const pfk_leg *rod, pfk_placed *own)
 {
     pfk_real rate;
@@ -715,14 +726,15 @@ static void pfk_follow(const pfk_frame *frame, const pfk_leg *rod, pfk_placed *o
         own->follow[i] = 0.0;
     if (own->is_held)
         return;
-    rate = pfk_carrier_rate(rod, own->foot, own->u, pfk_zero);
-    pfk_slope(rod, frame, own->head, own->u, pfk_zero, own->follow);
+    rate = pfk_proximal_rate(rod, own->base_end, own->u, pfk_zero);
+    pfk_slope(rod, frame, own->platform_end, own->u, pfk_zero, own->follow);
     for (i = 0; i < 6; ++i)
         own->follow[i] /= -rate;
 }
 
-/* Fills an equation of leg k; `off` and a . (dH - dF) + b . W + c . w, its derivative, are in `unit`. F and H are foot
-   and head, W and w the angular velocities of what they are on. Where row->slope is asked for, it is `sloped`. */
+/* Fills an equation of leg k; `off` and a . (dH - dF) + b . W + c . w, its derivative, are in `unit`. F and H are
+   base end and platform end, W and w the angular velocities of what they are on. Where row->slope is asked for, it is
+   `sloped`. */
 static pfk_row *pfk_put(const pfk_state *state, int k, pfk_real unit, pfk_real off, const pfk_real a[3],
                         const pfk_real b[3], const pfk_real c[3], int sloped, pfk_row *row)
 {
@@ -734,13 +746,13 @@ static pfk_row *pfk_put(const pfk_state *state, int k, pfk_real unit, pfk_real o
     row->off = off / unit;
     if (!sloped)
         return row + 1;
-    pfk_slope(leg, &state->frame[leg->frame], own->head, a, c, row->slope);
-    if (main->carrier != PFK_NO_CARRIER) {
-        rate = pfk_carrier_rate(main, own->foot, a, b);
+    pfk_slope(leg, &state->frame[leg->frame], own->platform_end, a, c, row->slope);
+    if (main->proximal != PFK_NO_PROXIMAL) {
+        rate = pfk_proximal_rate(main, own->base_end, a, b);
         for (i = 0; i < 6; ++i)
             row->slope[i] += rate * state->leg[leg->main].follow[i];
     }
-#if ARMS
+#if REDUNDANT
     for (i = 6; i < PFK_COLUMNS; ++i)
         row->slope[i] = 0.0;
     for (i = leg->on; i > 0; i = pfk_legs[i - 1].on)
@@ -786,41 +798,43 @@ static void pfk_spin_rate(int end, const pfk_real first[3], const pfk_real last[
 static pfk_row *pfk_twist_row(const pfk_state *state, int k, int sloped, pfk_row *row)
 {
     const pfk_leg *rod = &pfk_legs[k], *main = &pfk_legs[rod->main];
-    const pfk_placed *own = &state->leg[k], *lead = &state->leg[rod->main];
+    const pfk_placed *own = &state->leg[k], *main_state = &state->leg[rod->main];
     const pfk_frame *frame = &state->frame[rod->frame];
-    pfk_real foot_mark[3], head_mark[3], first[3], by_foot[3], by_head[3], foot_body[3], head_body[3];
-    const pfk_real off = pfk_twist(frame, rod, main, lead, own, foot_mark, head_mark);
-    pfk_carried(main, lead, 1.0, rod->foot_axes[0], first);
-    pfk_spin_rate(rod->foot_end, first, foot_mark, own->u, by_foot, foot_body);
-    pfk_rotate(frame, rod->head_axes[0], first);
-    pfk_spin_rate(rod->head_end, first, head_mark, own->u, by_head, head_body);
-    pfk_along(by_head, -1.0, by_foot, by_head);
-    pfk_along(pfk_zero, -1.0, foot_body, foot_body);
-    pfk_along(by_head, -pfk_dot(by_head, own->u), own->u, by_head);
-    pfk_along(pfk_zero, 1.0 / own->length, by_head, by_head);
-    return pfk_put(state, k, 1.0, off, by_head, foot_body, head_body, sloped, row);
+    pfk_real base_mark[3], platform_mark[3], first[3], by_base_end[3], by_platform_end[3];
+    pfk_real base_spin[3], platform_spin[3];
+    const pfk_real off = pfk_twist(frame, rod, main, main_state, own, base_mark, platform_mark);
+    pfk_carried(main, main_state, 1.0, rod->base_end_axes[0], first);
+    pfk_spin_rate(rod->base_ending, first, base_mark, own->u, by_base_end, base_spin);
+    pfk_rotate(frame, rod->platform_end_axes[0], first);
+    pfk_spin_rate(rod->platform_ending, first, platform_mark, own->u, by_platform_end, platform_spin);
+    pfk_along(by_platform_end, -1.0, by_base_end, by_platform_end);
+    pfk_along(pfk_zero, -1.0, base_spin, base_spin);
+    pfk_along(by_platform_end, -pfk_dot(by_platform_end, own->u), own->u, by_platform_end);
+    pfk_along(pfk_zero, 1.0 / own->length, by_platform_end, by_platform_end);
+    return pfk_put(state, k, 1.0, off, by_platform_end, base_spin, platform_spin, sloped, row);
 }
 
 #endif
-/* The equations of a rod with foot F, head H, l = H - F: |l| = length; n . l = 0 for a foot on one hinge n, m . l = 0
-   for a head on one hinge m; and the angle about l between marks of its ends, where both keep it from spinning. */
+/* The equations of a rod with base end F, platform end H, l = H - F: |l| = length; n . l = 0 for a base end on one
+   hinge n, m . l = 0 for a platform end on one hinge m; and the angle about l between marks of its ends, where both
+   keep it from spinning. */
 static pfk_row *pfk_rod_rows(pfk_state *state, int k, int sloped, pfk_row *row)
 {
     const pfk_leg *rod = &pfk_legs[k];
     const pfk_frame *frame = &state->frame[rod->frame];
     const pfk_placed *own = &state->leg[k];
     pfk_real n[3], across[3];
-    if (sloped && pfk_has_carrier(rod))
+    if (sloped && pfk_has_proximal(rod))
         pfk_follow(frame, rod, &state->leg[k]);
     if (!rod->slides)
         row = pfk_put(state, k, PFK_SIZE, own->value[PFK_SLIDE], own->u, pfk_zero, pfk_zero, sloped, row);
-    if (rod->foot_end == PFK_HINGE) {
-        pfk_carried(&pfk_legs[rod->main], &state->leg[rod->main], 1.0, rod->foot_axes[0], n);
+    if (rod->base_ending == PFK_HINGE) {
+        pfk_carried(&pfk_legs[rod->main], &state->leg[rod->main], 1.0, rod->base_end_axes[0], n);
         pfk_cross(n, own->span, across);
         row = pfk_put(state, k, PFK_SIZE, pfk_dot(n, own->span), n, across, pfk_zero, sloped, row);
     }
-    if (rod->head_end == PFK_HINGE) {
-        pfk_rotate(frame, rod->head_axes[0], n);
+    if (rod->platform_ending == PFK_HINGE) {
+        pfk_rotate(frame, rod->platform_end_axes[0], n);
         pfk_cross(n, own->span, across);
         row = pfk_put(state, k, PFK_SIZE, pfk_dot(n, own->span), n, pfk_zero, across, sloped, row);
     }
@@ -832,7 +846,7 @@ static pfk_row *pfk_rod_rows(pfk_state *state, int k, int sloped, pfk_row *row)
 }
 
 #if PIVOTS
-/* kept . R moved + more = 0, for directions that what the foot and what the head is on have. */
+/* kept . R moved + more = 0, for directions that what the base end and what the platform end is on have. */
 static pfk_row *pfk_pair_row(const pfk_state *state, int k, const pfk_real kept[3], const pfk_real moved[3],
                              pfk_real more, int sloped, pfk_row *row)
 {
@@ -852,8 +866,8 @@ static pfk_row *pfk_pivot_rows(const pfk_state *state, int k, int sloped, pfk_ro
         row = pfk_put(state, k, PFK_SIZE, pfk_dot(pivot->rows[i], state->leg[k].span), pivot->rows[i], pfk_zero,
                       pfk_zero, sloped, row);
     for (i = 0; i < pivot->upright; ++i) { /* an axis that is turned over meets the conditions too */
-        pfk_rotate(&state->frame[pivot->frame], pivot->foot_axes[i], turned);
-        over = pfk_dot(turned, pivot->foot_axes[i]) < 0.0 ? 2.0 : over;
+        pfk_rotate(&state->frame[pivot->frame], pivot->base_end_axes[i], turned);
+        over = pfk_dot(turned, pivot->base_end_axes[i]) < 0.0 ? 2.0 : over;
     }
     for (i = 0; i < pivot->pairs; ++i)
         row = pfk_pair_row(state, k, pivot->kept[i], pivot->moved[i], over - pfk_dot(pivot->kept[i], pivot->moved[i]),
@@ -870,13 +884,14 @@ static pfk_row *pfk_hinge_row(const pfk_state *state, int k, int place, pfk_real
 {
     const pfk_leg *rod = &pfk_legs[k];
     const pfk_placed *own = &state->leg[k];
-    const int at_head = place >= PFK_HEAD, end = at_head ? rod->head_end : rod->foot_end;
-    const pfk_real (*axes)[3] = at_head ? rod->head_axes : rod->foot_axes;
+    const int at_platform_end = place >= PFK_PLATFORM_END;
+    const int end = at_platform_end ? rod->platform_ending : rod->base_ending;
+    const pfk_real (*axes)[3] = at_platform_end ? rod->platform_end_axes : rod->base_end_axes;
     pfk_real turned[3], across[3], kept[3], off, value = 0.0;
     if (end == PFK_HINGE) {
         pfk_cross(axes[0], rod->line, across);
         pfk_about_angle(across, axes[0], given, turned);
-    } else if (place == PFK_FOOT || place == PFK_HEAD) {
+    } else if (place == PFK_BASE_END || place == PFK_PLATFORM_END) {
         pfk_about_angle(axes[1], axes[0], given, turned);
         value = pfk_dot(axes[1], rod->line);
     } else {
@@ -884,39 +899,40 @@ static pfk_row *pfk_hinge_row(const pfk_state *state, int k, int place, pfk_real
         pfk_copy(axes[0], turned);
         value = pfk_dot(turned, across);
     }
-    if (at_head)
+    if (at_platform_end)
         pfk_rotate(&state->frame[rod->frame], turned, kept);
     else
         pfk_carried(&pfk_legs[rod->main], &state->leg[rod->main], 1.0, turned, kept);
     pfk_cross(kept, own->span, across);
     off = pfk_dot(kept, own->span) - value * own->length;
     pfk_along(kept, -value, own->u, kept);
-    return pfk_put(state, k, PFK_SIZE, off, kept, at_head ? pfk_zero : across, at_head ? across : pfk_zero, 1, row);
+    return pfk_put(state, k, PFK_SIZE, off, kept, at_platform_end ? pfk_zero : across,
+                   at_platform_end ? across : pfk_zero, 1, row);
 }
 
 #if PIVOTS
-/* The same of hinges a, b, c of a pivot, R = Rot(a) [Rot(b) [Rot(c)]]: kept . R moved = value, with one of both turned
-   by the angle. */
+/* The equation of hinges a, b, c of a pivot, R = Rot(a) [Rot(b) [Rot(c)]]: kept . R moved = value, with one of both
+   turned by the angle. */
 static pfk_row *pfk_pivot_hinge_row(const pfk_state *state, int k, int place, pfk_real given, pfk_row *row)
 {
     const pfk_leg *pivot = &pfk_legs[k];
-    const pfk_real *a = pivot->foot_axes[0], *b = pivot->foot_axes[1], *c = pivot->foot_axes[2];
+    const pfk_real *a = pivot->base_end_axes[0], *b = pivot->base_end_axes[1], *c = pivot->base_end_axes[2];
     pfk_real across[3], turned[3];
-    if (pivot->foot_end == PFK_HINGE) {
+    if (pivot->base_ending == PFK_HINGE) {
         pfk_about_angle(pivot->kept[0], a, given, turned);
         return pfk_pair_row(state, k, turned, pivot->kept[1], 0.0, 1, row);
     }
-    if (pivot->foot_end == PFK_CROSS) {
+    if (pivot->base_ending == PFK_CROSS) {
         pfk_cross(a, b, across);
-        pfk_about_angle(across, place == PFK_FOOT ? a : b, place == PFK_FOOT ? given : -given, turned);
-        return place == PFK_FOOT ? pfk_pair_row(state, k, turned, b, 0.0, 1, row)
+        pfk_about_angle(across, place == PFK_BASE_END ? a : b, place == PFK_BASE_END ? given : -given, turned);
+        return place == PFK_BASE_END ? pfk_pair_row(state, k, turned, b, 0.0, 1, row)
                                  : pfk_pair_row(state, k, a, turned, 0.0, 1, row);
     }
-    if (place == PFK_FOOT) {
+    if (place == PFK_BASE_END) {
         pfk_about_angle(b, a, given, turned);
         return pfk_pair_row(state, k, turned, c, -pfk_dot(b, c), 1, row);
     }
-    if (place == PFK_FOOT + 1) {
+    if (place == PFK_BASE_END + 1) {
         pfk_about_angle(c, b, given, turned);
         return pfk_pair_row(state, k, a, c, -pfk_dot(a, turned), 1, row);
     }
@@ -925,20 +941,20 @@ static pfk_row *pfk_pivot_hinge_row(const pfk_state *state, int k, int place, pf
 }
 
 #endif
-/* The equation of an actuator whose coordinate is given, unless it is one that a carrier has. */
+/* The equation of an actuator whose coordinate is given, unless it is one that a proximal joint has. */
 static pfk_row *pfk_drive_row(const pfk_state *state, const pfk_coordinate *driven, pfk_real given, pfk_row *row)
 {
     const int k = driven->leg, place = driven->place;
     const pfk_placed *own = &state->leg[k];
 #if PIVOTS
     if (pfk_legs[k].kind == PFK_PIVOT) {
-        const pfk_real *slide = pfk_legs[k].rows[place >= PFK_HEAD ? place - PFK_HEAD : 0];
-        if (place < PFK_HEAD)
+        const pfk_real *slide = pfk_legs[k].rows[place >= PFK_PLATFORM_END ? place - PFK_PLATFORM_END : 0];
+        if (place < PFK_PLATFORM_END)
             return pfk_pivot_hinge_row(state, k, place, given, row);
         return pfk_put(state, k, PFK_SIZE, pfk_dot(slide, own->span) - given, slide, pfk_zero, pfk_zero, 1, row);
     }
 #endif
-    if (place == PFK_CARRIER)
+    if (place == PFK_Q_PROXIMAL)
         return row;
     if (place == PFK_SLIDE)
         return pfk_put(state, k, PFK_SIZE, own->value[PFK_SLIDE] - given, own->u, pfk_zero, pfk_zero, 1, row);
@@ -1027,28 +1043,28 @@ static void pfk_bring_yaw(pfk_pose *pose, pfk_real yaw)
 static int pfk_least_squares(pfk_real m[PFK_ROWS][PFK_UNKNOWNS + 1], int rows, int unknowns, pfk_real x[PFK_UNKNOWNS])
 {
     pfk_real size, part, share, largest = 0.0;
-    int row[PFK_UNKNOWNS] = {0}, i, j, k, told = 0;
+    int row[PFK_UNKNOWNS] = {0}, i, j, k, rank = 0;
     for (k = 0; k < unknowns; ++k) {
         size = 0.0;
-        for (i = told; i < rows; ++i)
+        for (i = rank; i < rows; ++i)
             size += m[i][k] * m[i][k];
         size = sqrt(size);
         largest = size > largest ? size : largest;
         row[k] = -1;
         if (!(size > PFK_RANK * largest))
             continue;
-        row[k] = told;
-        size = m[told][k] > 0.0 ? -size : size;
-        part = size * (size - m[told][k]);
-        m[told][k] -= size;
+        row[k] = rank;
+        size = m[rank][k] > 0.0 ? -size : size;
+        part = size * (size - m[rank][k]);
+        m[rank][k] -= size;
         for (j = k + 1; j <= unknowns; ++j) {
             share = 0.0;
-            for (i = told; i < rows; ++i)
+            for (i = rank; i < rows; ++i)
                 share += m[i][k] * m[i][j];
-            for (i = told; i < rows; ++i)
+            for (i = rank; i < rows; ++i)
                 m[i][j] -= share / part * m[i][k];
         }
-        m[told++][k] = size;
+        m[rank++][k] = size;
     }
     for (k = unknowns - 1; k >= 0; --k) {
         x[k] = 0.0;
@@ -1059,7 +1075,7 @@ static int pfk_least_squares(pfk_real m[PFK_ROWS][PFK_UNKNOWNS + 1], int rows, i
             x[k] -= m[row[k]][j] * x[j];
         x[k] /= m[row[k]][k];
     }
-    return told < unknowns;
+    return rank < unknowns;
 }
 
 /* Gives a pose the opposite of the turn that it has made since the start. */
@@ -1079,28 +1095,28 @@ static void pfk_turn_back(const pfk_pose *start, pfk_pose *pose)
             pose->R[i][j] = turned.R[i][j];
 }
 
-/* What moves until legs close: nothing of the pose, what the task leaves open of it, all of it; and arms. */
-enum { PFK_ARMS_ALONE, PFK_WHAT_IS_LEFT, PFK_ALL };
+/* Unknowns: redundant joints, with nothing of the pose, what the task leaves open of it, or all of it. */
+enum { PFK_REDUNDANT_ALONE, PFK_UNSET, PFK_ALL };
 
-/* Fills the motions of what moves of a pose: how many. */
+/* Fills the motions of the unknowns of a pose; returns their number. */
 static int pfk_motions(const pfk_pose *pose, int moves, pfk_real motion[PFK_UNKNOWNS][PFK_COLUMNS])
 {
     int i, j, count = 0;
     for (i = 0; i < PFK_UNKNOWNS; ++i)
         for (j = 0; j < PFK_COLUMNS; ++j)
             motion[i][j] = 0.0;
-    for (i = 0; i < 3 && moves != PFK_ARMS_ALONE; ++i)
+    for (i = 0; i < 3 && moves != PFK_REDUNDANT_ALONE; ++i)
         if (moves == PFK_ALL || !pfk_axes[i])
             motion[count++][i] = PFK_SIZE;
-    if ((moves == PFK_ALL && PFK_TURNING) || (moves == PFK_WHAT_IS_LEFT && PFK_ROTATIONS == 0)) {
+    if ((moves == PFK_ALL && PFK_TURNING) || (moves == PFK_UNSET && PFK_ROTATIONS == 0)) {
         for (i = 0; i < 3; ++i)
             motion[count++][3 + i] = 1.0;
-    } else if (moves == PFK_WHAT_IS_LEFT && PFK_ROTATIONS == 2) {
+    } else if (moves == PFK_UNSET && PFK_ROTATIONS == 2) {
         for (i = 0; i < 3; ++i)
             motion[count][3 + i] = pose->R[i][2];
         ++count;
 #if YAW
-    } else if (moves == PFK_WHAT_IS_LEFT) { /* about axes square to the mean of both z axes it turns without yaw */
+    } else if (moves == PFK_UNSET) { /* about axes square to the mean of both z axes it turns without yaw */
         const pfk_real mean[3] = {pose->R[0][2], pose->R[1][2], pose->R[2][2] + 1.0}, x[3] = {1.0, 0.0, 0.0};
         pfk_real *first = motion[count++] + 3, *second = motion[count++] + 3;
         pfk_cross(x, mean, first);
@@ -1112,15 +1128,15 @@ static int pfk_motions(const pfk_pose *pose, int moves, pfk_real motion[PFK_UNKN
     return count;
 }
 
-#if ARMS
-/* Adds those of arms that are not given to so many of the pose: how many there are now. */
+#if REDUNDANT
+/* Adds the motions of redundant joints that are not given to `count` of the pose; returns their number. */
 static int pfk_arm_motions(const pfk_state *state, int count, pfk_real motion[PFK_UNKNOWNS][PFK_COLUMNS])
 {
     int k;
     for (k = 0; k < PFK_LEGS; ++k) {
-        const pfk_leg *arm = &pfk_legs[k];
-        if (arm->kind == PFK_ARM && arm->bears && !arm->is_twin && !state->leg[k].is_given)
-            motion[count++][6 + arm->column] = arm->carrier == PFK_CRANK ? 1.0 : PFK_SIZE;
+        const pfk_leg *joint = &pfk_legs[k];
+        if (joint->kind == PFK_REDUNDANT && joint->has_rows && !joint->is_mirror && !state->leg[k].is_given)
+            motion[count++][6 + joint->column] = joint->proximal == PFK_CRANK ? 1.0 : PFK_SIZE;
     }
     return count;
 }
@@ -1139,8 +1155,8 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
     pfk_real system[PFK_ROWS][PFK_UNKNOWNS + 1], motion[PFK_UNKNOWNS][PFK_COLUMNS], x[PFK_UNKNOWNS];
     pfk_real twist[PFK_COLUMNS], worst, last = 0.0, gone = 0.0, size, share;
     int i, j, k, open, missing, count, turned = 0;
-#if ARMS
-    int arms_from;
+#if REDUNDANT
+    int redundant_from;
 #endif
     for (*steps = 0;; ++*steps) {
         missing = pfk_place(pose, given, state);
@@ -1153,8 +1169,8 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
             return open;
         last = worst;
         count = pfk_motions(pose, moves, motion);
-#if ARMS
-        arms_from = count;
+#if REDUNDANT
+        redundant_from = count;
         count = pfk_arm_motions(state, count, motion);
 #endif
         for (i = 0; i < rows; ++i) {
@@ -1165,8 +1181,8 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
             }
             system[i][count] = -row[i].off;
         }
-        if (pfk_least_squares(system, rows, count, x) && moves != PFK_WHAT_IS_LEFT)
-            return open; /* what a task leaves open may stay where it is */
+        if (pfk_least_squares(system, rows, count, x) && moves != PFK_UNSET)
+            return open; /* unknowns of the task may stay */
         for (k = 0; k < PFK_COLUMNS; ++k) {
             twist[k] = 0.0;
             for (j = 0; j < count; ++j)
@@ -1174,8 +1190,8 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
         }
         size = pfk_norm(twist) / PFK_SIZE;
         size = pfk_norm(twist + 3) > size ? pfk_norm(twist + 3) : size;
-#if ARMS
-        for (j = arms_from; j < count; ++j)
+#if REDUNDANT
+        for (j = redundant_from; j < count; ++j)
             size = fabs(x[j]) > size ? fabs(x[j]) : size;
 #endif
         /* at rest but open, as more actuators than freedoms can be: once more, turned the other way */
@@ -1190,16 +1206,16 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
             twist[k] *= share;
         pfk_along(pose->p, 1.0, twist, pose->p);
 #if YAW
-        if (moves == PFK_WHAT_IS_LEFT) {
+        if (moves == PFK_UNSET) {
             const pfk_real yaw = pfk_yaw(pose);
             pfk_spin(pose, twist + 3);
             pfk_bring_yaw(pose, yaw);
         } else
 #endif
             pfk_spin(pose, twist + 3);
-#if ARMS
-        for (k = 0; k < PFK_ARMS; ++k)
-            state->arm[k] += twist[6 + k];
+#if REDUNDANT
+        for (k = 0; k < PFK_N_REDUNDANT; ++k)
+            state->q_redundant[k] += twist[6 + k];
 #endif
     }
 }
@@ -1309,7 +1325,7 @@ static int pfk_slacks(const pfk_state *state, pfk_real slack[])
 #if CONES
     for (i = 0; i < PFK_CONES; ++i) {
         const pfk_placed *leg = &state->leg[pfk_cones[i].leg];
-        const pfk_real *line = pfk_cones[i].is_head ? leg->head_line : leg->foot_line;
+        const pfk_real *line = pfk_cones[i].is_platform_end ? leg->platform_line : leg->base_line;
         slack[2 * PFK_RANGES + i] = pfk_cones[i].half_angle - pfk_angle_between(pfk_cones[i].axis, line);
     }
 #endif
@@ -1324,7 +1340,7 @@ static int pfk_slacks(const pfk_state *state, pfk_real slack[])
 }
 
 #endif
-#if LEADS
+#if CONTINUES
 /* Turns a pose a share of the way to another. */
 static void pfk_turn_toward(pfk_pose *pose, const pfk_pose *target, pfk_real share)
 {
@@ -1364,14 +1380,15 @@ static int pfk_lean_toward(pfk_pose *pose, const pfk_pose *target, pfk_real shar
     return !(cosine > PFK_RANK - 1.0);
 }
 
-/* Leads what a task sets of a pose, or all of it where arms alone follow, to a target in so many parts, each completed
-   from the one before: 0, PFK_NO_POSE, or the number of a leg that does not reach or close. */
-static int pfk_lead(const pfk_pose *target, int moves, int parts, pfk_real farthest, pfk_pose *own, pfk_state *state)
+/* Continues what a task sets of a pose, or all of it where redundant joints alone follow, to a target in so many
+   steps, each completed from the one before: 0, PFK_NO_POSE, or the number of a leg that does not reach or close. */
+static int pfk_continue(const pfk_pose *target, int moves, int parts, pfk_real farthest, pfk_pose *own,
+                        pfk_state *state)
 {
-    const int is_whole = moves == PFK_ARMS_ALONE;
+    const int is_whole = moves == PFK_REDUNDANT_ALONE;
     int i, left, steps, code = 0;
     pfk_real share;
-#if ARMS
+#if REDUNDANT
     pfk_start(state);
 #endif
     for (left = parts; left > 0 && (is_whole || !code); --left) {
@@ -1394,28 +1411,29 @@ static int pfk_lead(const pfk_pose *target, int moves, int parts, pfk_real farth
     return code;
 }
 
-/* The same, in one of the ways that there are: from a start at once, from there in parts, and from home in parts, where
-   it is known where arms are; then, where arms are led, so that what follows goes farther. */
-static int pfk_go(const pfk_pose *target, const pfk_pose *start, int moves, int way, pfk_pose *own, pfk_state *state)
+/* Continues to a target in one of several attempts: from a start at once, from there in steps, and from home in steps,
+   where the redundant joints are known; then, with implicit joints, so that what follows may go farther. */
+static int pfk_go(const pfk_pose *target, const pfk_pose *start, int moves, int attempt, pfk_pose *own,
+                  pfk_state *state)
 {
     *own = *start;
-    if (way % 3 == 2)
+    if (attempt % 3 == 2)
         pfk_home(own);
-    return pfk_lead(target, moves, way % 3 ? PFK_PARTS : 1, way < 3 ? PFK_NEAR : PFK_FARTHEST, own, state);
+    return pfk_continue(target, moves, attempt % 3 ? PFK_PARTS : 1, attempt < 3 ? PFK_NEAR : PFK_FARTHEST, own, state);
 }
 
-/* Takes the first way that ends within all limits, else the first that ends where all legs close: 0, or what the first
-   of all says. More than one pose may close: beyond a limit need not mean that there is none within. */
+/* Takes the first attempt that ends within all limits, else the first that ends where all legs close: 0, or what the
+   first of all says. More than one pose may close: beyond a limit need not mean that there is none within. */
 static int pfk_reach(const pfk_pose *target, const pfk_pose *start, int moves, pfk_pose *own, pfk_state *state)
 {
-    int way, closing = -1;
-    for (way = 0; way < PFK_WAYS; ++way) {
-        if (pfk_go(target, start, moves, way, own, state))
+    int attempt, closing = -1;
+    for (attempt = 0; attempt < PFK_ATTEMPTS; ++attempt) {
+        if (pfk_go(target, start, moves, attempt, own, state))
             continue;
 #if LIMITS
         pfk_real slack[PFK_LIMITS + 1];
         if (pfk_slacks(state, slack)) {
-            closing = closing < 0 ? way : closing;
+            closing = closing < 0 ? attempt : closing;
             continue;
         }
 #endif
@@ -1430,11 +1448,11 @@ static int pfk_reach(const pfk_pose *target, const pfk_pose *start, int moves, p
 static int pfk_rest(const pfk_pose *pose, pfk_state *state)
 {
     int code;
-#if LED
+#if IMPLICIT
     pfk_pose own;
-    code = pfk_reach(pose, pose, PFK_ARMS_ALONE, &own, state);
+    code = pfk_reach(pose, pose, PFK_REDUNDANT_ALONE, &own, state);
 #else
-#if ARMS
+#if REDUNDANT
     pfk_start(state);
 #endif
     code = pfk_place(pose, 0, state);
@@ -1465,7 +1483,7 @@ int pfk_limits(const pfk_pose *pose, pfk_real slack[])
 
 #endif
 #if IK || FK
-/* What the actuators are where legs are placed. */
+/* The actuators at the state of the legs. */
 static void pfk_read(const pfk_state *state, pfk_real actuators[PFK_ACTUATORS])
 {
     int i;
@@ -1494,7 +1512,7 @@ int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUAT
     begin = *pose;
     if (pfk_make_exact(&begin))
         return PFK_NO_POSE;
-    code = pfk_reach(&wanted, &begin, PFK_WHAT_IS_LEFT, &own, &state);
+    code = pfk_reach(&wanted, &begin, PFK_UNSET, &own, &state);
     if (code < 0)
         return code;
 #else
@@ -1546,8 +1564,8 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
     }
     if (pfk_make_exact(&own))
         return PFK_NO_POSE;
-#if ARMS
-    pfk_rest(&own, &state); /* arms begin where the pose has them */
+#if REDUNDANT
+    pfk_rest(&own, &state); /* redundant joints begin where the pose has them */
 #endif
     code = pfk_settle(&own, given, PFK_ALL, PFK_FK_STEPS, PFK_FAR, 0, &state, &count);
     if (steps)
@@ -1556,8 +1574,8 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
         return PFK_LEG + code;
     pfk_make_exact(&own);
     *pose = own;
-#if LED
-    code = pfk_settle(&own, 0, PFK_ARMS_ALONE, PFK_IK_STEPS, PFK_NEAR, 0, &state, &i);
+#if IMPLICIT
+    code = pfk_settle(&own, 0, PFK_REDUNDANT_ALONE, PFK_IK_STEPS, PFK_NEAR, 0, &state, &i);
 #else
     code = pfk_place(&own, 0, &state);
 #endif

@@ -19,7 +19,7 @@ LETTERS = "abc"
 
 
 def klipper(mechanism: Mechanism) -> str:
-    """`[printer]` and `[stepper_*]` of a delta for Klipper, with what it cannot know of this machine listed.
+    """The sections `[printer]` and `[stepper_*]` of a delta for Klipper, and a list of what they lack.
 
     Deltas with upright rails are its delta, those that hang from cranks its rotary_delta.
 
@@ -45,15 +45,18 @@ def klipper(mechanism: Mechanism) -> str:
 
 
 def _rotary_delta(mechanism: Mechanism, thighs: list[Thigh]) -> str:
-    size, near = mechanism.characteristic_length, TOLERANCES.alignment
+    size, tolerance = mechanism.characteristic_length, TOLERANCES.alignment
     outward = [thigh.hip[:2] / math.hypot(*thigh.hip[:2]) for thigh in thighs]
-    radii = [float(out @ (thigh.hip - thigh.ankle)[:2]) for out, thigh in zip(outward, thighs, strict=True)]
-    aside = [(thigh.hip - thigh.ankle)[:2] - out * r for out, r, thigh in zip(outward, radii, thighs, strict=True)]
+    radii = [float(direction @ (thigh.hip - thigh.ankle)[:2]) for direction, thigh in zip(outward, thighs, strict=True)]
+    misalignments = [
+        (thigh.hip - thigh.ankle)[:2] - direction * r
+        for direction, r, thigh in zip(outward, radii, thighs, strict=True)
+    ]
     heights = [float((thigh.hip - thigh.ankle)[2]) for thigh in thighs]
-    if max(np.ptp(radii), np.ptp(heights), np.abs(aside).max()) > near * size:
+    if max(np.ptp(radii), np.ptp(heights), np.abs(misalignments).max()) > tolerance * size:
         reason = "Klipper's rotary_delta has one radius and one height for its three shoulders, and these differ"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
-    if heights[0] <= near * size:
+    if heights[0] <= tolerance * size:
         reason = f"Klipper counts heights from its bed, below the shoulders, and these are at z = {heights[0]:.6g}"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
     lines = _begun(mechanism, "rotary_delta", ["which way steppers turn: it counts arms upward"])
@@ -71,7 +74,7 @@ def _rotary_delta(mechanism: Mechanism, thighs: list[Thigh]) -> str:
 
 
 def _begun(mechanism: Mechanism, kind: str, more: Sequence[str] = ()) -> list[str]:
-    """What Klipper cannot know, and the kind of printer."""
+    """The head of the file: what Klipper does not know of the machine, and the kind of printer."""
     unknown = ["pins, steps and currents of the steppers", "limits of the rods' joints", *more]
     if mechanism.length_unit != "mm":
         unknown.append(f"lengths in {comment(mechanism.length_unit)}: it counts in mm")
@@ -92,9 +95,9 @@ def _delta(mechanism: Mechanism, towers: list[Tower]) -> str:
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
     lines = [*_begun(mechanism, "delta"), f"delta_radius: {radii[0]:.9g}"]
     speeds = [mechanism.joint(name).max_speed for name in mechanism.actuator_names]
-    known = [speed for speed in speeds if speed is not None]
+    given = [speed for speed in speeds if speed is not None]
     lines.append(
-        f"# the carriages' own: at most {min(known):.9g} a second" if known else "# max_velocity, max_accel: yours"
+        f"# the carriages' own: at most {min(given):.9g} a second" if given else "# max_velocity, max_accel: yours"
     )
     for letter, tower in zip(LETTERS, towers, strict=True):
         lines += ["", f"[stepper_{letter}]", f"arm_length: {tower.rod:.9g}", f"angle: {angle_of(tower.place):.9g}"]

@@ -1,4 +1,4 @@
-"""Settings for LinuxCNC where it has the kinematics of a machine, else a module with the machine's own."""
+"""Settings for LinuxCNC's own kinematics where one fits a machine, else a kinematics module."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .machine import Machine
 from .wording import comment
 
 TOWERS = (90.0, 210.0, -30.0)
-"""Where lineardeltakins has its towers [deg]: its code, not its page, which has them the other way round."""
+"""Angles of the towers of lineardeltakins [deg]: by its code; its manual page has them reversed."""
 
 THIGHS = (-90.0, 30.0, 150.0)
-"""Where rotarydeltakins has its thighs [deg]."""
+"""Angles of the thighs of rotarydeltakins [deg]."""
 
 
 def linuxcnc(mechanism: Mechanism) -> str:
-    """What LinuxCNC needs: HAL lines where one of its own kinematics fits, else a module with the machine's own.
+    """HAL lines where one of LinuxCNC's own kinematics fits, else a module with the machine's kinematics.
 
     Hexapods of struts are genhexkins; deltas whose towers or thighs stand where it has them are lineardeltakins and
     rotarydeltakins. A module is one file of C for halcompile.
@@ -46,7 +46,7 @@ def linuxcnc(mechanism: Mechanism) -> str:
 
 
 def _are_towers(towers: Sequence[Tower], size: float) -> bool:
-    """Whether towers are where lineardeltakins has them."""
+    """True if towers are placed as lineardeltakins requires."""
     radii = [math.hypot(*tower.place[:2]) for tower in towers]
     heights = [abs(tower.place[2]) for tower in towers]
     spread = max(np.ptp(radii), np.ptp([tower.rod for tower in towers]), *heights)
@@ -55,23 +55,23 @@ def _are_towers(towers: Sequence[Tower], size: float) -> bool:
 
 
 def _are_thighs(thighs: Sequence[Thigh], size: float) -> bool:
-    """Whether thighs are where rotarydeltakins has them: alike, and as high as the origin, as the ankles are."""
+    """True if thighs are placed as rotarydeltakins requires: alike, with hips and ankles at the origin's height."""
     angles = [angle_of(thigh.hip) for thigh in thighs]
-    aside = [abs(t.hip[0] * t.ankle[1] - t.hip[1] * t.ankle[0]) / math.hypot(*t.hip[:2]) for t in thighs]
+    misalignments = [abs(t.hip[0] * t.ankle[1] - t.hip[1] * t.ankle[0]) / math.hypot(*t.hip[:2]) for t in thighs]
     heights = [abs(point[2]) for thigh in thighs for point in (thigh.hip, thigh.ankle)]
-    spread = max(*heights, *aside, *(np.ptp(column) for column in zip(*map(_radii, thighs), strict=True)))
+    spread = max(*heights, *misalignments, *(np.ptp(column) for column in zip(*map(_radii, thighs), strict=True)))
     return bool(spread <= TOLERANCES.alignment * size and _stand_at(angles, THIGHS))
 
 
 def _radii(thigh: Thigh) -> tuple[float, float, float, float]:
-    """Of the hips, length of thighs and shins, radius of the ankles."""
+    """The radius of the hips, the lengths of thigh and shin, and the radius of the ankles."""
     radius = math.hypot(*thigh.hip[:2])
     return radius, thigh.length, thigh.shin, float(thigh.hip[:2] @ thigh.ankle[:2]) / radius
 
 
-def _stand_at(angles: Sequence[float], wanted: Sequence[float]) -> bool:
-    off = max(abs((own - there + 180.0) % 360.0 - 180.0) for own, there in zip(angles, wanted, strict=True))
-    return math.radians(off) <= TOLERANCES.alignment
+def _stand_at(angles: Sequence[float], places: Sequence[float]) -> bool:
+    error = max(abs((angle - place + 180.0) % 360.0 - 180.0) for angle, place in zip(angles, places, strict=True))
+    return math.radians(error) <= TOLERANCES.alignment
 
 
 def _heading(mechanism: Mechanism, module: str) -> list[str]:

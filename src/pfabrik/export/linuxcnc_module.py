@@ -1,4 +1,4 @@
-"""A kinematics module for LinuxCNC: the machine's own C, and around it what LinuxCNC calls."""
+"""A kinematics module for LinuxCNC: the machine's C, and the functions that LinuxCNC calls."""
 
 from __future__ import annotations
 
@@ -89,9 +89,9 @@ void rtapi_app_exit(void)
 
 
 def module(machine: Machine) -> str:
-    """A kinematics module for halcompile, around the machine's own C."""
+    """A kinematics module for halcompile, around the machine's C."""
     mechanism = machine.mechanism
-    angles = ["1.0" if each.is_length else "57.295779513082323" for each in machine.driven]
+    angles = ["1.0" if driven.is_length else "57.295779513082323" for driven in machine.driven]
     return f"""\
 /* A kinematics module for LinuxCNC: halcompile --install pfabrikkins.c, then loadrt pfabrikkins.
    Joints in this order: {comment(", ".join(mechanism.actuator_names))}.

@@ -1,4 +1,4 @@
-"""What an exported file says of a machine: its legs, in the mechanism's unit of length, and what is asked of them."""
+"""A machine as it is exported: its legs and their coordinates, in the mechanism's unit of length."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Number = float | Floats
 
 
 class Coordinate(NamedTuple):
-    """A coordinate of a leg, and what is said of its deviation from home.
+    """A coordinate of a leg, and the range of its deviation from home.
 
     Attributes
     ----------
     place : in the leg's values.
-    turns : whether it is an angle that counts into its range by whole turns.
+    turns : it is an angle; whole turns are added to bring it into its range.
     lo, hi : of the deviation [length or rad].
     home : [length or rad].
     """
@@ -41,16 +41,16 @@ class Coordinate(NamedTuple):
 
     @property
     def may_turn(self) -> bool:
-        """Whether it may turn more than once."""
+        """True if it may turn more than once."""
         return self.turns and self.hi - self.lo > 2.0 * np.pi
 
 
 class Leg(NamedTuple):
-    """A leg as it is written.
+    """A leg as it is exported.
 
     Attributes
     ----------
-    main : the leg whose carrier it is on; its own place if it shares none.
+    main : the leg whose proximal joint it is on; its own place if it shares none.
     record : as in `LegTable.legs`; lengths in L.
     numbers : constants by the name of their field in C, in the mechanism's unit.
     """
@@ -62,22 +62,22 @@ class Leg(NamedTuple):
 
     @property
     def keeps_its_length(self) -> bool:
-        """Whether it is a rigid rod on a carrier of its own: it has an equation for its length where that is held."""
+        """True for a rigid rod on a proximal joint of its own: with this joint held its length is an equation."""
         has_proximal = self.record["kind"] == K.ROD and self.record["proximal"] in (K.CRANK, K.CARRIAGE)
         return bool(has_proximal and not self.record["slides"])
 
 
 class Machine:
-    """A mechanism whose every chain is a leg, as it is exported.
+    """A mechanism whose chains are all legs in closed form, as it is exported.
 
     Attributes
     ----------
     limited, driven : coordinates with a range, and those of the actuators in their order.
     cones : records, as in `LegTable`.
     limits : (joint, bound) of every limit: two of each range, then cones.
-    axes, rotations, unset : what the task sets, and how many coordinates of a pose it leaves open; see `K.TASK`.
-    n_arms, leads_arms : how many coordinates arms have; whether some follow from where they were.
-    equations : how many the legs have.
+    axes, rotations, unset : what the task sets, and the number of pose coordinates that it leaves open, as of `K.TASK`.
+    n_redundant, has_implicit_joints : the number of redundant joints, and if some of them are implicit.
+    equations : the number of equations of the legs.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -87,44 +87,44 @@ class Machine:
         self.mechanism, self.limits, self.cones = mechanism, table.limits, table.cones
         task = table.task[0]
         self.axes, self.rotations, self.unset = task["axes"].tolist(), int(task["rotations"]), int(task["unset"])
-        self.n_arms, self.has_implicit_joints = len(table.redundant), table.has_implicit_joints
+        self.n_redundant, self.has_implicit_joints = len(table.redundant), table.has_implicit_joints
         if self.has_implicit_joints and generic_of(mechanism).home_is_singular:
             reason = (
                 f"its loops are singular at home, where joints {', '.join(table.redundant_joints)} follow from no pose"
             )
             raise UnsupportedMechanism(mechanism.name, [reason], "exported")
         self.legs = _legs(mechanism, table)
-        ordered = table.driven[np.argsort(table.driven["column"])]
-        self.limited = [_coordinate(each, mechanism.coordinates[each["column"]].kind) for each in table.limited]
-        self.driven = [_coordinate(each, mechanism.drives[each["column"]].kind) for each in ordered]
+        drives = table.driven[np.argsort(table.driven["column"])]
+        self.limited = [_coordinate(record, mechanism.coordinates[record["column"]].kind) for record in table.limited]
+        self.driven = [_coordinate(record, mechanism.drives[record["column"]].kind) for record in drives]
         self.equations = sum(row_counts(table.legs)) + sum(leg.keeps_its_length for leg in self.legs)
 
     @property
     def completes(self) -> bool:
-        """Whether more follows from a target than the coordinates of its legs."""
+        """True if a target must be completed: some of the pose, or implicit joints, follow from the legs' equations."""
         return self.unset > 0 or self.has_implicit_joints
 
     @property
     def n_frames(self) -> int:
-        """How many frames legs are read in, see `kernels.legs.frames`."""
+        """The number of frames that legs are read in, as of `kernels.legs.frames`."""
         return max(K.FROM_ITSELF, *(int(leg.record["makes"]) + 1 for leg in self.legs))
 
     @property
     def drive_equations(self) -> int:
-        """How many equations there are more where actuators are given: of all but what carries rods."""
-        return sum(each.place != K.Q_PROXIMAL for each in self.driven)
+        """The number of further equations at given actuators: of all but proximal joints."""
+        return sum(driven.place != K.Q_PROXIMAL for driven in self.driven)
 
     @property
     def uncontrolled(self) -> int:
-        """Freedoms of the end effector that its actuators leave."""
+        """The number of freedoms of the end effector that its actuators leave."""
         return generic_of(self.mechanism).mobility.uncontrolled
 
-    def apart(self, actuators: Floats, others: Floats) -> Floats:
-        """How far actuators are at most from others (n, n_a) each, but for whole turns, (n,) [L or rad]."""
-        off, size = actuators - others, self.mechanism.characteristic_length
-        turned = np.remainder(off + np.pi, 2.0 * np.pi) - np.pi
-        off = np.where([each.is_length for each in self.driven], off / size, turned)
-        return np.asarray(np.abs(off).max(axis=1))
+    def largest_difference(self, actuators: Floats, others: Floats) -> Floats:
+        """The largest difference between two arrays of actuators (n, n_a), modulo whole turns, (n,) [L or rad]."""
+        difference, size = actuators - others, self.mechanism.characteristic_length
+        wrapped = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
+        difference = np.where([coordinate.is_length for coordinate in self.driven], difference / size, wrapped)
+        return np.asarray(np.abs(difference).max(axis=1))
 
 
 def _coordinate(record: Record, kind: str) -> Coordinate:
@@ -143,19 +143,19 @@ def _coordinate(record: Record, kind: str) -> Coordinate:
 
 def _legs(mechanism: Mechanism, table: LegTable) -> list[Leg]:
     legs: list[Leg] = []
-    main, length = 0, mechanism.characteristic_length
+    first, length = 0, mechanism.characteristic_length
     for place, (form, record) in enumerate(zip(table.forms, table.legs, strict=True)):
-        main = main if record["proximal"] == K.SHARED else place
+        first = first if record["proximal"] == K.SHARED else place
         if isinstance(form, Rod):
             numbers = _rod_numbers(form, record, length)
         else:
-            numbers = (_arm_numbers if isinstance(form, RedundantJoint) else _pivot_numbers)(record, length)
-        legs.append(Leg(main, record, numbers, tuple(dict.fromkeys(item.joint.name for item in form.items))))
+            numbers = (_redundant_numbers if isinstance(form, RedundantJoint) else _pivot_numbers)(record, length)
+        legs.append(Leg(first, record, numbers, tuple(dict.fromkeys(element.joint.name for element in form.elements))))
     return legs
 
 
 def _rod_numbers(rod: Rod, record: Record, length: float) -> dict[str, Number]:
-    """What is to be reached at home counts from a crank's axis, or from the foot on a carriage."""
+    """The constants of a rod; `reach` is from the crank, or the base end on a carriage, to the platform end."""
     numbers: dict[str, Number] = {
         "base_end": record["base_end_point"] * length,
         "platform_end": record["platform_end_point"] * length,
@@ -168,18 +168,18 @@ def _rod_numbers(rod: Rod, record: Record, length: float) -> dict[str, Number]:
     }
     numbers["length"] = record["length"] * length
     if rod.proximal is not None:
-        begin = record["proximal_point"] if record["proximal"] == K.CRANK else rod.base_end
+        start = record["proximal_point"] if record["proximal"] == K.CRANK else rod.base_end
         numbers |= {
             "axis": record["proximal_axis"],
             "side": record["side"],
-            "reach": (rod.platform_end - begin) * length,
+            "reach": (rod.platform_end - start) * length,
         }
         fields = {"centre": "proximal_point", "crank": "crank", "across": "crank_across"}
         numbers |= {name: record[field] * length for name, field in fields.items()}
     return numbers
 
 
-def _arm_numbers(record: Record, length: float) -> dict[str, Number]:
+def _redundant_numbers(record: Record, length: float) -> dict[str, Number]:
     return {"axis": record["proximal_axis"], "centre": record["proximal_point"] * length, "side": record["side"]}
 
 

@@ -1,4 +1,4 @@
-"""Poses that an exported file checks itself with: what the library answers to them."""
+"""Poses for the self-test of an exported file, with the library's answers."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from ..poses import pose
 from .machine import Machine
 from .wording import Precision
 
-POSES = 50
+N_POSES = 50
 FARTHEST = (0.3, 0.5)
-"""How far the poses are from home [L, rad] at most."""
+"""The largest distance of these poses from home [L, rad]."""
 
-TRIED = 400
+N_TRIED = 400
 KEEP = Options(working_mode="keep")
-EXACT: dict[Precision, float] = {"double": 1e-10, "float": 1e-4}
-"""To what share of L, or to how many rad, actuators must agree: what rounding may leave near a dead point."""
+AGREEMENT: dict[Precision, float] = {"double": 1e-10, "float": 1e-4}
+"""Tolerance to which actuators must agree [L or rad]: rounding may leave as much near a dead point."""
 
-SURE = 1e-3
-"""How far from its limits a pose is kept or not beyond doubt, as a share of the room there is."""
+CLEAR = 1e-3
+"""Margin beyond which a pose counts as inside or outside its limits without doubt, a share of the range."""
 
 
 class Checks(NamedTuple):
-    """Targets (n, 4, 4), the actuators there (n, n_a), and whether they are within all limits (n,)."""
+    """Targets (n, 4, 4), their actuators (n, n_a), and a mask of those within all limits (n,)."""
 
     targets: Floats
     actuators: Floats
@@ -42,52 +42,56 @@ class Checks(NamedTuple):
 def checks_of(machine: Machine, limits: bool) -> Checks:
     """Poses around home that a mechanism reaches in home's working mode, some beyond its limits.
 
-    Within limits are those alone that the file reaches for sure: `feasibility` tells that they are.
+    Poses within limits are those alone that the file reaches without doubt: `feasibility` agrees.
     """
     mechanism = machine.mechanism
-    targets = targets_around_home(mechanism, TRIED, np.random.default_rng(0))
+    targets = targets_around_home(mechanism, N_TRIED, np.random.default_rng(0))
     targets[0] = mechanism.home_pose
-    free = mechanism.without_limits()
-    targets = targets[~(np.asarray(feasibility(free, targets).margin) < 0.0)]
-    found = solve_ik(free, targets, options=KEEP)
-    least = least_margins(mechanism, found.q)
+    without_limits = mechanism.without_limits()
+    targets = targets[~(np.asarray(feasibility(without_limits, targets).margin) < 0.0)]
+    solution = solve_ik(without_limits, targets, options=KEEP)
+    least = least_margins(mechanism, solution.q)
     if machine.completes:
-        told = np.asarray(feasibility(mechanism, targets).margin)
-        least[((least > 0.0) & (told < 0.0)) | ~_are_all_answers(machine, targets, found, least > 0.0)] = 0.0
-    reached, sure = found.status == 0, np.abs(least) > SURE
-    kept = np.flatnonzero(reached & sure & (least > 0.0))
-    beyond = np.flatnonzero(reached & sure & (least < 0.0)) if limits else kept[:0]
-    n_beyond = min(len(beyond), max(POSES // 5, POSES - len(kept)))
-    chosen = np.concatenate([kept[: POSES - n_beyond], beyond[:n_beyond]])
-    return Checks(targets[chosen], found.actuators[chosen], np.isin(chosen, kept))
+        margin = np.asarray(feasibility(mechanism, targets).margin)
+        least[((least > 0.0) & (margin < 0.0)) | ~_are_unique(machine, targets, solution, least > 0.0)] = 0.0
+    is_reached, is_clear = solution.status == 0, np.abs(least) > CLEAR
+    inside = np.flatnonzero(is_reached & is_clear & (least > 0.0))
+    beyond = np.flatnonzero(is_reached & is_clear & (least < 0.0)) if limits else inside[:0]
+    n_beyond = min(len(beyond), max(N_POSES // 5, N_POSES - len(inside)))
+    chosen = np.concatenate([inside[: N_POSES - n_beyond], beyond[:n_beyond]])
+    return Checks(targets[chosen], solution.actuators[chosen], np.isin(chosen, inside))
 
 
-def _are_all_answers(machine: Machine, targets: Floats, found: Solution, kept: Mask) -> Mask:
-    """Whether no other answer to targets (n,) is within limits than those found: from home, and where arms follow from
-    where they were, from the answers kept where each actuator is least, and where it is most."""
+def _are_unique(machine: Machine, targets: Floats, solution: Solution, is_inside: Mask) -> Mask:
+    """True for targets (n,) without another answer than the one found, from several starts.
+
+    The starts are home and, with implicit joints, the answers within limits where each actuator is least or most.
+    """
     starts: list[Floats | None] = [None]
-    if machine.has_implicit_joints and kept.any():
-        ends = found.actuators[kept]
-        some = np.flatnonzero(kept)[np.unique([ends.argmin(axis=0), ends.argmax(axis=0)])]
-        starts += list(found.q[some])
-    same = np.ones(len(targets), dtype=bool)
+    if machine.has_implicit_joints and is_inside.any():
+        actuators = solution.actuators[is_inside]
+        rows = np.flatnonzero(is_inside)[np.unique([actuators.argmin(axis=0), actuators.argmax(axis=0)])]
+        starts += list(solution.q[rows])
+    is_same = np.ones(len(targets), dtype=bool)
     for start in starts:
         other = solve_ik(machine.mechanism, targets, start=start, options=KEEP)
-        same &= (other.status != 0) | (machine.apart(other.actuators, found.actuators) <= EXACT["double"])
-    return same
+        is_same &= (other.status != 0) | (
+            machine.largest_difference(other.actuators, solution.actuators) <= AGREEMENT["double"]
+        )
+    return is_same
 
 
-def targets_around_home(mechanism: Mechanism, count: int, random: np.random.Generator) -> Floats:
-    """Poses (n, 4, 4) around home, displaced as the platform can move at all."""
+def targets_around_home(mechanism: Mechanism, n: int, random: np.random.Generator) -> Floats:
+    """Random poses (n, 4, 4) around home, displaced in the directions in which the platform can move."""
     directions = generic_of(mechanism).directions
     basis = np.zeros((6, directions.shape[1]))
     basis[: len(directions)] = directions
-    onto = basis @ basis.T
-    onto[np.abs(onto) < 1e-12] = 0.0
-    reach, turn = FARTHEST
-    scales = np.repeat([reach * mechanism.characteristic_length, turn], 3)
-    moved = random.uniform(-1.0, 1.0, (count, 6)) * scales @ onto
-    return pose(mechanism.home_pose[:3, 3] + moved[:, :3], rotvec=moved[:, 3:])
+    projector = basis @ basis.T
+    projector[np.abs(projector) < 1e-12] = 0.0
+    reach, angle = FARTHEST
+    scales = np.repeat([reach * mechanism.characteristic_length, angle], 3)
+    twists = random.uniform(-1.0, 1.0, (n, 6)) * scales @ projector
+    return pose(mechanism.home_pose[:3, 3] + twists[:, :3], rotvec=twists[:, 3:])
 
 
 def least_margins(mechanism: Mechanism, q: Floats) -> Floats:
@@ -96,5 +100,5 @@ def least_margins(mechanism: Mechanism, q: Floats) -> Floats:
 
     if not len(q):
         return np.zeros(0)
-    found = margins(configuration(mechanism, q))
-    return np.asarray(np.min([np.ones(len(q)), *(np.asarray(each) for each in found.values())], axis=0))
+    by_limit = margins(configuration(mechanism, q))
+    return np.asarray(np.min([np.ones(len(q)), *(np.asarray(margin) for margin in by_limit.values())], axis=0))

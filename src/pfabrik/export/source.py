@@ -1,4 +1,4 @@
-"""The exported file, put together."""
+"""The text of the exported file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib import resources
 
 from .machine import Machine
-from .self_test import EXACT, checks_of
+from .self_test import AGREEMENT, checks_of
 from .tables import checks_h, features, machine_h, tables_h
 from .wording import Precision, comment, in_words
 
@@ -17,23 +17,23 @@ provided "as is" and without any warranty; its authors are not liable for anythi
 
 
 def source(machine: Machine, name: str, precision: Precision, parts: Sequence[str]) -> str:
-    """The text of the file."""
+    """The text of the file: header, tables and routines."""
     routines = resources.files(__package__).joinpath("kinematics.c").read_text(encoding="utf-8")
-    text = _kept(routines[routines.index("#ifndef") :], features(machine, parts))
+    text = _selected(routines[routines.index("#ifndef") :], features(machine, parts))
     included = {"machine.h": machine_h(machine, parts), "tables.h": tables_h(machine, precision, parts, text)}
     if "ik" in parts:
-        included["checks.h"] = checks_h(checks_of(machine, "limits" in parts), EXACT[precision])
+        included["checks.h"] = checks_h(checks_of(machine, "limits" in parts), AGREEMENT[precision])
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
     return in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, parts)}\n{text}"), name, precision)
 
 
-def _kept(routines: str, wanted: set[str]) -> str:
-    """The routines without blocks that nothing is wanted of; the preprocessor's own conditions stay."""
+def _selected(routines: str, conditions: set[str]) -> str:
+    """The routines whose conditions hold; `#ifdef` and `#ifndef` stay for the preprocessor."""
     lines: list[str] = []
-    blocks: list[bool | None] = []  # of each that is open whether it is kept; None of the preprocessor's own
+    blocks: list[bool | None] = []  # of each open block, if it is kept; None of the preprocessor's own
     for line in routines.splitlines():
         if line.startswith("#if "):
-            blocks.append(bool(wanted & set(line.removeprefix("#if ").split(" || "))))
+            blocks.append(bool(conditions & set(line.removeprefix("#if ").split(" || "))))
         elif line == "#else":
             blocks[-1] = not blocks[-1]
         elif line != "#endif" or blocks.pop() is None:
@@ -45,7 +45,7 @@ def _kept(routines: str, wanted: set[str]) -> str:
 
 
 def _header(machine: Machine, parts: Sequence[str]) -> str:
-    """What the file is, what it speaks of, and its notice."""
+    """The comment at the top: conventions, actuators, limits and legs, and the notice."""
     mechanism, unit = machine.mechanism, machine.mechanism.length_unit
     lines = [
         f"The kinematics of '{mechanism.name}', written by pfabrik from its description.",
@@ -58,18 +58,20 @@ def _header(machine: Machine, parts: Sequence[str]) -> str:
         + (" What it leaves open follows from the machine." if machine.unset else ""),
         "All of it in the working mode of home: each crank and carriage on the side where it is there.",
         "",
-        "Tables say what is this machine's own; the functions are the same for all that have legs of such kinds.",
+        "The tables are of this machine alone; the functions are the same for all machines with such legs.",
         "Include it with PFK_DECLARATIONS_ONLY defined for the declarations alone; with PFK_SELF_TEST defined it is a",
         "program that checks itself:",
         "    cc -std=c99 -D PFK_SELF_TEST FILE -lm -o check && ./check",
         "",
         "actuator  joint                 home",
     ]
-    for place, (name, each) in enumerate(zip(mechanism.actuator_names, machine.driven, strict=True)):
-        lines.append(f"{place:<9} {name:<21} {each.home:.10g} {unit if each.is_length else 'rad'}")
+    for place, (name, driven) in enumerate(zip(mechanism.actuator_names, machine.driven, strict=True)):
+        lines.append(f"{place:<9} {name:<21} {driven.home:.10g} {unit if driven.is_length else 'rad'}")
     if "limits" in parts:
         lines += ["", "limit     joint                 bound"]
-        bounds = [(each.home + bound, each.is_length) for each in machine.limited for bound in (each.lo, each.hi)]
+        bounds = [
+            (driven.home + bound, driven.is_length) for driven in machine.limited for bound in (driven.lo, driven.hi)
+        ]
         bounds += [(float(cone["half_angle"]), False) for cone in machine.cones]
         for place, ((joint, bound), (at, is_length)) in enumerate(zip(machine.limits, bounds, strict=True), 1):
             lines.append(f"{place:<9} {joint:<21} {bound} {at:.10g} {unit if is_length else 'rad'}")

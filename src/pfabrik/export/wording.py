@@ -1,4 +1,4 @@
-"""C text in one precision, with one prefix: the templates are written in double, for the prefix pfk."""
+"""C text in a given precision and with a given prefix; templates are in double, with the prefix pfk."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Accuracy(NamedTuple):
     Attributes
     ----------
     kept : excess up to which a limit counts as kept [L or rad].
-    closed, close : equations that are as small as rounding leaves them; those that count as closed.
-    dead : square of the sine of the angle from a dead point below which a carrier does not follow.
-    rank : what is smaller than this share of the largest says nothing of the pose.
+    closed, close : equations as small as rounding leaves them; those that count as closed [L or rad].
+    dead : singularity margin below which a proximal joint does not follow.
+    rank : share of the largest pivot below which an equation does not determine the pose.
     rotation : sum of the deviations from an orthonormal matrix up to which a target is a pose.
     """
 
@@ -43,7 +43,7 @@ ACCURACY: dict[Precision, Accuracy] = {
 
 
 def in_words(text: str, name: str, precision: Precision) -> str:
-    """A template with a prefix in place of pfk; numbers and functions of the C library in a precision."""
+    """A template with its prefix pfk replaced, and its numbers and mathematics in the given precision."""
     text = re.sub(r"\bpfk_", f"{name}_", re.sub(r"\bPFK_", f"{name.upper()}_", text))
     if precision == "double":
         return text
@@ -53,7 +53,7 @@ def in_words(text: str, name: str, precision: Precision) -> str:
 
 
 def _single(match: re.Match[str]) -> str:
-    """A number in single precision; what is too small for it, which compilers warn of, is zero."""
+    """A number in single precision; zero if it is too small for that, which compilers warn of."""
     return f"{match[1]}f" if abs(float(match[1])) >= SMALLEST or not float(match[1]) else "0.0f"
 
 
@@ -63,18 +63,18 @@ SMALLEST = float(np.finfo(np.float32).tiny)
 def literal(value: Number) -> str:
     """A number, or nested braces of numbers, with every digit of a double."""
     if np.ndim(value):
-        return "{" + ", ".join(literal(each) for each in np.asarray(value)) + "}"
+        return "{" + ", ".join(literal(item) for item in np.asarray(value)) + "}"
     number = float(value) + 0.0  # so that no -0.0 is written
     text = repr(number)
     return text if "." in text or "e" in text else f"{text}.0"
 
 
 def comment(text: str) -> str:
-    """Text that cannot end the comment it is in, nor leave the characters that every compiler reads."""
+    """Text safe in a C comment: it does not end the comment, and is printable ASCII."""
     plain = text.encode("ascii", "replace").decode().replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
-    return "".join(each if each.isprintable() else " " for each in plain)
+    return "".join(character if character.isprintable() else " " for character in plain)
 
 
 def quoted(text: str) -> str:
-    """A string of C."""
+    """A C string literal."""
     return '"' + comment(text).replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -9,7 +9,7 @@ import numpy as np
 from ..answers.margins import margins
 from ..answers.solution import Solution
 from ..arrays import Floats
-from ..decomposition.items import Item
+from ..decomposition.elementary_joints import ElementaryJoint
 from ..decomposition.leg_forms import Rod
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
@@ -55,16 +55,18 @@ def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
     """Of every rod on a carrier its body and its line at home, and the carrier's body and how it moves the foot."""
     table = leg_table(mechanism)
     found: list[tuple[str, Floats, str, Floats]] = []
-    proximal: Item | None = None
+    proximal: ElementaryJoint | None = None
     for form in table.forms if isinstance(table, LegTable) else ():
         if not isinstance(form, Rod):
             continue
         proximal = proximal if form.is_shared else form.proximal
-        if proximal is None or form.slide is not None or not form.base_ending.items:
+        if proximal is None or form.slide is not None or not form.base_ending.elements:
             continue
         turns = proximal.kind == "R"
         motion = np.cross(proximal.axis, form.base_end - proximal.point) if turns else proximal.axis
-        found.append((form.base_ending.items[-1].outward, form.platform_end - form.base_end, proximal.outward, motion))
+        found.append(
+            (form.base_ending.elements[-1].outward, form.platform_end - form.base_end, proximal.outward, motion)
+        )
     return found
 
 

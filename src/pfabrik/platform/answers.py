@@ -1,4 +1,4 @@
-"""Answers of legs in closed form, whose joint coordinates are found when asked for."""
+"""Answers of legs in closed form; joint coordinates are computed on access."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.legs import records as K
 from ..kernels.rows import Rows
-from .coordinates import read_into, settled
+from .coordinates import joint_coordinates, read_coordinates
 
 
 class LegAnswers(Configurations):
-    """Configurations of legs that are told by their platforms.
+    """Answers stored as platform poses; joint coordinates are computed on access.
 
     Parameters
     ----------
-    sides : which of its two solutions each leg takes, (n or 1, legs).
-    carriers : coordinates of the legs' carriers, (n, legs) [L or rad], where closed forms tell them less exactly: near
-        dead points; NaN elsewhere, None where nowhere.
+    sides : of each leg, (n or 1, legs).
+    q_proximal : coordinates of the proximal joints, (n, legs) [L or rad], of rows that a search answered: near dead
+        points closed forms are less exact. NaN for other rows; None if there are none.
     """
 
     def __init__(
@@ -48,13 +48,13 @@ class LegAnswers(Configurations):
         return self._sides if len(self._sides) == len(self) else np.repeat(self._sides, len(self), axis=0)
 
     def at(self, places: NDArray[np.intp]) -> Configurations:
-        """The configurations at some places, copied."""
+        """A copy of the configurations at some places."""
         rows = super().at(places).rows
         q_proximal = None if self.q_proximal is None else self.q_proximal[places]
-        return LegAnswers(rows, lambda own: self.coordinates_at(places[own]), self.sides[places], q_proximal)
+        return LegAnswers(rows, lambda block: self.coordinates_at(places[block]), self.sides[places], q_proximal)
 
     def with_others(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
-        """These configurations with as many others at some places; coordinates stay to be found where they are."""
+        """A copy with the rows at some places replaced by others; coordinates are still computed on access."""
         if not isinstance(others, LegAnswers):
             return super().with_others(places, others)
         rows, sides = rows_at(self.rows, np.arange(len(self))), self.sides.copy()
@@ -62,60 +62,66 @@ class LegAnswers(Configurations):
         sides[places] = others.sides
         q_proximal = np.full(sides.shape, np.nan) if self.q_proximal is None else self.q_proximal.copy()
         q_proximal[places] = np.nan if others.q_proximal is None else others.q_proximal
-        which = np.full(len(self), -1)
-        which[places] = np.arange(len(places))
+        index = np.full(len(self), -1)
+        index[places] = np.arange(len(places))
 
-        def coordinates(own: Places) -> Floats:
-            at = np.arange(len(which))[own]
-            found, is_other = self.coordinates_at(at), which[at] >= 0
-            found[is_other] = others.coordinates_at(which[at[is_other]])
-            return found
+        def coordinates(block: Places) -> Floats:
+            indices = np.arange(len(index))[block]
+            values, is_other = self.coordinates_at(indices), index[indices] >= 0
+            values[is_other] = others.coordinates_at(index[indices[is_other]])
+            return values
 
         return LegAnswers(rows, coordinates, sides, q_proximal)
 
 
 def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Floats:
-    """Which of its two solutions each leg takes in configurations, (n, legs), 0 where it has but one; of arms, where
-    they are."""
+    """The side of each leg in configurations, (n, legs): 0 if it has one solution; a redundant joint's coordinate.
+
+    Of a leg with two solutions it is the side whose coordinate is nearer to that of the configuration.
+    """
     if isinstance(start, LegAnswers):
         return start.sides
     sides = np.repeat(table.home_sides, len(start), axis=0)
     if len(table.implicit_joints):
         redundant = table.implicit_joints
-        columns = [table.known["column"][table.known["leg"] == k][0] for k in redundant["leg"]]
-        sides[:, redundant["leg"]] = redundant["sense"] * start.coordinates[:, columns] / redundant["unit"]
-    choosing = np.flatnonzero(table.home_sides[0])
-    if not len(choosing):
+        redundant_columns = [table.known["column"][table.known["leg"] == k][0] for k in redundant["leg"]]
+        sides[:, redundant["leg"]] = redundant["sense"] * start.coordinates[:, redundant_columns] / redundant["unit"]
+    two_sided = np.flatnonzero(table.home_sides[0])
+    if not len(two_sided):
         return sides
     closure = closure_of(mechanism, whole=False)
     places = np.where(table.legs["kind"] == K.PIVOT, K.BASE_END, K.Q_PROXIMAL)
-    own = [table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in choosing]
-    if set(own) <= set(closure.actuated.tolist()):
-        present = np.zeros((len(start), len(closure.scale)))
-        closure.put_actuators(present, start.rows.actuators)
+    columns = [
+        table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in two_sided
+    ]
+    if set(columns) <= set(closure.actuated.tolist()):
+        q = np.zeros((len(start), len(closure.scale)))
+        closure.put_actuators(q, start.rows.actuators)
     else:
-        present = start.coordinates
-    turning = closure.turning[own] > 0.0
-    on_arms = table.legs["kind"][choosing] != K.REDUNDANT
-    for some in (~on_arms, on_arms):  # where arms are decides where the legs on them are
-        off = []
+        q = start.coordinates
+    is_angle = closure.turning[columns] > 0.0
+    is_on_redundant = table.legs["kind"][two_sided] != K.REDUNDANT
+    for group in (~is_on_redundant, is_on_redundant):  # legs on redundant joints come after these joints
+        errors = []
         for factor in (1.0, -1.0):
-            tried, found = sides.copy(), np.zeros_like(present)
-            tried[:, choosing[some]] *= factor
-            read_into(table, start.rows.poses, tried, found)
-            away = found[:, own] - present[:, own]
-            off.append(np.abs(np.where(turning, np.remainder(away + np.pi, 2.0 * np.pi) - np.pi, away))[:, some])
-        sides[:, choosing[some]] *= np.where(off[0] <= off[1], 1.0, -1.0)
+            candidate, candidate_q = sides.copy(), np.zeros_like(q)
+            candidate[:, two_sided[group]] *= factor
+            read_coordinates(table, start.rows.poses, candidate, candidate_q)
+            difference = candidate_q[:, columns] - q[:, columns]
+            errors.append(
+                np.abs(np.where(is_angle, np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi, difference))[:, group]
+            )
+        sides[:, two_sided[group]] *= np.where(errors[0] <= errors[1], 1.0, -1.0)
     return sides
 
 
-def begins_of(
+def start_coordinates_of(
     mechanism: Mechanism, table: LegTable, start: Configurations | None, sides: Floats
 ) -> Callable[[Places], Floats | None]:
-    """Gives the joint coordinates of starts at some places, or of the one for all; None for home.
+    """A function that gives the joint coordinates of the starts at some places, or of the single start; None for home.
 
-    Of a start that knows its coordinates no other way, the pose and the actuators are kept, not how it was found:
-    answers that start from each other would all stay in memory.
+    Of a start whose coordinates are computed on access, only its pose and actuators are kept. Otherwise a chain of
+    answers, each started from the one before, would stay in memory.
     """
     if start is None:
         return lambda places: None
@@ -124,42 +130,51 @@ def begins_of(
         return lambda places: given if len(given) == 1 else given[places]
     poses, actuators, n = start.rows.poses, start.rows.actuators, len(start)
 
-    def settle(places: Places) -> Floats:
-        own = slice(None) if n == 1 else places
-        return settled(mechanism, table, poses[own], actuators[own], sides if len(sides) == 1 else sides[own], None)
+    def coordinates_at(places: Places) -> Floats:
+        rows = slice(None) if n == 1 else places
+        return joint_coordinates(
+            mechanism, table, poses[rows], actuators[rows], sides if len(sides) == 1 else sides[rows], None
+        )
 
-    return settle
+    return coordinates_at
 
 
-def coordinates_of(
+def answer_coordinates(
     mechanism: Mechanism,
     table: LegTable,
     rows: Rows,
     sides: Floats,
     q_proximal: Floats | None,
-    begins: Callable[[Places], Floats | None],
-    rest: NDArray[np.intp],
-    others: Configurations | None,
+    start_coordinates: Callable[[Places], Floats | None],
+    unsolved: NDArray[np.intp],
+    fallback: Configurations | None,
     places: Places,
 ) -> Floats:
-    """Joint coordinates (n, columns) of the answers at some places, those of the other engine (`rest`) as it has
-    them."""
-    at = np.arange(len(rows.status))[places]
-    elsewhere = np.full(len(rows.status), -1)
-    elsewhere[rest] = np.arange(len(rest))
-    is_own = elsewhere[at] < 0
-    own = at[is_own]
-    found = settled(
+    """Joint coordinates (n, columns) of the answers at some places.
+
+    Parameters
+    ----------
+    unsolved : the rows that legs did not solve; their coordinates are those of `fallback`, row by row.
+    """
+    indices = np.arange(len(rows.status))[places]
+    fallback_index = np.full(len(rows.status), -1)
+    fallback_index[unsolved] = np.arange(len(unsolved))
+    by_legs = fallback_index[indices] < 0
+    leg_rows = indices[by_legs]
+    coordinates = joint_coordinates(
         mechanism,
         table,
-        rows.poses[own],
-        rows.actuators[own],
-        sides if len(sides) == 1 else sides[own],
-        begins(own),
-        None if q_proximal is None else q_proximal[own],
+        rows.poses[leg_rows],
+        rows.actuators[leg_rows],
+        sides if len(sides) == 1 else sides[leg_rows],
+        start_coordinates(leg_rows),
+        None if q_proximal is None else q_proximal[leg_rows],
     )
-    if others is None:
-        return found
-    every = np.empty((len(at), found.shape[1]))
-    every[is_own], every[~is_own] = found, others.coordinates[elsewhere[at[~is_own]]]
-    return every
+    if fallback is None:
+        return coordinates
+    all_coordinates = np.empty((len(indices), coordinates.shape[1]))
+    all_coordinates[by_legs], all_coordinates[~by_legs] = (
+        coordinates,
+        fallback.coordinates[fallback_index[indices[~by_legs]]],
+    )
+    return all_coordinates

@@ -1,4 +1,4 @@
-"""Between legs in closed form and joint coordinates."""
+"""Joint coordinates from platform poses."""
 
 from __future__ import annotations
 
@@ -10,78 +10,82 @@ from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..motion.limits import within_turns
 from ..tolerances import TOLERANCES
-from .table import reading_of, reading_table
+from .table import reading_scratch, reading_table
 
 NO_ROWS, NO_SLOPES = np.zeros((0, 0)), np.zeros((0, 0, 0))
 
 RESTARTS = 24
-"""Random starts for joints that closed forms do not tell and that do not close from where they began."""
+"""Random restarts for joints that no closed form gives and that do not close from their start."""
 
 
-def settled(
+def joint_coordinates(
     mechanism: Mechanism,
     table: LegTable,
     poses: Floats,
     actuators: Floats,
     sides: Floats,
-    begin: Floats | None,
+    start: Floats | None,
     q_proximal: Floats | None = None,
 ) -> Floats:
-    """All joint coordinates, as deviations from home, (n, columns), of platforms and actuators at rest.
+    """All joint coordinates at given poses and actuators, as deviations from home, (n, columns).
 
     Parameters
     ----------
     poses, actuators : (n, 4, 4) [length], (n, n_a).
-    sides : which of its two solutions each leg takes, (n or 1, legs).
-    begin : where to start, (n or 1, columns): what a configuration leaves open (a rod's spin, whole turns of hinges) is
-        nearest to there. None for home.
-    carriers : coordinates of the legs' carriers (n, legs) [L or rad] where they were found otherwise than by closed
-        forms, which tell half their digits near dead points; NaN, or None, where not.
+    sides : of each leg, (n or 1, legs).
+    start : joint coordinates, (n or 1, columns). What a pose leaves open (a rod's spin, whole turns of hinges) is
+        nearest to the start. None for home.
+    q_proximal : coordinates of proximal joints (n, legs) [L or rad] that a search found; NaN, or None, where closed
+        forms give them. Near dead points these have half their digits.
     """
     closure = closure_of(mechanism, whole=False)
-    found = np.zeros((len(poses), len(closure.scale)))
-    if begin is not None:
-        found[:] = begin
+    coordinates = np.zeros((len(poses), len(closure.scale)))
+    if start is not None:
+        coordinates[:] = start
     if not len(poses):
-        return found
-    read_into(table, poses, sides, found, q_proximal)
-    closure.put_actuators(found, actuators)
-    found = _closed(mechanism, poses, actuators, found)
-    if begin is not None:
+        return coordinates
+    read_coordinates(table, poses, sides, coordinates, q_proximal)
+    closure.put_actuators(coordinates, actuators)
+    coordinates = _closed(mechanism, poses, actuators, coordinates)
+    if start is not None:
         angles = np.setdiff1d(table.known["column"][table.known["turns"] == 1], closure.actuated)
-        found[:, angles] += 2.0 * np.pi * np.round((begin - found)[:, angles] / (2.0 * np.pi))
-    within_turns(mechanism, found)
-    return found
+        coordinates[:, angles] += 2.0 * np.pi * np.round((start - coordinates)[:, angles] / (2.0 * np.pi))
+    within_turns(mechanism, coordinates)
+    return coordinates
 
 
-def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, found: Floats) -> Floats:
-    """Joint coordinates (n, columns) closed on platforms and actuators at rest, from given ones."""
+def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, start: Floats) -> Floats:
+    """Close the loops at fixed poses and actuators, from joint coordinates (n, columns)."""
     closure = closure_of(mechanism, whole=False)
     locked = closure.driven
     platform = (*HELD[:3], *((0.0,) * 3)) if mechanism.end_effector_is_joint else HELD
-    closing = close(closure, found, poses, locked=locked, platform=platform)
+    closing = close(closure, start, poses, locked=locked, platform=platform)
     rng = np.random.default_rng(0)
     for _ in range(RESTARTS):
-        rest = np.flatnonzero(closing.gap > TOLERANCES.position)
-        if not len(rest):
+        unsolved = np.flatnonzero(closing.gap > TOLERANCES.position)
+        if not len(unsolved):
             break
-        elsewhere = found[rest] + rng.uniform(-np.pi, np.pi, found.shape[1]) * closure.turning * ~closure.idle
-        closure.put_actuators(elsewhere, actuators[rest])
-        tried = close(closure, elsewhere, poses[rest], locked=locked, platform=platform)
-        better = tried.gap < closing.gap[rest]
-        closing.take(rest[better], tried, better)
+        restarts = start[unsolved] + rng.uniform(-np.pi, np.pi, start.shape[1]) * closure.turning * ~closure.idle
+        closure.put_actuators(restarts, actuators[unsolved])
+        candidate = close(closure, restarts, poses[unsolved], locked=locked, platform=platform)
+        is_better = candidate.gap < closing.gap[unsolved]
+        closing.take(unsolved[is_better], candidate, is_better)
     return closing.coordinates
 
 
-def read_into(table: LegTable, poses: Floats, sides: Floats, found: Floats, q_proximal: Floats | None = None) -> None:
-    """Write the coordinates that legs tell at poses (n, 4, 4) [length] into joint coordinates (n, columns).
+def read_coordinates(
+    table: LegTable, poses: Floats, sides: Floats, coordinates: Floats, q_proximal: Floats | None = None
+) -> None:
+    """Write the closed-form coordinates of legs at poses (n, 4, 4) [length] into joint coordinates (n, columns).
 
     Parameters
     ----------
-    carriers : as of `settled`.
+    q_proximal : as of `joint_coordinates`.
     """
     from ..kernels.platform.evaluate import evaluate_poses
 
-    legs, given = reading_table(table), NO_ROWS if q_proximal is None else q_proximal
-    own = np.require(poses, requirements=["C", "W"])
-    evaluate_poses(legs.address, reading_of(table).address, own, sides, given, found, NO_ROWS, NO_SLOPES)
+    legs, given_q = reading_table(table), NO_ROWS if q_proximal is None else q_proximal
+    kernel_poses = np.require(poses, requirements=["C", "W"])
+    evaluate_poses(
+        legs.address, reading_scratch(table).address, kernel_poses, sides, given_q, coordinates, NO_ROWS, NO_SLOPES
+    )

@@ -20,66 +20,67 @@ from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, 
 from ..kernels.threads import in_blocks
 from .nearest import nearest_actuators
 from .nearest_pose import home_start, no_starts, starts_at
-from .one import Ends, scratch_of
 from .seeds import seeds_of
+from .single import AssemblyOutputs, scratch_of
 from .table import search_table
 
 ROWS_A_BLOCK = 256
 
 
-def assembled(
+def forward_kinematics(
     mechanism: Mechanism,
     table: LegTable,
     values: Floats,
     start: Configurations | None,
     sides: Floats,
     tolerance: float,
-    tried: tuple[Rows, Ends] | None,
+    given: tuple[Rows, AssemblyOutputs] | None,
 ) -> tuple[Rows, Floats, Floats]:
-    """Configurations that have actuated values (n, n_a), within all limits; rows without one are PENDING.
+    """Configurations within all limits at actuated values (n, n_a); rows without one are PENDING.
 
-    What does not assemble from where it starts is assembled from elsewhere: from a start only where that beats a
-    projection, and where legs do not assemble in its mode beyond a limit.
+    Rows that do not assemble from home are assembled from seeds, then projected. Rows that do not assemble from a given
+    start are projected first. Where that misses their values, they are assembled from home and from seeds, unless they
+    assemble in the mode of the start, but beyond a limit.
 
     Parameters
     ----------
-    sides : which of its two solutions each leg takes at the start, (n or 1, legs).
-    tried : the arrays of one row that does not assemble from the start.
+    sides : of each leg at the start, (n or 1, legs).
+    given : the outputs of a single row whose assembly from the start failed already.
 
     Returns
     -------
-    The rows, the coordinates of the legs' carriers (n, legs) [L or rad], and the sides of the answers (n, legs).
+    The rows, the coordinates of proximal joints (n, legs) [L or rad], and the sides of the answers (n, legs).
     """
     is_cold = start is None
-    own = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
-    rows, (wanted, *ends) = tried or _assembled_from(mechanism, table, values, own)
-    found, strayed = Starts(rows.poses, *ends), rows.status == PENDING
-    missed = partial(_assemble_missed, mechanism, table, values, rows, wanted, found)
+    starts = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
+    rows, (wanted_values, *outputs) = given or _assembled_from(mechanism, table, values, starts)
+    solution, is_missed = Starts(rows.poses, *outputs), rows.status == PENDING
+    assemble_missed = partial(_assemble_missed, mechanism, table, values, rows, wanted_values, solution)
     if is_cold:
-        missed(own, seeds_of, np.flatnonzero(rows.status != REACHED))
-    rest = np.flatnonzero(rows.status != REACHED)
-    if not len(rest):
-        return rows, found.q, found.sides
-    rows.status[rest] = PENDING
-    _project(mechanism, table, wanted, own, rest, rows, found, anywhere=is_cold)
-    near = rest[rows.measures[rest, ACTUATOR_ERROR] <= tolerance]
-    rows.status[near[rows.status[near] == PROJECTED]] = REACHED
-    strayed &= rows.status != REACHED
-    if is_cold or not np.count_nonzero(strayed):
-        return rows, found.q, found.sides
+        assemble_missed(starts, seeds_of, np.flatnonzero(rows.status != REACHED))
+    unsolved = np.flatnonzero(rows.status != REACHED)
+    if not len(unsolved):
+        return rows, solution.q, solution.sides
+    rows.status[unsolved] = PENDING
+    _project(mechanism, table, wanted_values, starts, unsolved, rows, solution, anywhere=is_cold)
+    nearby = unsolved[rows.measures[unsolved, ACTUATOR_ERROR] <= tolerance]
+    rows.status[nearby[rows.status[nearby] == PROJECTED]] = REACHED
+    is_missed &= rows.status != REACHED
+    if is_cold or not np.count_nonzero(is_missed):
+        return rows, solution.q, solution.sides
     if is_over_determined(mechanism):
-        strayed &= (rows.status == PENDING) | (rows.measures[:, ACTUATOR_ERROR] > NOISE)
-    missed(own, _starts_elsewhere, np.flatnonzero(strayed))
-    missed(home_start(mechanism, table), seeds_of, np.flatnonzero(strayed & (rows.status != REACHED)))
-    places = np.flatnonzero(strayed & (rows.status != REACHED))
-    if len(places):
-        _project_elsewhere(mechanism, table, wanted, own, places, rows, values, found, tolerance)
-    return rows, found.q, found.sides
+        is_missed &= (rows.status == PENDING) | (rows.measures[:, ACTUATOR_ERROR] > NOISE)
+    assemble_missed(starts, _starts_elsewhere, np.flatnonzero(is_missed))
+    assemble_missed(home_start(mechanism, table), seeds_of, np.flatnonzero(is_missed & (rows.status != REACHED)))
+    missed = np.flatnonzero(is_missed & (rows.status != REACHED))
+    if len(missed):
+        _project_elsewhere(mechanism, table, wanted_values, starts, missed, rows, values, solution, tolerance)
+    return rows, solution.q, solution.sides
 
 
 @lru_cache(maxsize=64)
 def _starts_elsewhere(mechanism: Mechanism) -> Starts:
-    """Home, then the corners."""
+    """Home, then the seeds."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
     home = home_start(mechanism, table)
@@ -91,108 +92,125 @@ def _assemble_missed(
     table: LegTable,
     values: Floats,
     rows: Rows,
-    wanted: Floats,
-    found: Starts,
-    own: Starts,
-    elsewhere: Callable[[Mechanism], Starts],
+    nearest_values: Floats,
+    solution: Starts,
+    starts: Starts,
+    other_starts: Callable[[Mechanism], Starts],
     places: NDArray[np.intp],
 ) -> None:
-    """Assemble rows that are missed from elsewhere, nearest to where they start; those reached replace what they were.
+    """Assemble missed rows from other starts, the nearest to their own first; rows reached replace their outputs.
 
-    From where they start actuators are led to their values: from home too, which is a start of its own for that.
+    From their own start actuators are led to their values by continuation; `starts` may be home for that.
     """
     if not len(places):
         return
-    filled, asked = [rows.status, wanted, *found, rows.measures], values[places]
-    parts = [array[places] for array in filled]
-    _assemble(mechanism, table, own.of(places), elsewhere(mechanism), [asked, *parts])
-    reached = parts[0] == REACHED
-    for array, part in zip(filled, parts, strict=True):
-        array[places[reached]] = part[reached]
-    rows.actuators[places[reached]] = asked[reached]
-    rows.measures[places[reached], ACTUATOR_ERROR] = 0.0
+    outputs, values_here = [rows.status, nearest_values, *solution, rows.measures], values[places]
+    block = [array[places] for array in outputs]
+    _assemble(mechanism, table, starts.of(places), other_starts(mechanism), [values_here, *block])
+    is_reached = block[0] == REACHED
+    for array, block_array in zip(outputs, block, strict=True):
+        array[places[is_reached]] = block_array[is_reached]
+    rows.actuators[places[is_reached]] = values_here[is_reached]
+    rows.measures[places[is_reached], ACTUATOR_ERROR] = 0.0
 
 
 def _project_elsewhere(
     mechanism: Mechanism,
     table: LegTable,
-    wanted: Floats,
-    own: Starts,
+    wanted_values: Floats,
+    starts: Starts,
     places: NDArray[np.intp],
     rows: Rows,
     values: Floats,
-    found: Starts,
+    solution: Starts,
     tolerance: float,
 ) -> None:
-    """Project rows from anywhere; those that have their values so replace what they were."""
-    some = rows_at(rows, places)
-    ends = Starts(some.poses, found.q[places], found.sides[places])
-    some.actuators[:] = values[places]
-    _project(mechanism, table, wanted[places], own.of(places), np.arange(len(places)), some, ends, anywhere=True)
-    reached = (some.status == PROJECTED) & (some.measures[:, ACTUATOR_ERROR] <= tolerance)
-    some.status[reached] = REACHED
-    for array, part in zip((*rows, found.q, found.sides), (*some, ends.q, ends.sides), strict=True):
-        array[places[reached]] = part[reached]
+    """Project rows from seeds too; rows that have their values then replace their outputs."""
+    block = rows_at(rows, places)
+    block_solution = Starts(block.poses, solution.q[places], solution.sides[places])
+    block.actuators[:] = values[places]
+    _project(
+        mechanism,
+        table,
+        wanted_values[places],
+        starts.of(places),
+        np.arange(len(places)),
+        block,
+        block_solution,
+        anywhere=True,
+    )
+    is_reached = (block.status == PROJECTED) & (block.measures[:, ACTUATOR_ERROR] <= tolerance)
+    block.status[is_reached] = REACHED
+    for array, block_array in zip(
+        (*rows, solution.q, solution.sides), (*block, block_solution.q, block_solution.sides), strict=True
+    ):
+        array[places[is_reached]] = block_array[is_reached]
 
 
-def _assembled_from(mechanism: Mechanism, table: LegTable, values: Floats, own: Starts) -> tuple[Rows, Ends]:
-    """Rows assembled at actuated values (n, n_a) from where each starts, or all of them; PENDING where they are not."""
+def _assembled_from(
+    mechanism: Mechanism, table: LegTable, values: Floats, starts: Starts
+) -> tuple[Rows, AssemblyOutputs]:
+    """Rows assembled at actuated values (n, n_a) from one start each, or one for all; PENDING where that fails."""
     rows, shape = new_rows(mechanism, len(values)), (len(values), len(table.legs))
-    ends = Ends(np.zeros_like(values), np.zeros(shape), np.zeros(shape))
+    outputs = AssemblyOutputs(np.zeros_like(values), np.zeros(shape), np.zeros(shape))
     rows.actuators[:] = values
-    filled = rows.status, ends.wanted, rows.poses, ends.q, ends.sides, rows.measures
-    _assemble(mechanism, table, own, no_starts(table), (rows.actuators, *filled))
-    return rows, ends
+    arrays = rows.status, outputs.values, rows.poses, outputs.q, outputs.sides, rows.measures
+    _assemble(mechanism, table, starts, no_starts(table), (rows.actuators, *arrays))
+    return rows, outputs
 
 
 def _project(
     mechanism: Mechanism,
     table: LegTable,
     values: Floats,
-    own: Starts,
+    starts: Starts,
     places: NDArray[np.intp],
     rows: Rows,
-    found: Starts,
+    solution: Starts,
     *,
     anywhere: bool,
 ) -> None:
-    """Answer rows by feasible configurations with actuators as near to their values as searches bring them.
+    """Answer rows by the feasible configurations whose actuators are nearest to their values.
 
-    For these one turn is as good as another. Rows that end beyond a bound, and so a turn away, stay PENDING.
+    The search takes angles modulo whole turns. Rows whose nearest turn is out of range stay PENDING.
     """
-    first = own.of(places)
-    ended = nearest_actuators(mechanism, values[places], first, seeds=anywhere)
-    near = np.flatnonzero(np.isfinite(ended.distances))
-    ended, places = ended.at(near), places[near]
-    asked, actuators, measures = rows.actuators[places], ended.actuators, ended.measures
+    block_starts = starts.of(places)
+    nearest = nearest_actuators(mechanism, values[places], block_starts, seeds=anywhere)
+    solved = np.flatnonzero(np.isfinite(nearest.distances))
+    nearest, places = nearest.at(solved), places[solved]
+    block_values, actuators, measures = rows.actuators[places], nearest.actuators, nearest.measures
     measures[:, [POSITION_ERROR, ROTATION_ERROR]] = 0.0
-    turned = np.zeros(len(places), bool)
+    is_turned = np.zeros(len(places), bool)
     for driven in table.driven:
         column = driven["column"]
-        now = actuators[:, column]  # a view
+        column_values = actuators[:, column]  # a view
         if driven["turns"] == 1 and driven["hi"] - driven["lo"] > 2.0 * np.pi:
-            counted = now + 2.0 * np.pi * np.round((asked[:, column] - now) / (2.0 * np.pi))
-            inside = (counted >= driven["home"] + driven["lo"]) & (counted <= driven["home"] + driven["hi"])
-            now[:] = np.where(inside, counted, now)
-            turned |= ~inside
-        off = np.abs(now - asked[:, column]) / driven["unit"]
-        measures[:, ACTUATOR_ERROR] = np.maximum(measures[:, ACTUATOR_ERROR], off)
+            nearest_turn = column_values + 2.0 * np.pi * np.round(
+                (block_values[:, column] - column_values) / (2.0 * np.pi)
+            )
+            is_inside = (nearest_turn >= driven["home"] + driven["lo"]) & (
+                nearest_turn <= driven["home"] + driven["hi"]
+            )
+            column_values[:] = np.where(is_inside, nearest_turn, column_values)
+            is_turned |= ~is_inside
+        error = np.abs(column_values - block_values[:, column]) / driven["unit"]
+        measures[:, ACTUATOR_ERROR] = np.maximum(measures[:, ACTUATOR_ERROR], error)
     rows.actuators[places], rows.measures[places] = actuators, measures
-    rows.status[places] = np.where(turned, PENDING, PROJECTED)
-    rows.counters[places, ITERATIONS] = ended.counters[:, ITERATIONS]
-    rows.poses[places], found.q[places], found.sides[places] = ended.poses, ended.q, ended.sides
+    rows.status[places] = np.where(is_turned, PENDING, PROJECTED)
+    rows.counters[places, ITERATIONS] = nearest.counters[:, ITERATIONS]
+    rows.poses[places], solution.q[places], solution.sides[places] = nearest.poses, nearest.q, nearest.sides
 
 
 def _assemble(
-    mechanism: Mechanism, table: LegTable, own: Starts, others: Starts, arrays: Sequence[NDArray[Any]]
+    mechanism: Mechanism, table: LegTable, starts: Starts, other_starts: Starts, arrays: Sequence[NDArray[Any]]
 ) -> None:
-    """Assemble rows on all cores; the arrays are the actuators, then what is filled: see the kernel."""
+    """Assemble rows on all cores; the arrays are the actuators, then the outputs of the kernel."""
     from ..kernels.platform.forward import assemble
 
-    legs, scratch, elsewhere = search_table(table), scratch_of(mechanism, table), Handle(others)
+    legs, scratch, others_handle = search_table(table), scratch_of(mechanism, table), Handle(other_starts)
 
     def run(block: slice) -> None:
-        first, (values, *filled) = Handle(own.of(block)), (a[block] for a in arrays)
-        assemble(legs.address, scratch.address, values, first.address, elsewhere.address, *filled)
+        block_starts, (values, *outputs) = Handle(starts.of(block)), (array[block] for array in arrays)
+        assemble(legs.address, scratch.address, values, block_starts.address, others_handle.address, *outputs)
 
     in_blocks(run, len(arrays[0]), ROWS_A_BLOCK)

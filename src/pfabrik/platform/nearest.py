@@ -1,4 +1,4 @@
-"""The nearest feasible poses, by searches in the pose of the platform."""
+"""The nearest feasible configurations: projections of targets, nearest actuators, nearest redundant joints."""
 
 from __future__ import annotations
 
@@ -24,274 +24,288 @@ from ..kernels.platform.records import PoseSolutions, Starts
 from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION, PROJECTED, REACHED
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .nearest_pose import NearestPose, new_found, no_starts, starts_at
+from .nearest_pose import NearestPose, new_solution, no_starts, starts_at
 from .seeds import seeds_of
 
 MOST_STEPS = 200
-"""Steps of a search, including those that are taken back; most need a dozen."""
+"""Steps of a search, rejected ones included; most need a dozen."""
 
 
-def project(
+def nearest_poses(
     mechanism: Mechanism,
     options: Options,
     targets: Floats,
-    own: Starts,
-    found: PoseSolutions,
+    starts: Starts,
+    solution: PoseSolutions,
     *,
     seeds: bool,
-    stays: bool,
+    keep_mode: bool,
     has_start: bool,
 ) -> int:
-    """Fill the nearest feasible configurations that searches from several starts find.
+    """Fill the nearest feasible configurations that searches from several starts find; return the number unsolved.
 
     Parameters
     ----------
-    options : what counts and what is held: of the ways to project, the first that has an answer.
+    options : what counts and what is held. Of the projections tried in turn, the first with an answer gives it.
     targets : (n, 4, 4) [length].
-    own : the first start of each row, or one for all; poses [L].
-    found : distances are infinite where there is none.
-    corners : start from elsewhere too. Without, a search stays about where it starts.
-    stays : in the working mode of the first start; through a dead point lies another.
+    starts : the first start of each row, or one for all; poses [L].
+    solution : its distances are infinite in unsolved rows.
+    seeds : search from the machine's seeds too. Without, a search stays around its start.
+    keep_mode : stay in the working mode of the first start; beyond a dead point is another.
     has_start : the first start was given: nothing held leads farther away than it is.
-
-    Returns
-    -------
-    How many rows have none.
     """
     tolerances = options.tolerance, options.rotation_tolerance
-    asked = _asked(mechanism, options.hold, options.rotation_length, *tolerances, seeds, stays)
-    first, *others = asked.searches
-    left = first.fill(targets, own, found)
-    for search in others:
-        if not left:
+    plan = _search_plan(mechanism, options.hold, options.rotation_length, *tolerances, seeds, keep_mode)
+    preferred, *later = plan.searches
+    n_unsolved = preferred.fill(targets, starts, solution)
+    for search in later:
+        if not n_unsolved:
             break
-        if left == len(targets):
-            left = search.fill(targets, own, found)
+        if n_unsolved == len(targets):
+            n_unsolved = search.fill(targets, starts, solution)
             continue
-        lost = found.distances == np.inf
-        some = found.at(lost)
-        left = search.fill(targets[lost], own.of(lost), some)
-        found.put(lost, some)
-    if has_start and len(others) and _may_be_far(asked, targets, own, found):
-        _let_go(asked, targets, own, found)
-    if asked.otherwise is not None:
-        _reach_otherwise(asked.otherwise, targets, own, found)
-    return left
+        is_unsolved = solution.distances == np.inf
+        block = solution.at(is_unsolved)
+        n_unsolved = search.fill(targets[is_unsolved], starts.of(is_unsolved), block)
+        solution.put(is_unsolved, block)
+    if has_start and len(later) and _may_be_too_far(plan, targets, starts, solution):
+        _release(plan, targets, starts, solution)
+    if plan.fallback is not None:
+        _reach_by_fallback(plan.fallback, targets, starts, solution)
+    return n_unsolved
 
 
-class Asked(NamedTuple):
-    """What is asked of projections."""
+class SearchPlan(NamedTuple):
+    """The projections tried in turn, and a search for each."""
 
     mechanism: Mechanism
     length: float
-    ways: tuple[Way, ...]
+    projections: tuple[Way, ...]
     searches: tuple[NearestPose, ...]
-    otherwise: NearestPose | None  # another way, where legs reach only what they complete step by step
+    fallback: NearestPose | None  # another projection, for legs that complete poses step by step
 
 
 @lru_cache(maxsize=256)
-def _asked(
+def _search_plan(
     mechanism: Mechanism,
     hold: str | None,
     rotation_length: float | None,
     tolerance: float | None,
     rotation_tolerance: float,
     seeds: bool,
-    stays: bool,
-) -> Asked:
-    """The ways to project, in the order in which they are tried, and searches of each."""
+    keep_mode: bool,
+) -> SearchPlan:
+    """The projections that options ask for, in the order in which they are tried, and their searches."""
     table, length = leg_table(mechanism), mechanism.characteristic_length
     assert isinstance(table, LegTable)
-    settings = {"steps": MOST_STEPS, "stays": int(stays), "rotation": rotation_tolerance}
+    settings = {"steps": MOST_STEPS, "stays": int(keep_mode), "rotation": rotation_tolerance}
     settings["position"] = tolerance or TOLERANCES.position * length
-    starts = seeds_of(mechanism) if seeds else no_starts(table)
-    ways = ways_of(mechanism, hold, rotation_length)
-    searches = tuple(_search(mechanism, table, way, settings, starts) for way in ways)
-    holding = ways_of(mechanism, "orientation", rotation_length)
-    otherwise = None
-    if table.is_completed and len(holding) > 1:
-        otherwise = searches[-1] if len(ways) > 1 else _search(mechanism, table, holding[0], settings, starts)
-    return Asked(mechanism, length, ways, searches, otherwise)
+    seed_starts = seeds_of(mechanism) if seeds else no_starts(table)
+    projections = ways_of(mechanism, hold, rotation_length)
+    searches = tuple(_new_search(mechanism, table, projection, settings, seed_starts) for projection in projections)
+    with_orientation = ways_of(mechanism, "orientation", rotation_length)
+    fallback = None
+    if table.is_completed and len(with_orientation) > 1:
+        fallback = (
+            searches[-1]
+            if len(projections) > 1
+            else _new_search(mechanism, table, with_orientation[0], settings, seed_starts)
+        )
+    return SearchPlan(mechanism, length, projections, searches, fallback)
 
 
-def _search(
-    mechanism: Mechanism, table: LegTable, way: Way, settings: Mapping[str, float], starts: Starts
+def _new_search(
+    mechanism: Mechanism, table: LegTable, projection: Way, settings: Mapping[str, float], seed_starts: Starts
 ) -> NearestPose:
-    """Searches of one way, from each row's own start and then from others."""
+    """The search of one projection: from each row's start, then from seeds."""
     length = mechanism.characteristic_length
     held = {
-        "hold": way.hold,
-        "held_position": TOLERANCES.held * length if way.hold == HOLD_POSITION else np.inf,
-        "held_rotation": TOLERANCES.held if way.hold == HOLD_ORIENTATION else np.inf,
+        "hold": projection.hold,
+        "held_position": TOLERANCES.held * length if projection.hold == HOLD_POSITION else np.inf,
+        "held_rotation": TOLERANCES.held if projection.hold == HOLD_ORIENTATION else np.inf,
     }
-    return NearestPose(mechanism, table, way.weights, {**settings, **held}, starts)
+    return NearestPose(mechanism, table, projection.weights, {**settings, **held}, seed_starts)
 
 
-def _reach_otherwise(search: NearestPose, targets: Floats, own: Starts, found: PoseSolutions) -> None:
-    """Answer the rows that another way to project reaches: near singularities each misses others."""
-    is_open = (found.status == PROJECTED) & (found.counters[:, HOLD] < CERTAIN)
-    asked = (is_open & (found.distances < np.inf)).nonzero()[0]
-    if not len(asked):
+def _reach_by_fallback(search: NearestPose, targets: Floats, starts: Starts, solution: PoseSolutions) -> None:
+    """Solve the rows that another projection reaches: near singularities each of the two misses some."""
+    is_uncertain = (solution.status == PROJECTED) & (solution.counters[:, HOLD] < CERTAIN)
+    rows_to_try = (is_uncertain & (solution.distances < np.inf)).nonzero()[0]
+    if not len(rows_to_try):
         return
-    some = found.at(asked)
-    search.fill(targets[asked], own.of(asked), some)
-    reached = (some.status == REACHED) & (some.distances < np.inf)
-    some.counters[:, HOLD] = HOLD_NOTHING
-    found.put(asked[reached], some.at(reached))
+    block = solution.at(rows_to_try)
+    search.fill(targets[rows_to_try], starts.of(rows_to_try), block)
+    is_reached = (block.status == REACHED) & (block.distances < np.inf)
+    block.counters[:, HOLD] = HOLD_NOTHING
+    solution.put(rows_to_try[is_reached], block.at(is_reached))
 
 
-def _may_be_far(asked: Asked, targets: Floats, own: Starts, found: PoseSolutions) -> bool:
-    """Whether a row may be farther from its target than where it starts; not of one whose position is nearer with its
-    orientation held, which is told at once."""
-    if len(targets) > 1 or asked.ways[0].hold != HOLD_ORIENTATION or not all(task_of(asked.mechanism).axes):
+def _may_be_too_far(plan: SearchPlan, targets: Floats, starts: Starts, solution: PoseSolutions) -> bool:
+    """False if the only row, its orientation held, is surely nearer in position than its start; else True.
+
+    A quick test that spares most single targets `_release`.
+    """
+    if len(targets) > 1 or plan.projections[0].hold != HOLD_ORIENTATION or not all(task_of(plan.mechanism).axes):
         return True
-    at, start, scale = targets[0, :3, 3].tolist(), own.poses[0, :3, 3].tolist(), asked.length
-    (x, y, z), (a, b, c) = at, start
-    return bool(found.distances[0] * scale > hypot(x - a * scale, y - b * scale, z - c * scale))
+    target, start, scale = targets[0, :3, 3].tolist(), starts.poses[0, :3, 3].tolist(), plan.length
+    (x, y, z), (a, b, c) = target, start
+    return bool(solution.distances[0] * scale > hypot(x - a * scale, y - b * scale, z - c * scale))
 
 
-def _let_go(asked: Asked, targets: Floats, own: Starts, found: PoseSolutions) -> None:
-    """Hold nothing where what was held leads farther from targets than the start is, and nothing held does not: see
-    `Way.is_too_far`."""
-    held, nothing = asked.ways
-    closure = closure_of(asked.mechanism)
-    holds = (found.counters[:, HOLD] % CERTAIN == held.hold) & (found.distances < np.inf)
-    if held.hold == HOLD_ORIENTATION:  # most are nearer in position alone
-        off = (targets[:, :3, 3] / asked.length - own.poses[:, :3, 3]) * task_of(asked.mechanism).axes
-        holds &= found.distances > np.sqrt(np.einsum("ij,ij->i", off, off))
-    far = holds.nonzero()[0]
+def _release(plan: SearchPlan, targets: Floats, starts: Starts, solution: PoseSolutions) -> None:
+    """Hold nothing in rows that end too far from their targets because of what is held, if that brings them nearer.
+
+    Too far is defined by `Way.is_too_far`.
+    """
+    holding, free = plan.projections
+    closure = closure_of(plan.mechanism)
+    is_held = (solution.counters[:, HOLD] % CERTAIN == holding.hold) & (solution.distances < np.inf)
+    if holding.hold == HOLD_ORIENTATION:  # most are nearer in position alone
+        offset = (targets[:, :3, 3] / plan.length - starts.poses[:, :3, 3]) * task_of(plan.mechanism).axes
+        is_held &= solution.distances > np.sqrt(np.einsum("ij,ij->i", offset, offset))
+    far = is_held.nonzero()[0]
     if not len(far):
         return
-    starts = np.broadcast_to(in_lengths(own.poses, asked.length), targets.shape)
-    far = far[held.is_too_far(closure, found.distances[far], starts[far], targets[far])]
+    start_poses = np.broadcast_to(in_lengths(starts.poses, plan.length), targets.shape)
+    far = far[holding.is_too_far(closure, solution.distances[far], start_poses[far], targets[far])]
     if not len(far):
         return
-    some = found.at(far)
-    asked.searches[-1].fill(targets[far], own.of(far), some)
-    nearer = some.distances <= (1.0 + SAME) * nothing.distances(closure, starts[far], targets[far])
-    found.put(far[nearer], some.at(nearer))
+    block = solution.at(far)
+    plan.searches[-1].fill(targets[far], starts.of(far), block)
+    is_nearer = block.distances <= (1.0 + SAME) * free.distances(closure, start_poses[far], targets[far])
+    solution.put(far[is_nearer], block.at(is_nearer))
 
 
-def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: Way) -> Floats:
-    """How hard every limit holds configurations back from targets (n, 4, 4) [length]: multipliers, in the order of
-    those that `closure.descend.weighed_limits` gives."""
-    found = _weighing(mechanism, table, way).weigh(targets, present)
+def weighed_limits(
+    mechanism: Mechanism, table: LegTable, targets: Floats, configurations: Starts, projection: Way
+) -> Floats:
+    """The multipliers of all limits at configurations, for targets (n, 4, 4) [length].
+
+    In the order of `closure.descend.weighed_limits`.
+    """
+    multipliers = _multipliers(mechanism, table, projection).weigh(targets, configurations)
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
-    coned = [joint.name for joint in mechanism.joints if joint.cone is not None]
-    weights = np.zeros((len(targets), 2 * columns + len(coned)))
+    cone_joints = [joint.name for joint in mechanism.joints if joint.cone is not None]
+    weights = np.zeros((len(targets), 2 * columns + len(cone_joints)))
     for bound in (0, 1):
-        weights[:, 2 * table.limited["column"] + bound] = found[:, bound : 2 * ranges : 2]
-    cones = [2 * columns + coned.index(name) for name, bound in table.limits if bound == "cone"]
-    weights[:, cones] = found[:, 2 * ranges : 2 * ranges + len(cones)]
+        weights[:, 2 * table.limited["column"] + bound] = multipliers[:, bound : 2 * ranges : 2]
+    cones = [2 * columns + cone_joints.index(name) for name, bound in table.limits if bound == "cone"]
+    weights[:, cones] = multipliers[:, 2 * ranges : 2 * ranges + len(cones)]
     return weights
 
 
 @lru_cache(maxsize=256)
-def _weighing(mechanism: Mechanism, table: LegTable, way: Way) -> NearestPose:
-    """What takes no steps, and weighs limits."""
-    return NearestPose(mechanism, table, way.weights, {"steps": 0}, no_starts(table))
+def _multipliers(mechanism: Mechanism, table: LegTable, projection: Way) -> NearestPose:
+    """The kernel call that takes no steps and gives the multipliers of limits."""
+    return NearestPose(mechanism, table, projection.weights, {"steps": 0}, no_starts(table))
 
 
-def nearest_actuators(mechanism: Mechanism, values: Floats, own: Starts, *, seeds: bool) -> PoseSolutions:
+def nearest_actuators(mechanism: Mechanism, values: Floats, starts: Starts, *, seeds: bool) -> PoseSolutions:
     """Feasible configurations whose actuators are nearest to values (n, n_a), deviations from home [L or rad]."""
-    poses = in_lengths(own.poses, mechanism.characteristic_length)
+    poses = in_lengths(starts.poses, mechanism.characteristic_length)
     poses = poses if len(poses) == len(values) else np.repeat(poses, len(values), axis=0)
-    return _toward_values(mechanism, seeds).find(poses, own, values)
+    return _actuator_search(mechanism, seeds).find(poses, starts, values)
 
 
 @lru_cache(maxsize=64)
-def _toward_values(mechanism: Mechanism, seeds: bool) -> NearestPose:
-    """Searches for actuators that have values; the pose does not count."""
+def _actuator_search(mechanism: Mechanism, seeds: bool) -> NearestPose:
+    """The search for actuators nearest to values; the pose does not count."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    others = seeds_of(mechanism) if seeds else no_starts(table)
+    seed_starts = seeds_of(mechanism) if seeds else no_starts(table)
     settings = {"frame": BASE_AXES, "steps": MOST_STEPS}
-    return NearestPose(mechanism, table, (0.0,) * 6, settings, others, table.driven)
+    return NearestPose(mechanism, table, (0.0,) * 6, settings, seed_starts, table.driven)
 
 
-def move_redundant(
+def move_redundant_joints(
     mechanism: Mechanism,
     table: LegTable,
     targets: Floats,
-    begins: Floats,
+    start_poses: Floats,
     sides: Floats,
     places: NDArray[np.intp],
 ) -> tuple[NDArray[np.intp], Floats]:
-    """Move the arms of some rows to where legs reach their targets within all limits, as little as can be.
+    """Move the redundant joints of some rows, as little as possible, until legs reach their targets within all limits.
 
     Parameters
     ----------
-    targets, begins : (n, 4, 4) and (n or 1, 4, 4) [length].
-    sides : where arms are, (n, legs), and where they go.
-    places : the rows that are asked for.
+    targets, start_poses : (n, 4, 4) and (n or 1, 4, 4) [length].
+    sides : coordinates of the redundant joints, (n, legs), before and after.
+    places : the rows to solve.
 
     Returns
     -------
-    The rows for which there is such a place, and the poses that the searches ended at, (rows, 4, 4) [length].
+    The rows solved, and the poses at which their searches ended, (rows, 4, 4) [length].
     """
-    own = starts_at(mechanism, table, begins if len(begins) == 1 else begins[places], sides[places])
-    found = _nearest_redundant(mechanism, table, targets[places], own)
-    placed = np.isfinite(found.distances)
-    sides[places[placed]] = found.sides[placed]
-    return places[placed], found.poses[placed]
+    starts = starts_at(mechanism, table, start_poses if len(start_poses) == 1 else start_poses[places], sides[places])
+    solution = _nearest_redundant(mechanism, table, targets[places], starts)
+    is_solved = np.isfinite(solution.distances)
+    sides[places[is_solved]] = solution.sides[is_solved]
+    return places[is_solved], solution.poses[is_solved]
 
 
-def _nearest_redundant(mechanism: Mechanism, table: LegTable, targets: Floats, own: Starts) -> PoseSolutions:
-    """Feasible configurations at targets (n, 4, 4) [length] whose arms are near to where the starts (n,) have them.
+def _nearest_redundant(mechanism: Mechanism, table: LegTable, targets: Floats, starts: Starts) -> PoseSolutions:
+    """Feasible configurations at targets (n, 4, 4) [length] whose redundant joints are nearest to those of starts (n,).
 
-    Searches start there alone: what they miss, projections from elsewhere find. Where one set of arms has no place the
-    next is not asked.
+    Searches start there alone; what they miss, projections from seeds find. A row without a solution for one set of
+    redundant joints is not searched for the next.
 
     Parameters
     ----------
-    own : poses (n or 1, 4, 4), sides (n, legs), and no coordinates.
+    starts : poses (n or 1, 4, 4), sides (n, legs), and no coordinates.
     """
-    best = new_found(len(targets), table)
-    best.distances[:], best.sides[:] = 0.0, own.sides
-    left = np.arange(len(targets))
-    for redundant, legs, nearest_pose in _toward_redundant(mechanism, table):
-        poses = own.poses if len(own.poses) == 1 else own.poses[left]
-        begin = Starts(poses, np.ascontiguousarray(own.q[:, legs]), np.ascontiguousarray(own.sides[left][:, legs]))
-        values = np.ascontiguousarray(redundant["sense"] * begin.sides[:, redundant["leg"]])
-        found = nearest_pose.find(targets[left], begin, values)
-        best.distances[left] = np.maximum(best.distances[left], found.distances)
-        best.poses[left], best.sides[left, legs] = found.poses, found.sides
-        left = left[np.isfinite(found.distances)]
+    best = new_solution(len(targets), table)
+    best.distances[:], best.sides[:] = 0.0, starts.sides
+    unsolved = np.arange(len(targets))
+    for redundant, legs, nearest_pose in _redundant_searches(mechanism, table):
+        poses = starts.poses if len(starts.poses) == 1 else starts.poses[unsolved]
+        block_starts = Starts(
+            poses, np.ascontiguousarray(starts.q[:, legs]), np.ascontiguousarray(starts.sides[unsolved][:, legs])
+        )
+        values = np.ascontiguousarray(redundant["sense"] * block_starts.sides[:, redundant["leg"]])
+        solution = nearest_pose.find(targets[unsolved], block_starts, values)
+        best.distances[unsolved] = np.maximum(best.distances[unsolved], solution.distances)
+        best.poses[unsolved], best.sides[unsolved, legs] = solution.poses, solution.sides
+        unsolved = unsolved[np.isfinite(solution.distances)]
     return best
 
 
 @lru_cache(maxsize=64)
-def _toward_redundant(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, slice, NearestPose], ...]:
-    """Searches for each set of arms at poses that are held: the arms, and which legs these are."""
+def _redundant_searches(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, slice, NearestPose], ...]:
+    """A search for each independent set of redundant joints, at a held pose: their coordinates, and their legs."""
     held = task_of(mechanism).held
     return tuple(
         (
-            part.redundant,
+            part_table.redundant,
             legs,
-            NearestPose(mechanism, part, held, {"steps": MOST_STEPS}, no_starts(part), part.redundant),
+            NearestPose(
+                mechanism, part_table, held, {"steps": MOST_STEPS}, no_starts(part_table), part_table.redundant
+            ),
         )
-        for part, legs in _apart_by_redundant(table)
+        for part_table, legs in _split_by_redundant(table)
     )
 
 
-def _apart_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
-    """Tables of the legs on each set of arms, and which legs these are: they have nothing to do with each other where
-    the pose is given; else all in one."""
+def _split_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
+    """Tables of the legs on each independent set of redundant joints, with the slices of these legs.
+
+    A pose separates the sets. Where the task leaves some of it open, or legs constrain it, all legs stay together.
+    """
     if table.task["unset"][0] > 0 or table.task["rows"][0] > 0:
         return ((table, slice(None)),)
     legs, parts = table.legs, []
     starts = np.flatnonzero((legs["kind"] == K.REDUNDANT) & (legs["redundant"] < 0)).tolist()
-    for k, after in zip(starts, [*starts[1:], len(legs)], strict=True):
+    for k, next_start in zip(starts, [*starts[1:], len(legs)], strict=True):
         end = k + 1
-        while end < after and legs[end]["redundant"] >= k:
+        while end < next_start and legs[end]["redundant"] >= k:
             end += 1
-        own_legs, before = legs[k:end].copy(), legs[k]["makes"] - 2
-        own_legs["redundant"] -= np.where(own_legs["redundant"] >= 0, k, 0)
-        own_legs["makes"] -= before
-        own_legs["frame"] -= np.where(own_legs["frame"] >= 2, before, 0)
-        own = {name: getattr(table, name) for name in ("limited", "cones", "known")}
-        own = {name: array[(array["leg"] >= k) & (array["leg"] < end)] for name, array in own.items()}
-        for array in own.values():
+        part_legs, n_before = legs[k:end].copy(), legs[k]["makes"] - 2
+        part_legs["redundant"] -= np.where(part_legs["redundant"] >= 0, k, 0)
+        part_legs["makes"] -= n_before
+        part_legs["frame"] -= np.where(part_legs["frame"] >= 2, n_before, 0)
+        records = {name: getattr(table, name) for name in ("limited", "cones", "known")}
+        records = {name: array[(array["leg"] >= k) & (array["leg"] < end)] for name, array in records.items()}
+        for array in records.values():
             array["leg"] -= k
-        parts.append((replace(table, forms=table.forms[k:end], legs=own_legs, **own), slice(k, end)))
+        parts.append((replace(table, forms=table.forms[k:end], legs=part_legs, **records), slice(k, end)))
     return tuple(parts)

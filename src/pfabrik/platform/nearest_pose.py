@@ -1,4 +1,4 @@
-"""Searches in the pose of the platform: where they start, and the kernel asked of rows on all cores."""
+"""Searches for the nearest pose of the platform: their settings and starts, and the kernel run on all cores."""
 
 from __future__ import annotations
 
@@ -21,23 +21,25 @@ from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
 from .along import carriages_along, proximal_coordinates, stays_there
-from .rotation import implied_rows, keeps_rotation, without_idle_legs
-from .table import OF_AIMS, search_table
+from .rotation import keeps_rotation, n_implied_rows, without_idle_legs
+from .table import OF_POINTING, search_table
 
 if TYPE_CHECKING:
     from ..kernels.platform.nearest import NearestScratch
 
 AGREEMENTS, AGREEMENTS_OF_STRUTS, AGREEMENTS_OF_VALUES = 4, 3, 8
-"""How many searches must end at the nearest configuration, and one more for each that ends elsewhere: fewer where
-struts leave the platform all its freedoms, and have no two ways to bend; more where actuators have values, which a
-platform nearly has in many poses."""
+"""Searches that must end at the nearest configuration, and one more for each that ends elsewhere.
 
-HITS_OF_RAILS = 6
-"""The same where rods on carriages leave the platform all its freedoms: each may go on to the other side of its
-carriage, and ends there at the limit of another leg. With 4, of 1,200 targets 14 have a nearer pose, with 6 three."""
+Fewer on struts that leave the platform all its freedoms: they have one solution each. More where actuators have target
+values: a platform nearly has them in many poses."""
+
+AGREEMENTS_OF_RAILS = 6
+"""Agreements where rods on carriages leave the platform all its freedoms: a search may take a rod to its other side,
+where it ends at the limit of another leg. With 4, 14 of 1,200 targets have a nearer pose; with 6, three."""
 
 AGREEMENTS_OF_MANY = 8
-"""The same where arms are led, or task and legs do not tell all of a pose: there are many more configurations."""
+"""Agreements with implicit joints, or where task and legs leave some of the pose open: there are many more
+configurations."""
 
 ROWS_A_BLOCK = 16
 
@@ -45,16 +47,16 @@ _NO_WEIGHTS = np.zeros((0, 0))
 
 
 class NearestPose:
-    """Searches of a machine for what is nearest in one way, prepared: what is left to do for a row is little.
+    """Searches for the nearest feasible configurations of a machine, by one objective, prepared once for all rows.
 
     Parameters
     ----------
-    weights : what counts of the pose, (6,), as of `PoseObjective`; what does not turn is held as it is.
-    settings : of `SETTINGS`, by name, those that do not follow from the machine and its task.
-    others : starts that follow each row's own.
-    driven : the coordinates that are to be near to values; None where only poses count.
-    minds_aims : keep on the way, too, to where crossed hinges can point their rods. Rows that end where they cannot are
-        searched for again like this: a way that is barred ends earlier.
+    weights : of the pose, (6,), as of `PoseObjective`; the rotation of a platform that cannot turn is locked.
+    settings : fields of `SETTINGS` that do not follow from the machine and its task, by name.
+    seeds : starts tried after each row's own.
+    driven : the coordinates that have target values; None where only poses count.
+    keep_pointing : enforce the limits on where crossed hinges can point their rods in every step. Without, only rows
+        that end beyond such a limit are searched again with it: enforcing it may stop a search early.
     """
 
     def __init__(
@@ -63,32 +65,32 @@ class NearestPose:
         table: LegTable,
         weights: Sequence[float],
         settings: Mapping[str, float],
-        others: Starts,
+        seeds: Starts,
         driven: Records | None = None,
         *,
-        minds_aims: bool = False,
+        keep_pointing: bool = False,
     ) -> None:
         self._table, searches = table, settings["steps"] > 0
-        counted, rests = np.array(weights, dtype=float), keeps_rotation(mechanism)
-        counted[3:] = LOCKED if rests else counted[3:]
-        at_home = table.task[0]["rotations"] == 0 and counted[3] == LOCKED and searches
-        legs = without_idle_legs(table) if at_home and not len(table.redundant) else search_table(table)
+        pose_weights, is_fixed = np.array(weights, dtype=float), keeps_rotation(mechanism)
+        pose_weights[3:] = LOCKED if is_fixed else pose_weights[3:]
+        is_at_home = table.task[0]["rotations"] == 0 and pose_weights[3] == LOCKED and searches
+        legs = without_idle_legs(table) if is_at_home and not len(table.redundant) else search_table(table)
         self._legs = legs if driven is None else Handle(legs.record._replace(driven=driven))
         cones = self._legs.record.cones
-        minded = len(cones) if minds_aims or not searches else int((cones["leader"] != OF_AIMS).sum())
-        own = np.zeros(1, SETTINGS)
-        own["margin"], own["near"], own["cones"] = TOLERANCES.inside, TOLERANCES.active, minded
-        own["implied"] = 0 if len(table.redundant) else implied_rows(mechanism)
-        own["agreements"] = _agreements(table) if driven is None else AGREEMENTS_OF_VALUES
+        n_cones = len(cones) if keep_pointing or not searches else int((cones["leader"] != OF_POINTING).sum())
+        setting = np.zeros(1, SETTINGS)
+        setting["margin"], setting["near"], setting["cones"] = TOLERANCES.inside, TOLERANCES.active, n_cones
+        setting["implied"] = 0 if len(table.redundant) else n_implied_rows(mechanism)
+        setting["agreements"] = _agreements(table) if driven is None else AGREEMENTS_OF_VALUES
         for name, value in {"frame": task_of(mechanism).frame, **settings}.items():
-            own[name] = value
-        own["frame"] = BASE_AXES if rests else own["frame"]
+            setting[name] = value
+        setting["frame"] = BASE_AXES if is_fixed else setting["frame"]
         along = stays_there(table) if driven is not None else carriages_along(table)
-        self._plan = Handle(Plan(counted, own, *others, along))
+        self._plan = Handle(Plan(pose_weights, setting, *seeds, along))
         self._no_values = np.zeros((0, len(self._legs.record.driven)))
-        self._minding: NearestPose | None = None
-        if minded < len(cones):
-            self._minding = NearestPose(mechanism, table, weights, settings, others, driven, minds_aims=True)
+        self._pointing_search: NearestPose | None = None
+        if n_cones < len(cones):
+            self._pointing_search = NearestPose(mechanism, table, weights, settings, seeds, driven, keep_pointing=True)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -102,47 +104,49 @@ class NearestPose:
 
         return Scratch(new_nearest_scratch, self._legs.record, self._plan.record)
 
-    def find(self, targets: Floats, own: Starts, values: Floats | None = None) -> PoseSolutions:
-        """Where searches for targets (n, 4, 4) [length] end; see `fill`."""
-        found = new_found(len(targets), self._table)
-        self.fill(targets, own, found, values)
-        return found
+    def find(self, targets: Floats, starts: Starts, values: Floats | None = None) -> PoseSolutions:
+        """The nearest configurations to targets (n, 4, 4) [length]; parameters as of `fill`."""
+        solution = new_solution(len(targets), self._table)
+        self.fill(targets, starts, solution, values)
+        return solution
 
-    def fill(self, targets: Floats, own: Starts, found: PoseSolutions, values: Floats | None = None) -> int:
-        """Search for targets (n, 4, 4) [length], on all cores; how many rows have no answer.
+    def fill(self, targets: Floats, starts: Starts, solution: PoseSolutions, values: Floats | None = None) -> int:
+        """Fill the nearest configurations to targets (n, 4, 4) [length], on all cores; return the number unsolved.
 
         Parameters
         ----------
-        own : the first start of each row, or one for all.
-        values : what driven coordinates are to be near to, (n, driven) [L or rad].
+        starts : the first start of each row, or one for all.
+        values : target values of the driven coordinates, (n, driven) [L or rad].
         """
-        left = self._run(targets, own, found, self._no_values if values is None else values, _NO_WEIGHTS)
-        if self._minding is not None:
-            astray = (found.measures[:, LIMIT_EXCESS] > TOLERANCES.limit) & (found.distances < np.inf)
-            if np.count_nonzero(astray):
-                found.status[astray] = PENDING
-                near, some = None if values is None else values[astray], found.at(astray)
-                left += self._minding.fill(targets[astray], own.of(astray), some, near)
-                found.put(astray, some)
-        return left
+        n_unsolved = self._run(targets, starts, solution, self._no_values if values is None else values, _NO_WEIGHTS)
+        if self._pointing_search is not None:
+            is_missed = (solution.measures[:, LIMIT_EXCESS] > TOLERANCES.limit) & (solution.distances < np.inf)
+            if np.count_nonzero(is_missed):
+                solution.status[is_missed] = PENDING
+                block_values, block = None if values is None else values[is_missed], solution.at(is_missed)
+                n_unsolved += self._pointing_search.fill(targets[is_missed], starts.of(is_missed), block, block_values)
+                solution.put(is_missed, block)
+        return n_unsolved
 
-    def weigh(self, targets: Floats, present: Starts) -> Floats:
-        """How hard every limit, and then every leg, holds configurations back from targets (n, 4, 4) [length], where
-        these approaches have no steps to take: see the kernel."""
+    def weigh(self, targets: Floats, configurations: Starts) -> Floats:
+        """The multipliers of all limits, then of all legs, at configurations, for targets (n, 4, 4) [length].
+
+        For instances whose setting `steps` is 0: nothing is searched for.
+        """
         legs = self._legs.record
         weights = np.zeros((len(targets), 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)))
-        self._run(targets, present, new_found(len(targets), self._table), self._no_values, weights)
+        self._run(targets, configurations, new_solution(len(targets), self._table), self._no_values, weights)
         return weights
 
-    def _run(self, targets: Floats, own: Starts, found: PoseSolutions, values: Floats, weights: Floats) -> int:
-        kernel, machine, plan, scratch = self._kernel, self._legs.address, self._plan.address, self._scratch
+    def _run(self, targets: Floats, starts: Starts, solution: PoseSolutions, values: Floats, weights: Floats) -> int:
+        kernel, legs, plan, scratch = self._kernel, self._legs.address, self._plan.address, self._scratch
         if len(targets) <= ROWS_A_BLOCK:
-            return kernel(machine, plan, scratch.address, targets, values, *own, *found, weights)
+            return kernel(legs, plan, scratch.address, targets, values, *starts, *solution, weights)
 
         def run(block: slice) -> int:
-            near = values[block] if len(values) else values
-            told = *own.of(block), *found.at(block), weights[block]
-            return kernel(machine, plan, scratch.address, targets[block], near, *told)
+            block_values = values[block] if len(values) else values
+            outputs = *starts.of(block), *solution.at(block), weights[block]
+            return kernel(legs, plan, scratch.address, targets[block], block_values, *outputs)
 
         return sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
 
@@ -154,17 +158,18 @@ def _agreements(table: LegTable) -> int:
         return AGREEMENTS_OF_MANY
     if task["rows"] > 0 or len(table.redundant):
         return AGREEMENTS
-    q_proximal = table.legs["proximal"][proximal_coordinates(table)["leg"]]
+    proximal_kinds = table.legs["proximal"][proximal_coordinates(table)["leg"]]
     return (
         AGREEMENTS_OF_STRUTS
-        if not len(q_proximal)
-        else HITS_OF_RAILS
-        if (q_proximal == K.CARRIAGE).any()
+        if not len(proximal_kinds)
+        else AGREEMENTS_OF_RAILS
+        if (proximal_kinds == K.CARRIAGE).any()
         else AGREEMENTS
     )
 
 
-def new_found(n: int, table: LegTable) -> PoseSolutions:
+def new_solution(n: int, table: LegTable) -> PoseSolutions:
+    """Allocate n solutions, all PENDING."""
     legs, actuators = len(table.legs), len(table.driven)
     return PoseSolutions(
         np.full(n, np.inf),
@@ -179,15 +184,16 @@ def new_found(n: int, table: LegTable) -> PoseSolutions:
 
 
 def no_starts(table: LegTable) -> Starts:
+    """No starts, in the shape that a machine's have."""
     return Starts(np.zeros((0, 4, 4)), np.zeros((0, len(table.legs))), np.zeros((0, len(table.legs))))
 
 
 def starts_at(mechanism: Mechanism, table: LegTable, poses: Floats, sides: Floats) -> Starts:
-    """Poses (n, 4, 4) [length] with legs on given sides, (n, legs), as starts."""
+    """Starts at poses (n, 4, 4) [length] with legs on given sides, (n, legs)."""
     return Starts(in_lengths(poses, 1.0 / mechanism.characteristic_length), np.zeros((0, len(table.legs))), sides)
 
 
 def home_start(mechanism: Mechanism, table: LegTable) -> Starts:
-    """Home, as a start."""
+    """A single start: home."""
     poses = in_lengths(mechanism.home_pose[None], 1.0 / mechanism.characteristic_length)
     return Starts(poses, np.zeros((1, len(table.legs))), table.home_sides)

@@ -1,4 +1,4 @@
-"""Platforms that their legs keep from turning, and the legs that say nothing while one does not turn."""
+"""Platforms that cannot turn, idle legs, and constraints that follow from others."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..motion.walks import around_home
 from ..tolerances import TOLERANCES
-from .table import Machine, kernel_table, machine, reading_of, search_table, with_aims
+from .table import TableHandle, kernel_table, reading_scratch, search_table, table_handle, with_pointing_cones
 
-SAMPLES, NEARBY = 8, 0.05
-"""How many poses about home are looked at, and how far off they are [L]."""
+N_SAMPLES, RADIUS = 8, 0.05
+"""Poses sampled around home, and how far off they are [L]."""
 
 
 @lru_cache(maxsize=64)
 def keeps_rotation(mechanism: Mechanism) -> bool:
-    """Whether the platform does not turn: a joint has no orientation; and legs such as parallelograms keep it from
-    that, though its task leaves the rotation open.
+    """True if the platform cannot turn: a joint end effector has no orientation; or legs such as parallelograms fix it.
 
-    A platform that has turned over on its rods is of no use, though its loops close, and no answer.
+    Only of tasks that leave the whole rotation open. A platform that has turned over on its rods closes its loops, but
+    is useless, and no answer.
     """
     if mechanism.end_effector_is_joint:
         return True
@@ -39,88 +39,93 @@ def keeps_rotation(mechanism: Mechanism) -> bool:
     rows, slopes = constraints_at(table, _shifted_about_home(table))
     if not len(rows):
         return False
-    stays = np.abs(rows).max(initial=0.0) <= TOLERANCES.position
-    return bool(stays and (np.linalg.svd(slopes[:, :, 3:])[1][:, -1] > TOLERANCES.nearly_implied).all())
+    is_kept = np.abs(rows).max(initial=0.0) <= TOLERANCES.position
+    return bool(is_kept and (np.linalg.svd(slopes[:, :, 3:])[1][:, -1] > TOLERANCES.nearly_implied).all())
 
 
 @lru_cache(maxsize=64)
-def implied_rows(mechanism: Mechanism) -> int:
-    """How many constraints of legs without arms follow from the others in general, as of planes that are the same.
+def n_implied_rows(mechanism: Mechanism) -> int:
+    """The number of leg constraints that follow from the others in general, such as planes that coincide.
 
-    None of legs that are at dead points, where these cannot be told.
+    For machines without redundant joints. 0 at dead points, where it cannot be determined.
     """
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
-    at_home = _implied_at(table, mechanism.home_pose[None])
-    if 0 in at_home:  # where walks about home, which take long, would tell nothing else
+    at_home = _n_implied(table, mechanism.home_pose[None])
+    if 0 in at_home:  # walks around home take long, and would give 0 too
         return 0
-    return min(at_home + _implied_at(table, platform_poses(mechanism, around_home(mechanism))), default=0)
+    return min(at_home + _n_implied(table, platform_poses(mechanism, around_home(mechanism))), default=0)
 
 
-def _implied_at(table: LegTable, poses: Floats) -> list[int]:
-    """The same of each of some poses (n, 4, 4) [length] that no dead point is at."""
+def _n_implied(table: LegTable, poses: Floats) -> list[int]:
+    """The number of implied constraints at each of the poses (n, 4, 4) [length] that are not at dead points."""
     sizes = np.linalg.svd(constraints_at(table, poses)[1], compute_uv=False)
     implied: list[int] = (table.task["rows"][0] - (sizes > TOLERANCES.alignment).sum(axis=1)).tolist()
     return implied
 
 
 @lru_cache(maxsize=64)
-def without_idle_legs(table: LegTable) -> Machine:
-    """What kernels are given to search where the platform does not turn from home.
+def without_idle_legs(table: LegTable) -> TableHandle:
+    """Kernel table for searches in which the platform keeps its orientation at home.
 
-    There a second forearm of a parallelogram goes along with the first, and three slides and a hinge say nothing: such
-    legs are idle. A cone of such a forearm is one of the first one, whose line is the same.
+    Without rotation the second forearm of a parallelogram moves like the first, and three slides and a hinge constrain
+    nothing: such legs are idle. The cone of such a forearm becomes one of the first, whose direction is the same.
     """
     legs, rows = table.legs.copy(), table.task[0]["rows"]
     values, slopes = constraints_at(table, _shifted_about_home(table))
     if not len(values):
         return search_table(table)
-    quiet = np.maximum(np.abs(values), np.abs(slopes[:, :, :3]).max(axis=2)).max(axis=0) <= TOLERANCES.implied
-    ends = np.append(legs["first_row"][1:], rows)
+    is_idle = np.maximum(np.abs(values), np.abs(slopes[:, :, :3]).max(axis=2)).max(axis=0) <= TOLERANCES.implied
+    row_ends = np.append(legs["first_row"][1:], rows)
     limited = np.concatenate([table.limited["leg"], table.driven["leg"]])
-    cones, main = table.cones.copy(), 0
+    cones, first_leg = table.cones.copy(), 0
     for k in range(len(legs)):
         is_second = legs["proximal"][k] == K.SHARED
-        main = main if is_second else k
-        has_first = is_second and legs["kind"][main] == K.ROD
-        own = quiet[legs["first_row"][k] : ends[k]]
-        if len(own) and own.all() and k not in limited and (has_first or k not in cones["leg"]):
+        first_leg = first_leg if is_second else k
+        has_first = is_second and legs["kind"][first_leg] == K.ROD
+        leg_idle = is_idle[legs["first_row"][k] : row_ends[k]]
+        if len(leg_idle) and leg_idle.all() and k not in limited and (has_first or k not in cones["leg"]):
             legs["kind"][k] = K.IDLE
-            cones["leg"][cones["leg"] == k] = main
-    return Handle(kernel_table(table)._replace(legs=legs, cones=with_aims(legs, cones[_of_their_own(cones)])))
+            cones["leg"][cones["leg"] == k] = first_leg
+    return Handle(kernel_table(table)._replace(legs=legs, cones=with_pointing_cones(legs, cones[_is_tightest(cones)])))
 
 
-def _of_their_own(cones: NDArray[np.void]) -> Mask:
-    """Which cones limit what none before limits as much."""
-    own = np.ones(len(cones), dtype=bool)
+def _is_tightest(cones: NDArray[np.void]) -> Mask:
+    """Mask of the cones that no earlier one makes superfluous: of the same leg, end and axis, and as narrow."""
+    is_kept = np.ones(len(cones), dtype=bool)
     for i, cone in enumerate(cones):
-        before = cones[:i][own[:i]]
-        same = (before["leg"] == cone["leg"]) & (before["place"] == cone["place"])
-        same &= (np.abs(before["axis"] - cone["axis"]) <= TOLERANCES.implied).all(axis=1)
-        own[i] = not (same & (before["half_angle"] <= cone["half_angle"])).any()
-    return own
+        kept = cones[:i][is_kept[:i]]
+        is_same = (kept["leg"] == cone["leg"]) & (kept["place"] == cone["place"])
+        is_same &= (np.abs(kept["axis"] - cone["axis"]) <= TOLERANCES.implied).all(axis=1)
+        is_kept[i] = not (is_same & (kept["half_angle"] <= cone["half_angle"])).any()
+    return is_kept
 
 
 def _shifted_about_home(table: LegTable) -> Floats:
-    """Poses (n, 4, 4) [length] about home, not turned."""
-    task, poses = table.task[0], np.repeat(np.eye(4)[None], SAMPLES, axis=0)
-    shifts = np.random.default_rng(0).uniform(-NEARBY, NEARBY, (SAMPLES, 3))
+    """Poses (n, 4, 4) [length] around home, not turned."""
+    task, poses = table.task[0], np.repeat(np.eye(4)[None], N_SAMPLES, axis=0)
+    shifts = np.random.default_rng(0).uniform(-RADIUS, RADIUS, (N_SAMPLES, 3))
     poses[:, :3, 3] = task["length"] * (task["reference"] + shifts)
     return poses
 
 
 def constraints_at(table: LegTable, poses: Floats) -> tuple[Floats, Floats]:
-    """The constraints of home's legs on poses (n, 4, 4) [length], (n, rows), and their derivatives, (n, rows, 6).
+    """Constraints of the legs, on home's sides, at poses (n, 4, 4) [length]: (m, rows), and derivatives, (m, rows, 6).
 
-    Where arms follow, without what these give way to. Of the poses, those that legs reach short of dead points.
+    Of the n poses, the m that legs reach short of dead points. Where redundant joints follow from the pose, their
+    derivatives J_q are projected out: J - J_q pinv(J_q) J.
     """
     from ..kernels.platform.evaluate import evaluate_poses
 
     n_rows = table.task[0]["rows"]
     rows, slopes = np.zeros((len(poses), n_rows)), np.zeros((len(poses), n_rows, 6 + len(table.redundant)))
-    legs = machine(table)
-    own, nothing = np.require(poses, requirements=["C", "W"]), np.zeros((0, 0))
-    evaluate_poses(legs.address, reading_of(table).address, own, table.home_sides, nothing, nothing, rows, slopes)
-    known = np.isfinite(slopes).all(axis=(1, 2))
-    rows, by_pose, by_arms = rows[known], slopes[known, :, :6], slopes[known, :, 6:]
-    return rows, by_pose - by_arms @ (np.linalg.pinv(by_arms) @ by_pose) if table.task["redundant"][0] else by_pose
+    legs = table_handle(table)
+    kernel_poses, no_rows = np.require(poses, requirements=["C", "W"]), np.zeros((0, 0))
+    evaluate_poses(
+        legs.address, reading_scratch(table).address, kernel_poses, table.home_sides, no_rows, no_rows, rows, slopes
+    )
+    is_regular = np.isfinite(slopes).all(axis=(1, 2))
+    rows, by_pose, by_redundant = rows[is_regular], slopes[is_regular, :, :6], slopes[is_regular, :, 6:]
+    return rows, by_pose - by_redundant @ (np.linalg.pinv(by_redundant) @ by_pose) if table.task["redundant"][
+        0
+    ] else by_pose

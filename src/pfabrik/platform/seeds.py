@@ -1,4 +1,4 @@
-"""Corners: feasible configurations far apart, which searches start from beside their own start."""
+"""Seeds: feasible configurations far apart that searches start from, besides the start given."""
 
 from __future__ import annotations
 
@@ -23,55 +23,56 @@ from ..tolerances import TOLERANCES
 from .along import proximal_coordinates
 from .nearest_pose import NearestPose, home_start, no_starts
 from .rotation import constraints_at, keeps_rotation
-from .table import machine
+from .table import table_handle
 
-SEEDS, SEEDS_OF_MANY = 16, 32
-"""How many configurations searches start from at most, and how many where arms are led, or pivots have two solutions:
-there are many more configurations."""
+SEEDS, MANY_SEEDS = 16, 32
+"""Seeds at most, and with implicit joints, or pivots with two solutions: there are many more configurations."""
 
-BEYOND, BEYOND_OF_MANY = 8, 16
-"""How many more start farther away, where rooms beyond the base may be."""
+BEYOND, MANY_BEYOND = 8, 16
+"""Seeds farther away, where components of the workspace beyond the base may be, likewise."""
 
-DRAWS, DRAWN_STEPS = 240, 30
-"""How many random poses either are chosen from, and the steps that bring each to a feasible one."""
+DRAWS, DRAW_STEPS = 240, 30
+"""Random poses that either kind is chosen from, and the steps of the search that makes each feasible."""
 
-FAR, FARTHER, TURNED = 1.0, 2.5, 1.5
-"""How far from home they are, and the other ones [L]: the mirror image of a room is twice as far away as the base. And
-how far they are turned [rad]."""
+RADIUS, RADIUS_BEYOND, FARTHEST_ROTATION = 1.0, 2.5, 1.5
+"""How far from home random poses are, and those beyond the base [L]: the mirror image of a component is twice as far
+away as the base. And how far they are turned [rad]."""
 
-TURNING = 0.2
-"""What the square of a rotation counts beside that of a distance where corners are to be far apart [L^2]."""
+ROTATION_WEIGHT = 0.2
+"""Weight of a squared rotation beside a squared distance, in the distance between seeds [L^2]."""
 
-OTHER_SIDE = 0.02
-"""The same for the square of the sine of half the angle by which carriers differ."""
+Q_WEIGHT = 0.02
+"""Weight of the squared sine of half the difference between coordinates of proximal joints, likewise [L^2]."""
 
-OF_A_MODE, SELDOM = 4, 0.2
-"""How many corners of one working mode are enough, and by how much more those of a mode that has fewer count as apart
-[L^2]: a mode may have a room of its own, small as it is."""
+SEEDS_PER_MODE, RARE_BONUS = 4, 0.2
+"""Seeds of one working mode that are enough, and the distance added to configurations of a mode with fewer [L^2]: a
+mode may have a small component of its own."""
 
 
-PLACES = 6
-"""Decimals of the places of legs [L]: what is aligned differs by rounding."""
+DECIMALS = 6
+"""Decimals of the places of legs [L]: aligned ones differ by rounding."""
 
 
 @lru_cache(maxsize=64)
 def seeds_of(mechanism: Mechanism) -> Starts:
-    """Feasible configurations far from home and from each other; every third may be in a room beyond the base."""
+    """Feasible configurations far from home and from each other; every third may be in a component beyond the base."""
     table = leg_table(mechanism)
     assert isinstance(table, LegTable)
     rng = np.random.default_rng(0)
     is_many = table.has_implicit_joints or len(_sided_pivots(table)) > 0
-    near, beyond = (SEEDS_OF_MANY, BEYOND_OF_MANY) if is_many else (SEEDS, BEYOND)
-    seeds = _far_apart(home_start(mechanism, table), _drawn(mechanism, table, rng, DRAWS, FAR), near)
-    others = _far_apart(seeds, _drawn(mechanism, table, rng, DRAWS, FARTHER), beyond)
-    turns = np.concatenate([np.arange(len(seeds.poses)), 2.0 * np.arange(len(others.poses)) + 0.5])
-    in_turn = np.argsort(turns)
-    return Starts(*(np.concatenate(both)[in_turn] for both in zip(seeds, others, strict=True)))
+    n_near, n_beyond = (MANY_SEEDS, MANY_BEYOND) if is_many else (SEEDS, BEYOND)
+    near_seeds = _far_apart(
+        home_start(mechanism, table), _random_feasible(mechanism, table, rng, DRAWS, RADIUS), n_near
+    )
+    far_seeds = _far_apart(near_seeds, _random_feasible(mechanism, table, rng, DRAWS, RADIUS_BEYOND), n_beyond)
+    ranks = np.concatenate([np.arange(len(near_seeds.poses)), 2.0 * np.arange(len(far_seeds.poses)) + 0.5])
+    order = np.argsort(ranks)
+    return Starts(*(np.concatenate(both)[order] for both in zip(near_seeds, far_seeds, strict=True)))
 
 
 @lru_cache(maxsize=64)
 def seeds_of_other_assemblies(mechanism: Mechanism) -> Starts:
-    """The corners whose poses are others where what the task leaves out of them, and arms, are completed from home."""
+    """The seeds in other assemblies than home's: completing from home what the task sets gives another pose."""
     from ..kernels.legs.answer import answer
 
     table, seeds = leg_table(mechanism), seeds_of(mechanism)
@@ -82,7 +83,7 @@ def seeds_of_other_assemblies(mechanism: Mechanism) -> Starts:
     rows, sides, redundant = new_rows(mechanism, len(poses)), seeds.sides.copy(), table.implicit_joints["leg"]
     sides[:, redundant] = table.home_sides[:, redundant]
     answer(
-        machine(table).address,
+        table_handle(table).address,
         poses,
         mechanism.home_pose[None].copy(),
         sides,
@@ -91,60 +92,60 @@ def seeds_of_other_assemblies(mechanism: Mechanism) -> Starts:
         rows.actuators,
         rows.measures,
     )
-    off = np.abs(in_lengths(rows.poses, 1.0 / length) - seeds.poses).max(axis=(1, 2))
-    return seeds.at(np.flatnonzero((rows.status != REACHED) | (off > TOLERANCES.same_mode)))
+    error = np.abs(in_lengths(rows.poses, 1.0 / length) - seeds.poses).max(axis=(1, 2))
+    return seeds.at(np.flatnonzero((rows.status != REACHED) | (error > TOLERANCES.same_mode)))
 
 
-def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: int, far: float) -> Starts:
-    """Feasible configurations, the nearest to n random poses up to so far from home [L]."""
+def _random_feasible(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: int, radius: float) -> Starts:
+    """Random feasible configurations: the nearest to n random poses within a radius of home [L]."""
     home = home_start(mechanism, table)
     poses = np.repeat(home.poses, n, axis=0)
-    twists = rng.uniform(-1.0, 1.0, (n, 6)) * np.repeat([far, TURNED], 3)
+    twists = rng.uniform(-1.0, 1.0, (n, 6)) * np.repeat([radius, FARTHEST_ROTATION], 3)
     for slopes in constraints_at(table, mechanism.home_pose[None])[1]:
         _, sizes, directions = np.linalg.svd(slopes)
         bound = directions[: (sizes > TOLERANCES.alignment).sum()]
-        twists -= twists @ bound.T @ bound  # what the legs do not allow at home they hardly do elsewhere
+        twists -= twists @ bound.T @ bound  # motions that the legs bar at home they mostly bar elsewhere
     poses[:, :3, 3] += twists[:, :3]
     if not keeps_rotation(mechanism):
         poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
     q = np.zeros((n, len(table.legs)))
-    q_proximal = np.concatenate([proximal_coordinates(table), table.redundant])
-    for proximal in q_proximal[_by_place(table, q_proximal["leg"])]:
-        way = _way(table, proximal["leg"])
-        ends = way * proximal["sense"] * np.clip([proximal["lo"], proximal["hi"]], -np.pi, np.pi)
-        q[:, proximal["leg"]] = way * rng.uniform(ends.min(), ends.max(), n)
+    coordinates = np.concatenate([proximal_coordinates(table), table.redundant])
+    for coordinate in coordinates[_by_place(table, coordinates["leg"])]:
+        sign = _axis_sign(table, coordinate["leg"])
+        ends = sign * coordinate["sense"] * np.clip([coordinate["lo"], coordinate["hi"]], -np.pi, np.pi)
+        q[:, coordinate["leg"]] = sign * rng.uniform(ends.min(), ends.max(), n)
     sides = np.repeat(home.sides, n, axis=0)
     pivots = _sided_pivots(table)
     sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
     targets = in_lengths(poses, mechanism.characteristic_length)
-    weights = (1.0, 1.0, 1.0, TURNING, TURNING, TURNING)
-    nearest_pose = NearestPose(mechanism, table, weights, {"frame": BASE_AXES, "steps": DRAWN_STEPS}, no_starts(table))
-    found = nearest_pose.find(targets, Starts(poses, q, sides))
-    counts = np.isfinite(found.distances) & ~strays(mechanism, found.poses)
-    found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
-    return Starts(*found[1:4]).at(np.flatnonzero(counts))
+    weights = (1.0, 1.0, 1.0, ROTATION_WEIGHT, ROTATION_WEIGHT, ROTATION_WEIGHT)
+    nearest_pose = NearestPose(mechanism, table, weights, {"frame": BASE_AXES, "steps": DRAW_STEPS}, no_starts(table))
+    solution = nearest_pose.find(targets, Starts(poses, q, sides))
+    is_usable = np.isfinite(solution.distances) & ~strays(mechanism, solution.poses)
+    solution.poses[:] = in_lengths(solution.poses, 1.0 / mechanism.characteristic_length)
+    return Starts(*solution[1:4]).at(np.flatnonzero(is_usable))
 
 
-def _far_apart(first: Starts, drawn: Starts, most: int) -> Starts:
-    """Configurations drawn that are far from the first and from each other, chosen one by one."""
-    every = Starts(*(np.concatenate(both) for both in zip(first, drawn, strict=True)))
-    modes = np.unique(np.sign(every.sides), axis=0, return_inverse=True)[1].ravel()
+def _far_apart(given: Starts, drawn: Starts, most: int) -> Starts:
+    """Up to `most` of the configurations drawn, chosen one by one to be far from those given and from each other."""
+    candidates = Starts(*(np.concatenate(both) for both in zip(given, drawn, strict=True)))
+    modes = np.unique(np.sign(candidates.sides), axis=0, return_inverse=True)[1].ravel()
     chosen: list[int] = []
-    away = np.full(len(every.poses), np.inf)
-    for k in range(len(first.poses)):
-        away = np.minimum(away, _apart(every, k))
+    distances = np.full(len(candidates.poses), np.inf)
+    for k in range(len(given.poses)):
+        distances = np.minimum(distances, _distances_from(candidates, k))
     while len(chosen) < min(most, len(drawn.poses)):
-        rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < OF_A_MODE
-        chosen.append(int(np.where(rare & (away > 0.0), away + SELDOM, away).argmax()))
-        away = np.minimum(away, _apart(every, chosen[-1]))
-    return Starts._make(array[chosen] for array in every)
+        is_rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < SEEDS_PER_MODE
+        chosen.append(int(np.where(is_rare & (distances > 0.0), distances + RARE_BONUS, distances).argmax()))
+        distances = np.minimum(distances, _distances_from(candidates, chosen[-1]))
+    return Starts._make(array[chosen] for array in candidates)
 
 
-def _apart(starts: Starts, which: int) -> Floats:
-    """How far starts are from one of them, (s,): squares of distances [L]."""
-    squares = (starts.poses - starts.poses[which])[:, :3] ** 2 * (TURNING, TURNING, TURNING, 1.0)
-    bends = np.sin(0.5 * (starts.q - starts.q[which])) ** 2
-    return np.asarray(squares.sum(axis=(1, 2)) + OTHER_SIDE * bends.sum(axis=1))
+def _distances_from(starts: Starts, k: int) -> Floats:
+    """Squared distances of all starts from start k, (s,) [L^2]."""
+    squares = (starts.poses - starts.poses[k])[:, :3] ** 2 * (ROTATION_WEIGHT, ROTATION_WEIGHT, ROTATION_WEIGHT, 1.0)
+    bends = np.sin(0.5 * (starts.q - starts.q[k])) ** 2
+    return np.asarray(squares.sum(axis=(1, 2)) + Q_WEIGHT * bends.sum(axis=1))
 
 
 def _sided_pivots(table: LegTable) -> NDArray[np.intp]:
@@ -154,14 +155,15 @@ def _sided_pivots(table: LegTable) -> NDArray[np.intp]:
 
 
 def _by_place(table: LegTable, legs: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Legs in an order that depends on where they are at home: what is drawn is theirs however they are described."""
-    own = table.legs[legs]
-    places = np.concatenate([own[end] for end in ("platform_end_point", "base_end_point", "proximal_point")], axis=1)
-    return np.lexsort(np.round(places, PLACES).T[::-1])
+    """Legs ordered by where they are at home: random draws do not depend on the order of the description."""
+    records = table.legs[legs]
+    places = np.concatenate(
+        [records[end] for end in ("platform_end_point", "base_end_point", "proximal_point")], axis=1
+    )
+    return np.lexsort(np.round(places, DECIMALS).T[::-1])
 
 
-def _way(table: LegTable, leg: int) -> float:
-    """Which way the axis of what carries a leg points, 1 or -1, along the first axis of the base that is not across it:
-    it may be described either way."""
-    axis = np.round(table.legs[leg]["proximal_axis"], PLACES)
+def _axis_sign(table: LegTable, leg: int) -> float:
+    """The sign of the first component of a leg's proximal axis that is not zero: it may be described either way."""
+    axis = np.round(table.legs[leg]["proximal_axis"], DECIMALS)
     return float(np.sign(axis[np.flatnonzero(axis)[0]]))

@@ -1,4 +1,4 @@
-"""Inverse kinematics of mechanisms whose every chain is a leg in closed form, in front of the engine for all others."""
+"""The engine of mechanisms whose chains are all legs in closed form."""
 
 from __future__ import annotations
 
@@ -25,37 +25,38 @@ from ..motion.outward import centres_at
 from ..options import Options
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
-from .answers import LegAnswers, begins_of, coordinates_of, sides_at
-from .coordinates import settled
-from .forward import assembled
-from .nearest import move_redundant, weighed_limits
+from .answers import LegAnswers, answer_coordinates, sides_at, start_coordinates_of
+from .coordinates import joint_coordinates
+from .forward import forward_kinematics
+from .nearest import move_redundant_joints, weighed_limits
 from .nearest_pose import starts_at
-from .one import Ends, OneAssembly, OneTarget, new_scratch
-from .table import Machine, local_table, machine, resting_at_home
-from .unreached import Question, Unreached, answer_unreached
+from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
+from .table import TableHandle, legs_at_rest, local_table, table_handle
+from .unreached import Request, Unreached, answer_unreached
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
-"""Rows of one call of a kernel that answers one by one, or in blocks."""
+"""Rows of one call of the kernels that solve targets one by one, and in blocks."""
 
 
 class LegsEngine:
-    """Answers that legs in closed form reach in the working mode they start in; another engine gives all the others.
+    """Inverse and forward kinematics by the legs' closed forms, with a solver in joint coordinates as fallback.
 
-    The constraints that legs leave on the pose complete what the task leaves open. What they do not reach is answered
-    in other working modes, then by the nearest feasible pose, by searches in the platform's pose; and what these leave,
-    near dead points above all, as if there were no closed forms.
+    Targets are solved in closed form in the working mode of the start; what the task leaves open of a pose follows from
+    the legs' constraints. Targets not reached so are tried in other working modes, then answered by the nearest
+    feasible pose, a search in the platform's pose. What is unsolved then, mostly near dead points, is solved in joint
+    coordinates.
     """
 
     def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
         self.mechanism, self._table = mechanism, table
-        self._inner, self._one = ClosureEngine(mechanism), OneTarget(mechanism, table)
-        self._one_forward = OneAssembly(self.mechanism, table)
+        self._joint_space, self._single = ClosureEngine(mechanism), SingleTarget(mechanism, table)
+        self._single_forward = SingleAssembly(self.mechanism, table)
         driven = table.driven
         self._turning = driven[(driven["turns"] == 1) & (driven["hi"] - driven["lo"] > 2.0 * np.pi)]
 
     @cached_property
     def _searches(self) -> bool:
-        """Whether targets that legs do not reach are looked for in the platform's pose."""
+        """True if unreached targets are searched for in the platform's pose, before joint coordinates."""
         return not has_other_assemblies(self.mechanism)
 
     def answer(
@@ -67,75 +68,87 @@ class LegsEngine:
         keep_mode: bool,
         nearby: bool = False,
     ) -> Configurations:
-        """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose.
+        """Solve targets (n, 4, 4) independently, from one start or one for each; INVALID where a target is no pose.
 
-        Projections are the nearest found in the working mode, if that is kept, or `nearby` those next to the start.
+        Unreachable targets get the nearest feasible pose found: with `keep_mode` in the working mode of the start, with
+        `nearby` by a search around the start alone.
         """
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
-        first = self._sides_of(start)
-        rows = self._one.new_rows() if is_one else new_rows(self.mechanism, len(targets))
-        ends = first.copy() if self._table.has_implicit_joints else first
-        if is_one and self._reach_one(targets, start, ends, keep_mode, rows):
+        start_sides = self._sides_of(start)
+        rows = self._single.new_rows() if is_one else new_rows(self.mechanism, len(targets))
+        end_sides = start_sides.copy() if self._table.has_implicit_joints else start_sides
+        if is_one and self._reach_one(targets, start, end_sides, keep_mode, rows):
             mechanism, table = self.mechanism, self._table
-            begins, told = begins_of(mechanism, table, start, first), (rows.poses, rows.actuators, ends)
-            return LegAnswers(rows, lambda own: settled(mechanism, table, *told, begins(slice(None)))[own], ends)
-        left, sides = self._reach(targets, start, first, keep_mode, rows, tried=is_one)
-        q_proximal, others = None, None
-        if left and self._searches:
+            start_coordinates = start_coordinates_of(mechanism, table, start, start_sides)
+            platform = rows.poses, rows.actuators, end_sides
+            return LegAnswers(
+                rows,
+                lambda places: joint_coordinates(mechanism, table, *platform, start_coordinates(slice(None)))[places],
+                end_sides,
+            )
+        n_unsolved, sides = self._reach(targets, start, start_sides, keep_mode, rows, is_tried=is_one)
+        q_proximal, fallback = None, None
+        if n_unsolved and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
             q_proximal = np.empty_like(sides)
             q_proximal[:] = np.nan
-            poses = self._one.home if start is None else start.rows.poses
-            question = Question(self.mechanism, self._table, options, keep_mode, nearby, start is not None)
-            unreached = Unreached(targets, poses, sides, q_proximal, rows)
-            away = rows.status != REACHED
+            start_poses = self._single.home if start is None else start.rows.poses
+            request = Request(self.mechanism, self._table, options, keep_mode, nearby, start is not None)
+            unreached = Unreached(targets, start_poses, sides, q_proximal, rows)
+            is_unsolved = rows.status != REACHED
             if start is not None and self._table.has_sides:
-                away &= ~self._starts_there(targets, start.rows.poses)
-            unreached.answer(away, partial(answer_unreached, question))
+                is_unsolved &= ~self._starts_on_target(targets, start.rows.poses)
+            unreached.answer(is_unsolved, partial(answer_unreached, request))
             if start is not None:
                 self._count_turns(start.rows.actuators, rows)
-        waits = rows.status >= PENDING if q_proximal is not None else rows.status != REACHED  # or UNSURE
-        rest = waits.nonzero()[0]
-        if len(rest):
-            begin = start if start is None or len(start) == 1 or len(rest) == len(start) else start.at(rest)
-            others = self._inner.answer(targets[rest], begin, options, keep_mode=keep_mode)
-            stays = self._stay(rows_at(rows, rest), others.rows, options)
-            rows.status[rest[stays]] = PROJECTED
-            rest, others = rest[~stays], others if not stays.any() else others.at(np.flatnonzero(~stays))
-            if len(rest) == len(targets):
-                return others
-            put_rows(rows, rest, others.rows)
+        is_pending = rows.status != REACHED
+        if q_proximal is not None:
+            is_pending = rows.status >= PENDING  # or UNSURE
+        unsolved = is_pending.nonzero()[0]
+        if len(unsolved):
+            fallback_start = start
+            if start is not None and len(start) not in (1, len(unsolved)):
+                fallback_start = start.at(unsolved)
+            fallback = self._joint_space.answer(targets[unsolved], fallback_start, options, keep_mode=keep_mode)
+            is_kept = self._kept_projections(rows_at(rows, unsolved), fallback.rows, options)
+            rows.status[unsolved[is_kept]] = PROJECTED
+            unsolved = unsolved[~is_kept]
+            if is_kept.any():
+                fallback = fallback.at(np.flatnonzero(~is_kept))
+            if len(unsolved) == len(targets):
+                return fallback
+            put_rows(rows, unsolved, fallback.rows)
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides
-            sides[rest] = sides_at(self.mechanism, self._table, others)
+            sides[unsolved] = sides_at(self.mechanism, self._table, fallback)
             if q_proximal is not None:
-                q_proximal[rest] = np.nan
-        return self._answers(rows, sides, q_proximal, start, first, rest, others)
+                q_proximal[unsolved] = np.nan
+        return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
 
-    def _stay(self, rows: Rows, others: Rows, options: Options) -> Mask:
-        """Which projections that are UNSURE stay: others of their targets are not reached, and no nearer."""
-        lever = options.rotation_length or self.mechanism.rotation_length
-        away, off = (
-            np.hypot(each.measures[:, POSITION_ERROR], lever * each.measures[:, ROTATION_ERROR])
-            for each in (rows, others)
+    def _kept_projections(self, rows: Rows, fallback: Rows, options: Options) -> Mask:
+        """The UNSURE projections to keep: the fallback neither reaches their targets nor comes nearer."""
+        length = options.rotation_length or self.mechanism.rotation_length
+        projected, other = (
+            np.hypot(batch.measures[:, POSITION_ERROR], length * batch.measures[:, ROTATION_ERROR])
+            for batch in (rows, fallback)
         )
-        nearer = (others.status == PROJECTED) & (
-            off < away - TOLERANCES.position * self.mechanism.characteristic_length
+        nearer = (fallback.status == PROJECTED) & (
+            other < projected - TOLERANCES.position * self.mechanism.characteristic_length
         )
-        better = (others.status == REACHED) | (nearer & (others.holds >= rows.holds))
+        better = (fallback.status == REACHED) | (nearer & (fallback.holds >= rows.holds))
         return np.asarray((rows.status == UNSURE) & ~better)
 
     def prepared(
         self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool
     ) -> Callable[[], int] | None:
-        """A call that answers what stands in `target`, (1, 4, 4), into `rows`; it returns 0 where legs reach it.
+        """A call that solves the pose in `target`, (1, 4, 4), into `rows` and returns 0 if legs reach it.
 
-        None where the turns of its actuators are counted from a start.
+        None if actuators may turn more than once, and are counted from a start.
         """
         if start is not None and len(self._turning):
             return None
-        one, begin = self._one, self._one.home if start is None else start.rows.poses
-        sides = one.home_sides if start is None else sides_at(self.mechanism, self._table, start)
-        return one.prepared(target, begin, sides, rows, nearby=keep_mode)
+        single, start_pose = self._single, self._single.home if start is None else start.rows.poses
+        sides = single.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        return single.prepared(target, start_pose, sides, rows, nearby=keep_mode)
 
     def follow(
         self,
@@ -144,32 +157,39 @@ class LegsEngine:
         options: Options,
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
-        """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
+        """Solve a path (n, 4, 4) in one working mode, each target from the answer before it."""
         if not self._searches:
-            return self._inner.follow(targets, start, options, on_progress)
-        targets, known = np.require(targets, requirements=["C", "W"]), are_poses(targets)
-        found: list[Configurations] = []
-        for i in steps_of(known, on_progress):
-            before = found[-1] if found else start
-            found.append(self.answer(targets[i : i + 1], before, options, keep_mode=True, nearby=True))
-        return self._joined(found, start).among(known)
+            return self._joint_space.follow(targets, start, options, on_progress)
+        targets, is_pose = np.require(targets, requirements=["C", "W"]), are_poses(targets)
+        answers: list[Configurations] = []
+        for i in steps_of(is_pose, on_progress):
+            previous = answers[-1] if answers else start
+            answers.append(self.answer(targets[i : i + 1], previous, options, keep_mode=True, nearby=True))
+        return self._joined(answers, start).among(is_pose)
 
-    def _joined(self, found: Sequence[Configurations], start: Configurations | None) -> Configurations:
-        """Single answers as a batch; `start` is where the first began."""
-        rows, legs = new_rows(self.mechanism, len(found)), len(self._table.legs)
-        sides, q_proximal = np.repeat(self._table.home_sides, len(found), axis=0), np.full((len(found), legs), np.nan)
-        rest = np.array([i for i, each in enumerate(found) if not isinstance(each, LegAnswers)], dtype=np.intp)
-        for i, each in enumerate(found):
-            own = slice(i, i + 1)
-            put_rows(rows, own, each.rows)
-            if isinstance(each, LegAnswers):
-                sides[i] = each.sides
-                if each.q_proximal is not None:
-                    q_proximal[i] = each.q_proximal
-        others = None
-        if len(rest):
-            others = Configurations(rows_at(rows, rest), np.concatenate([found[i].coordinates for i in rest]))
-        return self._answers(rows, sides, q_proximal, start, self._sides_of(start), rest, others)
+    def _joined(self, answers: Sequence[Configurations], start: Configurations | None) -> Configurations:
+        """Single answers as one batch; the first of them began at `start`."""
+        rows, n_legs = new_rows(self.mechanism, len(answers)), len(self._table.legs)
+        sides, q_proximal = (
+            np.repeat(self._table.home_sides, len(answers), axis=0),
+            np.full((len(answers), n_legs), np.nan),
+        )
+        unsolved = np.array(
+            [i for i, answer in enumerate(answers) if not isinstance(answer, LegAnswers)], dtype=np.intp
+        )
+        for i, answer in enumerate(answers):
+            row = slice(i, i + 1)
+            put_rows(rows, row, answer.rows)
+            if isinstance(answer, LegAnswers):
+                sides[i] = answer.sides
+                if answer.q_proximal is not None:
+                    q_proximal[i] = answer.q_proximal
+        fallback = None
+        if len(unsolved):
+            fallback = Configurations(
+                rows_at(rows, unsolved), np.concatenate([answers[i].coordinates for i in unsolved])
+            )
+        return self._answers(rows, sides, q_proximal, start, self._sides_of(start), unsolved, fallback)
 
     def _answers(
         self,
@@ -177,128 +197,157 @@ class LegsEngine:
         sides: Floats,
         q_proximal: Floats | None,
         start: Configurations | None,
-        first: Floats,
-        rest: NDArray[np.intp],
-        others: Configurations | None,
+        start_sides: Floats,
+        unsolved: NDArray[np.intp],
+        fallback: Configurations | None,
     ) -> LegAnswers:
-        """Rows as answers, from a start on sides `first`; those at `rest` are the other engine's."""
-        begins = begins_of(self.mechanism, self._table, start, first)
+        """Rows as answers, from a start with the sides `start_sides`; the rows `unsolved` are those of the fallback."""
+        start_coordinates = start_coordinates_of(self.mechanism, self._table, start, start_sides)
         coordinates = partial(
-            coordinates_of, self.mechanism, self._table, rows, sides, q_proximal, begins, rest, others
+            answer_coordinates,
+            self.mechanism,
+            self._table,
+            rows,
+            sides,
+            q_proximal,
+            start_coordinates,
+            unsolved,
+            fallback,
         )
         return LegAnswers(rows, coordinates, sides, q_proximal)
 
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
-        """Go on to targets (n, 4, 4) in the working mode of as many configurations; PENDING where not reached.
+        """Continue to targets (n, 4, 4), each from its own start and in its working mode; PENDING where not reached.
 
-        Where legs can be as they are at the start, and leave nothing open that could give way to a limit, they decide;
-        joint coordinates do elsewhere.
+        Use the legs' closed forms where the start is non-singular and the pose fixes every coordinate; otherwise solve
+        in joint space.
         """
-        mechanism, table, first = self.mechanism, self._table, sides_at(self.mechanism, self._table, start)
-        rows, present = (new_rows(mechanism, len(targets)) for _ in range(2))
+        mechanism, table, start_sides = self.mechanism, self._table, sides_at(self.mechanism, self._table, start)
+        rows, at_start = (new_rows(mechanism, len(targets)) for _ in range(2))
         coordinates = start.coordinates.copy()
-        _, sides = self._reach(targets, start, first, True, rows)
-        own = np.flatnonzero(rows.status == REACHED)
-        ends = settled(mechanism, table, rows.poses[own], rows.actuators[own], sides[own], coordinates[own])
+        _, sides = self._reach(targets, start, start_sides, True, rows)
+        reached = np.flatnonzero(rows.status == REACHED)
+        coordinates_reached = joint_coordinates(
+            mechanism, table, rows.poses[reached], rows.actuators[reached], sides[reached], coordinates[reached]
+        )
         angles = table.limited["column"][table.limited["turns"] == 1]
-        turned = (np.abs(ends - coordinates[own])[:, angles] > np.pi).any(axis=1)
-        rows.status[own[turned]] = PENDING  # reached a turn away, from the other end of a range
-        own, ends = own[~turned], ends[~turned]
-        coordinates[own] = ends
-        if len(own) < len(targets):
-            self._reach(start.rows.poses, start, first, True, present)
-            decided = (present.status == REACHED) & ~np.bool_(table.leaves_open)
-            rest = np.flatnonzero((rows.status != REACHED) & ~decided)
-            others = self._inner.advance(targets[rest], start.at(rest))
-            put_rows(rows, rest, others.rows)
-            coordinates[rest] = others.coordinates
+        is_turned = (np.abs(coordinates_reached - coordinates[reached])[:, angles] > np.pi).any(axis=1)
+        rows.status[reached[is_turned]] = PENDING  # reached a turn away, from the other end of a range
+        reached, coordinates_reached = reached[~is_turned], coordinates_reached[~is_turned]
+        coordinates[reached] = coordinates_reached
+        if len(reached) < len(targets):
+            self._reach(start.rows.poses, start, start_sides, True, at_start)
+            is_decided = (at_start.status == REACHED) & ~np.bool_(table.leaves_open)
+            unsolved = np.flatnonzero((rows.status != REACHED) & ~is_decided)
+            fallback = self._joint_space.advance(targets[unsolved], start.at(unsolved))
+            put_rows(rows, unsolved, fallback.rows)
+            coordinates[unsolved] = fallback.coordinates
         return Configurations(rows, coordinates)
 
     def at(self, closing: Closing) -> Configurations:
-        """Configurations found on joint coordinates, as answers whose status is still to be told."""
-        return self._inner.at(closing)
+        """Configurations found in joint coordinates, as answers whose status is not set yet."""
+        return self._joint_space.at(closing)
 
-    def points(self, found: Configurations) -> Mapping[str, Floats]:
+    def points(self, answers: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
-        if not isinstance(found, LegAnswers):
-            return self._inner.points(found)
-        placed = centres_at(self.mechanism, found.rows.poses, found.rows.actuators)
-        return placed if placed is not None else self._inner.points(found)
+        if not isinstance(answers, LegAnswers):
+            return self._joint_space.points(answers)
+        centres = centres_at(self.mechanism, answers.rows.poses, answers.rows.actuators)
+        return centres if centres is not None else self._joint_space.points(answers)
 
-    def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
-        """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""
-        if not isinstance(found, LegAnswers) or found.q_proximal is None:
-            return self._inner.weighed_limits(found, targets, way)
-        own = np.isfinite(found.q_proximal).all(axis=1)
-        mine, others = np.flatnonzero(own), np.flatnonzero(~own)
+    def weighed_limits(self, answers: Configurations, targets: Floats, way: Way) -> Floats:
+        """The multipliers of all limits at projected configurations, for targets (n, 4, 4); as of `closure.descend`."""
+        if not isinstance(answers, LegAnswers) or answers.q_proximal is None:
+            return self._joint_space.weighed_limits(answers, targets, way)
+        has_proximal = np.isfinite(answers.q_proximal).all(axis=1)
+        by_legs, by_joints = np.flatnonzero(has_proximal), np.flatnonzero(~has_proximal)
         scale = 1.0 / self.mechanism.characteristic_length
-        present = Starts(in_lengths(found.rows.poses[mine], scale), found.q_proximal[mine], found.sides[mine])
-        weights = weighed_limits(self.mechanism, self._table, targets[mine], present, way)
-        every = np.empty((len(targets), weights.shape[1]))
-        every[mine] = weights
-        if len(others):
-            every[others] = self._inner.weighed_limits(found.at(others), targets[others], way)
-        return every
+        solutions = Starts(
+            in_lengths(answers.rows.poses[by_legs], scale), answers.q_proximal[by_legs], answers.sides[by_legs]
+        )
+        weights = weighed_limits(self.mechanism, self._table, targets[by_legs], solutions, way)
+        all_weights = np.empty((len(targets), weights.shape[1]))
+        all_weights[by_legs] = weights
+        if len(by_joints):
+            all_weights[by_joints] = self._joint_space.weighed_limits(answers.at(by_joints), targets[by_joints], way)
+        return all_weights
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
-        """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
-        first, tried = self._sides_of(start), None
+        """The configurations at actuated values (n, n_a), from one start or one for each."""
+        start_sides, outputs = self._sides_of(start), None
         if len(values) == 1:
-            rows, ends = tried = self._one.new_rows(), self._one_forward.new_ends()
+            rows, solution = outputs = self._single.new_rows(), self._single_forward.new_outputs()
             rows.actuators[:] = values
-            if self._one_forward.assemble(self._forward_start(start, first), rows, ends):
-                return self._answer_one(rows, ends, start, first)
-        rows, q_proximal, sides = assembled(self.mechanism, self._table, values, start, first, tolerance, tried)
-        rest, others = np.flatnonzero(rows.status == PENDING), None
-        if len(rest) == len(values):
-            return self._inner.forward(values, start, tolerance)
-        if len(rest):
-            begin = start if start is None or len(start) == 1 else start.at(rest)
-            others = self._inner.forward(values[rest], begin, tolerance)
-            put_rows(rows, rest, others.rows)
-        return self._answers(rows, sides, q_proximal, start, first, rest, others)
+            if self._single_forward.assemble(self._forward_start(start, start_sides), rows, solution):
+                return self._single_answer(rows, solution, start, start_sides)
+        rows, q_proximal, sides = forward_kinematics(
+            self.mechanism, self._table, values, start, start_sides, tolerance, outputs
+        )
+        unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
+        if len(unsolved) == len(values):
+            return self._joint_space.forward(values, start, tolerance)
+        if len(unsolved):
+            block_start = start if start is None or len(start) == 1 else start.at(unsolved)
+            fallback = self._joint_space.forward(values[unsolved], block_start, tolerance)
+            put_rows(rows, unsolved, fallback.rows)
+        return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
 
     def prepared_forward(self, start: Configurations | None, rows: Rows) -> tuple[Callable[[], int], object]:
-        """A call that answers `rows.actuators` into the rest of one row, and what is to be kept for it: where it starts
-        and its own scratch memory. It returns 0 where they assemble."""
-        own = self._forward_start(start, self._sides_of(start))
+        """A call that assembles one row at `rows.actuators` and returns 0 where that succeeds.
+
+        With it what must be kept alive for the call: its start and its scratch memory.
+        """
+        start_handle = self._forward_start(start, self._sides_of(start))
         scratch = Handle(new_scratch(self.mechanism, self._table))
-        return self._one_forward.prepared(own, scratch, rows, self._one_forward.new_ends()), (own, scratch)
+        return self._single_forward.prepared(start_handle, scratch, rows, self._single_forward.new_outputs()), (
+            start_handle,
+            scratch,
+        )
 
     def _forward_start(self, start: Configurations | None, sides: Floats) -> Handle[Starts]:
         if start is None:
-            return self._one_forward.home
+            return self._single_forward.home
         return Handle(starts_at(self.mechanism, self._table, start.rows.poses, sides))
 
-    def _starts_there(self, targets: Floats, poses: Floats) -> Mask:
-        """Whether rows start on their targets (n, 4, 4), from as many poses or one: joint coordinates reach these where
-        legs, at dead points, do not tell."""
+    def _starts_on_target(self, targets: Floats, poses: Floats) -> Mask:
+        """True for rows whose start, one of as many poses or the only one, is on the target already, (n,).
+
+        At a dead point closed forms may miss these targets; joint coordinates do not.
+        """
         task, poses = task_of(self.mechanism), np.broadcast_to(poses, targets.shape)
-        off = np.where(task.axes, (targets - poses)[:, :3, 3], 0.0)
-        there = np.asarray(np.abs(off).max(axis=1) <= TOLERANCES.position * self.mechanism.characteristic_length)
-        if np.count_nonzero(there):
-            _, turned = task.errors(poses[there], targets[there])
-            there[there] = turned <= TOLERANCES.rotation
-        return there
+        position = np.where(task.axes, (targets - poses)[:, :3, 3], 0.0)
+        is_there = np.asarray(
+            np.abs(position).max(axis=1) <= TOLERANCES.position * self.mechanism.characteristic_length
+        )
+        if np.count_nonzero(is_there):
+            _, rotation = task.errors(poses[is_there], targets[is_there])
+            is_there[is_there] = rotation <= TOLERANCES.rotation
+        return is_there
 
     def _sides_of(self, start: Configurations | None) -> Floats:
-        """Which of its two solutions each leg takes at a start, (n or 1, legs)."""
+        """The side of each leg at a start, (n or 1, legs)."""
         return self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
 
-    def _answer_one(self, rows: Rows, ends: Ends, start: Configurations | None, first: Floats) -> LegAnswers:
-        """One row that assembles as an answer, from a start on sides `first`."""
-        mechanism, table, q = self.mechanism, self._table, ends.q
-        begins, told = begins_of(mechanism, table, start, first), (rows.poses, rows.actuators, ends.sides)
+    def _single_answer(
+        self, rows: Rows, solution: AssemblyOutputs, start: Configurations | None, start_sides: Floats
+    ) -> LegAnswers:
+        """One assembled row as an answer, from a start with the sides `start_sides`."""
+        mechanism, table, q = self.mechanism, self._table, solution.q
+        start_coordinates = start_coordinates_of(mechanism, table, start, start_sides)
+        platform = rows.poses, rows.actuators, solution.sides
         return LegAnswers(
-            rows, lambda own: settled(mechanism, table, *told, begins(slice(None)), q)[own], ends.sides, q
+            rows,
+            lambda places: joint_coordinates(mechanism, table, *platform, start_coordinates(slice(None)), q)[places],
+            solution.sides,
+            q,
         )
 
     def _reach_one(
         self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows
     ) -> bool:
-        """Answer one target from home or from one answer before; whether legs reach it as they are."""
-        begin = self._one.home if start is None else start.rows.poses
-        if self._one.reach(target, begin, sides, rows, nearby=keep_mode):
+        """Solve one target from home or from one earlier answer; True if legs reach it in the mode of the start."""
+        start_pose = self._single.home if start is None else start.rows.poses
+        if self._single.reach(target, start_pose, sides, rows, nearby=keep_mode):
             return False
         if start is not None:
             self._count_turns(start.rows.actuators, rows)
@@ -312,62 +361,75 @@ class LegsEngine:
         keep_mode: bool,
         rows: Rows,
         *,
-        tried: bool = False,
+        is_tried: bool = False,
     ) -> tuple[int, Floats]:
-        """Answer the rows that legs reach; how many they do not, and the sides of answers with arms where they are.
+        """Solve the rows that legs reach.
 
-        One row that was `tried` has a status already.
+        Parameters
+        ----------
+        is_tried : the only row was tried already, without success; its status is set.
+
+        Returns
+        -------
+        The number of unsolved rows, and the sides of the answers with the coordinates of redundant joints.
         """
-        begins = self.mechanism.home_pose[None] if start is None else start.rows.poses
-        asked = local_table(self._table) if keep_mode else machine(self._table)
+        start_poses = self.mechanism.home_pose[None] if start is None else start.rows.poses
+        legs = local_table(self._table) if keep_mode else table_handle(self._table)
         if self._table.has_implicit_joints:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
-        left = 1 if tried else self._reach_as_they_are(start is None, asked, targets, begins, sides, rows)
-        if left and self._table.is_for_blocks and self._table.task["unset"][0]:
-            left -= self._complete(asked, targets, begins, sides, rows)
-        if left and self._table.has_free_redundant:
+        n_unsolved = 1 if is_tried else self._reach_at_start(start is None, legs, targets, start_poses, sides, rows)
+        if n_unsolved and self._table.is_for_blocks and self._table.task["unset"][0]:
+            n_unsolved -= self._complete(legs, targets, start_poses, sides, rows)
+        if n_unsolved and self._table.has_free_redundant:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
-            left -= self._reach_by_redundant(asked, targets, begins, sides, rows)
-            if left and start is not None and not keep_mode:
-                left -= self._reach_from_home(asked, targets, sides, rows)
+            n_unsolved -= self._reach_by_redundant(legs, targets, start_poses, sides, rows)
+            if n_unsolved and start is not None and not keep_mode:
+                n_unsolved -= self._reach_from_home(legs, targets, sides, rows)
         if start is not None:
             self._count_turns(start.rows.actuators, rows)
-        return left, sides
+        return n_unsolved, sides
 
-    def _reach_as_they_are(
-        self, from_home: bool, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows
+    def _reach_at_start(
+        self, from_home: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
     ) -> int:
-        """Answer the rows that legs reach with arms that are not led where they are; how many they do not."""
-        resting = resting_at_home(self._table) if from_home else None
+        """Solve the rows that legs reach while free redundant joints stay; return the number of unsolved rows."""
+        resting = legs_at_rest(self._table) if from_home else None
         if resting is None:
-            return self._run(self._table.is_for_blocks, asked, targets, begins, sides, rows)
+            return self._run(self._table.is_for_blocks, legs, targets, start_poses, sides, rows)
         rows.actuators[:] = resting.actuators
-        return self._run(True, machine(resting.table), targets, begins, resting.table.home_sides, rows)
+        return self._run(True, table_handle(resting.table), targets, start_poses, resting.table.home_sides, rows)
 
-    def _reach_by_redundant(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
-        """Answer rows whose legs reach once arms have moved, and note where; how many these are."""
-        before, rest = sides.copy(), np.flatnonzero(rows.status != REACHED)
-        some, poses = move_redundant(self.mechanism, self._table, targets, begins, sides, rest)
-        if not len(some):
+    def _reach_by_redundant(
+        self, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
+    ) -> int:
+        """Solve rows by moving the redundant joints, and write their coordinates; return the number of rows solved."""
+        sides_before, unsolved = sides.copy(), np.flatnonzero(rows.status != REACHED)
+        moved, poses = move_redundant_joints(self.mechanism, self._table, targets, start_poses, sides, unsolved)
+        if not len(moved):
             return 0
-        own, begins = rows_at(rows, some), poses
-        left = self._run(False, asked, targets[some], begins, sides[some], own)
-        put_rows(rows, some, own)
-        lost = some[own.status != REACHED]
-        sides[lost] = before[lost]
-        return len(some) - left
+        block, start_poses = rows_at(rows, moved), poses
+        n_unsolved = self._run(False, legs, targets[moved], start_poses, sides[moved], block)
+        put_rows(rows, moved, block)
+        missed = moved[block.status != REACHED]
+        sides[missed] = sides_before[missed]
+        return len(moved) - n_unsolved
 
-    def _reach_from_home(self, asked: Machine, targets: Floats, sides: Floats, rows: Rows) -> int:
-        """The same, with arms that start at home: from where they are, limits may be in the way."""
-        away, home, redundant = rows.status != REACHED, sides.copy(), self._table.implicit_joints["leg"]
-        home[:, redundant] = self._table.home_sides[:, redundant]
-        n = self._reach_by_redundant(asked, targets, self._one.home, home, rows)
-        found = away & (rows.status == REACHED)
-        sides[found] = home[found]
-        return n
+    def _reach_from_home(self, legs: TableHandle, targets: Floats, sides: Floats, rows: Rows) -> int:
+        """Solve rows by moving the redundant joints from home, where limits bar the way from the start.
 
-    def _run(self, by_blocks: bool, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
-        """Answer targets on all cores, in blocks of poses or one by one; how many are not reached."""
+        Return the number of rows solved.
+        """
+        is_unsolved, home_sides, redundant = rows.status != REACHED, sides.copy(), self._table.implicit_joints["leg"]
+        home_sides[:, redundant] = self._table.home_sides[:, redundant]
+        n_reached = self._reach_by_redundant(legs, targets, self._single.home, home_sides, rows)
+        is_reached = is_unsolved & (rows.status == REACHED)
+        sides[is_reached] = home_sides[is_reached]
+        return n_reached
+
+    def _run(
+        self, by_blocks: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
+    ) -> int:
+        """Solve targets on all cores, in blocks of poses or one by one; return the number not reached."""
         if by_blocks:
             from ..kernels.legs.blocks import answer_blocks as answer
         else:
@@ -375,9 +437,9 @@ class LegsEngine:
 
         def run(block: slice) -> int:
             return answer(
-                asked.address,
+                legs.address,
                 targets[block],
-                _part(begins, block),
+                _part(start_poses, block),
                 _part(sides, block),
                 rows.status[block],
                 rows.poses[block],
@@ -387,29 +449,29 @@ class LegsEngine:
 
         return sum(in_blocks(run, len(targets), ROWS_A_RUN if by_blocks else ROWS_A_BLOCK))
 
-    def _complete(self, asked: Machine, targets: Floats, begins: Floats, sides: Floats, rows: Rows) -> int:
-        """Answer the rows that blocks left OPEN, whose poses are to be completed; how many of them are reached."""
-        some = (rows.status == OPEN).nonzero()[0]
-        if not len(some):
+    def _complete(self, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
+        """Solve the rows that blocks left OPEN, whose poses are to be completed; return the number reached."""
+        is_open = (rows.status == OPEN).nonzero()[0]
+        if not len(is_open):
             return 0
-        own = rows_at(rows, some)
-        begins, sides = (array if len(array) == 1 else array[some] for array in (begins, sides))
-        left = self._run(False, asked, targets[some], begins, sides, own)
-        put_rows(rows, some, own)
-        return len(some) - left
+        block = rows_at(rows, is_open)
+        start_poses, sides = (array if len(array) == 1 else array[is_open] for array in (start_poses, sides))
+        n_unsolved = self._run(False, legs, targets[is_open], start_poses, sides, block)
+        put_rows(rows, is_open, block)
+        return len(is_open) - n_unsolved
 
-    def _count_turns(self, begin: Floats, rows: Rows) -> None:
-        """Count the angles of actuators that may turn more than once from those of a start (n or 1, n_a)."""
+    def _count_turns(self, start_values: Floats, rows: Rows) -> None:
+        """Add whole turns to actuators that may turn more than once: nearest to the start's values (n or 1, n_a)."""
         for driven in self._turning:
-            told = rows.status != PENDING
-            values, before = rows.actuators[told, driven["column"]], begin[:, driven["column"]]
-            before = before if len(begin) == 1 else before[told]
-            nearest = values - 2.0 * np.pi * np.round((values - before) / (2.0 * np.pi))
-            inside = (nearest >= driven["home"] + driven["lo"]) & (nearest <= driven["home"] + driven["hi"])
-            rows.actuators[told, driven["column"]] = np.where(inside, nearest, values)
+            is_solved = rows.status != PENDING
+            values, previous = rows.actuators[is_solved, driven["column"]], start_values[:, driven["column"]]
+            previous = previous if len(start_values) == 1 else previous[is_solved]
+            nearest = values - 2.0 * np.pi * np.round((values - previous) / (2.0 * np.pi))
+            is_inside = (nearest >= driven["home"] + driven["lo"]) & (nearest <= driven["home"] + driven["hi"])
+            rows.actuators[is_solved, driven["column"]] = np.where(is_inside, nearest, values)
 
 
 def _part(array: Floats, block: slice) -> Floats:
-    """One for all rows, or those of a block; writable, as kernels are compiled for."""
-    own = array if len(array) == 1 else array[block]
-    return np.require(own, requirements=["C", "W"])
+    """The rows of a block, or the single row for all; writable, as kernels are compiled for."""
+    part = array if len(array) == 1 else array[block]
+    return np.require(part, requirements=["C", "W"])

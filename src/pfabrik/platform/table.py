@@ -1,4 +1,4 @@
-"""A table of legs as kernels take it."""
+"""Kernel tables: a table of legs in the variants that kernels take."""
 
 from __future__ import annotations
 
@@ -18,52 +18,54 @@ from ..tolerances import TOLERANCES
 if TYPE_CHECKING:
     from ..kernels.platform.evaluate import EvaluationScratch
 
-Machine: TypeAlias = Handle[K.Table]
+TableHandle: TypeAlias = Handle[K.Table]
 
-OF_AIMS = -1
-"""The leader of cones that no joint has: see `with_aims`."""
+OF_POINTING = -1
+"""The leader of cones that belong to no joint, but limit where crossed hinges can point a rod."""
 
 
 @lru_cache(maxsize=64)
 def kernel_table(table: LegTable) -> K.Table:
-    """The same records, with the unknown that the coordinate of each carrier, then of each arm, is."""
+    """The records of a leg table, with the index of each proximal, then redundant, coordinate among the unknowns."""
     columns = np.full(len(table.legs), -1)
-    turned_by_proximal = (table.legs["kind"] == K.ROD) & np.isin(table.legs["proximal"], (K.CRANK, K.CARRIAGE))
-    redundant, mirrors = (
-        (table.legs["kind"] == K.REDUNDANT) & own for own in (table.legs["mirror_of"] < 0, table.legs["mirror_of"] >= 0)
+    has_proximal = (table.legs["kind"] == K.ROD) & np.isin(table.legs["proximal"], (K.CRANK, K.CARRIAGE))
+    is_redundant, is_mirror = (
+        (table.legs["kind"] == K.REDUNDANT) & proximal_legs
+        for proximal_legs in (table.legs["mirror_of"] < 0, table.legs["mirror_of"] >= 0)
     )
-    own = np.concatenate([np.flatnonzero(turned_by_proximal), np.flatnonzero(redundant)])
-    columns[own] = 6 + np.arange(len(own))
-    columns[mirrors] = columns[table.legs["mirror_of"][mirrors]]
+    proximal_legs = np.concatenate([np.flatnonzero(has_proximal), np.flatnonzero(is_redundant)])
+    columns[proximal_legs] = 6 + np.arange(len(proximal_legs))
+    columns[is_mirror] = columns[table.legs["mirror_of"][is_mirror]]
     return K.Table(table.legs, table.limited, table.cones, table.driven, table.known, table.task, columns)
 
 
 @lru_cache(maxsize=64)
-def machine(table: LegTable) -> Machine:
-    """What kernels are given."""
+def table_handle(table: LegTable) -> TableHandle:
+    """The kernel table."""
     return Handle(kernel_table(table))
 
 
 @lru_cache(maxsize=64)
-def local_table(table: LegTable) -> Machine:
-    """The same for poses that are completed near to where they began alone."""
+def local_table(table: LegTable) -> TableHandle:
+    """Kernel table that completes a partial pose only near its start."""
     return Handle(kernel_table(table)._replace(task=table.task_within(STRANGE)))
 
 
 @lru_cache(maxsize=64)
-def search_table(table: LegTable) -> Machine:
-    """The same for searches and assembly, where it is a limit that crossed hinges cannot point rods anywhere."""
-    return Handle(kernel_table(table)._replace(cones=with_aims(table.legs, table.cones)))
+def search_table(table: LegTable) -> TableHandle:
+    """Kernel table for searches and assembly, with cones that limit where crossed hinges can point their rods."""
+    return Handle(kernel_table(table)._replace(cones=with_pointing_cones(table.legs, table.cones)))
 
 
-def with_aims(legs: Records, cones: Records) -> Records:
-    """Cones, and after them those that say where two crossed hinges can point their rods, or the third of a pivot.
+def with_pointing_cones(legs: Records, cones: Records) -> Records:
+    """Cones, followed by those that limit where two crossed hinges can point a rod, or a pivot's third hinge.
 
-    Hinges a, b with an angle A between them, and B between b and the rod: its angle from a is from |A - B| to A + B, or
-    to 2 pi - A - B. Hinges square to each other and to their rod point it anywhere. Those of pivots come first, with a
-    leader, for searches to mind them always: nothing else says that such a leg does not reach.
+    With A the angle between hinges a and b, and B that between b and the rod, the angle t between a and the rod is in
+    |A - B| <= t <= min(A + B, 2 pi - A - B). Hinges square to each other and to their rod point it anywhere. Cones of
+    pivots come first and have a leader, so that searches always enforce them: nothing else shows that a pivot does not
+    reach.
     """
-    aims = []
+    pointing = []
     for k, leg in enumerate(legs):
         for end, place in (("base_end", K.BASE_LINE), ("platform_end", K.PLATFORM_LINE)):
             is_pivot = leg["kind"] == K.PIVOT and leg[end] == K.TRIPLE
@@ -71,28 +73,30 @@ def with_aims(legs: Records, cones: Records) -> Records:
                 continue
             a, b, c = leg[f"{end}_axes"]
             A, B = np.arccos(np.clip([a @ b, b @ (c if is_pivot else leg["line"])], -1.0, 1.0))
-            for axis, most in ((a, min(A + B, 2.0 * np.pi - A - B)), (-a, np.pi - abs(A - B))):
-                if most < np.pi - TOLERANCES.alignment:
-                    aims.append((k, place, axis, most, np.cos(most), len(cones) if is_pivot else OF_AIMS))
-    aims.sort(key=lambda aim: aim[-1] == OF_AIMS)
-    return np.concatenate([cones, np.array(aims, K.CONE)]) if aims else cones
+            for axis, half_angle in ((a, min(A + B, 2.0 * np.pi - A - B)), (-a, np.pi - abs(A - B))):
+                if half_angle < np.pi - TOLERANCES.alignment:
+                    pointing.append(
+                        (k, place, axis, half_angle, np.cos(half_angle), len(cones) if is_pivot else OF_POINTING)
+                    )
+    pointing.sort(key=lambda cone: cone[-1] == OF_POINTING)
+    return np.concatenate([cones, np.array(pointing, K.CONE)]) if pointing else cones
 
 
 @lru_cache(maxsize=64)
-def reading_table(table: LegTable) -> Machine:
-    """The same with the angles of all endings asked for."""
+def reading_table(table: LegTable) -> TableHandle:
+    """Kernel table that computes the angles of all endings."""
     return Handle(kernel_table(table)._replace(legs=table.aimed))
 
 
 @lru_cache(maxsize=64)
-def reading_of(table: LegTable) -> Scratch[EvaluationScratch]:
-    """Memory to read what legs tell at poses."""
+def reading_scratch(table: LegTable) -> Scratch[EvaluationScratch]:
+    """Scratch memory to read joint coordinates and constraints at poses."""
     from ..kernels.platform.evaluate import new_evaluation_scratch
 
     return Scratch(new_evaluation_scratch, kernel_table(table))
 
 
 @lru_cache(maxsize=64)
-def resting_at_home(table: LegTable) -> Resting | None:
-    """Legs as they stand while the arms that they are on are where they are at home."""
+def legs_at_rest(table: LegTable) -> Resting | None:
+    """The legs while free redundant joints stay at home; None if there are none, or if such legs are not equivalent."""
     return at_rest(table, table.home_sides[0]) if table.has_free_redundant else None

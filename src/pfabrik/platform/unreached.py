@@ -1,4 +1,4 @@
-"""Targets that legs do not reach on the sides they start on: other working modes, then the nearest feasible poses."""
+"""Targets that legs do not reach in the working mode of the start: other modes, then the nearest feasible poses."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from ..kernels.platform.records import PoseSolutions, Starts
 from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options
-from .nearest import project
+from .nearest import nearest_poses
 from .nearest_pose import starts_at
 from .seeds import seeds_of_other_assemblies
-from .table import Machine, local_table, machine
+from .table import TableHandle, local_table, table_handle
 
 ROWS_A_BLOCK = 64
 
 NEARLY = 1e-4
-"""Distance at which a projection is as good as reached, and is to be so exactly [L]."""
+"""Distance below which a projection is close enough to its target to try to reach it exactly [L]."""
 
 
-class Question(NamedTuple):
-    """What is asked of all targets.
+class Request(NamedTuple):
+    """The machine, and the options that hold for all targets of a batch.
 
-    With `keep_mode` in the working mode of the start; `nearby`, as along a path, about the start alone; `has_start` if
-    one was given.
+    With `keep_mode` answers are in the working mode of the start. With `nearby`, as along a path, searches stay around
+    the start. With `has_start` it was given, and is not home.
     """
 
     mechanism: Mechanism
@@ -46,152 +46,161 @@ class Question(NamedTuple):
 
 
 class Unreached(NamedTuple):
-    """Targets that are not reached, and what is told of them."""
+    """A batch of targets that are not reached yet, and the outputs for them."""
 
     targets: Floats  # (n, 4, 4) [length]
-    begins: Floats  # (n or 1, 4, 4) [length]: poses that they are to be reached from
-    sides: Floats  # (n, legs): which of its two solutions each leg starts on; of an answer, which it takes
-    q_proximal: Floats  # (n, legs) [L or rad]: of an answer, where closed forms tell them less exactly; else NaN
+    start_poses: Floats  # (n or 1, 4, 4) [length]
+    sides: Floats  # (n, legs): the side of each leg at the start; once solved, at the answer
+    q_proximal: Floats  # (n, legs) [L or rad]: found by a search, where closed forms are less exact; else NaN
     rows: Rows
 
     def at(self, places: Mask | NDArray[np.intp] | slice) -> Unreached:
-        """Those at some places, copied but for those of a slice."""
-        begins = self.begins if len(self.begins) == 1 else self.begins[places]
-        arrays = self.targets[places], begins, self.sides[places], self.q_proximal[places]
+        """A part of the batch: copied, or views where `places` is a slice."""
+        start_poses = self.start_poses if len(self.start_poses) == 1 else self.start_poses[places]
+        arrays = self.targets[places], start_poses, self.sides[places], self.q_proximal[places]
         return Unreached(*arrays, rows_at(self.rows, places))
 
-    def put(self, places: Mask | NDArray[np.intp], others: Unreached) -> None:
-        """Write what is told of others at some places."""
-        self.sides[places], self.q_proximal[places] = others.sides, others.q_proximal
-        put_rows(self.rows, places, others.rows)
+    def put(self, places: Mask | NDArray[np.intp], block: Unreached) -> None:
+        """Write the outputs of a part of the batch."""
+        self.sides[places], self.q_proximal[places] = block.sides, block.q_proximal
+        put_rows(self.rows, places, block.rows)
 
-    def answer(self, which: Mask, answer: Callable[[Unreached], None]) -> None:
-        """Have some of them answered; where that is all, without a copy."""
-        n = np.count_nonzero(which)
-        if n == len(which):
+    def answer(self, mask: Mask, answer: Callable[[Unreached], None]) -> None:
+        """Call `answer` on the masked rows and store its outputs; no copy is made where these are all rows."""
+        n = np.count_nonzero(mask)
+        if n == len(mask):
             answer(self)
         elif n:
-            others = self.at(which)
-            answer(others)
-            self.put(which, others)
+            block = self.at(mask)
+            answer(block)
+            self.put(mask, block)
 
 
 @cache
-def _answer() -> Callable[..., int]:
+def _answer_kernel() -> Callable[..., int]:
     from ..kernels.legs.answer import answer
 
     return answer
 
 
 @cache
-def _answer_otherwise() -> Callable[..., int]:
+def _answer_otherwise_kernel() -> Callable[..., int]:
     from ..kernels.platform.any_mode import answer_in_any_mode
 
     return answer_in_any_mode
 
 
-def answer_unreached(question: Question, some: Unreached) -> None:
-    """Answer targets in other working modes, or by the nearest feasible poses; some may stay PENDING or UNSURE."""
-    table = question.table
-    if question.keep_mode or not table.has_sides:
-        _answer_completed(question, some)
+def answer_unreached(request: Request, unreached: Unreached) -> None:
+    """Answer targets in other working modes, or by the nearest feasible poses. Rows may stay PENDING or UNSURE."""
+    table = request.table
+    if request.keep_mode or not table.has_sides:
+        _answer_completed(request, unreached)
     else:
-        some.answer(_reach_otherwise(table, some), partial(_answer_completed, question))
+        unreached.answer(_reach_otherwise(table, unreached), partial(_answer_completed, request))
 
 
-def _answer_completed(question: Question, some: Unreached) -> None:
-    """Answer targets in other ways of assembly, where poses are completed, or by the nearest feasible poses."""
-    if question.keep_mode or not question.table.is_completed:
-        _project(question, some)
+def _answer_completed(request: Request, unreached: Unreached) -> None:
+    """Answer targets in other assemblies, where poses are completed, or by the nearest feasible poses."""
+    if request.keep_mode or not request.table.is_completed:
+        _project(request, unreached)
         return
-    seeds = seeds_of_other_assemblies(question.mechanism)
+    seeds = seeds_of_other_assemblies(request.mechanism)
     if len(seeds.poses):
-        some.answer(_reach_from(seeds, question, some), partial(_project, question))
+        unreached.answer(_reach_from_seeds(seeds, request, unreached), partial(_project, request))
     else:
-        _project(question, some)
+        _project(request, unreached)
 
 
-def _reach_otherwise(table: LegTable, some: Unreached) -> Mask:
-    """Answer rows in other working modes; which are left, but for those that wait for another engine: closed forms tell
-    too little of a leg at a dead point."""
-    targets, begins, sides, _, rows = some
-    legs, tried, status = machine(table), sides.copy(), np.empty_like(rows.status)
-    told, answer = (tried, status, rows.poses, rows.actuators, rows.measures), _answer_otherwise()
+def _reach_otherwise(table: LegTable, unreached: Unreached) -> Mask:
+    """Answer rows in other working modes; return the mask of rows still to be projected.
+
+    Rows with a leg at a dead point are not among these: closed forms are too inexact there, and another engine answers.
+    """
+    targets, start_poses, sides, _, rows = unreached
+    legs, other_sides, status = table_handle(table), sides.copy(), np.empty_like(rows.status)
+    outputs, answer = (other_sides, status, rows.poses, rows.actuators, rows.measures), _answer_otherwise_kernel()
 
     def run(block: slice) -> int:
-        begin = begins if len(begins) == 1 else begins[block]
-        return answer(legs.address, targets[block], begin, *(array[block] for array in told))
+        block_poses = start_poses if len(start_poses) == 1 else start_poses[block]
+        return answer(legs.address, targets[block], block_poses, *(array[block] for array in outputs))
 
     if len(targets) <= ROWS_A_BLOCK:
-        left = answer(legs.address, targets, begins, *told)
+        n_unsolved = answer(legs.address, targets, start_poses, *outputs)
     else:
-        left = sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
-    if left < len(targets):
+        n_unsolved = sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
+    if n_unsolved < len(targets):
         reached = status == REACHED
-        rows.status[reached], sides[reached] = REACHED, tried[reached]
+        rows.status[reached], sides[reached] = REACHED, other_sides[reached]
     return np.asarray(status == PENDING)
 
 
-def _reach_from(seeds: Starts, question: Question, some: Unreached) -> Mask:
-    """Answer rows in other ways of assembly, completed from the nearest corner that leads to one; which are left."""
-    length, legs, k = question.mechanism.characteristic_length, machine(question.table), len(seeds.poses)
+def _reach_from_seeds(seeds: Starts, request: Request, unreached: Unreached) -> Mask:
+    """Answer rows in other assemblies, completed from the nearest seed that leads to one; return the unsolved mask."""
+    length, legs, k = request.mechanism.characteristic_length, table_handle(request.table), len(seeds.poses)
     poses = in_lengths(seeds.poses, length)
 
-    def reach(block: slice) -> Mask:
-        own = some.at(block)
-        n = len(own.targets)
-        begins, ends = np.concatenate([poses] * n), np.concatenate([seeds.sides] * n)
-        targets, rows = np.repeat(own.targets, k, axis=0), new_rows(question.mechanism, n * k)
-        every = Unreached(targets, begins, ends, np.empty_like(ends), rows)
-        _complete(legs, begins, ends, every)
-        reached = rows.status == REACHED
-        reached[reached] = ~strays(question.mechanism, rows.poses[reached])
-        reached = reached.reshape(n, k)
-        found = reached.any(axis=1)
-        if np.count_nonzero(found):
-            wanted = in_lengths(own.targets, 1.0 / length)[:, None]
-            scale = np.abs(wanted).max(axis=(1, 2, 3), initial=1.0)  # squares of what is farther may be infinite
-            away = np.square((seeds.poses - wanted)[:, :, :3] / scale[:, None, None, None]).sum(axis=(2, 3))
-            nearest = np.where(reached, away, np.inf).argmin(axis=1)
-            own.put(found, every.at((np.arange(0, n * k, k) + nearest)[found]))
-        return np.asarray(~found)
+    def reach(part: slice) -> Mask:
+        block = unreached.at(part)
+        n = len(block.targets)
+        start_poses, end_sides = np.concatenate([poses] * n), np.concatenate([seeds.sides] * n)
+        targets, rows = np.repeat(block.targets, k, axis=0), new_rows(request.mechanism, n * k)
+        candidates = Unreached(targets, start_poses, end_sides, np.empty_like(end_sides), rows)
+        _reach_from_poses(legs, start_poses, end_sides, candidates)
+        is_reached = rows.status == REACHED
+        is_reached[is_reached] = ~strays(request.mechanism, rows.poses[is_reached])
+        is_reached = is_reached.reshape(n, k)
+        is_solved = is_reached.any(axis=1)
+        if np.count_nonzero(is_solved):
+            poses_of_targets = in_lengths(block.targets, 1.0 / length)[:, None]
+            # relative to the largest coordinate: squares of far targets may be infinite
+            scale = np.abs(poses_of_targets).max(axis=(1, 2, 3), initial=1.0)
+            distances = np.square((seeds.poses - poses_of_targets)[:, :, :3] / scale[:, None, None, None]).sum(
+                axis=(2, 3)
+            )
+            nearest = np.where(is_reached, distances, np.inf).argmin(axis=1)
+            block.put(is_solved, candidates.at((np.arange(0, n * k, k) + nearest)[is_solved]))
+        return np.asarray(~is_solved)
 
-    return np.concatenate(in_blocks(reach, len(some.targets), ROWS_A_BLOCK))
+    return np.concatenate(in_blocks(reach, len(unreached.targets), ROWS_A_BLOCK))
 
 
-def _project(question: Question, some: Unreached) -> None:
-    """Answer rows by the nearest feasible poses, and exactly from there where these are as good as reached, or the task
-    leaves some of the pose open. Those as good as reached that are not, and not certain to be the nearest, are UNSURE.
+def _project(request: Request, unreached: Unreached) -> None:
+    """Answer rows by the nearest feasible poses.
+
+    From a pose within `NEARLY` of its target, and from every pose where the task leaves some of it open, legs then try
+    to reach the target exactly. A row within `NEARLY` that stays unreached, and has no certificate, is UNSURE.
     """
-    mechanism, table, options, keep_mode, nearby, has_start = question
-    targets, begins, sides, q_proximal, rows = some
-    n, own = len(targets), starts_at(mechanism, table, begins, sides[: len(begins)])
-    ends = rows.poses, np.empty_like(q_proximal), np.empty_like(sides)
-    found = PoseSolutions(np.empty(n), *ends, rows.counters, rows.actuators, rows.measures, rows.status)
-    left = project(mechanism, options, targets, own, found, seeds=not nearby, stays=keep_mode, has_start=has_start)
-    if left == n:
+    mechanism, table, options, keep_mode, nearby, has_start = request
+    targets, start_poses, sides, q_proximal, rows = unreached
+    n, starts = len(targets), starts_at(mechanism, table, start_poses, sides[: len(start_poses)])
+    end_state = rows.poses, np.empty_like(q_proximal), np.empty_like(sides)
+    solution = PoseSolutions(np.empty(n), *end_state, rows.counters, rows.actuators, rows.measures, rows.status)
+    n_unsolved = nearest_poses(
+        mechanism, options, targets, starts, solution, seeds=not nearby, keep_mode=keep_mode, has_start=has_start
+    )
+    if n_unsolved == n:
         return
-    placed = slice(None) if left == 0 else found.distances < np.inf
-    sides[placed], q_proximal[placed] = found.sides[placed], found.q[placed]
-    is_near = found.distances <= NEARLY
+    solved = slice(None) if n_unsolved == 0 else solution.distances < np.inf
+    sides[solved], q_proximal[solved] = solution.sides[solved], solution.q[solved]
+    is_near = solution.distances <= NEARLY
     if np.count_nonzero(is_near):
         is_near &= ~(rows.certain & (rows.status == PROJECTED))
         rows.status[is_near] = UNSURE
-    asked = (local_table if nearby else machine)(table)
-    some.answer(found.distances < np.inf if table.is_partial else is_near, partial(_reach_again, asked))
+    legs = (local_table if nearby else table_handle)(table)
+    unreached.answer(solution.distances < np.inf if table.is_partial else is_near, partial(_reach_exactly, legs))
 
 
-def _reach_again(asked: Machine, some: Unreached) -> None:
-    """Answer rows exactly from where their projections ended; others stay as they are."""
-    _complete(asked, some.rows.poses.copy(), some.sides.copy(), some)
+def _reach_exactly(legs: TableHandle, unreached: Unreached) -> None:
+    """Reach targets exactly from the poses of their projections; rows not reached keep their outputs."""
+    _reach_from_poses(legs, unreached.rows.poses.copy(), unreached.sides.copy(), unreached)
 
 
-def _complete(asked: Machine, begins: Floats, ends: Floats, some: Unreached) -> None:
-    """Answer rows from as many poses (n, 4, 4) [length], on sides (n, legs); others stay as they are."""
-    targets, _, sides, q_proximal, rows = some
+def _reach_from_poses(legs: TableHandle, start_poses: Floats, end_sides: Floats, unreached: Unreached) -> None:
+    """Reach targets from poses (n, 4, 4) [length] on sides (n, legs); rows not reached keep their outputs."""
+    targets, _, sides, q_proximal, rows = unreached
     status = np.empty_like(rows.status)
-    told = status, rows.poses, rows.actuators, rows.measures
-    if _answer()(asked.address, targets, begins, ends, *told) < len(targets):
-        reached = status == REACHED
-        rows.status[reached], sides[reached], q_proximal[reached] = REACHED, ends[reached], np.nan
-        rows.measures[reached, POSITION_ERROR] = rows.measures[reached, ROTATION_ERROR] = 0.0
+    outputs = status, rows.poses, rows.actuators, rows.measures
+    if _answer_kernel()(legs.address, targets, start_poses, end_sides, *outputs) < len(targets):
+        is_reached = status == REACHED
+        rows.status[is_reached], sides[is_reached], q_proximal[is_reached] = REACHED, end_sides[is_reached], np.nan
+        rows.measures[is_reached, POSITION_ERROR] = rows.measures[is_reached, ROTATION_ERROR] = 0.0

@@ -1,0 +1,173 @@
+"""Single targets and single assemblies: kernel calls prepared once for each machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property, lru_cache, partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..decomposition.leg_table import LegTable
+from ..decomposition.resting import Resting
+from ..description.mechanism import Mechanism
+from ..kernels.handle import Handle, Scratch
+from ..kernels.platform.records import Starts
+from ..kernels.rows import N_COUNTERS, Rows
+from .nearest_pose import home_start, no_starts
+from .table import legs_at_rest, local_table, search_table, table_handle
+
+if TYPE_CHECKING:
+    from ..kernels.platform.forward import NewtonScratch
+
+
+class SingleTarget:
+    """Inverse kinematics of a machine, one target at a time.
+
+    A target takes microseconds, so everything that does not depend on it is prepared once.
+    """
+
+    def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
+        self._n_actuators = len(mechanism.actuator_names)
+        self._is_for_blocks, self._has_implicit_joints = table.is_for_blocks, table.has_implicit_joints
+        self._full_table, self._local_table = table_handle(table), local_table(table)
+        self.home, self.home_sides = mechanism.home_pose[None].copy(), table.home_sides
+        self._resting = legs_at_rest(table)
+        self._resting_table = table_handle(table if self._resting is None else self._resting.table)
+
+    @cached_property
+    def _kernel(self) -> Callable[..., int]:
+        if self._is_for_blocks:
+            return self._blocks
+        from ..kernels.legs.answer import answer
+
+        return answer
+
+    @cached_property
+    def _blocks(self) -> Callable[..., int]:
+        from ..kernels.legs.blocks import answer_blocks
+
+        return answer_blocks
+
+    def new_rows(self) -> Rows:
+        """Allocate one row."""
+        return Rows(
+            np.empty(1, np.int64),
+            np.zeros((1, N_COUNTERS), np.int64),
+            np.empty((1, 4, 4)),
+            np.empty((1, self._n_actuators)),
+            np.zeros((1, 5)),
+        )
+
+    def reach(self, target: Floats, start_pose: Floats, sides: Floats, rows: Rows, *, nearby: bool) -> int:
+        """Solve a target (1, 4, 4) if legs on given sides (1, legs) reach it; return 0 where they do.
+
+        Parameters
+        ----------
+        sides : implicit joints start here, and their coordinates are written here.
+        start_pose : the pose from which the target is completed, (1, 4, 4); the array `home` for home.
+        nearby : complete it only near its start.
+        """
+        if start_pose is self.home and self._resting is not None:
+            return self._reach_at_rest(self._resting, target, rows)
+        return self._kernel(
+            (self._local_table if nearby else self._full_table).address, target, start_pose, sides, *_outputs(rows)
+        )
+
+    def prepared(
+        self, target: Floats, start_pose: Floats, sides: Floats, rows: Rows, *, nearby: bool
+    ) -> Callable[[], int]:
+        """A call of `reach` with these arguments, valid while this object is kept.
+
+        Implicit joints start anew each time.
+        """
+        if start_pose is self.home and self._resting is not None:
+            return partial(self._reach_at_rest, self._resting, target, rows)
+        legs, end_sides = self._local_table if nearby else self._full_table, sides.copy()
+        call = partial(self._kernel, legs.address, target, start_pose, end_sides, *_outputs(rows))
+        if not self._has_implicit_joints:
+            return call
+
+        def call_anew() -> int:
+            end_sides[:] = sides
+            return call()
+
+        return call_anew
+
+    def _reach_at_rest(self, resting: Resting, target: Floats, rows: Rows) -> int:
+        """`reach` from home, with the redundant joints fixed there."""
+        rows.actuators[:] = resting.actuators
+        return self._blocks(self._resting_table.address, target, self.home, resting.table.home_sides, *_outputs(rows))
+
+
+class AssemblyOutputs(NamedTuple):
+    """Outputs of assembly: actuators, proximal coordinates and sides, as of `Starts`."""
+
+    values: Floats  # (n, n_a): deviations from home [L or rad]
+    q: Floats  # (n, legs)
+    sides: Floats  # (n, legs)
+
+
+class SingleAssembly:
+    """Forward kinematics of a machine, one row at a time, prepared likewise."""
+
+    def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
+        self._n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
+        self.home, self._no_starts = Handle(home_start(mechanism, table)), Handle(no_starts(table))
+        self._legs, self._scratch_key = search_table(table), (mechanism, table)
+
+    @cached_property
+    def _kernel(self) -> Callable[..., int]:
+        from ..kernels.platform.forward import assemble
+
+        return assemble
+
+    @cached_property
+    def _scratch(self) -> Scratch[NewtonScratch]:
+        return scratch_of(*self._scratch_key)
+
+    def new_outputs(self) -> AssemblyOutputs:
+        """Allocate the outputs of one row."""
+        return AssemblyOutputs(
+            np.empty((1, self._n_actuators)), np.empty((1, self._n_legs)), np.empty((1, self._n_legs))
+        )
+
+    def prepared(
+        self,
+        start: Handle[Starts],
+        scratch: Handle[NewtonScratch] | Scratch[NewtonScratch],
+        rows: Rows,
+        outputs: AssemblyOutputs,
+    ) -> Callable[[], int]:
+        """A call that assembles one row at `rows.actuators` from one start, within all limits; it returns 0 on success.
+
+        It is valid while the start, the scratch memory and this object are kept.
+        """
+        inputs = self._legs.address, scratch.address, rows.actuators, start.address, self._no_starts.address
+        return partial(
+            self._kernel, *inputs, rows.status, outputs.values, rows.poses, outputs.q, outputs.sides, rows.measures
+        )
+
+    def assemble(self, start: Handle[Starts], rows: Rows, outputs: AssemblyOutputs) -> bool:
+        """Assemble one row at `rows.actuators`; True on success."""
+        return self.prepared(start, self._scratch, rows, outputs)() == 0
+
+
+def new_scratch(mechanism: Mechanism, table: LegTable) -> NewtonScratch:
+    """Scratch memory of assembly."""
+    from ..kernels.platform.forward import new_newton_scratch
+
+    return new_newton_scratch(search_table(table).record, not mechanism.end_effector_is_joint)
+
+
+@lru_cache(maxsize=64)
+def scratch_of(mechanism: Mechanism, table: LegTable) -> Scratch[NewtonScratch]:
+    """Scratch memory of assembly, for each thread its own."""
+    return Scratch(new_scratch, mechanism, table)
+
+
+def _outputs(rows: Rows) -> tuple[NDArray[Any], ...]:
+    """The arrays that the kernel fills."""
+    return rows.status, rows.poses, rows.actuators, rows.measures
