@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from .answers.solution import Solution
 from .answers.starts import joint_vectors
 from .answers.status import Status
-from .closure.close import CLOSED, measured
+from .closure.close import CLOSED, measure_configurations
 from .description.mechanism import Mechanism
 from .engine import engine_of
 
@@ -31,8 +31,8 @@ def configuration(mechanism: Mechanism, q: ArrayLike) -> Solution:
     InvalidArgument : coordinates of the wrong shape, or not finite.
     """
     deviations, shape = joint_vectors(mechanism, q, "q")
-    closing = measured(mechanism, deviations)
-    found = engine_of(mechanism).at(closing)
+    closing = measure_configurations(mechanism, deviations)
+    found = engine_of(mechanism).as_configurations(closing)
     within = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
     found.rows.status[:] = np.where(closing.gap <= CLOSED, within, Status.FAILED)
     return Solution(mechanism, found, shape)

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .arrays import Floats
-from .closure.assemble import judged
-from .closure.close import measured
+from .closure.assemble import forward_answers
+from .closure.close import measure_configurations
 from .description.mechanism import Mechanism, checked_mechanism
 from .engine import engine_of
 from .errors import InvalidArgument, UnknownName
@@ -66,13 +66,15 @@ def solve_fk(
     first = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(known))
     asked = np.clip(values[known], -HORIZON, HORIZON)
     found = engine_of(mechanism).forward(asked, first, options.actuator_tolerance)
-    return Solution(mechanism, found.among(known), shape)
+    return Solution(mechanism, found.scatter(known), shape)
 
 
-def assembled(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:
+def solution_at(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:
     """Joint coordinates (n, columns) as the answer to actuated values (n, n_a): measured, not changed."""
-    closing = measured(mechanism, coordinates)
-    found = judged(mechanism, engine_of(mechanism).at(closing), closing, values, TOLERANCES.position)
+    closing = measure_configurations(mechanism, coordinates)
+    found = forward_answers(
+        mechanism, engine_of(mechanism).as_configurations(closing), closing, values, TOLERANCES.position
+    )
     return Solution(mechanism, found, (len(values),))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .answers.answer import Wanted
+from .answers.answer import PoseRequest
 from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .closure.configurations import Configurations
@@ -54,14 +54,14 @@ def solve_ik(
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
     if not is_missed:
         return Solution(mechanism, found, shape)
-    wanted = Wanted(targets.copy(), options.hold, options.rotation_length)
-    if begin is not None and isinstance(start, Solution) and start._wanted is not None:
-        found = _unless_nearer(mechanism, found, wanted, begin, start._wanted)
+    wanted = PoseRequest(targets.copy(), options.hold, options.rotation_length)
+    if begin is not None and isinstance(start, Solution) and start._request is not None:
+        found = _unless_nearer(mechanism, found, wanted, begin, start._request)
     return Solution(mechanism, found, shape, wanted)
 
 
 def _unless_nearer(
-    mechanism: Mechanism, found: Configurations, wanted: Wanted, start: Configurations, before: Wanted
+    mechanism: Mechanism, found: Configurations, wanted: PoseRequest, start: Configurations, before: PoseRequest
 ) -> Configurations:
     """What was found, with the start where that is the answer to the same target, and not farther: asked again, an
     answer stays as it is unless something nearer is found."""
@@ -80,7 +80,7 @@ def _unless_nearer(
     if not len(places):
         return found
     own = np.zeros(len(places), np.intp) if len(start) == 1 else places
-    return found.with_others(places, start.at(own))
+    return found.with_rows(places, start.at(own))
 
 
 def keeps_mode(options: Options, start: object) -> bool:

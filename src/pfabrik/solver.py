@@ -70,7 +70,7 @@ class Solver:
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))
         self.pose, self.actuators = _read_only(self._rows.poses[0]), _read_only(self._rows.actuators[0])
         self.status = Status.INVALID
-        self._found: Solution | None = None
+        self._solution: Solution | None = None
         self._was_forward = False
         self._clear()
 
@@ -88,7 +88,7 @@ class Solver:
         if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is DOUBLE:
             self._target[0] = target
             if self._reach is not None and not self._reach():
-                self._found, self._was_forward, self.status = None, False, Status.REACHED
+                self._solution, self._was_forward, self.status = None, False, Status.REACHED
                 return Status.REACHED
         asked = target.copy() if isinstance(target, np.ndarray) else target
         self._clear()
@@ -104,7 +104,7 @@ class Solver:
         if type(actuators) is np.ndarray and actuators.shape == self.actuators.shape and actuators.dtype is DOUBLE:
             self._rows.actuators[0] = actuators
             if self._assemble is not None and not self._assemble():
-                self._found, self._was_forward, self.status = None, True, Status.REACHED
+                self._solution, self._was_forward, self.status = None, True, Status.REACHED
                 return Status.REACHED
         asked = actuators.copy() if isinstance(actuators, np.ndarray) else actuators
         self._clear()
@@ -129,15 +129,15 @@ class Solver:
         ------
         InvalidArgument : there is none: nothing was asked, or the last question was refused.
         """
-        if self._found is None:
+        if self._solution is None:
             if self.status is Status.INVALID:
                 raise InvalidArgument("solution", "no answer", "a question before that is not refused")
             if self._was_forward:
                 asked = self._rows.actuators[0]
-                self._found = solve_fk(self.mechanism, asked, start=self._start, options=self.options)
+                self._solution = solve_fk(self.mechanism, asked, start=self._start, options=self.options)
             else:
-                self._found = solve_ik(self.mechanism, self._target[0], start=self._start, options=self.options)
-        return self._found
+                self._solution = solve_ik(self.mechanism, self._target[0], start=self._start, options=self.options)
+        return self._solution
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For copies and other processes: prepared anew, and not asked yet. Addresses lead nowhere there."""
@@ -152,12 +152,12 @@ class Solver:
             raise InvalidArgument(name, f"batch shape {found.shape}", "one at a time")
         rows = found._rows
         self._rows.poses[:], self._rows.actuators[:] = rows.poses, rows.actuators
-        self._found, self.status = found, Status(int(rows.status[0]))
+        self._solution, self.status = found, Status(int(rows.status[0]))
         return self.status
 
     def _clear(self) -> None:
         """Have no answer, until there is one."""
-        self._found, self.status = None, Status.INVALID
+        self._solution, self.status = None, Status.INVALID
         self._rows.poses[:], self._rows.actuators[:] = np.nan, np.nan
 
 

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .answers.answer import Wanted
+from .answers.answer import PoseRequest
 from .answers.starts import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track, pace_of
@@ -72,7 +72,7 @@ def track(
     if begin is not None:
         _count_on(mechanism, found.rows, begin.rows.actuators[0])
     refuse_invalid(poses, shape, found.rows.status, options)
-    wanted = Wanted(poses.copy(), options.hold, options.rotation_length)
+    wanted = PoseRequest(poses.copy(), options.hold, options.rotation_length)
     return Track(mechanism, found, wanted, partial(track, mechanism, options=options), pace)
 
 

@@ -301,7 +301,7 @@ class _Search:
         self._engine = engine_of(solution.mechanism)
         self._length = solution.mechanism.characteristic_length
         every = np.arange(len(self.directions))
-        start = solution._found.at(0 * every)
+        start = solution._configurations.at(0 * every)
         self.best = self._engine.advance(self._targets(every, np.zeros(len(every))), start)
 
     def run(self) -> Floats:
@@ -340,7 +340,7 @@ class _Search:
         """Whether poses so far out in some directions are reached; where they are, the next go on from them."""
         found = self._engine.advance(self._targets(which, distances), self.best.at(which))
         reached = np.asarray(found.rows.status == REACHED)
-        self.best.replace(which[reached], found, reached)
+        self.best.put(which[reached], found, reached)
         return reached
 
     def _targets(self, which: NDArray[np.intp], distances: Floats) -> Floats:

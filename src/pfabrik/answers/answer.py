@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, shaped
 from ..closure.configurations import Configurations
-from ..closure.projection import ways_of
+from ..closure.projection import projection_modes
 from ..description.mechanism import Mechanism
 from ..engine import engine_of
 from ..frozen import FrozenMapping
@@ -34,7 +34,7 @@ Held: TypeAlias = Literal["orientation", "position"] | None
 """What of its target a projected answer has."""
 
 
-class Wanted(NamedTuple):
+class PoseRequest(NamedTuple):
     """Poses that were asked for, (n, 4, 4), and how the distance from them counts; see `Options`."""
 
     targets: Floats
@@ -46,29 +46,29 @@ class Answer:
     """The fields of a `Solution`, which says what they are; what puts them into words or pictures reads these."""
 
     def __init__(
-        self, mechanism: Mechanism, found: Configurations, shape: tuple[int, ...], wanted: Wanted | None = None
+        self, mechanism: Mechanism, found: Configurations, shape: tuple[int, ...], wanted: PoseRequest | None = None
     ) -> None:
         """Wrap configurations, as many as the batch shape has; `wanted` are the poses asked for, if any are missed."""
         self.mechanism = mechanism
         self.shape = shape
-        self._found = found
-        self._wanted = wanted
+        self._configurations = found
+        self._request = wanted
 
-    def __getstate__(self) -> tuple[Mechanism, Configurations, tuple[int, ...], Wanted | None]:
+    def __getstate__(self) -> tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None]:
         """What an answer is made of; all else follows again where it is unpickled."""
-        return self.mechanism, self._found, self.shape, self._wanted
+        return self.mechanism, self._configurations, self.shape, self._request
 
-    def __setstate__(self, state: tuple[Mechanism, Configurations, tuple[int, ...], Wanted | None]) -> None:
+    def __setstate__(self, state: tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None]) -> None:
         Answer.__init__(self, *state)
 
     @property
     def _rows(self) -> Rows:
-        return self._found.rows
+        return self._configurations.rows
 
     @property
     def _coordinates(self) -> Floats:
         """All joint coordinates as deviations from home, row by row, (n, columns) [length or rad]."""
-        return self._found.coordinates
+        return self._configurations.coordinates
 
     def _shaped(self, array: NDArray[Any]) -> Any:
         return shaped(array, self.shape)
@@ -137,7 +137,7 @@ class Answer:
 
     @cached_property
     def points(self) -> Mapping[str, Floats]:
-        found = engine_of(self.mechanism).points(self._found)
+        found = engine_of(self.mechanism).points(self._configurations)
         order = [joint.name for joint in self.mechanism.joints if joint.name in found]
         unknown = (self._rows.status == Status.INVALID)[:, None]
         return FrozenMapping({name: self._shaped(np.where(unknown, np.nan, found[name])) for name in order})
@@ -152,14 +152,14 @@ class Answer:
         """The same as a list of rows, also of a single answer."""
         status = self._rows.status
         held: list[tuple[ActiveLimit, ...]] = [()] * len(status)
-        is_asked = (status == Status.PROJECTED) & (self._wanted is not None)
+        is_asked = (status == Status.PROJECTED) & (self._request is not None)
         others = np.flatnonzero((status != Status.REACHED) & (status != Status.INVALID) & ~is_asked)
         if len(others):
             for row, found in zip(others, active_limits(self.mechanism, self._coordinates[others]), strict=True):
                 held[row] = found
         projected = np.flatnonzero(is_asked)
-        if self._wanted is not None and len(projected):
-            for row, found in zip(projected, self._holding(self._wanted, projected), strict=True):
+        if self._request is not None and len(projected):
+            for row, found in zip(projected, self._holding(self._request, projected), strict=True):
                 held[row] = found
         return held
 
@@ -172,18 +172,18 @@ class Answer:
         """
         return binding_limits(self._limits).reshape(self.shape)
 
-    def _holding(self, wanted: Wanted, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
+    def _holding(self, wanted: PoseRequest, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
         """The limits that hold projected rows back from the poses that were asked for."""
         found: dict[int, tuple[ActiveLimit, ...]] = {}
         engine = engine_of(self.mechanism)
         holds, ways = (
             self._rows.holds[projected],
-            ways_of(self.mechanism, wanted.hold, wanted.rotation_length),
+            projection_modes(self.mechanism, wanted.hold, wanted.rotation_length),
         )
         for way in ways:
             rows = projected[holds == way.hold]
             if len(rows):
-                weights = engine.weighed_limits(self._found.at(rows), wanted.targets[rows], way)
+                weights = engine.limit_multipliers(self._configurations.at(rows), wanted.targets[rows], way)
                 limits = holding_limits(self.mechanism, self._told_of(rows, weights), weights)
                 found.update(zip(rows.tolist(), limits, strict=True))
         return [found[row] for row in projected.tolist()]

@@ -72,7 +72,7 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
 
     Parameters
     ----------
-    multipliers : (n, 2 columns + cones), as of `weighed_limits`.
+    multipliers : (n, 2 columns + cones), as of `limit_multipliers`.
     """
     found: list[list[ActiveLimit]] = [[] for _ in coordinates]
     n, units = coordinates.shape[1], rate_units(mechanism)

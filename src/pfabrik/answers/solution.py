@@ -71,7 +71,7 @@ class Solution(Answer):
         sentence = as_sentence(self)
         return (
             "; ".join([*given_up(self), *causes(self)])
-            if self.status == Status.PROJECTED and self._wanted
+            if self.status == Status.PROJECTED and self._request
             else sentence
         )
 
@@ -88,10 +88,10 @@ class Solution(Answer):
         """The answer at `index` of the batch axes; NumPy's rules for integers, slices and arrays."""
         if self.shape == ():
             raise TypeError("the answer to one target cannot be indexed")
-        chosen = np.arange(len(self._found)).reshape(self.shape)[cast(Any, index)]
+        chosen = np.arange(len(self._configurations)).reshape(self.shape)[cast(Any, index)]
         places = np.ravel(chosen)
-        wanted = None if self._wanted is None else self._wanted._replace(targets=self._wanted.targets[places])
-        return Solution(self.mechanism, self._found.at(places), np.shape(chosen), wanted)
+        wanted = None if self._request is None else self._request._replace(targets=self._request.targets[places])
+        return Solution(self.mechanism, self._configurations.at(places), np.shape(chosen), wanted)
 
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..closure.close import measured
+from ..closure.close import measure_configurations
 from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism, checked_mechanism, told_apart
 from ..engine import engine_of
@@ -35,14 +35,14 @@ def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) 
     if not isinstance(start, Solution):
         deviations, own = joint_vectors(mechanism, start, "start")
         _require_shape(own, shape)
-        return engine_of(mechanism).at(measured(mechanism, deviations))
+        return engine_of(mechanism).as_configurations(measure_configurations(mechanism, deviations))
     if start.mechanism != mechanism:
         found = f"an answer of {told_apart(start.mechanism, mechanism)}"
         raise InvalidArgument("start", found, f"one of '{mechanism.name}' itself, or joint coordinates")
     if np.count_nonzero(start._rows.status >= FAILED):
         raise InvalidArgument("start", "an answer that is FAILED or INVALID", "a feasible configuration")
     _require_shape(start.shape, shape)
-    return start._found
+    return start._configurations
 
 
 def joint_vectors(mechanism: Mechanism, q: ArrayLike, name: str) -> tuple[Floats, tuple[int, ...]]:

@@ -18,7 +18,7 @@ from ..errors import InvalidArgument
 from ..motion.displacements import actuator_units
 from ..poses import as_floats, between
 from ..tolerances import TOLERANCES
-from .answer import Wanted
+from .answer import PoseRequest
 from .limits import ActiveLimit
 from .solution import Solution, as_plain
 from .status import Status
@@ -74,7 +74,7 @@ class Track(Solution):
         self,
         mechanism: Mechanism,
         found: Configurations,
-        wanted: Wanted,
+        wanted: PoseRequest,
         follow: Callable[..., Solution],
         pace: Pace | None,
     ) -> None:
@@ -118,8 +118,8 @@ class Track(Solution):
 
     @property
     def targets(self) -> Floats:
-        assert self._wanted is not None
-        return self._wanted.targets
+        assert self._request is not None
+        return self._request.targets
 
     @property
     def times(self) -> Floats | None:

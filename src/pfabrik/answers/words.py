@@ -55,13 +55,13 @@ def causes(answer: Answer) -> list[str]:
 
 def given_up(answer: Answer) -> list[str]:
     """What a projected answer was to hold of its target and does not: one phrase, or none."""
-    from ..closure.projection import ways_of
+    from ..closure.projection import projection_modes
     from ..kernels.rows import HOLD_NOTHING
 
-    wanted = answer._wanted
+    wanted = answer._request
     if wanted is None or answer.held is not None:
         return []
-    first, *_ = ways_of(answer.mechanism, wanted.hold, wanted.rotation_length)
+    first, *_ = projection_modes(answer.mechanism, wanted.hold, wanted.rotation_length)
     if first.hold == HOLD_NOTHING:
         return []
     other = "position" if wanted.hold == "orientation" else "orientation"
@@ -86,7 +86,7 @@ def missed(answer: Answer) -> tuple[bool, bool]:
 
     Of a rotation that is missed, only the first is said.
     """
-    mechanism, wanted = answer.mechanism, answer._wanted
+    mechanism, wanted = answer.mechanism, answer._request
     if wanted is None or answer.rotation_error > TOLERANCES.rotation:
         return True, False
     axes = [axis in mechanism.task for axis in "xyz"]

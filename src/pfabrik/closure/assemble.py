@@ -66,7 +66,7 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, seede
         for attempt in attempts if seeded else [*attempts, _scattered]:
             rest = np.flatnonzero(~best.feasible)
             if len(rest):
-                best.improve(rest, attempt(closure, coordinates[rest], poses[rest], values[rest]))
+                best.put_better(rest, attempt(closure, coordinates[rest], poses[rest], values[rest]))
     rest = np.flatnonzero(~best.feasible)
     if not len(rest):
         return best
@@ -88,9 +88,9 @@ def _assemble_elsewhere(closure: Closure, best: Closing, rows: NDArray[np.intp],
     tried = _locked(closure, *home, values)
     missed = np.flatnonzero(~tried.feasible)
     if len(missed):
-        tried.improve(missed, _scattered(closure, home[0][missed], poses[missed], values[missed]))
+        tried.put_better(missed, _scattered(closure, home[0][missed], poses[missed], values[missed]))
     reached = np.flatnonzero(tried.feasible)
-    best.take(rows[reached], tried, reached)
+    best.put(rows[reached], tried, reached)
 
 
 @lru_cache(maxsize=64)
@@ -128,7 +128,7 @@ def _scattered(closure: Closure, coordinates: Floats, poses: Floats, values: Flo
         equal = np.abs(tried_off - off) <= SAME * off
         better = np.flatnonzero(np.where(equal, distance < from_start, tried_off < off))
         off[better], from_start[better] = tried_off[better], distance[better]
-        best.take(better, tried, better)
+        best.put(better, tried, better)
     return best
 
 
@@ -170,7 +170,7 @@ def _project(
         tried = nearest_actuators(closure, start[0][waiting], start[1][waiting], asked, steps)
         _take_nearer(closure, found, distance, waiting, tried, values)
     feasible = np.flatnonzero(found.feasible)
-    best.take(rest[feasible], found, feasible)
+    best.put(rest[feasible], found, feasible)
 
 
 def _newton_ends(closure: Closure, values: Floats) -> Iterator[tuple[Floats, Floats]]:
@@ -187,7 +187,7 @@ def _take_nearer(
     errors = np.linalg.norm(actuator_errors(closure, tried.coordinates, values[rows]), axis=1)
     better = np.flatnonzero(tried.feasible & (errors < (1.0 - SAME) * distance[rows]))
     distance[rows[better]] = errors[better]
-    found.take(rows[better], tried, better)
+    found.put(rows[better], tried, better)
 
 
 def _within_sight(closure: Closure, coordinates: Floats, values: Floats) -> Floats:
@@ -203,7 +203,7 @@ def actuator_errors(closure: Closure, coordinates: Floats, values: Floats) -> Fl
     return np.asarray(off * closure.scale[closure.actuated])
 
 
-def judged(
+def forward_answers(
     mechanism: Mechanism, found: Configurations, closing: Closing, values: Floats, tolerance: float
 ) -> Configurations:
     """Configurations as answers to actuated values (n, n_a): which are what was asked for, and which are feasible."""

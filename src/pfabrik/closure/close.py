@@ -173,12 +173,12 @@ class Closing(NamedTuple):
         """What keeps each group of each row from being feasible: its gap or its excess, (n, groups) [L or rad]."""
         return np.maximum(self.gaps, self.excesses)
 
-    def improve(self, places: NDArray[np.intp], tried: Closing) -> None:
+    def put_better(self, places: NDArray[np.intp], tried: Closing) -> None:
         """Put rows of another search in these places where they are feasible, or less far from it."""
         better = np.flatnonzero(tried.feasible | (tried.off.max(axis=1) < self.off[places].max(axis=1)))
-        self.take(places[better], tried, better)
+        self.put(places[better], tried, better)
 
-    def take(self, places: NDArray[np.intp], found: Closing, rows: Any = slice(None)) -> None:
+    def put(self, places: NDArray[np.intp], found: Closing, rows: Any = slice(None)) -> None:
         """Put rows of another search in some places of this one."""
         for array, own in zip(self, found, strict=True):
             array[places] = own[rows]
@@ -195,7 +195,7 @@ def close(
     centres: Floats | None = None,
     limits: bool = False,
     margin: float = 0.0,
-    plunging: bool = False,
+    undamped: bool = False,
     closeness: float = 1e-13,
     max_iterations: int = 100,
 ) -> Closing:
@@ -210,7 +210,7 @@ def close(
         which the third yaws; one of `K.BASE_AXES`, `K.TARGET_AXES`, `K.HALF_WAY`.
     centres : wished joint centres, (n, joints, 3); NaN for none.
     limits : keep all limits too, by `margin` inside.
-    plunging : undamped steps, up and down: finds more of many solutions, but not the nearest.
+    undamped : undamped steps, up and down: finds more of many solutions, but not the nearest.
     max_iterations : with 0 configurations are measured as they are.
     closeness : largest gap, excess and miss that ends the search [L or rad].
     """
@@ -226,7 +226,7 @@ def close(
         limits=int(limits),
         margin=margin,
         balls_follow=int(follow),
-        plunging=int(plunging),
+        undamped=int(undamped),
         closeness=closeness,
         max_iterations=max_iterations,
     )
@@ -247,7 +247,7 @@ def closing_of(closure: Closure, closed: K.Closed) -> Closing:
     return Closing(closed.coordinates / closure.scale, poses, *closed[2:])
 
 
-def measured(mechanism: Mechanism, coordinates: Floats) -> Closing:
+def measure_configurations(mechanism: Mechanism, coordinates: Floats) -> Closing:
     """Joint coordinates (n, columns), deviations from home, as they are: their loop gaps and limit excesses."""
     return close(closure_of(mechanism), coordinates, platform_poses(mechanism, coordinates), max_iterations=0)
 

@@ -116,20 +116,20 @@ class Configurations:
             return Configurations(rows, self.coordinates[places])
         return Configurations(rows, lambda own: self.coordinates_at(places[own]))
 
-    def with_others(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
+    def with_rows(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
         """These configurations with as many others at some places."""
         rows, coordinates = rows_at(self.rows, np.arange(len(self))), self.coordinates.copy()
         put_rows(rows, places, others.rows)
         coordinates[places] = others.coordinates
         return Configurations(rows, coordinates)
 
-    def replace(self, places: NDArray[np.intp], others: Configurations, rows: Mask) -> None:
+    def put(self, places: NDArray[np.intp], others: Configurations, rows: Mask) -> None:
         """Put some rows of other configurations in some places, in place."""
         put_rows(self.rows, places, rows_at(others.rows, rows))
         if self.were_given:
             self.coordinates[places] = others.coordinates[rows]
 
-    def among(self, known: Mask) -> Configurations:
+    def scatter(self, known: Mask) -> Configurations:
         """As many rows as `known` has, with these configurations where it is true, INVALID and NaN elsewhere."""
         if known.all():
             return self

@@ -80,7 +80,7 @@ def _ended(closure: Closure, coordinates: Floats, objective: Objective) -> Closi
     return closing_of(closure, _run(closure, coordinates, objective)[0])
 
 
-def weighed_limits(
+def limit_multipliers(
     closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
 ) -> Floats:
     """How hard every limit holds configurations back from their targets: multipliers, (n, 2 columns + cones).
@@ -89,11 +89,11 @@ def weighed_limits(
     per unit [L or rad] by which a limit gives way; 0 for limits that do not matter.
     """
     return _run(
-        closure, coordinates, _objective(closure, within_sight(closure.mechanism, targets), platform, frame, 0)
+        closure, coordinates, _objective(closure, clip_targets(closure.mechanism, targets), platform, frame, 0)
     )[1]
 
 
-def within_sight(mechanism: Mechanism, targets: Floats) -> Floats:
+def clip_targets(mechanism: Mechanism, targets: Floats) -> Floats:
     """Targets (n, 4, 4), those so far from home that no search could tell them from others there brought nearer."""
     home, far = mechanism.home_pose[:3, 3], SIGHT * mechanism.characteristic_length
     near, offset = targets.copy(), targets[:, :3, 3] - home

@@ -63,7 +63,7 @@ def has_parasitic_motion(mechanism: Mechanism) -> bool:
     return bool((differences(closure_of(mechanism), poses, kept) > TOLERANCES.same_mode).any())
 
 
-def strays(mechanism: Mechanism, poses: Floats) -> Mask:
+def is_flipped(mechanism: Mechanism, poses: Floats) -> Mask:
     """Whether poses (n, 4, 4) are those of a platform that has turned over though its legs keep it as it is, (n,)."""
     if not follows_task(mechanism) or has_parasitic_motion(mechanism):
         return np.zeros(len(poses), bool)

@@ -17,10 +17,10 @@ from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of, platform_poses
-from .descend import MOST_STEPS, nearest_configurations, weighed_limits
+from .descend import MOST_STEPS, limit_multipliers, nearest_configurations
 from .effort import descents_within
-from .known import SEEDS, seeds_of
-from .parasitic import strays
+from .multistart import SEEDS, seeds_of
+from .parasitic import is_flipped
 
 SAME = 1e-7
 """Share by which a later start must come nearer to be preferred to an earlier one."""
@@ -37,7 +37,7 @@ DRAGGED = 1.0
 part differs at the start [L per rad, or rad per L]: a turn about the middle of a machine moves no joint by more."""
 
 
-class Way(NamedTuple):
+class ProjectionMode(NamedTuple):
     """A way to project: weights of the platform's position [L] and rotation [rad], and what of them is held."""
 
     weights: Weights
@@ -77,25 +77,27 @@ class Projected(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def ways_of(mechanism: Mechanism, hold: str | None, rotation_length: float | None) -> tuple[Way, ...]:
+def projection_modes(
+    mechanism: Mechanism, hold: str | None, rotation_length: float | None
+) -> tuple[ProjectionMode, ...]:
     """The ways to project, in the order in which they are tried: what is to be held, then everything free."""
     task = task_of(mechanism)
     turning = ((rotation_length or mechanism.rotation_length) / mechanism.characteristic_length) ** 2
-    free = Way(task.weights(1.0, turning), HOLD_NOTHING)
+    free = ProjectionMode(task.weights(1.0, turning), HOLD_NOTHING)
     if hold is None or not any(task.axes) or task.rotations == 0:
         return (free,)  # nothing is to be held, or nothing else could give way
     if hold == "orientation":
-        return Way(task.weights(1.0, LOCKED), HOLD_ORIENTATION), free
-    return Way(task.weights(LOCKED, turning), HOLD_POSITION), free
+        return ProjectionMode(task.weights(1.0, LOCKED), HOLD_ORIENTATION), free
+    return ProjectionMode(task.weights(LOCKED, turning), HOLD_POSITION), free
 
 
-def held_back(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: Way) -> Floats:
-    """How hard every limit holds projected configurations (n, columns) back from targets: see `weighed_limits`."""
+def projection_multipliers(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: ProjectionMode) -> Floats:
+    """How hard every limit holds projected configurations (n, columns) back from targets: see `limit_multipliers`."""
     closure, frame = closure_of(mechanism), task_of(mechanism).frame
-    return weighed_limits(closure, coordinates, targets, platform=way.weights, frame=frame)
+    return limit_multipliers(closure, coordinates, targets, platform=way.weights, frame=frame)
 
 
-def kept(mechanism: Mechanism, holds: Ints, position: Floats, rotation: Floats) -> Ints:
+def held_parts(mechanism: Mechanism, holds: Ints, position: Floats, rotation: Floats) -> Ints:
     """What poses have of their targets, of what they were to hold, by how far they are: targets out of sight were not
     sought."""
     turned = (holds == HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
@@ -104,7 +106,7 @@ def kept(mechanism: Mechanism, holds: Ints, position: Floats, rotation: Floats) 
 
 
 def project(
-    closure: Closure, targets: Floats, starts: Sequence[Floats], ways: Sequence[Way], *, seeds: bool
+    closure: Closure, targets: Floats, starts: Sequence[Floats], ways: Sequence[ProjectionMode], *, seeds: bool
 ) -> Projected:
     """The nearest feasible configurations that local searches from several starts find.
 
@@ -158,7 +160,7 @@ def _at_rest(closure: Closure, coordinates: Floats) -> Closing:
     return close(closure, coordinates, platform_poses(closure.mechanism, coordinates), max_iterations=0)
 
 
-def _nearest_at_rest(closure: Closure, targets: Floats, starts: Sequence[Floats], way: Way) -> Floats:
+def _nearest_at_rest(closure: Closure, targets: Floats, starts: Sequence[Floats], way: ProjectionMode) -> Floats:
     """The starts that are nearest to targets once they are closed within limits, row by row; the first where none is.
 
     There is no time to search from each of them.
@@ -172,7 +174,9 @@ def _nearest_at_rest(closure: Closure, targets: Floats, starts: Sequence[Floats]
     return best.closing.coordinates
 
 
-def _let_go(closure: Closure, best: Projected, targets: Floats, starts: Sequence[Floats], ways: Sequence[Way]) -> None:
+def _let_go(
+    closure: Closure, best: Projected, targets: Floats, starts: Sequence[Floats], ways: Sequence[ProjectionMode]
+) -> None:
     """Hold nothing where what was held leads farther from targets than the start is, and nothing held does not."""
     begun = platform_poses(closure.mechanism, starts[0])
     far = np.flatnonzero((best.holds == ways[0].hold) & ways[0].is_too_far(closure, best.distances, begun, targets))
@@ -180,7 +184,7 @@ def _let_go(closure: Closure, best: Projected, targets: Floats, starts: Sequence
         return
     other = project(closure, targets[far], [start[far] for start in starts], ways[-1:], seeds=False)
     nearer = other.distances <= (1.0 + SAME) * ways[-1].distances(closure, begun[far], targets[far])
-    best.closing.take(far[nearer], other.closing, nearer)
+    best.closing.put(far[nearer], other.closing, nearer)
     best.distances[far[nearer]], best.holds[far[nearer]] = other.distances[nearer], other.holds[nearer]
 
 
@@ -190,21 +194,21 @@ def _take_nearer(
     rows: NDArray[np.intp],
     found: Closing,
     targets: Floats,
-    way: Way,
+    way: ProjectionMode,
     agreements: Ints,
 ) -> Ints:
     """Take over the rows that are feasible, and nearer than the best so far; how often each best was found by now."""
-    counts = found.feasible & ~strays(closure.mechanism, found.poses)
+    counts = found.feasible & ~is_flipped(closure.mechanism, found.poses)
     distances = np.where(counts, way.distances(closure, found.poses, targets[rows]), np.inf)
     least = best.distances[rows]
     better = distances < (1.0 - SAME) * least
     again = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)
     best.distances[rows[better]], best.holds[rows[better]] = distances[better], way.hold
-    best.closing.take(rows[better], found, better)
+    best.closing.put(rows[better], found, better)
     return np.where(better, 1, agreements + again)
 
 
-def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Floats:
+def _placed(closure: Closure, start: Floats, targets: Floats, way: ProjectionMode) -> Floats:
     """Joint coordinates with the end effector put as it is to be held, and the loops closed on it.
 
     A search from there finds what is held where no short way leads to it.

@@ -18,8 +18,8 @@ from ..motion.limits import within_turns
 from ..options import Options
 from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
-from .assemble import assemble, judged
-from .close import HELD, Closing, Closure, close, closure_of, measured, platform_poses
+from .assemble import assemble, forward_answers
+from .close import HELD, Closing, Closure, close, closure_of, measure_configurations, platform_poses
 from .configurations import (
     Configurations,
     coordinates_for,
@@ -29,11 +29,11 @@ from .configurations import (
     steps_of,
     write_closing,
 )
-from .descend import within_sight
+from .descend import clip_targets
 from .effort import starts_within, steps_within, stride_within
-from .known import random_feasible
+from .multistart import random_feasible
 from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
-from .projection import Way, held_back, kept, project, ways_of
+from .projection import ProjectionMode, held_parts, project, projection_modes, projection_multipliers
 from .starts import random_coordinates
 from .stretched import Bends
 
@@ -71,9 +71,9 @@ class ClosureEngine:
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        known, begin = are_poses(targets), begin_of(self.mechanism, start)
+        known, begin = are_poses(targets), start_coordinates(self.mechanism, start)
         begin = begin[known] if len(begin) > 1 else np.repeat(begin, known.sum(), axis=0)
-        return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode).among(known)
+        return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode).scatter(known)
 
     def follow(
         self,
@@ -83,7 +83,7 @@ class ClosureEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        known, begin = are_poses(targets), begin_of(self.mechanism, start)
+        known, begin = are_poses(targets), start_coordinates(self.mechanism, start)
         found = [np.zeros((0, begin.shape[1]))]
         rows, bends = new_rows(self.mechanism, int(known.sum())), Bends(self.mechanism, options)
         for i in steps_of(known, on_progress):
@@ -91,7 +91,7 @@ class ClosureEngine:
             put_rows(rows, slice(len(found) - 1, len(found)), answer.rows)
             begin = answer.coordinates
             found.append(begin)
-        return Configurations(rows, np.concatenate(found)).among(known)
+        return Configurations(rows, np.concatenate(found)).scatter(known)
 
     def _follow_one(self, target: Floats, begin: Floats, options: Options, bends: Bends) -> Configurations:
         answer = _answer(self._closure, target, begin, options, keep_mode=True)
@@ -130,7 +130,7 @@ class ClosureEngine:
         rows.status[:] = np.where(found.feasible & ~leapt, REACHED, FAILED)
         return Configurations(rows, found.coordinates)
 
-    def at(self, closing: Closing) -> Configurations:
+    def as_configurations(self, closing: Closing) -> Configurations:
         """Configurations found elsewhere, as answers whose status is still to be told."""
         rows = new_rows(self.mechanism, len(closing.poses))
         write_closing(self._closure, closing, rows)
@@ -140,28 +140,28 @@ class ClosureEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         return centres(self.mechanism, found.coordinates)
 
-    def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
+    def limit_multipliers(self, found: Configurations, targets: Floats, way: ProjectionMode) -> Floats:
         """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""
-        return held_back(self.mechanism, found.coordinates, targets, way)
+        return projection_multipliers(self.mechanism, found.coordinates, targets, way)
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
         coordinates = coordinates_for(self.mechanism, start, len(values))
         closing = assemble(self.mechanism, coordinates, values, seeded=start is not None)
-        return judged(self.mechanism, self.at(closing), closing, values, tolerance)
+        return forward_answers(self.mechanism, self.as_configurations(closing), closing, values, tolerance)
 
 
-def begin_of(mechanism: Mechanism, start: Configurations | None) -> Floats:
+def start_coordinates(mechanism: Mechanism, start: Configurations | None) -> Floats:
     """Joint coordinates to start from, (n, columns) or (1, columns); loops beside the way to the end effector, which
     will rest, are closed."""
     begin = joint_coordinates(mechanism, start)
     if not _has_loops_aside(mechanism):
         return begin
-    present = measured(mechanism, begin)
+    present = measure_configurations(mechanism, begin)
     away = np.flatnonzero(~present.feasible)
     if len(away):
         closure, poses = closure_of(mechanism), present.poses[away]
-        present.take(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=TOLERANCES.inside))
+        present.put(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=TOLERANCES.inside))
     return present.coordinates
 
 
@@ -174,21 +174,27 @@ def _answer(closure: Closure, wanted: Floats, start: Floats, options: Options, k
     if len(away):
         stays = keep_mode or follows_task(mechanism)
         starts = [start[away]] if stays else [start[away], found.coordinates[away]]
-        sought = within_sight(mechanism, wanted[away])
+        sought = clip_targets(mechanism, wanted[away])
         answers = project(
-            closure, sought, starts, ways_of(mechanism, options.hold, options.rotation_length), seeds=not keep_mode
+            closure,
+            sought,
+            starts,
+            projection_modes(mechanism, options.hold, options.rotation_length),
+            seeds=not keep_mode,
         )
-        holds[away] = kept(mechanism, answers.holds, *task_of(mechanism).errors(answers.closing.poses, wanted[away]))
-        found.take(away, answers.closing)
-    return told(closure, found, wanted, holds, options)
+        holds[away] = held_parts(
+            mechanism, answers.holds, *task_of(mechanism).errors(answers.closing.poses, wanted[away])
+        )
+        found.put(away, answers.closing)
+    return to_answers(closure, found, wanted, holds, options)
 
 
-def told(closure: Closure, found: Closing, wanted: Floats, holds: Ints, options: Options) -> Configurations:
+def to_answers(closure: Closure, found: Closing, wanted: Floats, holds: Ints, options: Options) -> Configurations:
     """Configurations found for poses (n, 4, 4), as answers: with what they hold, their errors, and their status."""
     mechanism = closure.mechanism
     within_turns(mechanism, found.coordinates)
     if _has_loops_aside(mechanism):
-        found = measured(mechanism, found.coordinates)._replace(iterations=found.iterations)
+        found = measure_configurations(mechanism, found.coordinates)._replace(iterations=found.iterations)
     rows = new_rows(mechanism, len(wanted))
     write_closing(closure, found, rows)
     position, rotation = task_of(mechanism).errors(rows.poses, wanted)
@@ -223,7 +229,7 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
         strayed |= _distances(closure, begin, wanted) > STRIDE
     rest = np.flatnonzero(strayed)
     if len(rest):
-        found.improve(rest, _led(closure, wanted[rest], start[rest], begin[rest], held, limits=True))
+        found.put_better(rest, _led(closure, wanted[rest], start[rest], begin[rest], held, limits=True))
     elif len(rows) == len(targets):
         return found
     if not keep_mode:
@@ -254,7 +260,7 @@ def _start_nearby(closure: Closure, found: Closing, targets: Floats, held: Weigh
         rows, places = rest[waiting], places[waiting]
         start = np.where(closure.idle, found.coordinates[rows], coordinates[places])
         wanted = task.completed(targets[rows], poses[places])
-        found.improve(rows, _close_below(closure, start, wanted, held, STEPS))
+        found.put_better(rows, _close_below(closure, start, wanted, held, STEPS))
 
 
 def _search(
@@ -277,7 +283,7 @@ def _search(
             agreements[rest] = _agreements(found.off[rest], tried.off, agreements[rest])
             _take_legs(closure, found, rest, tried)
         else:
-            found.improve(rest, tried)
+            found.put_better(rest, tried)
 
 
 def _agreements(best: Floats, tried: Floats, agreements: Ints) -> Ints:
@@ -299,7 +305,7 @@ def _assembled(closure: Closure, wanted: Floats, start: Floats, begin: Floats) -
     found = close(closure, start, wanted, platform=task.held, frame=task.frame)
     strange = np.flatnonzero((found.gap > TOLERANCES.position) | (differences(closure, found.poses, wanted) > STRANGE))
     if len(strange):
-        found.take(strange, _led(closure, wanted[strange], start[strange], begin[strange], task.held, limits=False))
+        found.put(strange, _led(closure, wanted[strange], start[strange], begin[strange], task.held, limits=False))
     return found
 
 

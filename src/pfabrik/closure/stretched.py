@@ -9,7 +9,7 @@ from ..options import Options
 from .close import closure_of
 from .first_order import are_stretched
 from .parasitic import differences
-from .projection import SAME, ways_of
+from .projection import SAME, projection_modes
 
 SAME_POSE = 1e-7
 """Largest difference of poses that are the same to a search for the nearest [L and entries of rotations]."""
@@ -28,7 +28,7 @@ class Bends:
 
     def __init__(self, mechanism: Mechanism, options: Options) -> None:
         self._mechanism = mechanism
-        self._ways = ways_of(mechanism, options.hold, options.rotation_length)
+        self._ways = projection_modes(mechanism, options.hold, options.rotation_length)
         self.before: Floats | None = None
 
     def note(self, status: int, start: Floats, found: Floats) -> None:

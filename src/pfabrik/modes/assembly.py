@@ -11,7 +11,7 @@ from ..closure.close import Closing, Closure, close, closure_of, platform_poses
 from ..closure.starts import random_starts
 from ..description.mechanism import Mechanism
 from ..errors import ContinuumOfSolutions, InvalidArgument
-from ..fk import Actuators, as_values, assembled
+from ..fk import Actuators, as_values, solution_at
 from ..motion.walks import stepped_freely
 from ..tolerances import TOLERANCES
 from .fingerprints import pose_marks
@@ -50,13 +50,13 @@ def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: i
     most_starts = as_count("most_starts", most_starts, 1)
     search = _Search(closure_of(mechanism), values)
     while search.starts < most_starts and not search.is_done:
-        search.go_on(BATCH)
+        search.add_starts(BATCH)
     order = np.argsort(search.from_home, kind="stable")
     coordinates = np.zeros((len(order), len(search.closure.scale)))
     for row, place in enumerate(order):
         coordinates[row] = search.found.coordinates[place]
     polished = close(search.closure, coordinates, platform_poses(mechanism, coordinates), locked=search.locked)
-    modes = assembled(mechanism, polished.coordinates, np.repeat(values, len(order), axis=0))
+    modes = solution_at(mechanism, polished.coordinates, np.repeat(values, len(order), axis=0))
     return AssemblyModes(tuple(modes), tuple(search.found.hits[place] for place in order), search.starts)
 
 
@@ -81,7 +81,7 @@ class _Search:
         home = self._marks(self.closure.mechanism.home_pose[None])
         return np.asarray(np.linalg.norm(np.reshape(self.found.marks, (-1, home.size)) - home, axis=1))
 
-    def go_on(self, n: int) -> None:
+    def add_starts(self, n: int) -> None:
         """Try n more starts."""
         coordinates, poses = random_starts(self.closure, n, self.rng)
         if self.starts == 0:
@@ -89,7 +89,7 @@ class _Search:
         self.starts += n
         self.closure.put_actuators(coordinates, np.repeat(self.values, n, axis=0))
         found = close(
-            self.closure, coordinates, poses, locked=self.locked, plunging=True, closeness=1e-11, max_iterations=STEPS
+            self.closure, coordinates, poses, locked=self.locked, undamped=True, closeness=1e-11, max_iterations=STEPS
         )
         self._sort(close(self.closure, found.coordinates, found.poses, locked=self.locked, max_iterations=4))
 

@@ -74,7 +74,7 @@ class BranchSearch:
         least = LEAST_STARTS_OF_LEGS if self.task.is_whole_pose else LEAST_STARTS
         return self.starts >= least and all(each.are_well_known for each in every)
 
-    def go_on(self, n: int) -> None:
+    def add_starts(self, n: int) -> None:
         """Try n more starts."""
         coordinates, begin = random_starts(self.closure, n, self.rng)
         if self.starts == 0:

@@ -76,7 +76,7 @@ def working_modes(mechanism: Mechanism, target: Target, *, most_starts: int = 40
     most_starts, most = as_count("most_starts", most_starts, 1), as_count("most", most, 0)
     search = BranchSearch(closure_of(mechanism), pose)
     while search.starts < most_starts and not search.is_done:
-        search.go_on(BATCH)
+        search.add_starts(BATCH)
     listed = search.listed(most)
     branches = tuple(tuple(tuple(leg.hits) for leg in legs) for legs in search.legs)
     return WorkingModes(tuple(_answered(mechanism, pose, listed)), listed.hits, search.starts, branches)
@@ -96,7 +96,7 @@ def _as_pose(mechanism: Mechanism, target: Target) -> Floats:
 def _answered(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
     """Configurations as answers to one target: measured, not changed."""
     closing = close(closure_of(mechanism), listed.coordinates, listed.poses, max_iterations=0)
-    found = engine_of(mechanism).at(closing)
+    found = engine_of(mechanism).as_configurations(closing)
     rows, n = found.rows, len(found)
     if mechanism.end_effector_is_joint:
         rows.poses[:, :3, :3] = target[:3, :3]

@@ -53,10 +53,10 @@ class LegAnswers(Configurations):
         q_proximal = None if self.q_proximal is None else self.q_proximal[places]
         return LegAnswers(rows, lambda own: self.coordinates_at(places[own]), self.sides[places], q_proximal)
 
-    def with_others(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
+    def with_rows(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
         """These configurations with as many others at some places; coordinates stay to be found where they are."""
         if not isinstance(others, LegAnswers):
-            return super().with_others(places, others)
+            return super().with_rows(places, others)
         rows, sides = rows_at(self.rows, np.arange(len(self))), self.sides.copy()
         put_rows(rows, places, others.rows)
         sides[places] = others.sides

@@ -69,7 +69,7 @@ def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, found: Float
         closure.put_actuators(elsewhere, actuators[rest])
         tried = close(closure, elsewhere, poses[rest], locked=locked, platform=platform)
         better = tried.gap < closing.gap[rest]
-        closing.take(rest[better], tried, better)
+        closing.put(rest[better], tried, better)
     return closing.coordinates
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Records
 from ..closure.close import closure_of, in_lengths
-from ..closure.projection import SAME, Way, ways_of
+from ..closure.projection import SAME, ProjectionMode, projection_modes
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
@@ -75,7 +75,7 @@ class Asked(NamedTuple):
 
     mechanism: Mechanism
     length: float
-    ways: tuple[Way, ...]
+    ways: tuple[ProjectionMode, ...]
     searches: tuple[NearestPose, ...]
     otherwise: NearestPose | None  # another way, where legs reach only what they complete step by step
 
@@ -96,9 +96,9 @@ def _asked(
     settings = {"steps": MOST_STEPS, "stays": int(stays), "rotation": rotation_tolerance}
     settings["position"] = tolerance or TOLERANCES.position * length
     starts = seeds_of(mechanism) if seeds else no_starts(table)
-    ways = ways_of(mechanism, hold, rotation_length)
+    ways = projection_modes(mechanism, hold, rotation_length)
     searches = tuple(_search(mechanism, table, way, settings, starts) for way in ways)
-    holding = ways_of(mechanism, "orientation", rotation_length)
+    holding = projection_modes(mechanism, "orientation", rotation_length)
     otherwise = None
     if table.is_completed and len(holding) > 1:
         otherwise = searches[-1] if len(ways) > 1 else _search(mechanism, table, holding[0], settings, starts)
@@ -106,7 +106,7 @@ def _asked(
 
 
 def _search(
-    mechanism: Mechanism, table: LegTable, way: Way, settings: Mapping[str, float], starts: Starts
+    mechanism: Mechanism, table: LegTable, way: ProjectionMode, settings: Mapping[str, float], starts: Starts
 ) -> NearestPose:
     """Searches of one way, from each row's own start and then from others."""
     length = mechanism.characteristic_length
@@ -143,7 +143,7 @@ def _may_be_far(asked: Asked, targets: Floats, own: Starts, found: Found) -> boo
 
 def _let_go(asked: Asked, targets: Floats, own: Starts, found: Found) -> None:
     """Hold nothing where what was held leads farther from targets than the start is, and nothing held does not: see
-    `Way.is_too_far`."""
+    `ProjectionMode.is_too_far`."""
     held, nothing = asked.ways
     closure = closure_of(asked.mechanism)
     holds = (found.counters[:, HOLD] % CERTAIN == held.hold) & (found.distances < np.inf)
@@ -163,9 +163,11 @@ def _let_go(asked: Asked, targets: Floats, own: Starts, found: Found) -> None:
     found.put(far[nearer], some.at(nearer))
 
 
-def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: Way) -> Floats:
+def limit_multipliers(
+    mechanism: Mechanism, table: LegTable, targets: Floats, present: Starts, way: ProjectionMode
+) -> Floats:
     """How hard every limit holds configurations back from targets (n, 4, 4) [length]: multipliers, in the order of
-    those that `closure.descend.weighed_limits` gives."""
+    those that `closure.descend.limit_multipliers` gives."""
     found = _weighing(mechanism, table, way).weigh(targets, present)
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
     coned = [joint.name for joint in mechanism.joints if joint.cone is not None]
@@ -178,7 +180,7 @@ def weighed_limits(mechanism: Mechanism, table: LegTable, targets: Floats, prese
 
 
 @lru_cache(maxsize=256)
-def _weighing(mechanism: Mechanism, table: LegTable, way: Way) -> NearestPose:
+def _weighing(mechanism: Mechanism, table: LegTable, way: ProjectionMode) -> NearestPose:
     """What takes no steps, and weighs limits."""
     return NearestPose(mechanism, table, way.weights, {"steps": 0}, no_starts(table))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..closure.close import in_lengths
 from ..closure.configurations import new_rows
-from ..closure.parasitic import strays
+from ..closure.parasitic import is_flipped
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import BASE_AXES
@@ -116,7 +116,7 @@ def _drawn(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: i
     weights = (1.0, 1.0, 1.0, TURNING, TURNING, TURNING)
     nearest_pose = NearestPose(mechanism, table, weights, {"frame": BASE_AXES, "steps": DRAWN_STEPS}, no_starts(table))
     found = nearest_pose.find(targets, Starts(poses, q, sides))
-    counts = np.isfinite(found.distances) & ~strays(mechanism, found.poses)
+    counts = np.isfinite(found.distances) & ~is_flipped(mechanism, found.poses)
     found.poses[:] = in_lengths(found.poses, 1.0 / mechanism.characteristic_length)
     return Starts(*found[1:4]).at(np.flatnonzero(counts))
 

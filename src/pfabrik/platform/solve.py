@@ -12,7 +12,7 @@ from ..arrays import Floats, Mask
 from ..closure.close import Closing, in_lengths
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
 from ..closure.parasitic import has_other_assemblies
-from ..closure.projection import Way
+from ..closure.projection import ProjectionMode
 from ..closure.solve import ClosureEngine
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
@@ -28,7 +28,7 @@ from ..tolerances import TOLERANCES
 from .answers import LegAnswers, begins_of, coordinates_of, sides_at
 from .coordinates import settled
 from .forward import assembled
-from .nearest import move_redundant, weighed_limits
+from .nearest import limit_multipliers, move_redundant
 from .nearest_pose import starts_at
 from .one import Ends, OneAssembly, OneTarget, new_scratch
 from .table import Machine, local_table, machine, resting_at_home
@@ -152,7 +152,7 @@ class LegsEngine:
         for i in steps_of(known, on_progress):
             before = found[-1] if found else start
             found.append(self.answer(targets[i : i + 1], before, options, keep_mode=True, nearby=True))
-        return self._joined(found, start).among(known)
+        return self._joined(found, start).scatter(known)
 
     def _joined(self, found: Sequence[Configurations], start: Configurations | None) -> Configurations:
         """Single answers as a batch; `start` is where the first began."""
@@ -214,9 +214,9 @@ class LegsEngine:
             coordinates[rest] = others.coordinates
         return Configurations(rows, coordinates)
 
-    def at(self, closing: Closing) -> Configurations:
+    def as_configurations(self, closing: Closing) -> Configurations:
         """Configurations found on joint coordinates, as answers whose status is still to be told."""
-        return self._inner.at(closing)
+        return self._inner.as_configurations(closing)
 
     def points(self, found: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
@@ -225,19 +225,19 @@ class LegsEngine:
         placed = centres_at(self.mechanism, found.rows.poses, found.rows.actuators)
         return placed if placed is not None else self._inner.points(found)
 
-    def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
+    def limit_multipliers(self, found: Configurations, targets: Floats, way: ProjectionMode) -> Floats:
         """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""
         if not isinstance(found, LegAnswers) or found.q_proximal is None:
-            return self._inner.weighed_limits(found, targets, way)
+            return self._inner.limit_multipliers(found, targets, way)
         own = np.isfinite(found.q_proximal).all(axis=1)
         mine, others = np.flatnonzero(own), np.flatnonzero(~own)
         scale = 1.0 / self.mechanism.characteristic_length
         present = Starts(in_lengths(found.rows.poses[mine], scale), found.q_proximal[mine], found.sides[mine])
-        weights = weighed_limits(self.mechanism, self._table, targets[mine], present, way)
+        weights = limit_multipliers(self.mechanism, self._table, targets[mine], present, way)
         every = np.empty((len(targets), weights.shape[1]))
         every[mine] = weights
         if len(others):
-            every[others] = self._inner.weighed_limits(found.at(others), targets[others], way)
+            every[others] = self._inner.limit_multipliers(found.at(others), targets[others], way)
         return every
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Mask
 from ..closure.close import in_lengths
 from ..closure.configurations import new_rows, put_rows, rows_at
-from ..closure.parasitic import strays
+from ..closure.parasitic import is_flipped
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import Found, Starts
@@ -143,7 +143,7 @@ def _reach_from(seeds: Starts, question: Question, some: Unreached) -> Mask:
         every = Unreached(targets, begins, ends, np.empty_like(ends), rows)
         _complete(legs, begins, ends, every)
         reached = rows.status == REACHED
-        reached[reached] = ~strays(question.mechanism, rows.poses[reached])
+        reached[reached] = ~is_flipped(question.mechanism, rows.poses[reached])
         reached = reached.reshape(n, k)
         found = reached.any(axis=1)
         if np.count_nonzero(found):

@@ -41,10 +41,10 @@ def holding(mechanism: Mechanism) -> Weights:
     return (*HELD[:3], 0.0, 0.0, 0.0) if mechanism.end_effector_is_joint else HELD
 
 
-def new_reached(compiled: CompiledPlan, n: int) -> P.Reached:
+def new_pass_results(compiled: CompiledPlan, n: int) -> P.PassResults:
     """Room for where n rows end."""
     home = compiled.home_seed
-    return P.Reached(
+    return P.PassResults(
         poses=np.empty((n, 4, 4)),
         nodes=np.empty((n, *home.nodes.shape[1:])),
         trunks=np.empty((n, home.trunks.shape[1])),
@@ -54,7 +54,7 @@ def new_reached(compiled: CompiledPlan, n: int) -> P.Reached:
     )
 
 
-def place(mechanism: Mechanism, compiled: CompiledPlan, begin: Floats, reached: P.Reached) -> Closing:
+def place(mechanism: Mechanism, compiled: CompiledPlan, begin: Floats, reached: P.PassResults) -> Closing:
     """Joint coordinates that follow where joint centres and platforms are, from others (n, columns).
 
     What centres leave open (a rod's spin) stays next to where it began. Loops are open by about the gap of the chains;
@@ -72,7 +72,7 @@ def place(mechanism: Mechanism, compiled: CompiledPlan, begin: Floats, reached: 
         turns = np.where(closure.idle, 0.0, rng.uniform(-np.pi, np.pi, begin.shape[1]) * closure.turning)
         tried = close(closure, begin[rest] + turns, poses[rest], platform=platform, centres=centres[rest])
         better = _off(tried) < _off(placed)[rest]
-        placed.take(rest[better], tried, better)
+        placed.put(rest[better], tried, better)
     return placed
 
 
@@ -81,7 +81,7 @@ def _off(placed: Closing) -> Floats:
     return np.asarray(np.maximum(placed.gap, placed.misses.max(axis=1, initial=0.0)))
 
 
-def _centres(mechanism: Mechanism, compiled: CompiledPlan, reached: P.Reached) -> Floats:
+def _centres(mechanism: Mechanism, compiled: CompiledPlan, reached: P.PassResults) -> Floats:
     """Joint centres as the closure kernel wishes for them, (n, joints, 3); NaN for those that cannot be read."""
     readable = _readable_centres(mechanism)
     wished = np.full((len(reached.poses), len(mechanism.joints), 3), np.nan)
@@ -96,7 +96,7 @@ def _centres(mechanism: Mechanism, compiled: CompiledPlan, reached: P.Reached) -
 def _readable_centres(mechanism: Mechanism) -> frozenset[str]:
     """Joints whose centres positions tell: not those merged with others into one at a common centre."""
     compiled = compile_plan(mechanism)
-    home = new_reached(compiled, 1)._replace(**compiled.home_seed._asdict())
+    home = new_pass_results(compiled, 1)._replace(**compiled.home_seed._asdict())
     near = TOLERANCES.position * mechanism.characteristic_length
     return frozenset(
         name
@@ -105,7 +105,7 @@ def _readable_centres(mechanism: Mechanism) -> frozenset[str]:
     )
 
 
-def joint_points(compiled: CompiledPlan, reached: P.Reached) -> dict[str, Floats]:
+def joint_points(compiled: CompiledPlan, reached: P.PassResults) -> dict[str, Floats]:
     """Joint name -> position of its centre in the base frame, (n, 3); joints that act as one share a centre."""
     carriers, screw_points = _carriers(compiled.plan, reached.trunks)
     found = {name: screw_points[joint] for name, joint in compiled.trunk_points}
@@ -115,7 +115,7 @@ def joint_points(compiled: CompiledPlan, reached: P.Reached) -> dict[str, Floats
     return found
 
 
-def _node(plan: P.Plan, reached: P.Reached, k: int, carriers: list[Floats]) -> Floats:
+def _node(plan: P.Plan, reached: P.PassResults, k: int, carriers: list[Floats]) -> Floats:
     """Positions (n, 3) of node k: stored, on the platform, or on its carrier."""
     node = plan.nodes[k]
     if node["stored"] >= 0:

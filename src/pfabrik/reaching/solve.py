@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..closure.close import Closing, close, closure_of
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
-from ..closure.descend import within_sight
-from ..closure.projection import Way, kept, ways_of
-from ..closure.solve import ClosureEngine, begin_of, told
+from ..closure.descend import clip_targets
+from ..closure.projection import ProjectionMode, held_parts, projection_modes
+from ..closure.solve import ClosureEngine, start_coordinates, to_answers
 from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
@@ -28,7 +28,7 @@ from ..platform.answers import sides_at
 from ..platform.solve import LegsEngine
 from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
-from .positions import holding, new_reached, place, positions_of
+from .positions import holding, new_pass_results, place, positions_of
 
 NEAR = 1e-3
 """Share of L within which passes bring the ends of chains where exact answers are asked for: loops close from there."""
@@ -65,15 +65,15 @@ class ReachingEngine:
             found = Configurations(found.rows, found.coordinates)
             tried = self._by_passes(made_exact(targets[away]), _at(start, away), options, keep_mode)
             good = tried.rows.status != FAILED
-            found.replace(away[good], tried, good)
+            found.put(away[good], tried, good)
             return found
         own = _at(start, np.flatnonzero(known))
         found = self._by_passes(made_exact(targets[known]), own, options, keep_mode)
         away = np.flatnonzero(found.rows.status == FAILED)
         if len(away):
             others = self._exact.answer(targets[known][away], _at(own, away), options, keep_mode=keep_mode)
-            found.replace(away, others, np.ones(len(away), bool))
-        return found.among(known)
+            found.put(away, others, np.ones(len(away), bool))
+        return found.scatter(known)
 
     def follow(
         self,
@@ -85,21 +85,21 @@ class ReachingEngine:
         """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
         known, before = are_poses(targets), start
         found = new_rows(self.mechanism, len(targets))
-        coordinates = np.zeros((len(targets), begin_of(self.mechanism, start).shape[1]))
+        coordinates = np.zeros((len(targets), start_coordinates(self.mechanism, start).shape[1]))
         for i in steps_of(known, on_progress):
             answer = self.answer(targets[i : i + 1], before, options, keep_mode=True)
             before = Configurations(answer.rows, answer.coordinates)
             put_rows(found, slice(i, i + 1), before.rows)
             coordinates[i] = before.coordinates[0]
-        return Configurations(rows_at(found, known), coordinates[known]).among(known)
+        return Configurations(rows_at(found, known), coordinates[known]).scatter(known)
 
     def _by_passes(
         self, wanted: Floats, start: Configurations | None, options: Options, keep_mode: bool
     ) -> Configurations:
         """Answer poses by passes; FAILED where these end in nothing feasible, or leave the mode to be kept."""
-        begin = begin_of(self.mechanism, start)
+        begin = start_coordinates(self.mechanism, start)
         begin = np.repeat(begin, len(wanted), axis=0) if len(begin) == 1 else begin
-        way = ways_of(self.mechanism, options.hold, options.rotation_length)[0]
+        way = projection_modes(self.mechanism, options.hold, options.rotation_length)[0]
         found = self._tried(wanted, begin, options, way)
         if keep_mode:
             strayed = (self._sides(found) * self._sides(start) < 0.0).any(axis=1)
@@ -114,10 +114,10 @@ class ReachingEngine:
         chosen = (legs["kind"] != REDUNDANT) | (legs["orients"] == 1)
         return np.where(chosen, home if found is None else sides_at(self.mechanism, self._table, found), 0.0)
 
-    def _tried(self, wanted: Floats, begin: Floats, options: Options, way: Way) -> Configurations:
+    def _tried(self, wanted: Floats, begin: Floats, options: Options, way: ProjectionMode) -> Configurations:
         """Answer poses by passes one way, from joint coordinates (n, columns); FAILED where the loops do not close."""
         closure = closure_of(self.mechanism, whole=False)
-        settings, sought = settings_of(self.mechanism, options, way), within_sight(self.mechanism, wanted)
+        settings, sought = settings_of(self.mechanism, options, way), clip_targets(self.mechanism, wanted)
         if options.exact and not self._is_struts:
             placed, reached = self._agree(sought, begin, settings)
         else:
@@ -130,21 +130,21 @@ class ReachingEngine:
         slipped = np.flatnonzero((reached.rounds == 0) & (errors[0] > settings.enough))
         if len(slipped):  # loops that close only off a target that chains came near to may close on it
             start = placed.coordinates[slipped], placed.poses[slipped]
-            closed.improve(slipped, close(closure, *start, platform=self._held, limits=True, margin=margin))
+            closed.put_better(slipped, close(closure, *start, platform=self._held, limits=True, margin=margin))
             errors = task_of(self.mechanism).errors(closed.poses, wanted)
-        holds = kept(self.mechanism, np.full(len(wanted), way.hold), *errors)
-        found = told(closure, closed, wanted, holds, options)
+        holds = held_parts(self.mechanism, np.full(len(wanted), way.hold), *errors)
+        found = to_answers(closure, closed, wanted, holds, options)
         found.rows.counters[:, ITERATIONS], found.rows.counters[:, ROUNDS] = reached.iterations, reached.rounds
         return found
 
-    def _agree(self, wanted: Floats, begin: Floats, settings: P.Settings) -> tuple[Closing, P.Reached]:
+    def _agree(self, wanted: Floats, begin: Floats, settings: P.Settings) -> tuple[Closing, P.PassResults]:
         """Configurations with their platforms where chains that come as near as they can agree.
 
         Passes are caught by the ranges of joints. As near as it can is here what closes the chain's loops in the sense
         of least squares, with all that it misses put at its ends.
         """
         closure = closure_of(self.mechanism, whole=False)
-        reached, rest = new_reached(self._compiled, len(wanted)), np.arange(len(wanted))
+        reached, rest = new_pass_results(self._compiled, len(wanted)), np.arange(len(wanted))
         reached.rounds[:] = 0
         placed = close(closure, begin, wanted, platform=self._held, limits=True, max_iterations=0)
         once = settings._replace(max_iterations=0, max_rounds=1)
@@ -155,7 +155,7 @@ class ReachingEngine:
             if not self.mechanism.end_effector_is_joint:
                 tried.poses[:] = ended.poses
             tried.poses[:, :3, 3] = ended.poses[:, :3, 3]
-            placed.take(rest, tried)
+            placed.put(rest, tried)
             rounds = reached.rounds[rest] + ended.rounds
             for array, own in zip(reached, ended, strict=True):
                 array[rest] = own
@@ -172,18 +172,18 @@ class ReachingEngine:
         branches = self._compiled.plan.branches
         return bool((branches["last"] - branches["first"] <= 1).all() and (branches["carrier"] == 0).all())
 
-    def _run(self, wanted: Floats, begin: Floats, settings: P.Settings) -> P.Reached:
+    def _run(self, wanted: Floats, begin: Floats, settings: P.Settings) -> P.PassResults:
         """The kernel over all rows, on all cores."""
         from ..kernels.reaching.solve import solve_by_passes
 
         if self.mechanism.end_effector_is_joint:  # a point has no orientation: home's
             wanted[:, :3, :3] = np.eye(3)
         seeds = positions_of(self.mechanism, self._compiled, begin)
-        reached = new_reached(self._compiled, len(wanted))
+        reached = new_pass_results(self._compiled, len(wanted))
 
         def run(block: slice) -> None:
             own = P.Seeds._make(array[block] for array in seeds)
-            ends = P.Reached._make(array[block] for array in reached)
+            ends = P.PassResults._make(array[block] for array in reached)
             solve_by_passes(self._compiled.plan, wanted[block], own, settings, ends)
 
         in_blocks(run, len(wanted), ROWS_A_BLOCK)
@@ -196,7 +196,7 @@ def _at(start: Configurations | None, places: NDArray[np.intp]) -> Configuration
 
 
 @lru_cache(maxsize=256)
-def settings_of(mechanism: Mechanism, options: Options, way: Way) -> P.Settings:
+def settings_of(mechanism: Mechanism, options: Options, way: ProjectionMode) -> P.Settings:
     """Options as the kernel takes them; where exact steps follow, passes end sooner."""
     length, free = mechanism.characteristic_length, [weight != LOCKED and weight > 0.0 for weight in way.weights]
     tolerance = float(options.tolerance or TOLERANCES.position * length)

@@ -257,7 +257,7 @@ def close_row(
     """Close the loops of a row, from `scratch.trial`, into `scratch.best`; how many steps it took."""
     best, trial, eq = scratch.best, scratch.trial, scratch.eq
     least = least_damping(layout)
-    plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
+    undamped, keeps_yaw = problem.undamped == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
     copy_state(trial, best)
     cost, factor, step = math.inf, 1.0, math.inf
     iterations, turn = 0, TRY
@@ -278,12 +278,12 @@ def close_row(
             turn_equations(eq.frame, layout, eq)
         hold_platform(problem, eq)
         if turn == TRY:
-            if found < cost or plunging:
+            if found < cost or undamped:
                 gained, cost = cost - found, found
                 copy_state(trial, best)
                 note(eq, row, closed)
                 factor = max(factor / 4.0, 1e-3)
-                if is_close(problem, eq) or (gained <= 1e-13 * cost and not plunging):
+                if is_close(problem, eq) or (gained <= 1e-13 * cost and not undamped):
                     turn = MEASURE
             else:
                 factor *= 8.0
@@ -291,7 +291,7 @@ def close_row(
                 copy_state(best, trial)
         elif turn == RETURN:
             turn = TRY
-        damping = least if plunging else max(least, DAMPING * factor * min(cost, 1.0))
+        damping = least if undamped else max(least, DAMPING * factor * min(cost, 1.0))
         if turn == TRY and (iterations == problem.max_iterations or not damping < MOST_DAMPING):
             turn = MEASURE
         if turn == TRY:

@@ -64,7 +64,7 @@ class ClosureProblem(NamedTuple):
     limits: int  # 1: limits are to be kept
     margin: float  # by how much inside
     balls_follow: int  # 1: the ball joints of `last_balls` follow the platform; they are locked in the layout
-    plunging: int  # 1: undamped steps, up and down: finds more of many solutions, but not the nearest
+    undamped: int  # 1: undamped steps, up and down: finds more of many solutions, but not the nearest
     closeness: float  # largest gap that ends the search
     max_iterations: int
 

@@ -23,7 +23,7 @@ _vector = ("f8", (3,))
 NODE = np.dtype(
     [
         ("home", *_vector),
-        ("stored", "i8"),  # its place in Reached.nodes; -1 if it follows from the pose and the trunks
+        ("stored", "i8"),  # its place in PassResults.nodes; -1 if it follows from the pose and the trunks
         ("lo", "f8"),  # length of the segment from the previous node
         ("hi", "f8"),
         ("hinge", "i8"),  # 1: the next segment stays in the branch's plane
@@ -103,7 +103,7 @@ class Settings(NamedTuple):
     free: int  # what a target that is not reached may do: TRANSLATES, TURNS, or both
 
 
-class Reached(NamedTuple):
+class PassResults(NamedTuple):
     """Where chains and targets end, row by row: configurations whose loops are closed but for the gap."""
 
     poses: Floats  # (n, 4, 4)

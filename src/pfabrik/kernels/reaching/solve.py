@@ -10,7 +10,7 @@ from ..vectors import along, copy_row, copy_table, move, put, sub, vec
 from .fit import turn_to_fit
 from .frames import move_carriers, place_ends
 from .passes import reach_by_passes
-from .plan import TRANSLATES, TURNS, Configuration, Plan, Reached, Seeds, Settings
+from .plan import TRANSLATES, TURNS, Configuration, PassResults, Plan, Seeds, Settings
 
 
 @routine
@@ -81,7 +81,7 @@ def load_seed(plan: Plan, seeds: Seeds, i: int, now: Configuration) -> None:
 
 
 @routine
-def write_row(plan: Plan, i: int, now: Configuration, reached: Reached) -> None:
+def write_row(plan: Plan, i: int, now: Configuration, reached: PassResults) -> None:
     """The configuration that answers row `i`."""
     copy_table(now.pose, reached.poses[i])
     copy_row(now.trunks, reached.trunks[i])
@@ -91,7 +91,7 @@ def write_row(plan: Plan, i: int, now: Configuration, reached: Reached) -> None:
 
 
 @search
-def solve_by_passes(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, reached: Reached) -> None:
+def solve_by_passes(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, reached: PassResults) -> None:
     """Let chains reach for every target, and move those they do not reach."""
     now = new_configuration(plan)
     for i in range(targets.shape[0]):
