@@ -1,4 +1,4 @@
-"""A configuration of the caller's own: is it closed, and within its limits?"""
+"""The configuration at given joint coordinates, with its loop gaps and limits measured."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from .engine import engine_of
 
 
 def configuration(mechanism: Mechanism, q: ArrayLike) -> Solution:
-    """The configuration at given joint coordinates, measured and not changed.
+    """The configuration at given joint coordinates: measured, not changed.
 
     Parameters
     ----------
-    q : all joint coordinates (..., nq), in the order of `mechanism.coordinate_names` [rad or length], counted as the
-        description counts them.
+    q : all joint coordinates (..., nq), in the order of `mechanism.coordinate_names` [rad or length], with the zeros of
+        the description.
 
     Returns
     -------
-    Solution : REACHED where all loops are closed and every limit is kept; EXCEEDED where a limit is not, which
-        `active_limits` names; FAILED where loops are open, by `residual`. Errors are 0: nothing else was asked for.
+    Solution : REACHED if all loops are closed and every limit is kept; EXCEEDED if a limit is exceeded, which
+        `active_limits` names; FAILED if loops are open, by `residual`. Errors are 0, as there is no target.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def configuration(mechanism: Mechanism, q: ArrayLike) -> Solution:
     """
     deviations, shape = joint_vectors(mechanism, q, "q")
     closing = measure_configurations(mechanism, deviations)
-    found = engine_of(mechanism).as_configurations(closing)
+    configurations = engine_of(mechanism).as_configurations(closing)
     within = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
-    found.rows.status[:] = np.where(closing.gap <= CLOSED, within, Status.FAILED)
-    return Solution(mechanism, found, shape)
+    configurations.rows.status[:] = np.where(closing.gap <= CLOSED, within, Status.FAILED)
+    return Solution(mechanism, configurations, shape)

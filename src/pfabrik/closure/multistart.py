@@ -1,4 +1,4 @@
-"""Feasible configurations of a mechanism that searches can start from, found once."""
+"""Seeds of multistart searches: feasible configurations of a mechanism, computed once."""
 
 from __future__ import annotations
 
@@ -18,60 +18,60 @@ from .effort import descents_within, starts_within
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .starts import random_starts
 
-FAR_CORNER, TURNED_CORNER = 0.5, 0.5
-"""Where corners are looked for: so far from home [L], and turned so far [rad]."""
+SEED_DISTANCE, SEED_TURN = 0.5, 0.5
+"""Distance [L] and rotation [rad] from home of the poses for which the first seeds are the nearest configurations."""
 
-
-SEEDS, CHANCES, A_CHANCE = 8, 128, 20
-"""How many corners searches start from, and how many random configurations are closed to find some, in about how many
-steps each."""
+SEEDS, RANDOM_STARTS, RANDOM_STEPS = 8, 128, 20
+"""Most seeds; random configurations that are closed to find them; about as many steps are spent on each."""
 
 
 @lru_cache(maxsize=64)
 def seeds_of(mechanism: Mechanism) -> tuple[Floats, ...]:
     """Feasible configurations far from home and from each other, as joint coordinates (columns,).
 
-    Some are as far as the workspace goes from home in four directions; some are chanced upon, in parts of it to which
-    no way may lead from home.
+    They are chosen from the configurations nearest to poses in four directions from home, and from random ones, which
+    may lie in components of the workspace that are not connected with home.
     """
     closure = closure_of(mechanism, whole=False)
     directions = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]) / np.sqrt(3.0)
-    offsets = FAR_CORNER * mechanism.characteristic_length * directions
+    offsets = SEED_DISTANCE * mechanism.characteristic_length * directions
     poses = [
-        pose(mechanism.home_pose[:3, 3] + offset, rotvec=TURNED_CORNER * direction)
+        pose(mechanism.home_pose[:3, 3] + offset, rotvec=SEED_TURN * direction)
         for offset, direction in zip(offsets, directions, strict=True)
     ]
     turning = 0.0 if mechanism.end_effector_is_joint else 1.0
     home = np.zeros((len(directions), len(closure.scale)))
     _, steps = descents_within(closure, SEEDS, MOST_STEPS)
     platform = (1.0, 1.0, 1.0, turning, turning, turning)
-    ends = nearest_configurations(closure, home, np.array(poses), platform=platform, steps=max(steps, 1))
-    coordinates, places = random_feasible(mechanism)
-    kept = ends.feasible
-    coordinates = np.concatenate([home[:1], ends.coordinates[kept], coordinates])
-    places = np.concatenate([mechanism.home_pose[None], ends.poses[kept], places])
-    chosen = [0]
-    while len(chosen) <= min(SEEDS, len(places) - 1):
-        apart = [differences(closure, places, np.repeat(places[i : i + 1], len(places), axis=0)) for i in chosen]
+    nearest = nearest_configurations(closure, home, np.array(poses), platform=platform, steps=max(steps, 1))
+    coordinates, candidate_poses = random_feasible(mechanism)
+    is_feasible = nearest.feasible
+    coordinates = np.concatenate([home[:1], nearest.coordinates[is_feasible], coordinates])
+    candidate_poses = np.concatenate([mechanism.home_pose[None], nearest.poses[is_feasible], candidate_poses])
+    n, chosen = len(candidate_poses), [0]
+    while len(chosen) <= min(SEEDS, n - 1):
+        apart = [
+            differences(closure, candidate_poses, np.repeat(candidate_poses[i : i + 1], n, axis=0)) for i in chosen
+        ]
         chosen.append(int(np.min(apart, axis=0).argmax()))
     return tuple(coordinates[chosen[1:]])
 
 
 @lru_cache(maxsize=64)
 def random_feasible(mechanism: Mechanism) -> tuple[Floats, Floats]:
-    """Feasible configurations closed from random ones: joint coordinates (k, columns), and poses (k, 4, 4).
+    """Random feasible configurations: joint coordinates (k, columns), and poses (k, 4, 4).
 
-    They are in the assembly of home as far as a task tells it.
+    If what the task leaves out of a pose never changes, it is that of home.
     """
     closure, task = closure_of(mechanism, whole=False), task_of(mechanism)
-    chances = starts_within(closure, CHANCES, A_CHANCE)
-    coordinates, poses = random_starts(closure, chances, np.random.default_rng(0))
-    rest = task.left_out
-    keeps_rest = follows_task(mechanism) and not has_parasitic_motion(mechanism)
-    if keeps_rest:
-        poses = task.completed(poses, np.repeat(mechanism.home_pose[None], chances, axis=0))
-    platform, frame = (rest.held, rest.frame) if keeps_rest else (EVERYTHING_FREE, BASE_AXES)
-    found = close(
+    n = starts_within(closure, RANDOM_STARTS, RANDOM_STEPS)
+    coordinates, poses = random_starts(closure, n, np.random.default_rng(0))
+    left_out = task.left_out
+    is_fixed = follows_task(mechanism) and not has_parasitic_motion(mechanism)
+    if is_fixed:
+        poses = task.completed(poses, np.repeat(mechanism.home_pose[None], n, axis=0))
+    platform, frame = (left_out.held, left_out.frame) if is_fixed else (EVERYTHING_FREE, BASE_AXES)
+    closing = close(
         closure,
         coordinates,
         poses,
@@ -79,7 +79,7 @@ def random_feasible(mechanism: Mechanism) -> tuple[Floats, Floats]:
         frame=frame,
         limits=True,
         margin=TOLERANCES.inside,
-        max_iterations=100 if chances == CHANCES else A_CHANCE,
+        max_iterations=100 if n == RANDOM_STARTS else RANDOM_STEPS,
     )
-    feasible = found.feasible
-    return found.coordinates[feasible], found.poses[feasible]
+    feasible = closing.feasible
+    return closing.coordinates[feasible], closing.poses[feasible]
