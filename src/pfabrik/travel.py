@@ -158,7 +158,7 @@ def travel(
     about: ArrayLike | None = None,
     pivot: ArrayLike | None = None,
 ) -> Travel:
-    """How far the end effector can go from a configuration, in its working mode, until a limit or a link stops it.
+    """Distances that the end effector can move from a configuration, in its working mode, until something stops it.
 
     A search takes steps of L/32 or 1/32 rad in each direction, each from the configuration before it, and halves steps
     that are not reached, far below the tolerance of a pose. All directions are searched at once.
@@ -299,9 +299,9 @@ class _Search:
         self._pose, self._pivot = solution.pose, pivot
         self._engine = engine_of(solution.mechanism)
         self._length = solution.mechanism.characteristic_length
-        every = np.arange(len(self.directions))
-        start = solution._configurations.at(0 * every)
-        self.farthest = self._engine.advance(self._targets(every, np.zeros(len(every))), start)
+        rows = np.arange(len(self.directions))
+        start = solution._configurations.at(0 * rows)
+        self.farthest = self._engine.advance(self._targets(rows, np.zeros(len(rows))), start)
 
     def run(self) -> Floats:
         """Distance in each direction, (n,) [length or rad].

@@ -111,8 +111,8 @@ class Track(Solution):
         return *super().__getstate__(), self._pace, self.jumps
 
     def __setstate__(self, state: Any) -> None:
-        *own, self._pace, self.jumps = state
-        super().__setstate__(tuple(own))
+        *solution_state, self._pace, self.jumps = state
+        super().__setstate__(tuple(solution_state))
 
     @property
     def targets(self) -> Floats:

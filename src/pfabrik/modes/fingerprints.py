@@ -1,4 +1,4 @@
-"""Fingerprints that distinguish working modes, and the test for motions with the end effector on its target."""
+"""Fingerprints that distinguish working modes, and a test for motions that leave the end effector on its target."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ def tilt(target: Floats, weight: float, X: Floats, force: Floats) -> float:
 
 @routine
 def turn_of_tilt(target: Floats, X: Floats) -> tuple[Vec, float]:
-    """Axis and angle of the shortest rotation of the z axis to the target's; half a turn is about the platform's x axis."""
+    """Axis and angle of the shortest rotation of the z axis to the target's; half a turn is about its x axis."""
     here, there = (X[0, 2], X[1, 2], X[2, 2]), (target[0, 2], target[1, 2], target[2, 2])
     axis = cross(here, there)
     sine, cosine = norm(axis), dot(here, there)

@@ -20,18 +20,18 @@ LARGEST_TURN, TURN_DAMPING = 0.5, 1e-9
 def fit_trunk(plan: Plan, c: int, config: Configuration) -> None:
     """Fit the pose of the common body, within the ranges of its joints, to its branches.
 
-    Gauss-Newton on the trunk's joint values; `config.wanted` holds where each branch would have its first node.
+    Gauss-Newton on the trunk's joint values; `config.first_nodes` holds the position of each branch's first node.
     """
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    n, wanted, system = last - first, config.wanted, config.system
+    n, first_nodes, system = last - first, config.first_nodes, config.system
     for _step in range(FIT_STEPS):
         for i in range(n):
             for j in range(n + 1):
                 system[i, j] = 0.0
         for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
             present = move(config.carriers[trunk + 1], vec(plan.nodes[plan.branches[b]["first"]]["home"]))
-            miss = sub(vec(wanted[b]), present)
+            miss = sub(vec(first_nodes[b]), present)
             for i in range(n):
                 rate = scale(trunk_unit(plan, first + i), point_rate(plan, config, first + i, present))
                 system[i, n] += dot(rate, miss)

@@ -88,7 +88,7 @@ def pass_over_chain(plan: Plan, c: int, config: Configuration) -> float:
     chain = plan.chains[c]
     for b in range(chain["first"], chain["last"]):
         reach_forward(plan, b, config)
-        put(config.wanted[b], vec(config.nodes[plan.branches[b]["first"]]))
+        put(config.first_nodes[b], vec(config.nodes[plan.branches[b]["first"]]))
     if chain["trunk"] >= 0:
         fit_trunk(plan, c, config)
     return pass_outward(plan, c, config)

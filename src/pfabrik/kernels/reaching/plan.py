@@ -82,7 +82,7 @@ class Configuration(NamedTuple):
     trunks: Floats  # (n_trunk_joints,): deviation from home
     carriers: Floats  # (n_trunks + 1, 3, 4); the first is the base
     screws: Floats  # (n_trunk_joints, 2, 3): present point and axis
-    wanted: Floats  # (n_branches, 3): position of each branch's first node after a forward pass
+    first_nodes: Floats  # (n_branches, 3): position of each branch's first node after a forward pass
     system: Floats  # (n, n + 1): the normal equations of a fit, right-hand side in the last column
 
 
