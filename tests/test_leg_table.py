@@ -18,6 +18,7 @@ from pfabrik.description.home_mobility import end_effector_freedom
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.feasibility import _margins
+from pfabrik.kernels.platform.evaluate import evaluate_poses
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
 from pfabrik.platform.answers import sides_at

@@ -18,7 +18,7 @@ from machines import closure, positions
 from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
 from pfabrik.closure.close import close, closure_of
-from pfabrik.closure.projection import ways_of
+from pfabrik.closure.projection import projection_modes
 from pfabrik.closure.solve import ClosureEngine
 from pfabrik.decomposition.leg_table import leg_table
 from pfabrik.description.task import task_of
@@ -531,12 +531,12 @@ def test_what_holds_a_projection_back_is_the_same_in_the_platforms_pose_and_on_a
     targets[:, :3, 3] += rng.normal(size=(12, 3)) * machine.characteristic_length
     targets[:, :3, :3] = Rotation.from_rotvec(rng.normal(size=(12, 3))).as_matrix()
     answers = pf.solve_ik(machine, targets, options=pf.Options(hold=None))
-    (way,) = ways_of(machine, None, None)
+    (way,) = projection_modes(machine, None, None)
     rows = np.flatnonzero(answers.status == Status.PROJECTED)
-    found = answers._found.at(rows)
-    told = engine.weighed_limits(found, targets[rows], way)
+    found = answers._configurations.at(rows)
+    told = engine.limit_multipliers(found, targets[rows], way)
     assert (told > 0).any(axis=1).sum() >= 4
-    on_joints = ClosureEngine(machine).weighed_limits(found, targets[rows], way)
+    on_joints = ClosureEngine(machine).limit_multipliers(found, targets[rows], way)
     np.testing.assert_allclose(told, on_joints, atol=1e-5 * on_joints.max())
 
 

@@ -12,7 +12,7 @@ import pfabrik as pf
 from machines import ring
 from pfabrik import Joint, Mechanism, Options, Solution, Status
 from pfabrik.decomposition.plan import compile_plan
-from pfabrik.reaching.positions import joint_points, new_reached
+from pfabrik.reaching.positions import joint_points, new_pass_results
 
 FIELDS = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
 
@@ -185,7 +185,9 @@ def test_centres_along_a_trunk_move_with_the_joints_before_them() -> None:
     machine = Mechanism("arm with elbow", joints, "platform", (0, 0, 150))
     compiled = compile_plan(machine)
     values = np.array([[0.3, 12.0, -0.5]])
-    reached = new_reached(compiled, 1)._replace(poses=np.eye(4)[None], nodes=compiled.home_seed.nodes, trunks=values)
+    reached = new_pass_results(compiled, 1)._replace(
+        poses=np.eye(4)[None], nodes=compiled.home_seed.nodes, trunks=values
+    )
     points = joint_points(compiled, reached)
     shoulder = Rotation.from_rotvec([0, 0.3, 0])
     at = np.array((100.0, 0, 0)) + shoulder.apply((90.0 - 100, 0, 40) - 12.0 * np.array((-1, 0, 3)) / np.sqrt(10))
@@ -217,7 +219,7 @@ def test_limits_are_active_up_to_the_stated_distance(
         expected = lengths[joint.name] - homeward * gap
         limit = (expected, 400.0) if bound == "min" else (1.0, expected)
     moved = stewart.with_limits({joint.name: limit})
-    found = Solution(moved, answer._found, ()).active_limits
+    found = Solution(moved, answer._configurations, ()).active_limits
     hits = [(hit.bound, hit.limit) for hit in found if hit.joint == joint.name]
     assert hits == ([(bound, pytest.approx(expected))] if named else [])
 

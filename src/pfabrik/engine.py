@@ -1,4 +1,4 @@
-"""Which engine answers: the only place that decides."""
+"""The choice of the engine that solves a mechanism, made nowhere else."""
 
 from __future__ import annotations
 
@@ -18,17 +18,20 @@ Engine: TypeAlias = LegsEngine | ClosureEngine
 
 @lru_cache(maxsize=64)
 def engine_of(mechanism: Mechanism) -> Engine:
-    """The engine that answers for a mechanism.
+    """The engine that solves a mechanism.
 
-    Closed forms where every chain is a leg that has them, else joint coordinates; `leg_table` says why it has none.
+    Closed forms if every chain is a leg that has one, otherwise joint coordinates; `leg_table` then returns the reason.
     """
     table = leg_table(mechanism)
     return LegsEngine(mechanism, table) if isinstance(table, LegTable) else ClosureEngine(mechanism)
 
 
 def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> Engine | ReachingEngine:
-    """The engine that answers targets: the paper's passes and its projection are on joint positions, where these
-    express all chains and the whole task."""
+    """The engine that solves for targets.
+
+    The paper's passes and its projection work on joint positions. They are used if the options ask for them and joint
+    positions express all chains and the whole task.
+    """
     nearest = options.exact and options.projection == "nearest"
     return engine_of(mechanism) if nearest or not positions_express(mechanism) else _reaching(mechanism)
 

@@ -1,4 +1,4 @@
-"""Forward kinematics: from actuator values to the configuration that has them."""
+"""Forward kinematics: from actuator values to a configuration that has them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .arrays import Floats
-from .closure.assemble import judged
-from .closure.close import measured
+from .closure.assemble import forward_answers
+from .closure.close import measure_configurations
 from .description.mechanism import Mechanism, checked_mechanism
 from .engine import engine_of
 from .errors import InvalidArgument, UnknownName
@@ -24,7 +24,7 @@ Actuators: TypeAlias = ArrayLike | Mapping[str, ArrayLike]
 """Actuated coordinates (..., n_a) in the order of `mechanism.actuator_names`, or joint name -> values (...,)."""
 
 HORIZON = 1e100
-"""Values beyond this count as there while a search goes on: their squares are still numbers [length or rad]."""
+"""Largest actuator value that searches use [length or rad]; larger ones are clipped, so that squares stay finite."""
 
 
 def solve_fk(
@@ -32,9 +32,9 @@ def solve_fk(
 ) -> Solution:
     """The pose of the end effector, and all joints, at given actuator values.
 
-    Newton's method closes the loops from the start with the actuators locked. Where it strays, the actuators are led to
-    their values in steps; where neither assembles them, other starts follow. The assembly mode is the start's wherever
-    the first two succeed: see `assembly_modes` for all.
+    Newton's method closes the loops from the start with the actuators locked. If it fails, continuation moves the
+    actuators to their values in steps; if that fails too, other starts follow. The assembly mode is that of the start
+    if Newton's method or continuation succeeds. `assembly_modes` finds all assembly modes.
 
     Parameters
     ----------
@@ -59,21 +59,22 @@ def solve_fk(
     begin = start_of(mechanism, start, shape)
     if shape == () and np.vdot(values, values) <= HORIZON**2:  # one row of numbers, with nothing to set aside
         return Solution(mechanism, engine_of(mechanism).forward(values, begin, options.actuator_tolerance), shape)
-    known = np.asarray(np.isfinite(values).all(axis=1))
-    if options.on_invalid == "raise" and not known.all():
-        bad = np.flatnonzero(~known)[:5].tolist() if shape else ()
+    is_valid = np.asarray(np.isfinite(values).all(axis=1))
+    if options.on_invalid == "raise" and not is_valid.all():
+        bad = np.flatnonzero(~is_valid)[:5].tolist() if shape else ()
         raise InvalidArgument("actuators", "a value that is not finite", "finite values", rows=bad)
-    first = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(known))
-    asked = np.clip(values[known], -HORIZON, HORIZON)
-    found = engine_of(mechanism).forward(asked, first, options.actuator_tolerance)
-    return Solution(mechanism, found.among(known), shape)
+    starts = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(is_valid))
+    clipped = np.clip(values[is_valid], -HORIZON, HORIZON)
+    solutions = engine_of(mechanism).forward(clipped, starts, options.actuator_tolerance)
+    return Solution(mechanism, solutions.scatter(is_valid), shape)
 
 
-def assembled(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:
-    """Joint coordinates (n, columns) as the answer to actuated values (n, n_a): measured, not changed."""
-    closing = measured(mechanism, coordinates)
-    found = judged(mechanism, engine_of(mechanism).at(closing), closing, values, TOLERANCES.position)
-    return Solution(mechanism, found, (len(values),))
+def solution_at(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:
+    """The answer to actuated values (n, n_a) at given joint coordinates (n, columns): measured, not changed."""
+    closing = measure_configurations(mechanism, coordinates)
+    configurations = engine_of(mechanism).as_configurations(closing)
+    solutions = forward_answers(mechanism, configurations, closing, values, TOLERANCES.position)
+    return Solution(mechanism, solutions, (len(values),))
 
 
 def as_values(mechanism: Mechanism, actuators: Actuators) -> tuple[Floats, tuple[int, ...]]:
@@ -89,7 +90,7 @@ def as_values(mechanism: Mechanism, actuators: Actuators) -> tuple[Floats, tuple
 
 
 def _by_name(names: Sequence[str], actuators: Mapping[str, ArrayLike]) -> Floats:
-    """Values (..., n_a) from values by name; each name once, all of them, of shapes that agree."""
+    """Actuated values (..., n_a) from a mapping that has every actuator, with shapes that broadcast."""
     for name in actuators:
         if name not in names:
             raise UnknownName("actuator", name, names)

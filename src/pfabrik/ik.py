@@ -1,10 +1,10 @@
-"""Inverse kinematics: from a target pose to a feasible, honest answer."""
+"""Inverse kinematics: from a target pose to a feasible configuration."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .answers.answer import Wanted
+from .answers.answer import PoseRequest
 from .answers.solution import Solution
 from .answers.starts import Start, start_of
 from .closure.configurations import Configurations
@@ -48,41 +48,49 @@ def solve_ik(
     options = checked_options(options)
     targets, shape = as_targets(mechanism, target)
     begin = start_of(mechanism, start, shape)
-    found = inverse_engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keeps_mode(options, begin))
-    refuse_invalid(targets, shape, found.rows.status, options)
-    status = found.rows.status
+    solutions = inverse_engine_of(mechanism, options).answer(
+        targets, begin, options, keep_mode=keeps_mode(options, begin)
+    )
+    status = solutions.rows.status
+    refuse_invalid(targets, shape, status, options)
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
     if not is_missed:
-        return Solution(mechanism, found, shape)
-    wanted = Wanted(targets.copy(), options.hold, options.rotation_length)
-    if begin is not None and isinstance(start, Solution) and start._wanted is not None:
-        found = _unless_nearer(mechanism, found, wanted, begin, start._wanted)
-    return Solution(mechanism, found, shape, wanted)
+        return Solution(mechanism, solutions, shape)
+    request = PoseRequest(targets.copy(), options.hold, options.rotation_length)
+    if begin is not None and isinstance(start, Solution) and start._request is not None:
+        solutions = _prefer_start(mechanism, solutions, request, begin, start._request)
+    return Solution(mechanism, solutions, shape, request)
 
 
-def _unless_nearer(
-    mechanism: Mechanism, found: Configurations, wanted: Wanted, start: Configurations, before: Wanted
+def _prefer_start(
+    mechanism: Mechanism,
+    solutions: Configurations,
+    request: PoseRequest,
+    start: Configurations,
+    start_request: PoseRequest,
 ) -> Configurations:
-    """What was found, with the start where that is the answer to the same target, and not farther: asked again, an
-    answer stays as it is unless something nearer is found."""
-    if (wanted.hold, wanted.rotation_length) != (before.hold, before.rotation_length):
-        return found
-    lever = wanted.rotation_length or mechanism.rotation_length
-    others, rows = start.rows, found.rows
-    distances, farthest = (
-        np.hypot(each.measures[:, POSITION_ERROR], lever * each.measures[:, ROTATION_ERROR]) for each in (others, rows)
+    """The solutions, with rows of the start in place of those that are no nearer to the same target.
+
+    A target that is asked for again, from its own answer, keeps this answer unless a nearer one is found.
+    """
+    if (request.hold, request.rotation_length) != (start_request.hold, start_request.rotation_length):
+        return solutions
+    lever = request.rotation_length or mechanism.rotation_length
+    start_distances, distances = (
+        np.hypot(rows.measures[:, POSITION_ERROR], lever * rows.measures[:, ROTATION_ERROR])
+        for rows in (start.rows, solutions.rows)
     )
-    same = (wanted.targets == before.targets).all(axis=(1, 2)) & (others.status == PROJECTED)
-    same &= rows.status != REACHED
-    no_nearer = distances <= farthest + TOLERANCES.position * mechanism.characteristic_length
-    stays = same & np.where(others.holds == rows.holds, no_nearer, rows.holds == HOLD_NOTHING)
-    places = np.flatnonzero(stays)
-    if not len(places):
-        return found
-    own = np.zeros(len(places), np.intp) if len(start) == 1 else places
-    return found.with_others(places, start.at(own))
+    is_same = (request.targets == start_request.targets).all(axis=(1, 2)) & (start.rows.status == PROJECTED)
+    is_same &= solutions.rows.status != REACHED
+    is_no_farther = start_distances <= distances + TOLERANCES.position * mechanism.characteristic_length
+    has_same_hold = start.rows.holds == solutions.rows.holds
+    rows = np.flatnonzero(is_same & np.where(has_same_hold, is_no_farther, solutions.rows.holds == HOLD_NOTHING))
+    if not len(rows):
+        return solutions
+    start_rows = np.zeros(len(rows), np.intp) if len(start) == 1 else rows
+    return solutions.with_rows(rows, start.at(start_rows))
 
 
 def keeps_mode(options: Options, start: object) -> bool:
-    """Whether answers stay in the working mode of a start, or of home where there is none."""
+    """True if answers stay in the working mode of the start, or of home without a start."""
     return (options.working_mode or ("any" if start is None else "keep")) == "keep"

@@ -1,4 +1,4 @@
-"""A machine prepared for control loops: the same answers as `solve_ik` and `solve_fk` give, in arrays that stay."""
+"""A solver prepared for control loops: the answers of `solve_ik` and `solve_fk`, in arrays allocated once."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ from .warm_up import warm_up
 
 
 class Solver:
-    """Asks one machine again and again, one question at a time.
+    """Solves single targets of one mechanism repeatedly.
 
-    Everything is compiled, or loaded, when it is made, which is announced on standard error; questions compile nothing.
-    Targets that legs in closed form reach are answered in arrays made once; others take what `solve_ik` takes.
+    The constructor compiles or loads all kernels, and says so on standard error; later calls compile nothing. Targets
+    that are reached in closed form allocate no arrays; others take as long as `solve_ik`.
     An instance is for one thread: make one for each.
 
     Attributes
     ----------
-    status : a `Status`, of the last answer; INVALID before the first, and where a question was refused.
-    pose : T_base_platform achieved, (4, 4) [length]; NaN where `status` is INVALID.
-    actuators : in the order of `mechanism.actuator_names`, (n_a,) [length or rad]; likewise.
+    status : the `Status` of the last answer; INVALID before the first one, and after a call that raised.
+    pose : T_base_platform achieved, (4, 4) [length]; NaN if `status` is INVALID.
+    actuators : in the order of `mechanism.actuator_names`, (n_a,) [length or rad]; NaN if `status` is INVALID.
 
-    `pose`, `actuators` and what `jacobian` returns are views, the same arrays each time: the next question overwrites
-    them. Copy what is to stay, or take `solution`. They can be read only.
+    `pose`, `actuators` and the result of `jacobian` are read-only views of the same arrays each time: the next call
+    overwrites them. Copy them to keep them, or use `solution`.
     """
 
     def __init__(self, mechanism: Mechanism, *, start: Start | None = None, options: Options | None = None) -> None:
-        """Compile, or load, what questions need.
+        """Compile or load all kernels.
 
         Parameters
         ----------
-        start : where every search starts, as of `solve_ik`: its working mode is kept, and its assembly mode. Default:
+        start : the start of every search, as of `solve_ik`; its working mode and its assembly mode are kept. Default:
             home, and any working mode.
-        options : of every question.
+        options : of every call.
 
         Raises
         ------
@@ -70,16 +70,16 @@ class Solver:
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))
         self.pose, self.actuators = _read_only(self._rows.poses[0]), _read_only(self._rows.actuators[0])
         self.status = Status.INVALID
-        self._found: Solution | None = None
+        self._solution: Solution | None = None
         self._was_forward = False
         self._clear()
 
     def ik(self, target: Target) -> Status:
-        """Answer a target as `solve_ik` does; its status.
+        """Solve for a target as `solve_ik` does; the status.
 
         Parameters
         ----------
-        target : one, as of `solve_ik`; a pose as an array (4, 4) of float64 is the quickest.
+        target : a single target, as of `solve_ik`; an array (4, 4) of float64 is the fastest.
 
         Raises
         ------
@@ -88,14 +88,14 @@ class Solver:
         if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is DOUBLE:
             self._target[0] = target
             if self._reach is not None and not self._reach():
-                self._found, self._was_forward, self.status = None, False, Status.REACHED
+                self._solution, self._was_forward, self.status = None, False, Status.REACHED
                 return Status.REACHED
-        asked = target.copy() if isinstance(target, np.ndarray) else target
+        copied = target.copy() if isinstance(target, np.ndarray) else target
         self._clear()
-        return self._take(solve_ik(self.mechanism, asked, start=self._start, options=self.options), "target")
+        return self._store(solve_ik(self.mechanism, copied, start=self._start, options=self.options), "target")
 
     def fk(self, actuators: Actuators) -> Status:
-        """Answer actuator values (n_a,) [length or rad] as `solve_fk` does; the status.
+        """Solve for actuator values (n_a,) [length or rad] as `solve_fk` does; the status.
 
         Raises
         ------
@@ -104,15 +104,14 @@ class Solver:
         if type(actuators) is np.ndarray and actuators.shape == self.actuators.shape and actuators.dtype is DOUBLE:
             self._rows.actuators[0] = actuators
             if self._assemble is not None and not self._assemble():
-                self._found, self._was_forward, self.status = None, True, Status.REACHED
+                self._solution, self._was_forward, self.status = None, True, Status.REACHED
                 return Status.REACHED
-        asked = actuators.copy() if isinstance(actuators, np.ndarray) else actuators
+        copied = actuators.copy() if isinstance(actuators, np.ndarray) else actuators
         self._clear()
-        found = solve_fk(self.mechanism, asked, start=self._start, options=self.options)
-        return self._take(found, "actuators")
+        return self._store(solve_fk(self.mechanism, copied, start=self._start, options=self.options), "actuators")
 
     def jacobian(self) -> Floats:
-        """Twist of the end effector per actuator rate at the last answer, as of `forward_jacobian`, (6 or 3, n_a).
+        """The forward Jacobian at the last answer, as of `forward_jacobian`, (6 or 3, n_a): twist per actuator rate.
 
         Raises
         ------
@@ -123,46 +122,46 @@ class Solver:
 
     @property
     def solution(self) -> Solution:
-        """The last answer with all that is told of one, which later questions leave as it is.
+        """The last answer as a `Solution`, which later calls do not change.
 
         Raises
         ------
-        InvalidArgument : there is none: nothing was asked, or the last question was refused.
+        InvalidArgument : there is none: nothing was solved yet, or the last call raised.
         """
-        if self._found is None:
+        if self._solution is None:
             if self.status is Status.INVALID:
                 raise InvalidArgument("solution", "no answer", "a question before that is not refused")
             if self._was_forward:
-                asked = self._rows.actuators[0]
-                self._found = solve_fk(self.mechanism, asked, start=self._start, options=self.options)
+                values = self._rows.actuators[0]
+                self._solution = solve_fk(self.mechanism, values, start=self._start, options=self.options)
             else:
-                self._found = solve_ik(self.mechanism, self._target[0], start=self._start, options=self.options)
-        return self._found
+                self._solution = solve_ik(self.mechanism, self._target[0], start=self._start, options=self.options)
+        return self._solution
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For copies and other processes: prepared anew, and not asked yet. Addresses lead nowhere there."""
+        """Copy and pickle as a new solver without an answer: memory addresses hold in one process only."""
         return partial(type(self), start=self._start, options=self.options), (self.mechanism,)
 
     def __repr__(self) -> str:
         return f"<Solver of '{self.mechanism.name}': {self.status}>"
 
-    def _take(self, found: Solution, name: str) -> Status:
-        """Take over an answer given elsewhere."""
-        if found.shape != ():
-            raise InvalidArgument(name, f"batch shape {found.shape}", "one at a time")
-        rows = found._rows
+    def _store(self, solution: Solution, name: str) -> Status:
+        """Store a solution of `solve_ik` or `solve_fk` as the last answer."""
+        if solution.shape != ():
+            raise InvalidArgument(name, f"batch shape {solution.shape}", "one at a time")
+        rows = solution._rows
         self._rows.poses[:], self._rows.actuators[:] = rows.poses, rows.actuators
-        self._found, self.status = found, Status(int(rows.status[0]))
+        self._solution, self.status = solution, Status(int(rows.status[0]))
         return self.status
 
     def _clear(self) -> None:
-        """Have no answer, until there is one."""
-        self._found, self.status = None, Status.INVALID
+        """Forget the last answer."""
+        self._solution, self.status = None, Status.INVALID
         self._rows.poses[:], self._rows.actuators[:] = np.nan, np.nan
 
 
 def _read_only(array: Floats) -> Floats:
-    """A view that follows what its owner writes."""
+    """A read-only view of an array."""
     view = array.view()
     view.setflags(write=False)
     return view

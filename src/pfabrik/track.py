@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .answers.answer import Wanted
+from .answers.answer import PoseRequest
 from .answers.starts import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track, pace_of
@@ -34,9 +34,9 @@ def track(
     times: ArrayLike | None = None,
     speed_limits: float | Mapping[str, float] | None = None,
 ) -> Track:
-    """Follow a path: warm-started from step to step, in the working mode it starts in.
+    """Solve a path of targets, each from the answer before it, in the working mode of the start.
 
-    Links that are stretched out where a target is beyond reach bend back the way they did.
+    Links that are stretched out at an unreachable target bend back to the side from which they came.
 
     Parameters
     ----------
@@ -44,16 +44,16 @@ def track(
     start : a single Solution or joint vector q to start from; default home.
     on_progress : called with (steps done, steps in all) every few steps.
     sample_time : from one target to the next [s].
-    times : instead of it, when each target is to be there, (n,) [s], as of `read_path`: none before one before it; the
-        same where the machine is to wait, NaN where nothing is known.
-    speed_limits : highest speeds of the actuators, by name or the same for all [length/s or rad/s]; those not named may
-        be as fast as they like.
+    times : in place of `sample_time`, the time of each target, (n,) [s], as `read_path` returns them: never falling;
+        equal where the machine waits, NaN where unknown.
+    speed_limits : highest speeds of the actuators, by name or one for all [length/s or rad/s]; actuators that are not
+        named have no limit.
 
     Returns
     -------
-    Track : a Solution of batch shape (n,), which also tells where answers leap, and which actuators would have to be
-        too fast. Revolute actuators that may turn more than once are counted on through full turns, as far as their
-        range goes.
+    Track : a Solution of batch shape (n,), with the steps at which answers jump and the actuators that would exceed
+        their speed limits. Angles of revolute actuators that may turn more than once continue through full turns, as
+        far as the range allows.
 
     Raises
     ------
@@ -68,22 +68,22 @@ def track(
         raise InvalidArgument("options.working_mode", "'any'", "'keep' or None: a machine cannot change it on its way")
     pace = pace_of(mechanism, len(poses), sample_time, times, speed_limits)
     begin = start_of(mechanism, start, ())
-    found = inverse_engine_of(mechanism, options).follow(poses, begin, options, on_progress)
+    solutions = inverse_engine_of(mechanism, options).follow(poses, begin, options, on_progress)
     if begin is not None:
-        _count_on(mechanism, found.rows, begin.rows.actuators[0])
-    refuse_invalid(poses, shape, found.rows.status, options)
-    wanted = Wanted(poses.copy(), options.hold, options.rotation_length)
-    return Track(mechanism, found, wanted, partial(track, mechanism, options=options), pace)
+        _continue_turns(mechanism, solutions.rows, begin.rows.actuators[0])
+    refuse_invalid(poses, shape, solutions.rows.status, options)
+    request = PoseRequest(poses.copy(), options.hold, options.rotation_length)
+    return Track(mechanism, solutions, request, partial(track, mechanism, options=options), pace)
 
 
-def _count_on(mechanism: Mechanism, rows: Rows, begin: Floats) -> None:
-    """Count the turns of actuators on from those of the start, (n_a,), as far as their ranges go."""
-    known = np.flatnonzero(rows.status != Status.INVALID)
+def _continue_turns(mechanism: Mechanism, rows: Rows, start: Floats) -> None:
+    """Shift angles of actuators by full turns towards their values at the start, (n_a,), if their ranges allow it."""
+    valid = np.flatnonzero(rows.status != Status.INVALID)
     for column, drive in enumerate(mechanism.drives):
         low, high = drive.limits
-        if drive.kind != "angle" or high - low <= 2.0 * np.pi or not len(known):
+        if drive.kind != "angle" or high - low <= 2.0 * np.pi or not len(valid):
             continue
-        values = rows.actuators[known, column]
-        values += 2.0 * np.pi * np.round((begin[column] - values[0]) / (2.0 * np.pi))
+        values = rows.actuators[valid, column]
+        values += 2.0 * np.pi * np.round((start[column] - values[0]) / (2.0 * np.pi))
         if (values >= low - TOLERANCES.limit).all() and (values <= high + TOLERANCES.limit).all():
-            rows.actuators[known, column] = values
+            rows.actuators[valid, column] = values

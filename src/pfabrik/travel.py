@@ -1,4 +1,4 @@
-"""How far the end effector can go from where it is, along and about each axis, and what stops it."""
+"""Travel: how far the end effector can move from a configuration in each direction, and which limits stop it."""
 
 from __future__ import annotations
 
@@ -28,37 +28,36 @@ from .rotations import from_rotvec
 from .tolerances import TOLERANCES
 
 STEP = 1.0 / 32.0
-"""How far one look ahead goes at first [L or rad]: what is narrower may be stepped over."""
+"""First step [L or rad]: narrower obstacles may be stepped over."""
 
 NEARBY, LONGEST, HORIZON = 4.0, 64.0, 1e3
-"""How far looks along a line are so short, beyond which each goes twice as far as the one before; how far one goes at
-most, as an engine that takes limited steps can follow; and beyond which none goes [L]."""
+"""Distance up to which steps keep the length `STEP`, and beyond which they double; the longest step, which an engine
+with limited steps can follow; the largest distance [L]."""
 
 SHORTEST = 1e-12
-"""How short a step is not halved again [L or rad]: so near to where a limit stops it, a joint is on that limit even if
-it turns a hundred thousand times as fast as the end effector goes. Beyond, its links are as good as stretched out."""
+"""Shortest step, which is not halved again [L or rad]: a joint is then on the limit that stops it, even if it turns a
+hundred thousand times as fast as the end effector moves. If it turns faster, links are practically stretched out."""
 
 IN_SHORT = {STRETCHED: "links stretched", NO_FREEDOM: "no freedom that way"}
-"""Causes as there is room for in a table or a picture."""
+"""Short names of causes, for tables and pictures."""
 
 FULL_TURN = 2.0 * np.pi
-"""How far is looked about an axis [rad]: after a full turn the poses repeat."""
+"""Largest rotation about an axis [rad]: after a full turn the poses repeat."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """How far it is in one direction.
+    """The travel in one direction.
 
     Attributes
     ----------
     kind : "along" an axis, or "about" it.
     direction : unit vector in the base frame.
     distance : how far the end effector can go [length or rad]; inf where nothing stops it.
-    stopped_by : the limits met there, and which of their bounds; empty where the links are stretched out, or nothing
-        stops it.
-    end : the last configuration on the way; None where nothing stops it.
-    cause : in words, what stops it where no limit does: the links are stretched out, the mechanism has no freedom that
-        way, or its task asks for more than it can do, on whatever limits it is there; else empty.
+    stopped_by : the limits that stop it; empty if the links are stretched out or nothing stops it.
+    end : the last configuration in this direction; None if nothing stops it.
+    cause : in words, what stops it if no limit does: the links are stretched out, the mechanism has no freedom that
+        way, or its task asks for more than it can do, whatever limits are active; else empty.
     """
 
     kind: Literal["along", "about"]
@@ -70,20 +69,20 @@ class Reach:
 
     @property
     def why(self) -> str:
-        """What stops it, in a few words that a table has room for; empty where nothing does."""
+        """What stops it, in a few words for a table; empty if nothing does."""
         return IN_SHORT.get(self.cause, "the task") if self.cause else short_names(self.stopped_by)
 
 
 @dataclass(frozen=True, repr=False)
 class Travel(Sequence[Reach]):
-    """What `travel` found, one `Reach` a direction, in the order they were asked for."""
+    """The result of `travel`: one `Reach` per direction, in the order of the arguments."""
 
     origin: Solution
     reaches: tuple[Reach, ...]
 
     @property
     def distances(self) -> Floats:
-        """How far it is in every direction, (n,) [length or rad]."""
+        """Distance in every direction, (n,) [length or rad]."""
         return np.array([reach.distance for reach in self.reaches])
 
     def __len__(self) -> int:
@@ -103,25 +102,25 @@ class Travel(Sequence[Reach]):
         return f"<Travel of '{self.origin.mechanism.name}': {counted(len(self), 'direction')}>"
 
     def __str__(self) -> str:
-        """A table of them, angles in degrees, and what stops it where no limit does."""
+        """A table of all directions, angles in degrees, and what stops the end effector if no limit does."""
         return "\n\n".join([aligned(_HEADER, self._rows()), *self._remarks()])
 
     def _repr_html_(self) -> str:
-        """The same for notebooks."""
+        """The table for notebooks."""
         return card(
             self.origin.mechanism.name, ["how far the end effector can go", *self._remarks()], _HEADER, self._rows(), ""
         )
 
     def _rows(self) -> list[tuple[str, ...]]:
-        return [(*_direction(each), *self._distance(each), each.why) for each in self]
+        return [(*_direction(reach), *self._distance(reach), reach.why) for reach in self]
 
     def _remarks(self) -> list[str]:
-        """What there is no room for in a table."""
-        said = task_remark(self.origin.mechanism)
-        return [said] if any(each.cause == said for each in self) else []
+        """Causes that are too long for the table."""
+        remark = task_remark(self.origin.mechanism)
+        return [remark] if any(reach.cause == remark for reach in self) else []
 
     def _distance(self, reach: Reach) -> tuple[str, str]:
-        """How far it is, and the unit: degrees about an axis."""
+        """Distance and unit as text; degrees about an axis."""
         mechanism = self.origin.mechanism
         unit = "deg" if reach.kind == "about" else mechanism.length_unit
         if not np.isfinite(reach.distance):
@@ -159,10 +158,10 @@ def travel(
     about: ArrayLike | None = None,
     pivot: ArrayLike | None = None,
 ) -> Travel:
-    """How far the end effector can go from a configuration, in its working mode, until a limit or a link stops it.
+    """Distances that the end effector can move from a configuration, in its working mode, until something stops it.
 
-    Directions are looked along in steps of L/32 or 1/32 rad, each from the configuration before it; steps that are not
-    reached are halved, far below the tolerance of a pose. All are followed at once.
+    A search takes steps of L/32 or 1/32 rad in each direction, each from the configuration before it, and halves steps
+    that are not reached, far below the tolerance of a pose. All directions are searched at once.
 
     Parameters
     ----------
@@ -195,7 +194,7 @@ def travel(
     centre = solution.pose[:3, 3] if pivot is None else _vector("pivot", pivot)
     search = _Search(solution, lines, axes, centre)
     distances = search.run()
-    ends = Solution(mechanism, search.best, (len(distances),))
+    ends = Solution(mechanism, search.farthest, (len(distances),))
     named = active_limits(mechanism, ends._coordinates)
     reaches = []
     for row, (distance, direction) in enumerate(zip(distances.tolist(), search.directions.tolist(), strict=True)):
@@ -209,11 +208,11 @@ def travel(
 
 
 def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> str:
-    """What stops an end effector besides limits, as far as first order tells: where it is at one, that may be the task.
+    """The cause that stops an end effector if no limit does, to first order; at a limit, only the task can be one.
 
     Parameters
     ----------
-    velocity, turn : how it would go on, (3,) each: velocity of the reference point [L], and angular velocity.
+    velocity, turn : of the blocked motion, (3,) each: velocity of the reference point [L], and angular velocity.
     """
     mechanism, task = end.mechanism, task_of(end.mechanism)
     if is_at_limit and not has_dependent_coordinates(mechanism):
@@ -221,9 +220,9 @@ def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> 
     motions, axes = motions_at(mechanism, end._coordinates), list(task.axes)
     about = task.turning_axes(end.pose) if len(motions) > 3 else np.zeros((0, 3))
     able = np.concatenate([motions[:3][axes], about @ motions[3:] if len(about) else motions[:0]])
-    wanted = np.concatenate([velocity[axes], about @ turn])
-    left = wanted - able @ np.linalg.lstsq(able, wanted, rcond=TOLERANCES.alignment)[0]
-    is_able = bool(np.linalg.norm(left) <= TOLERANCES.stretched * np.linalg.norm(wanted))
+    blocked = np.concatenate([velocity[axes], about @ turn])
+    remainder = blocked - able @ np.linalg.lstsq(able, blocked, rcond=TOLERANCES.alignment)[0]
+    is_able = bool(np.linalg.norm(remainder) <= TOLERANCES.stretched * np.linalg.norm(blocked))
     if has_dependent_coordinates(mechanism):
         return "" if is_able else task_remark(mechanism)
     if are_stretched(mechanism, end._coordinates).any():
@@ -238,7 +237,7 @@ def _lines(mechanism: Mechanism, along: ArrayLike | None, default: bool) -> Floa
         chosen = np.eye(3)[list(counts)] if default else np.zeros((0, 3))
         return np.stack([chosen, -chosen], axis=1).reshape(-1, 3)
     lines = _directions("along", along)
-    off = np.abs(lines[:, [not each for each in counts]]).max(axis=1, initial=0.0)
+    off = np.abs(lines[:, [not axis for axis in counts]]).max(axis=1, initial=0.0)
     _require_task(mechanism, "along", lines, off > TOLERANCES.alignment)
     return lines
 
@@ -286,12 +285,12 @@ def _vector(name: str, given: ArrayLike) -> Floats:
 
 
 class _Search:
-    """All directions from one pose, and the farthest configuration reached yet on each.
+    """A line search from one pose in several directions at once.
 
     Attributes
     ----------
     directions : unit vectors (n, 3): lines first, then axes.
-    best : the farthest configurations, (n,).
+    farthest : the farthest configuration reached yet in each direction, (n,).
     """
 
     def __init__(self, solution: Solution, lines: Floats, axes: Floats, pivot: Floats) -> None:
@@ -300,55 +299,55 @@ class _Search:
         self._pose, self._pivot = solution.pose, pivot
         self._engine = engine_of(solution.mechanism)
         self._length = solution.mechanism.characteristic_length
-        every = np.arange(len(self.directions))
-        start = solution._found.at(0 * every)
-        self.best = self._engine.advance(self._targets(every, np.zeros(len(every))), start)
+        rows = np.arange(len(self.directions))
+        start = solution._configurations.at(0 * rows)
+        self.farthest = self._engine.advance(self._targets(rows, np.zeros(len(rows))), start)
 
     def run(self) -> Floats:
-        """How far each goes, (n,) [length or rad].
+        """Distance in each direction, (n,) [length or rad].
 
-        Steps that are not reached are halved, until they are the shortest; two in a row that are reached
-        after all, for they begin nearer, are doubled again.
+        A step that is not reached is halved, down to the shortest; after two in a row that are reached, the step is
+        doubled again.
         """
         units = np.where(self._turns, 1.0, self._length)
-        farthest = np.where(self._turns, FULL_TURN, HORIZON * self._length)
-        near, step, longest = np.zeros(len(units)), STEP * units, STEP * units
+        most = np.where(self._turns, FULL_TURN, HORIZON * self._length)
+        distances, step, longest = np.zeros(len(units)), STEP * units, STEP * units
         streak = np.zeros(len(units), np.int64)
         moving = np.arange(len(units))
         while len(moving):
-            reached = self._go_on(moving, near[moving] + step[moving])
-            near[moving[reached]] += step[moving[reached]]
+            reached = self._advance(moving, distances[moving] + step[moving])
+            distances[moving[reached]] += step[moving[reached]]
             streak[moving] = np.where(reached, streak[moving] + 1, 0)
             step[moving[~reached]] *= 0.5
-            distant = (near > NEARBY * self._length) & ~self._turns
-            longest[distant] = LONGEST * self._length
+            is_distant = (distances > NEARBY * self._length) & ~self._turns
+            longest[is_distant] = LONGEST * self._length
             steady = moving[streak[moving] >= 2]
             step[steady] = np.minimum(2.0 * step[steady], longest[steady])
             streak[steady] = 0
-            near[near > farthest] = np.inf
-            moving = moving[np.isfinite(near[moving]) & (step[moving] > SHORTEST * units[moving])]
-        return near
+            distances[distances > most] = np.inf
+            moving = moving[np.isfinite(distances[moving]) & (step[moving] > SHORTEST * units[moving])]
+        return distances
 
     def twist(self, row: int, pose: Floats) -> tuple[Floats, Floats]:
-        """How the end effector goes on in a direction at a pose (4, 4): its velocity [L], and its angular velocity."""
+        """Velocity [L] and angular velocity of the end effector that moves in a direction, at a pose (4, 4)."""
         direction = self.directions[row]
         if not self._turns[row]:
             return direction, np.zeros(3)
         return np.cross(direction, pose[:3, 3] - self._pivot) / self._length, direction
 
-    def _go_on(self, which: NDArray[np.intp], distances: Floats) -> Mask:
-        """Whether poses so far out in some directions are reached; where they are, the next go on from them."""
-        found = self._engine.advance(self._targets(which, distances), self.best.at(which))
-        reached = np.asarray(found.rows.status == REACHED)
-        self.best.replace(which[reached], found, reached)
+    def _advance(self, rows: NDArray[np.intp], distances: Floats) -> Mask:
+        """True for directions whose pose at the given distance is reached; the next step starts there."""
+        solutions = self._engine.advance(self._targets(rows, distances), self.farthest.at(rows))
+        reached = np.asarray(solutions.rows.status == REACHED)
+        self.farthest.put(rows[reached], solutions, reached)
         return reached
 
-    def _targets(self, which: NDArray[np.intp], distances: Floats) -> Floats:
-        """Poses (k, 4, 4) so far along, or turned so far about, some of the directions."""
-        steps = distances[:, None] * self.directions[which]
-        turned = from_rotvec(np.where(self._turns[which, None], steps, 0.0))
-        targets = np.repeat(self._pose[None], len(which), axis=0)
-        targets[:, :3, :3] = turned @ targets[:, :3, :3]
-        targets[:, :3, 3] = self._pivot + turned @ (self._pose[:3, 3] - self._pivot)
-        targets[:, :3, 3] += np.where(self._turns[which, None], 0.0, steps)
+    def _targets(self, rows: NDArray[np.intp], distances: Floats) -> Floats:
+        """Poses (k, 4, 4), displaced along or turned about some of the directions by the given distances."""
+        steps = distances[:, None] * self.directions[rows]
+        rotations = from_rotvec(np.where(self._turns[rows, None], steps, 0.0))
+        targets = np.repeat(self._pose[None], len(rows), axis=0)
+        targets[:, :3, :3] = rotations @ targets[:, :3, :3]
+        targets[:, :3, 3] = self._pivot + rotations @ (self._pose[:3, 3] - self._pivot)
+        targets[:, :3, 3] += np.where(self._turns[rows, None], 0.0, steps)
         return targets

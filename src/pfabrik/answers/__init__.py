@@ -1,1 +1,1 @@
-"""What an answer is, and what can be read of it: limits, margins, Jacobians, words."""
+"""Answers and their properties: active limits, margins, Jacobians, and descriptions in words."""

@@ -1,4 +1,4 @@
-"""The fields of an answer: a status, a configuration that is feasible, and what was measured of it."""
+"""The fields of an answer: its status, its configuration, and the measured errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, shaped
 from ..closure.configurations import Configurations
-from ..closure.projection import ways_of
+from ..closure.projection import projection_modes
 from ..description.mechanism import Mechanism
 from ..engine import engine_of
 from ..frozen import FrozenMapping
@@ -27,15 +27,15 @@ from ..kernels.rows import (
     Rows,
 )
 from ..motion.displacements import columns, home_coordinates
-from .limits import ActiveLimit, active_limits, binding_limits, holding_limits, is_held_by_others
+from .limits import ActiveLimit, active_limits, binding_limits, has_passive_limits, holding_limits
 from .status import Status
 
 Held: TypeAlias = Literal["orientation", "position"] | None
-"""What of its target a projected answer has."""
+"""The part of its target that a projected answer holds."""
 
 
-class Wanted(NamedTuple):
-    """Poses that were asked for, (n, 4, 4), and how the distance from them counts; see `Options`."""
+class PoseRequest(NamedTuple):
+    """Target poses (n, 4, 4) with the options that define their distance: `hold` and `rotation_length` of `Options`."""
 
     targets: Floats
     hold: str | None
@@ -43,32 +43,32 @@ class Wanted(NamedTuple):
 
 
 class Answer:
-    """The fields of a `Solution`, which says what they are; what puts them into words or pictures reads these."""
+    """The fields of a `Solution`, whose docstring describes them; text and pictures are made from these."""
 
     def __init__(
-        self, mechanism: Mechanism, found: Configurations, shape: tuple[int, ...], wanted: Wanted | None = None
+        self, mechanism: Mechanism, found: Configurations, shape: tuple[int, ...], request: PoseRequest | None = None
     ) -> None:
-        """Wrap configurations, as many as the batch shape has; `wanted` are the poses asked for, if any are missed."""
+        """Wrap configurations, as many as the batch shape has; `request` are the poses asked for, if any are missed."""
         self.mechanism = mechanism
         self.shape = shape
-        self._found = found
-        self._wanted = wanted
+        self._configurations = found
+        self._request = request
 
-    def __getstate__(self) -> tuple[Mechanism, Configurations, tuple[int, ...], Wanted | None]:
-        """What an answer is made of; all else follows again where it is unpickled."""
-        return self.mechanism, self._found, self.shape, self._wanted
+    def __getstate__(self) -> tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None]:
+        """The arguments of the constructor; cached properties are not pickled."""
+        return self.mechanism, self._configurations, self.shape, self._request
 
-    def __setstate__(self, state: tuple[Mechanism, Configurations, tuple[int, ...], Wanted | None]) -> None:
+    def __setstate__(self, state: tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None]) -> None:
         Answer.__init__(self, *state)
 
     @property
     def _rows(self) -> Rows:
-        return self._found.rows
+        return self._configurations.rows
 
     @property
     def _coordinates(self) -> Floats:
-        """All joint coordinates as deviations from home, row by row, (n, columns) [length or rad]."""
-        return self._found.coordinates
+        """All joint coordinates as deviations from home, (n, columns) [length or rad]."""
+        return self._configurations.coordinates
 
     def _shaped(self, array: NDArray[Any]) -> Any:
         return shaped(array, self.shape)
@@ -137,65 +137,63 @@ class Answer:
 
     @cached_property
     def points(self) -> Mapping[str, Floats]:
-        found = engine_of(self.mechanism).points(self._found)
-        order = [joint.name for joint in self.mechanism.joints if joint.name in found]
-        unknown = (self._rows.status == Status.INVALID)[:, None]
-        return FrozenMapping({name: self._shaped(np.where(unknown, np.nan, found[name])) for name in order})
+        points = engine_of(self.mechanism).points(self._configurations)
+        order = [joint.name for joint in self.mechanism.joints if joint.name in points]
+        is_invalid = (self._rows.status == Status.INVALID)[:, None]
+        return FrozenMapping({name: self._shaped(np.where(is_invalid, np.nan, points[name])) for name in order})
 
     @cached_property
     def active_limits(self) -> tuple[ActiveLimit, ...] | list[tuple[ActiveLimit, ...]]:
-        listed = self._limits
-        return listed[0] if self.shape == () else listed
+        limits = self._limits
+        return limits[0] if self.shape == () else limits
 
     @cached_property
     def _limits(self) -> list[tuple[ActiveLimit, ...]]:
-        """The same as a list of rows, also of a single answer."""
+        """`active_limits` as a list of rows, also of a single answer."""
         status = self._rows.status
-        held: list[tuple[ActiveLimit, ...]] = [()] * len(status)
-        is_asked = (status == Status.PROJECTED) & (self._wanted is not None)
-        others = np.flatnonzero((status != Status.REACHED) & (status != Status.INVALID) & ~is_asked)
-        if len(others):
-            for row, found in zip(others, active_limits(self.mechanism, self._coordinates[others]), strict=True):
-                held[row] = found
-        projected = np.flatnonzero(is_asked)
-        if self._wanted is not None and len(projected):
-            for row, found in zip(projected, self._holding(self._wanted, projected), strict=True):
-                held[row] = found
-        return held
+        limits: list[tuple[ActiveLimit, ...]] = [()] * len(status)
+        is_projected = (status == Status.PROJECTED) & (self._request is not None)
+        without_target = np.flatnonzero((status != Status.REACHED) & (status != Status.INVALID) & ~is_projected)
+        if len(without_target):
+            active = active_limits(self.mechanism, self._coordinates[without_target])
+            for row, row_limits in zip(without_target, active, strict=True):
+                limits[row] = row_limits
+        projected = np.flatnonzero(is_projected)
+        if self._request is not None and len(projected):
+            for row, row_limits in zip(projected, self._holding(self._request, projected), strict=True):
+                limits[row] = row_limits
+        return limits
 
     @cached_property
     def binding(self) -> NDArray[np.void]:
-        """The first of `active_limits` of every row as one array, (...,): empty names where there is none.
+        """The first of `active_limits` of every row as one array, (...,): empty names if there is none.
 
-        Fields: joint, bound (text), coordinate (int), value, limit [length or rad], multiplier (NaN where none is
-        known).
+        Fields: joint, bound (text), coordinate (int), value, limit [length or rad], multiplier (NaN if unknown).
         """
         return binding_limits(self._limits).reshape(self.shape)
 
-    def _holding(self, wanted: Wanted, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
-        """The limits that hold projected rows back from the poses that were asked for."""
-        found: dict[int, tuple[ActiveLimit, ...]] = {}
-        engine = engine_of(self.mechanism)
-        holds, ways = (
-            self._rows.holds[projected],
-            ways_of(self.mechanism, wanted.hold, wanted.rotation_length),
-        )
-        for way in ways:
-            rows = projected[holds == way.hold]
+    def _holding(self, request: PoseRequest, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
+        """The limits that block projected rows from their targets."""
+        limits: dict[int, tuple[ActiveLimit, ...]] = {}
+        engine, holds = engine_of(self.mechanism), self._rows.holds[projected]
+        for projection in projection_modes(self.mechanism, request.hold, request.rotation_length):
+            rows = projected[holds == projection.hold]
             if len(rows):
-                weights = engine.weighed_limits(self._found.at(rows), wanted.targets[rows], way)
-                limits = holding_limits(self.mechanism, self._told_of(rows, weights), weights)
-                found.update(zip(rows.tolist(), limits, strict=True))
-        return [found[row] for row in projected.tolist()]
+                configurations = self._configurations.at(rows)
+                multipliers = engine.limit_multipliers(configurations, request.targets[rows], projection)
+                coordinates = self._coordinates_for_limits(rows, multipliers)
+                row_limits = holding_limits(self.mechanism, coordinates, multipliers)
+                limits.update(zip(rows.tolist(), row_limits, strict=True))
+        return [limits[row] for row in projected.tolist()]
 
-    def _told_of(self, rows: NDArray[np.intp], weights: Floats) -> Floats:
-        """Joint coordinates of some rows, (n, columns), as far as the limits that hold these back need them.
+    def _coordinates_for_limits(self, rows: NDArray[np.intp], multipliers: Floats) -> Floats:
+        """Joint coordinates of some rows, (n, columns), computed only if the active limits need them.
 
-        Where only those of actuators hold, the others are not worked out: they are NaN.
+        If only limits of actuators are active, the coordinates of other joints are NaN.
         """
-        if is_held_by_others(self.mechanism, weights):
+        if has_passive_limits(self.mechanism, multipliers):
             return self._coordinates[rows]
-        told = np.full((len(rows), len(home_coordinates(self.mechanism))), np.nan)
+        coordinates = np.full((len(rows), len(home_coordinates(self.mechanism))), np.nan)
         for place, drive in enumerate(self.mechanism.drives):
-            told[:, drive.column] = self._rows.actuators[rows, place] - drive.home
-        return told
+            coordinates[:, drive.column] = self._rows.actuators[rows, place] - drive.home
+        return coordinates

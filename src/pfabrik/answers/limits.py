@@ -1,4 +1,4 @@
-"""Limits of a configuration: which of them it lies on."""
+"""The active limits of a configuration."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..tolerances import TOLERANCES
 
 @dataclass(frozen=True)
 class ActiveLimit:
-    """A limit that holds an answer back.
+    """A limit that an answer lies on or exceeds.
 
     Attributes
     ----------
@@ -26,10 +26,10 @@ class ActiveLimit:
     value, limit : the coordinate (or the angle at the cone) and its bound [length or rad].
     coordinate : which coordinate of the joint, as in `home_coordinate`: 0, or 1 for the second of a universal or
         cylindrical joint.
-    multiplier : by how much the answer to a target comes nearer to it, at most, per unit by which the limit gives way
-        [length per length or rad]; rotations count as lengths by `Options.rotation_length`. By just so much where the
-        limits that hold are independent; those that act as one (two rods side by side) share what they hold, and
-        neither alone brings the answer nearer. None where no pose was asked for.
+    multiplier : the most by which the answer comes nearer to its target per unit by which the limit is relaxed [length
+        per length or rad]; rotations count as lengths by `Options.rotation_length`. It is exact if the active limits
+        are independent; redundant limits (two parallel rods) share a multiplier, and relaxing one of them alone changes
+        nothing. None if the target was no pose.
     """
 
     joint: str
@@ -41,15 +41,15 @@ class ActiveLimit:
 
 
 ALIKE = 0.999
-"""Share of a multiplier above which another counts as the same: they are known to about one in ten thousand."""
+"""Ratio of two multipliers above which they count as equal: their relative error is about 1e-4."""
 
 
 def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[ActiveLimit, ...]]:
     """The limits that each row of joint coordinates (n, columns), deviations from home, lies on; ranges first.
 
-    A rigid joint is always where it is locked: only beyond that it counts.
+    A rigid joint is always at its limits, and is listed only if it exceeds them.
     """
-    found: list[list[ActiveLimit]] = [[] for _ in coordinates]
+    limits: list[list[ActiveLimit]] = [[] for _ in coordinates]
     ranges = ranges_of(mechanism)
     rigid = [joint.is_rigid for joint in ranges.joints]
     values, near = ranges.values(coordinates), np.where(rigid, -TOLERANCES.limit, TOLERANCES.active) * ranges.units
@@ -58,61 +58,64 @@ def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[Activ
         for row in np.flatnonzero(low[:, k] | high[:, k]):
             bound: Literal["min", "max"] = "min" if low[row, k] else "max"
             limit = float((ranges.low if bound == "min" else ranges.high)[k])
-            found[row].append(ActiveLimit(joint.name, bound, float(values[row, k]), limit, None, place))
+            limits[row].append(ActiveLimit(joint.name, bound, float(values[row, k]), limit, None, place))
     for joint, angles, half_angle in coned(mechanism, coordinates):
         for row in np.flatnonzero(half_angle - angles <= TOLERANCES.active):
-            found[row].append(ActiveLimit(joint.name, "cone", float(angles[row]), half_angle))
-    return [tuple(each) for each in found]
+            limits[row].append(ActiveLimit(joint.name, "cone", float(angles[row]), half_angle))
+    return [tuple(row_limits) for row_limits in limits]
 
 
 def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Floats) -> list[tuple[ActiveLimit, ...]]:
-    """The limits that hold each row of joint coordinates (n, columns) back, the hardest first.
+    """The limits that block each row of joint coordinates (n, columns) from its target, the largest multiplier first.
 
-    Those that hold alike, as symmetry makes them, come as the description lists them.
+    Limits with equal multipliers, as of symmetric legs, are in the order of the description.
 
     Parameters
     ----------
-    multipliers : (n, 2 columns + cones), as of `weighed_limits`.
+    multipliers : (n, 2 columns + cones), as of `limit_multipliers`.
     """
-    found: list[list[ActiveLimit]] = [[] for _ in coordinates]
+    limits: list[list[ActiveLimit]] = [[] for _ in coordinates]
     n, units = coordinates.shape[1], rate_units(mechanism)
     angles = coned(mechanism, coordinates) if (multipliers[:, 2 * n :] > TOLERANCES.holding).any() else []
-    for row, place in ((row, place) for row, own in enumerate(multipliers) for place in _hardest_first(own)):
-        which = 0
+    places = [(row, place) for row in range(len(multipliers)) for place in _largest_first(multipliers[row])]
+    for row, place in places:
+        coordinate_place = 0
         if place < 2 * n:
-            own = mechanism.coordinates[place // 2]
-            if own.joint.is_rigid:
+            coordinate = mechanism.coordinates[place // 2]
+            if coordinate.joint.is_rigid:
                 continue
-            name, which, unit = own.joint.name, own.place, mechanism.characteristic_length / float(units[own.column])
-            value, limit = float(coordinates[row, own.column]) + own.home, own.bounds[place % 2]
+            name, coordinate_place, column = coordinate.joint.name, coordinate.place, coordinate.column
+            unit = mechanism.characteristic_length / float(units[column])
+            value, limit = float(coordinates[row, column]) + coordinate.home, coordinate.bounds[place % 2]
             bound: Literal["min", "max", "cone"] = "max" if place % 2 else "min"
         else:
             joint, values, limit = angles[place - 2 * n]
             name, value, bound, unit = joint.name, float(values[row]), "cone", mechanism.characteristic_length
-        found[row].append(ActiveLimit(name, bound, value, limit, float(multipliers[row, place]) * unit, which))
-    return [tuple(each) for each in found]
+        multiplier = float(multipliers[row, place]) * unit
+        limits[row].append(ActiveLimit(name, bound, value, limit, multiplier, coordinate_place))
+    return [tuple(row_limits) for row_limits in limits]
 
 
-def is_held_by_others(mechanism: Mechanism, multipliers: Floats) -> bool:
-    """Whether a limit other than an actuator's holds some row back; multipliers as of `holding_limits`."""
-    resting = [drive.column for drive in mechanism.drives]
-    resting += [each.column for each in mechanism.coordinates if each.joint.is_rigid]  # which are left out anyway
-    others = np.ones(multipliers.shape[1], bool)
-    others[[2 * column + side for column in resting for side in (0, 1)]] = False
-    return bool((multipliers[:, others] > TOLERANCES.holding).any())
+def has_passive_limits(mechanism: Mechanism, multipliers: Floats) -> bool:
+    """True if a limit of a passive joint is active in some row; multipliers as of `holding_limits`."""
+    columns = [drive.column for drive in mechanism.drives]
+    columns += [coordinate.column for coordinate in mechanism.coordinates if coordinate.joint.is_rigid]  # never listed
+    is_passive = np.ones(multipliers.shape[1], bool)
+    is_passive[[2 * column + bound for column in columns for bound in (0, 1)]] = False
+    return bool((multipliers[:, is_passive] > TOLERANCES.holding).any())
 
 
-def _hardest_first(multipliers: Floats) -> list[int]:
-    """Places of the multipliers (k,) that hold, in falling order, but for those that are alike."""
-    alike: list[list[int]] = []
+def _largest_first(multipliers: Floats) -> list[int]:
+    """Places of the active multipliers (k,), in falling order; equal ones in the order of their places."""
+    groups: list[list[int]] = []
     for place in np.argsort(-multipliers, kind="stable").tolist():
         if multipliers[place] <= TOLERANCES.holding:
             break
-        if alike and multipliers[place] > ALIKE * multipliers[alike[-1][0]]:
-            alike[-1].append(place)
+        if groups and multipliers[place] > ALIKE * multipliers[groups[-1][0]]:
+            groups[-1].append(place)
         else:
-            alike.append([place])
-    return [place for group in alike for place in sorted(group)]
+            groups.append([place])
+    return [place for group in groups for place in sorted(group)]
 
 
 BINDING = np.dtype(
@@ -123,11 +126,11 @@ BINDING = np.dtype(
 
 def binding_limits(rows: Sequence[tuple[ActiveLimit, ...]]) -> NDArray[np.void]:
     """The first limit of each row, (n,) records of `BINDING`; empty names and NaN where a row has none."""
-    found = np.zeros(len(rows), BINDING)
+    records = np.zeros(len(rows), BINDING)
     for name in ("value", "limit", "multiplier"):
-        found[name] = np.nan
+        records[name] = np.nan
     for place, limits in enumerate(rows):
         for limit in limits[:1]:
             multiplier = np.nan if limit.multiplier is None else limit.multiplier
-            found[place] = (limit.joint, limit.bound, limit.coordinate, limit.value, limit.limit, multiplier)
-    return found
+            records[place] = (limit.joint, limit.bound, limit.coordinate, limit.value, limit.limit, multiplier)
+    return records

@@ -1,4 +1,4 @@
-"""How far a configuration is from each of its limits."""
+"""The margins of a configuration: its distances from all limits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .solution import Solution, checked_solution
 
 
 class Margins(FrozenMapping[tuple[str, str], float | Floats]):
-    """(joint, bound) -> margin, for every limit; `margins` makes them."""
+    """(joint, bound) -> margin, for every limit, as `margins` returns them."""
 
     def _repr_html_(self) -> str:
         """Every limit, the nearest first, for notebooks; of a batch, the least margin of each."""
@@ -25,37 +25,38 @@ class Margins(FrozenMapping[tuple[str, str], float | Floats]):
 
 
 def _least(margins: Floats) -> float:
-    known = margins[~np.isnan(margins)]
-    return float(known.min()) if len(known) else float("nan")
+    """The least of margins (n,), without NaN; NaN if there is none."""
+    valid = margins[~np.isnan(margins)]
+    return float(valid.min()) if len(valid) else float("nan")
 
 
 def margins(solution: Solution) -> Margins:
-    """(joint, bound) -> how far every limit is from being met, (...,), for every limit of its mechanism.
+    """(joint, bound) -> margin, (...,), for every limit of the mechanism.
 
-    Bounds are "min", "max" and "cone", as in `ActiveLimit`. A margin is a share of the room there is: of half the
-    range, or of the cone's half angle. It is 1 in the middle of a range or on the axis of a cone, 0 on the limit, and
-    negative beyond it; of the two ranges of a universal or cylindrical joint the nearer bound counts. In a range whose
-    two bounds are the same there is no room: 0 on it, infinite off it. NaN for INVALID rows.
+    Bounds are "min", "max" and "cone", as in `ActiveLimit`. A margin is a share of half the range, or of the half angle
+    of the cone. It is 1 in the middle of a range or on the axis of a cone, 0 on the limit, and negative beyond it; of
+    the two ranges of a universal or cylindrical joint the nearer bound counts. For a range with two equal bounds it is
+    0 on them and infinite off them. NaN for INVALID rows.
 
     Raises
     ------
-    InvalidArgument : what is no Solution.
+    InvalidArgument : the argument is no Solution.
     """
     mechanism = checked_solution(solution).mechanism
     ranges, q = ranges_of(mechanism), solution._coordinates
-    values, room, tolerances = ranges.values(q), 0.5 * (ranges.high - ranges.low), TOLERANCES.limit * ranges.units
+    values, half, tolerances = ranges.values(q), 0.5 * (ranges.high - ranges.low), TOLERANCES.limit * ranges.units
     shares = {
-        "min": _shares(values - ranges.low, room, tolerances).T,
-        "max": _shares(ranges.high - values, room, tolerances).T,
+        "min": _shares(values - ranges.low, half, tolerances).T,
+        "max": _shares(ranges.high - values, half, tolerances).T,
     }
-    found: dict[tuple[str, str], Floats] = {}
+    by_limit: dict[tuple[str, str], Floats] = {}
     for place, joint in enumerate(ranges.joints):
-        for bound, each in shares.items():
-            before = found.get((joint.name, bound))
-            found[joint.name, bound] = each[place] if before is None else np.minimum(each[place], before)
+        for bound, of_bound in shares.items():
+            other = by_limit.get((joint.name, bound))
+            by_limit[joint.name, bound] = of_bound[place] if other is None else np.minimum(of_bound[place], other)
     for joint, angles, half_angle in coned(mechanism, q):
-        found[joint.name, "cone"] = (half_angle - angles) / half_angle
-    return Margins({key: shaped(margin, solution.shape) for key, margin in found.items()})
+        by_limit[joint.name, "cone"] = (half_angle - angles) / half_angle
+    return Margins({key: shaped(margin, solution.shape) for key, margin in by_limit.items()})
 
 
 def nearest_first(solution: Solution) -> list[tuple[str, str, float]]:
@@ -64,9 +65,9 @@ def nearest_first(solution: Solution) -> list[tuple[str, str, float]]:
     return sorted(named, key=lambda limit: limit[2])
 
 
-def _shares(off: Floats, room: Floats, tolerances: Floats) -> Floats:
-    """Distances from bounds (n, k) as shares of the room there is, (k,)."""
-    if (room > 0.0).all():
-        return off / room
-    without = np.where(np.abs(off) <= tolerances, 0.0 * off, np.copysign(np.inf, off))
-    return np.where(room > 0.0, off / np.where(room > 0.0, room, 1.0), without)
+def _shares(distances: Floats, half: Floats, tolerances: Floats) -> Floats:
+    """Distances from bounds (n, k) as shares of half the ranges, (k,); 0 or infinite for ranges of no width."""
+    if (half > 0.0).all():
+        return distances / half
+    of_no_width = np.where(np.abs(distances) <= tolerances, 0.0 * distances, np.copysign(np.inf, distances))
+    return np.where(half > 0.0, distances / np.where(half > 0.0, half, 1.0), of_no_width)

@@ -1,4 +1,4 @@
-"""What a notebook shows of an answer: its status, how far it is, its actuators and a drawing, as HTML."""
+"""An answer as HTML for notebooks: its status, errors, actuators and a drawing."""
 
 from __future__ import annotations
 
@@ -16,29 +16,30 @@ if TYPE_CHECKING:
 
 
 def answer_html(answer: Answer, counts: dict[str, int]) -> str:
-    """One answer with its actuators and a drawing; of a batch, how many rows have each status."""
+    """One answer with its actuators and a drawing; of a batch, the number of rows with each status."""
     if answer.shape != ():
         rows = [(name, str(count)) for name, count in counts.items()]
         return card(answer.mechanism.name, [f"batch of shape {answer.shape}"], ("status", "rows"), rows, "")
-    known = bool(np.isfinite(answer.pose).all())
-    drawing = sketch(answer.mechanism, answer.points, answer.pose[:3, 3]) if known else ""
-    return card(answer.mechanism.name, _facts(answer, known), _HEADER, _actuators(answer), drawing)
+    is_valid = bool(np.isfinite(answer.pose).all())
+    drawing = sketch(answer.mechanism, answer.points, answer.pose[:3, 3]) if is_valid else ""
+    return card(answer.mechanism.name, _facts(answer, is_valid), _HEADER, _actuators(answer), drawing)
 
 
 _HEADER = ("actuator", "value", "min", "max", "unit")
 
 
-def _facts(answer: Answer, known: bool) -> list[str]:
-    if not known:
+def _facts(answer: Answer, is_valid: bool) -> list[str]:
+    """Status, errors and residual, a line each; of an INVALID answer the status only."""
+    if not is_valid:
         return [str(answer.status).lower()]
-    unit, turned = answer.mechanism.length_unit, np.degrees(answer.rotation_error)
-    errors = f"position error {answer.position_error:.3g} {unit}, rotation error {turned:.3g} deg"
+    unit, rotation_error = answer.mechanism.length_unit, np.degrees(answer.rotation_error)
+    errors = f"position error {answer.position_error:.3g} {unit}, rotation error {rotation_error:.3g} deg"
     return [as_sentence(answer), errors, f"residual {answer.residual:.2g} {unit}"]
 
 
 def _actuators(answer: Answer) -> list[tuple[str, ...]]:
-    shown = zip(readouts(answer.mechanism), answer.actuators, strict=True)
+    """Name, value, bounds and unit of each actuator."""
     return [
-        (each.name, f"{float(each.display(value)):.6g}", *map(bound_text, each.limits), each.unit)
-        for each, value in shown
+        (readout.name, f"{float(readout.display(value)):.6g}", *map(bound_text, readout.limits), readout.unit)
+        for readout, value in zip(readouts(answer.mechanism), answer.actuators, strict=True)
     ]

@@ -1,4 +1,4 @@
-"""The independent check: whether an answer closes its mechanism's loops, worked out from its joint coordinates."""
+"""The closure residual of an answer, computed independently from its joint coordinates."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from .solution import Solution, checked_solution
 
 
 def closure_residual(solution: Solution) -> float | Floats:
-    """Largest gap of any loop of an answer, by the closure engine, (...,) [length].
+    """Largest gap of any loop of an answer, (...,) [length].
 
-    Bodies are posed from `solution.joints` alone, along one tree of joints. Compared are the two bodies of every other
-    joint, the end effector with the pose of the answer, and the actuated joints with its actuator values; angles count
-    times L. NaN for INVALID rows.
+    Bodies are posed from `solution.joints` alone, along a spanning tree of joints. The residual is the largest gap
+    between the two bodies of every other joint, between the end effector and the pose of the answer, and between the
+    actuated joints and its actuator values; angles are multiplied by L. NaN for INVALID rows.
 
     Raises
     ------
-    InvalidArgument : what is no Solution.
+    InvalidArgument : the argument is no Solution.
     """
     mechanism = checked_solution(solution).mechanism
     length, rows, q = mechanism.characteristic_length, solution._rows, solution._coordinates
-    known = np.isfinite(q).all(axis=1)
-    found = np.full(len(q), np.nan)
-    compared = Task((True, True, True), 0 if mechanism.end_effector_is_joint else 3)
-    position, rotation = compared.errors(end_effector_pose(mechanism, q[known]), rows.poses[known])
-    found[known] = np.max([gaps(mechanism, q[known]), position, rotation * length], axis=0)
+    valid = np.isfinite(q).all(axis=1)
+    residuals = np.full(len(q), np.nan)
+    whole_pose = Task((True, True, True), 0 if mechanism.end_effector_is_joint else 3)
+    position, rotation = whole_pose.errors(end_effector_pose(mechanism, q[valid]), rows.poses[valid])
+    residuals[valid] = np.max([gaps(mechanism, q[valid]), position, rotation * length], axis=0)
     for place, (drive, unit) in enumerate(zip(mechanism.drives, actuator_units(mechanism), strict=True)):
-        value = q[known, drive.column] + drive.home
-        found[known] = np.maximum(found[known], np.abs(value - rows.actuators[known, place]) * (length / unit))
-    return float(found[0]) if solution.shape == () else found.reshape(solution.shape)
+        value = q[valid, drive.column] + drive.home
+        residuals[valid] = np.maximum(residuals[valid], np.abs(value - rows.actuators[valid, place]) * (length / unit))
+    return float(residuals[0]) if solution.shape == () else residuals.reshape(solution.shape)

@@ -1,4 +1,4 @@
-"""What an answer is to who asked: its fields, its rows, and what it shows of itself."""
+"""The solution that users get: its fields, its rows, and its representations."""
 
 from __future__ import annotations
 
@@ -18,51 +18,51 @@ from .words import as_sentence, causes, given_up
 
 _AlongAxis: TypeAlias = int | slice | EllipsisType | Sequence[int] | NDArray[np.integer] | NDArray[np.bool_]
 Index: TypeAlias = _AlongAxis | tuple[_AlongAxis, ...]
-"""What NumPy takes as an index of the axes of a batch."""
+"""An index of the batch axes, as NumPy takes them."""
 
 
 class Solution(Answer):
     """The answer to one target or, with leading batch axes on every field, to a batch.
 
-    What a status promises is measured on the configuration, not assumed: `residual` and `limit_excess` are there to
-    be read. Where the status is INVALID (a row that was no pose, marked), numbers are NaN.
+    The status rests on measurements of the configuration: `residual` and `limit_excess`. Where it is INVALID (a row
+    that was no pose, and is to be marked), numbers are NaN.
 
     Attributes
     ----------
     status : a `Status`; for a batch an integer array of them, (...,).
     pose : T_base_platform achieved, (..., 4, 4) [length].
     actuators : actuated coordinates in the order of `mechanism.actuator_names`, (..., n_a) [length or rad].
-    q : all joint coordinates (..., nq) in the order of `mechanism.coordinate_names`, counted as the description counts
-        them [rad or length]: one for R and P, two for U and C, three for S, whose rotation vector turns its second body
+    q : all joint coordinates (..., nq) in the order of `mechanism.coordinate_names`, with the zeros of the description
+        [rad or length]: one for R and P, two for U and C, three for S, whose rotation vector turns its second body
         against its first, from home. What a configuration leaves open (a rod's spin about itself) is nearest to the
-        start, or to home; angles count on along a path.
+        start, or to home; along a path, angles continue beyond full turns.
     joints : joint name -> its part of `q`: (...,) for R and P, (..., 2) for U and C, (..., 3) for S.
     points : joint name -> position of its centre in the base frame, (..., 3) [length].
-    position_error, rotation_error : distance of the pose from the target, (...,) [length], [rad]; 0 where actuator
-        values were asked for, not a pose.
-    actuator_error : largest difference of an actuated coordinate from the asked value, (...,); lengths relative to L,
-        angles in rad; 0 where a pose was asked for.
+    position_error, rotation_error : distance of the pose from the target, (...,) [length], [rad]; 0 in forward
+        kinematics.
+    actuator_error : largest difference of an actuated coordinate from the given value, (...,); lengths relative to L,
+        angles in rad; 0 in inverse kinematics.
     residual : largest gap of any loop: open ends, stretched rigid links, links out of their plane, (...,) [length].
     limit_excess : largest excess over any limit, (...,); lengths relative to L, angles in rad; 0 if all are kept.
-    held : what of the target a projected answer has all the same: "orientation", "position", or None; for a batch an
-        array of them, (...,). It is what `Options.hold` asked for, or None where no feasible pose has that.
-    certified : whether it is certain that no feasible pose of the same orientation is nearer, in any working mode,
-        (...,): it is of REACHED answers, and of most projected ones where the platform does not turn, or its
-        orientation is held, and legs are struts, or rods on cranks and carriages. False where searches alone say so.
+    held : the part of the target that a projected answer keeps: "orientation", "position", or None; for a batch an
+        array of them, (...,). It is that of `Options.hold`, or None if no feasible pose has it.
+    certified : True if there is a proof that no feasible pose of the same orientation is nearer, in any working mode,
+        (...,). REACHED answers are certified, and most projected ones of machines whose legs are struts, or rods on
+        cranks and carriages, if the platform does not rotate or its orientation is held. False if only searches say so.
     iterations, rounds : passes over the chains, and revisions of the target, (...,).
-    active_limits : limits that hold a projected answer back, the hardest first, or that another one exceeds; for a
-        batch, one tuple a row, in row order. A projected answer may lie on other limits too; were one of those a little
-        wider, it would not come nearer. Where a chain is at full stretch there may be none.
+    active_limits : limits that block a projected answer from its target, the largest multiplier first, or that another
+        answer exceeds; for a batch, one tuple per row, in row order. Limits on which a projected answer lies, but whose
+        relaxation would not bring it nearer, are not listed. If a chain is at full stretch there may be none.
     """
 
     @property
     def reason(self) -> str:
-        """Why one target is not reached, in words: the limits that hold the answer back, or what does where none is
-        active, such as a task that asks for more than the mechanism can do; empty where it is reached.
+        """Why a single target is not reached, in words: the limits that block it, or another cause, such as a task that
+        asks for more than the mechanism can do; empty if it is reached.
 
         Raises
         ------
-        TypeError : a batch; its rows have one each: `solution[row].reason`.
+        TypeError : the solution is a batch; its rows have one reason each: `solution[row].reason`.
         """
         if self.shape != ():
             raise TypeError("a batch has a reason a row: solution[row].reason")
@@ -71,12 +71,12 @@ class Solution(Answer):
         sentence = as_sentence(self)
         return (
             "; ".join([*given_up(self), *causes(self)])
-            if self.status == Status.PROJECTED and self._wanted
+            if self.status == Status.PROJECTED and self._request
             else sentence
         )
 
     def __bool__(self) -> bool:
-        """Whether the target, or every target of the batch, is REACHED."""
+        """True if the target, or every target of the batch, is REACHED."""
         return not np.count_nonzero(self._rows.status != REACHED)
 
     def __len__(self) -> int:
@@ -88,10 +88,10 @@ class Solution(Answer):
         """The answer at `index` of the batch axes; NumPy's rules for integers, slices and arrays."""
         if self.shape == ():
             raise TypeError("the answer to one target cannot be indexed")
-        chosen = np.arange(len(self._found)).reshape(self.shape)[cast(Any, index)]
+        chosen = np.arange(len(self._configurations)).reshape(self.shape)[cast(Any, index)]
         places = np.ravel(chosen)
-        wanted = None if self._wanted is None else self._wanted._replace(targets=self._wanted.targets[places])
-        return Solution(self.mechanism, self._found.at(places), np.shape(chosen), wanted)
+        request = None if self._request is None else self._request._replace(targets=self._request.targets[places])
+        return Solution(self.mechanism, self._configurations.at(places), np.shape(chosen), request)
 
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))
@@ -116,26 +116,26 @@ class Solution(Answer):
         plain["certified"] = as_plain(self.certified)
         plain["joints"] = {name: as_plain(value) for name, value in self.joints.items()}
         plain["points"] = {name: as_plain(point) for name, point in self.points.items()}
-        listed = [[vars(limit) for limit in row] for row in self._limits]
-        plain["active_limits"] = listed[0] if self.shape == () else listed
+        limits = [[vars(limit) for limit in row] for row in self._limits]
+        plain["active_limits"] = limits[0] if self.shape == () else limits
         return plain
 
     def __repr__(self) -> str:
-        found = ", ".join(f"{count} {name}" for name, count in self._counts().items())
-        return f"<{type(self).__name__} of '{self.mechanism.name}': {found or 'empty'}>"
+        counts = ", ".join(f"{count} {name}" for name, count in self._counts().items())
+        return f"<{type(self).__name__} of '{self.mechanism.name}': {counts or 'empty'}>"
 
     def _repr_html_(self) -> str:
-        """Status, errors, actuators and a small drawing, for notebooks; of a batch, how many rows have each status."""
+        """Status, errors, actuators and a small drawing, for notebooks; of a batch, the number of rows per status."""
         return answer_html(self, self._counts())
 
     def _counts(self) -> dict[str, int]:
-        """How many rows have each status that occurs."""
+        """Status name -> number of rows, for those that occur."""
         counts = {status.name: int((self._rows.status == status).sum()) for status in Status}
         return {name: count for name, count in counts.items() if count}
 
 
 def checked_solution(solution: Any) -> Solution:
-    """What was passed as an answer; InvalidArgument where it is none."""
+    """The argument, if it is a Solution; raises InvalidArgument otherwise."""
     if not isinstance(solution, Solution):
         raise InvalidArgument("solution", type(solution).__name__, "a Solution, as `solve_ik` returns")
     return solution
@@ -150,7 +150,7 @@ def _plain_status(status: Any) -> Any:
 
 
 def as_plain(value: Any) -> Any:
-    """An array as numbers and lists; what is not finite becomes None."""
+    """An array as numbers and lists; numbers that are not finite become None."""
     array = np.asarray(value)
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         return np.where(np.isfinite(array), array.astype(object), np.array(None)).tolist()

@@ -1,4 +1,4 @@
-"""Where a search starts: at an answer, or at given joint coordinates."""
+"""The start of a search: an answer, or joint coordinates."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..closure.close import measured
+from ..closure.close import measure_configurations
 from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism, checked_mechanism, told_apart
 from ..engine import engine_of
@@ -23,26 +23,26 @@ Start: TypeAlias = Solution | ArrayLike
 
 
 def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) -> Configurations | None:
-    """Configurations to start a batch of that shape from: one for all rows or one for each; None for home.
+    """The configurations from which a batch of this shape starts: one for all rows or one for each; None for home.
 
     Raises
     ------
-    InvalidArgument : what is neither an answer of this mechanism nor joint coordinates of it, an answer that is no
-        feasible configuration, or another batch shape.
+    InvalidArgument : the start is neither an answer of this mechanism nor joint coordinates of it, is not feasible, or
+        has another batch shape.
     """
     if start is None:
         return None
     if not isinstance(start, Solution):
-        deviations, own = joint_vectors(mechanism, start, "start")
-        _require_shape(own, shape)
-        return engine_of(mechanism).at(measured(mechanism, deviations))
+        deviations, start_shape = joint_vectors(mechanism, start, "start")
+        _require_shape(start_shape, shape)
+        return engine_of(mechanism).as_configurations(measure_configurations(mechanism, deviations))
     if start.mechanism != mechanism:
         found = f"an answer of {told_apart(start.mechanism, mechanism)}"
         raise InvalidArgument("start", found, f"one of '{mechanism.name}' itself, or joint coordinates")
     if np.count_nonzero(start._rows.status >= FAILED):
         raise InvalidArgument("start", "an answer that is FAILED or INVALID", "a feasible configuration")
     _require_shape(start.shape, shape)
-    return start._found
+    return start._configurations
 
 
 def joint_vectors(mechanism: Mechanism, q: ArrayLike, name: str) -> tuple[Floats, tuple[int, ...]]:
@@ -57,6 +57,6 @@ def joint_vectors(mechanism: Mechanism, q: ArrayLike, name: str) -> tuple[Floats
     return array.reshape(-1, len(home)) - home, array.shape[:-1]
 
 
-def _require_shape(own: tuple[int, ...], shape: tuple[int, ...]) -> None:
-    if own not in ((), shape):
-        raise InvalidArgument("start", f"batch shape {own}", f"a single configuration or batch shape {shape}")
+def _require_shape(start_shape: tuple[int, ...], shape: tuple[int, ...]) -> None:
+    if start_shape not in ((), shape):
+        raise InvalidArgument("start", f"batch shape {start_shape}", f"a single configuration or batch shape {shape}")

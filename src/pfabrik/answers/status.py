@@ -1,4 +1,4 @@
-"""What became of a target: one word."""
+"""The status of an answer."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from enum import IntEnum
 from ..kernels import rows
 
 NUMBERS = tuple("bdoxXneEfFgG%")
-"""Types of format specifications by which a status is written as the number it is."""
+"""Format types that write a status as a number."""
 
 
 class Status(IntEnum):
-    """What became of a target; the worst of a batch is the largest.
+    """The status of an answer; the largest of a batch is the worst.
 
-    REACHED : what was asked for, closed and within every limit.
-    PROJECTED : closed and within every limit, near what was asked for.
-    EXCEEDED : what was asked for, closed, but beyond a limit; only `assembly_modes` and `working_modes` look for such.
+    REACHED : on the target, closed and within every limit.
+    PROJECTED : near the target, closed and within every limit.
+    EXCEEDED : on the target and closed, but beyond a limit; `assembly_modes` and `working_modes` search for such.
     FAILED : no feasible configuration was found.
-    INVALID : what was asked for is no pose, or not finite; only where such rows are to be marked.
+    INVALID : the target is no pose, or not finite; only if such rows are to be marked.
     """
 
     REACHED = rows.REACHED

@@ -1,4 +1,4 @@
-"""Aligned text: looks the same on a terminal, in a pipe and in a file; never cut, never coloured."""
+"""Tables as aligned text, neither cut nor coloured, for a terminal, a pipe or a file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def pad(column: Sequence[str]) -> list[str]:
 
 
 def starts_like_a_number(cell: str) -> bool:
-    """Whether a cell reads as a number, perhaps with a unit; ``-`` stands for a missing one."""
+    """True if a cell is a number, perhaps with a unit; ``-`` stands for a missing one."""
     head = cell.split(" ")[0]
     try:
         float(head)
@@ -31,5 +31,5 @@ def starts_like_a_number(cell: str) -> bool:
 
 
 def plain(value: float, smallest: float) -> str:
-    """Six digits; what is smaller than `smallest` is noise and reads 0."""
+    """A number with six digits; 0 if its magnitude is not above `smallest`."""
     return f"{value:.6g}" if abs(value) > smallest else "0"

@@ -1,4 +1,4 @@
-"""A path that was followed: where it leaps, and where it is too fast."""
+"""The answers along a path, with its jumps and the speeds of actuators."""
 
 from __future__ import annotations
 
@@ -18,32 +18,31 @@ from ..errors import InvalidArgument
 from ..motion.displacements import actuator_units
 from ..poses import as_floats, between
 from ..tolerances import TOLERANCES
-from .answer import Wanted
+from .answer import PoseRequest
 from .limits import ActiveLimit
 from .solution import Solution, as_plain
 from .status import Status
 
 SUSPICIOUS, LEAST = 4.0, 1e-6
-"""An answer that moves so many times as far as its target, and farther than the least [L or rad], may have leapt."""
+"""Ratio of the motion of an answer to that of its target, and least motion [L or rad], above which it may be a jump."""
 
 SUBSTEPS = 8
-"""Steps that a suspicious one is divided into: a leap stays within one of them, a swift motion spreads over several."""
+"""Parts into which a checked step is divided: a jump stays within one of them, a fast motion spreads over several."""
 
-LEAP = 0.5
-"""Share of the whole motion that one of them makes if it is a leap."""
-
+JUMP = 0.5
+"""Share of the whole motion that one part makes if it is a jump."""
 
 EVEN = 1e-6
-"""How far steps of time may differ to count as the same, as a share: times are written with so many digits."""
+"""Relative difference up to which time steps count as equal: times in files have so many digits."""
 
 
 class Pace(NamedTuple):
-    """When each target is to be there, and how fast actuators may be.
+    """Times of the targets, and speed limits of the actuators.
 
     Attributes
     ----------
-    times : (n,) [s]; NaN where nothing is known.
-    sample_time : from each to the next [s]; None where it differs.
+    times : (n,) [s]; NaN where unknown.
+    sample_time : from each target to the next [s]; None if it varies.
     speed_limits : (n_a,) [length/s or rad/s].
     """
 
@@ -53,32 +52,31 @@ class Pace(NamedTuple):
 
 
 class Track(Solution):
-    """The answers along a path, (n,), with what a machine that follows it must know.
+    """The answers along a path, (n,), with jumps, speeds and accelerations.
 
     Attributes
     ----------
-    targets : what was asked for, poses (n, 4, 4) [length].
-    times : when each target is to be there, (n,) [s]; None where nothing was said of it.
-    sample_time : from one target to the next [s]; None where nothing was said of it, or it differs.
-    jumps : whether an answer leaps away from the one before it, (n,): no motion leads from one to the other while
-        the target moves between theirs. So it is where the nearest feasible pose itself jumps, as it can where a
-        workspace is not convex.
+    targets : target poses (n, 4, 4) [length].
+    times : of the targets, (n,) [s]; None if not given.
+    sample_time : from one target to the next [s]; None if not given, or if it varies.
+    jumps : mask of answers to which no continuous motion leads from the answer before, as the target moves, (n,). The
+        nearest feasible pose itself can jump if a workspace is not convex.
     speeds : mean speed of every actuator since the answer before, (n, n_a) [length/s or rad/s]; 0 in the first row.
-        NaN where no time passes or none is known; None without times.
-    accelerations : how fast the mean velocity changes from the step before to this one, (n, n_a) [per s^2]; 0 in the
-        first two rows. NaN and None as of speeds.
-    too_fast : actuators that cannot move as fast as they would have to, one tuple of names a row; None without times.
+        NaN where no time passes or times are unknown; None without times.
+    accelerations : change of the mean velocity from the step before to this one, per time, (n, n_a) [length/s^2 or
+        rad/s^2]; 0 in the first two rows. NaN and None as for speeds.
+    too_fast : names of actuators that exceed their speed limits, one tuple per row; None without times.
     """
 
     def __init__(
         self,
         mechanism: Mechanism,
         found: Configurations,
-        wanted: Wanted,
+        wanted: PoseRequest,
         follow: Callable[..., Solution],
         pace: Pace | None,
     ) -> None:
-        """Wrap answers; `follow` answers another path, (k, 4, 4), from a start, in the same way."""
+        """Wrap answers; `follow` solves another path, (k, 4, 4), from a start, with the same options."""
         super().__init__(mechanism, found, (len(found),), wanted)
         self._follow = follow
         self._pace = pace
@@ -109,17 +107,17 @@ class Track(Solution):
         def active_limits(self) -> list[tuple[ActiveLimit, ...]]: ...
 
     def __getstate__(self) -> Any:
-        """As that of a `Solution`; whether there are jumps is found out before."""
+        """The state of a `Solution`, the pace, and the jumps, which are computed before pickling."""
         return *super().__getstate__(), self._pace, self.jumps
 
     def __setstate__(self, state: Any) -> None:
-        *own, self._pace, self.jumps = state
-        super().__setstate__(tuple(own))
+        *solution_state, self._pace, self.jumps = state
+        super().__setstate__(tuple(solution_state))
 
     @property
     def targets(self) -> Floats:
-        assert self._wanted is not None
-        return self._wanted.targets
+        assert self._request is not None
+        return self._request.targets
 
     @property
     def times(self) -> Floats | None:
@@ -131,28 +129,28 @@ class Track(Solution):
 
     @cached_property
     def jumps(self) -> Mask:
-        found = np.zeros(self.shape, bool)
+        jumps = np.zeros(self.shape, bool)
         actuators = _scaled(self.mechanism, self.actuators).max(axis=1, initial=0.0)
-        moved = np.maximum(_moves(self.mechanism, self.pose), actuators)
-        asked = np.maximum(SUSPICIOUS * _moves(self.mechanism, self.targets), LEAST)
-        for row in np.flatnonzero(moved > asked).tolist():
-            # where links are stretched out, only one direction may tell which way they bend
-            ways = [ends for ends in ((row - 1, row), (row, row - 1)) if self.status[ends[0]] < Status.FAILED]
-            found[row] = all(self._leaps(*ends, moved[row]) for ends in ways)
-        return found
+        moves = np.maximum(_moves(self.mechanism, self.pose), actuators)
+        expected = np.maximum(SUSPICIOUS * _moves(self.mechanism, self.targets), LEAST)
+        for row in np.flatnonzero(moves > expected).tolist():
+            # with stretched links, substeps may bend them to the right side in one of the two directions only
+            steps = [ends for ends in ((row - 1, row), (row, row - 1)) if self.status[ends[0]] < Status.FAILED]
+            jumps[row] = all(self._is_jump(*ends, moves[row]) for ends in steps)
+        return jumps
 
-    def _leaps(self, start: int, end: int, moved: float) -> bool:
-        """Whether a step from one row to the next, or back, stays a leap where it is divided, or leads elsewhere."""
+    def _is_jump(self, start: int, end: int, whole: float) -> bool:
+        """True if a step from one row to the next, or back, is a jump also when divided into substeps."""
         shares = np.arange(1, SUBSTEPS + 1)[:, None, None] / SUBSTEPS
-        here, there = (np.repeat(self.targets[row : row + 1], SUBSTEPS, axis=0) for row in (start, end))
-        way = [self[start], self._follow(between(here, there, shares), start=self[start]), self[end]]
-        poses = np.concatenate([each.pose.reshape(-1, 4, 4) for each in way])
-        actuators = np.concatenate([each.actuators.reshape(-1, self.actuators.shape[1]) for each in way])
+        first, last = (np.repeat(self.targets[row : row + 1], SUBSTEPS, axis=0) for row in (start, end))
+        parts = [self[start], self._follow(between(first, last, shares), start=self[start]), self[end]]
+        poses = np.concatenate([part.pose.reshape(-1, 4, 4) for part in parts])
+        actuators = np.concatenate([part.actuators.reshape(-1, self.actuators.shape[1]) for part in parts])
         steps = np.maximum(_moves(self.mechanism, poses), _scaled(self.mechanism, actuators).max(axis=1, initial=0.0))
-        return bool(steps.max() > LEAP * moved)
+        return bool(steps.max() > JUMP * whole)
 
     def to_dict(self) -> dict[str, Any]:
-        """As that of a `Solution`, with the fields of a track."""
+        """The dict of a `Solution`, with the fields of a track."""
         plain = super().to_dict()
         plain["jumps"] = self.jumps.tolist()
         for name in ("times", "speeds", "accelerations"):
@@ -171,17 +169,17 @@ class Track(Solution):
         rates, times = self._rates(), self.times
         if rates is None or times is None:
             return None
-        found = np.zeros_like(rates)
-        found[2:] = np.diff(rates[1:], axis=0) / _passed(0.5 * (times[2:] - times[:-2]))
-        return found
+        accelerations = np.zeros_like(rates)
+        accelerations[2:] = np.diff(rates[1:], axis=0) / _durations(0.5 * (times[2:] - times[:-2]))
+        return accelerations
 
     def _rates(self) -> Floats | None:
         """Mean velocities of the actuators since the answer before, (n, n_a)."""
         if self.times is None:
             return None
-        found = np.zeros_like(self.actuators)
-        found[1:] = np.diff(self.actuators, axis=0) / _passed(np.diff(self.times))
-        return found
+        rates = np.zeros_like(self.actuators)
+        rates[1:] = np.diff(self.actuators, axis=0) / _durations(np.diff(self.times))
+        return rates
 
     @property
     def too_fast(self) -> list[tuple[str, ...]] | None:
@@ -200,7 +198,7 @@ def pace_of(
     times: ArrayLike | None,
     speed_limits: float | Mapping[str, float] | None,
 ) -> Pace | None:
-    """What was said of time and speeds along a path of so many targets, checked."""
+    """The checked times and speed limits of a path of `count` targets; None without times."""
     names = mechanism.actuator_names
     if sample_time is None and times is None:
         if speed_limits is not None:
@@ -211,45 +209,45 @@ def pace_of(
         sample_time = require_positive("sample_time", sample_time)
         if times is not None:
             raise InvalidArgument("times", "times beside a sample time", "one of them")
-        when = sample_time * np.arange(count, dtype=np.float64)
+        checked = sample_time * np.arange(count, dtype=np.float64)
     else:
-        when = _checked_times(times, count)
-        sample_time = _even_step(when)
+        checked = _checked_times(times, count)
+        sample_time = _even_step(checked)
     limits = np.full(len(names), np.inf)
     put_limits(limits, "speed_limits", speed_limits, names)
-    return Pace(when, sample_time, limits)
+    return Pace(checked, sample_time, limits)
 
 
 def _checked_times(times: ArrayLike | None, count: int) -> Floats:
     expected = f"shape ({count},): when each target is to be there [s], NaN where not known, none before one before it"
-    found = as_floats("times", times, expected).copy()
-    if found.shape != (count,):
-        raise InvalidArgument("times", f"shape {found.shape}", expected)
-    if np.isinf(found).any() or (np.diff(found[~np.isnan(found)]) < 0.0).any():
+    checked = as_floats("times", times, expected).copy()
+    if checked.shape != (count,):
+        raise InvalidArgument("times", f"shape {checked.shape}", expected)
+    if np.isinf(checked).any() or (np.diff(checked[~np.isnan(checked)]) < 0.0).any():
         raise InvalidArgument("times", "times that go back, or are infinite", expected)
-    return found
+    return checked
 
 
 def _even_step(times: Floats) -> float | None:
-    """The step between times that are as far apart as each other; None for others."""
+    """The step of times that are equally far apart; None for others."""
     steps = np.diff(times)
     if not len(steps) or not steps.min() > 0.0 or np.ptp(steps) > EVEN * steps[0]:
         return None
     return float(steps.mean())
 
 
-def _passed(steps: Floats) -> Floats:
-    """Durations as a column to divide by, NaN where there are none."""
+def _durations(steps: Floats) -> Floats:
+    """Positive time steps as a column (n, 1), to divide by; NaN where a step is not positive."""
     return np.where(steps > 0.0, steps, np.nan)[:, None]
 
 
 def _moves(mechanism: Mechanism, poses: Floats) -> Floats:
-    """How far each pose of a path is from the one before it in what the task counts, (n,) [L]; 0 for the first."""
+    """Distance of each pose of a path from the one before it, in the components of the task, (n,) [L]; first 0."""
     position, rotation = task_of(mechanism).errors(poses[1:], poses[:-1])
     moves = np.hypot(position, mechanism.rotation_length * rotation) / mechanism.characteristic_length
     return np.concatenate([np.zeros(min(len(poses), 1)), moves])
 
 
 def _scaled(mechanism: Mechanism, actuators: Floats) -> Floats:
-    """How far each actuator moves in every step, (n, n_a) [L or rad]."""
+    """Distance that each actuator moves in every step, (n, n_a) [L or rad]."""
     return np.asarray(np.abs(np.diff(actuators, axis=0, prepend=actuators[:1])) / actuator_units(mechanism))

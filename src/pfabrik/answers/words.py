@@ -1,4 +1,4 @@
-"""An answer in words and in the units that people read: degrees, and the mechanism's own length."""
+"""An answer in words, in degrees and the mechanism's own unit of length."""
 
 from __future__ import annotations
 
@@ -22,25 +22,26 @@ if TYPE_CHECKING:
 
 
 STRETCHED, NO_FREEDOM = "the links are stretched out or folded", "the mechanism has no freedom that way"
-"""What stops an end effector where no limit does."""
+"""Causes that stop an end effector if no limit does."""
 
 
-def as_sentence(answer: Answer, asked: Floats | None = None) -> str:
-    """What became of one target, or of the actuator values asked for, in one sentence.
+def as_sentence(answer: Answer, values: Floats | None = None) -> str:
+    """The status of an answer to a single target, or to actuator values, in one sentence.
 
-    For instance ``projected: 12.3 mm from the target; strut B3 at its maximum 250 mm; joint C1's cone at 45 deg``: how
-    far, what was to be held and is not, and the limits that hold it back, the hardest first.
+    For instance ``projected: 12.3 mm from the target; strut B3 at its maximum 250 mm; joint C1's cone at 45 deg``: the
+    distance, the part of the target that is not held although it should be, and the limits that block it, the largest
+    multiplier first.
 
     Parameters
     ----------
-    asked : actuator values (n_a,) [length or rad], where these were asked for and not a pose.
+    values : target values of the actuators (n_a,) [length or rad], in forward kinematics.
     """
     status = str(answer.status).lower()
     if status == "reached":
         return "reached"
-    if status == "projected" and asked is not None:
+    if status == "projected" and values is not None:
         why = reasons(answer) or ["no limit is active: no configuration with these values was found"]
-        return "; ".join([f"projected: {actuator_distance(answer, asked)} from the values asked for", *why])
+        return "; ".join([f"projected: {actuator_distance(answer, values)} from the values asked for", *why])
     if status == "projected":
         return "; ".join([f"projected: {distance(answer)} from the target", *given_up(answer), *causes(answer)])
     if status == "exceeded":
@@ -49,65 +50,65 @@ def as_sentence(answer: Answer, asked: Floats | None = None) -> str:
 
 
 def causes(answer: Answer) -> list[str]:
-    """What keeps a projected answer to a target from it: the limits, or what does where none is active."""
+    """Phrases for the active limits of a projected answer, or for another cause if no limit is active."""
     return reasons(answer) or [f"no limit is active: {why_without_limits(answer)}"]
 
 
 def given_up(answer: Answer) -> list[str]:
-    """What a projected answer was to hold of its target and does not: one phrase, or none."""
-    from ..closure.projection import ways_of
+    """A phrase for the part of the target that a projected answer should hold and does not; empty if there is none."""
+    from ..closure.projection import projection_modes
     from ..kernels.rows import HOLD_NOTHING
 
-    wanted = answer._wanted
-    if wanted is None or answer.held is not None:
+    request = answer._request
+    if request is None or answer.held is not None:
         return []
-    first, *_ = ways_of(answer.mechanism, wanted.hold, wanted.rotation_length)
-    if first.hold == HOLD_NOTHING:
+    preferred, *_ = projection_modes(answer.mechanism, request.hold, request.rotation_length)
+    if preferred.hold == HOLD_NOTHING:
         return []
-    other = "position" if wanted.hold == "orientation" else "orientation"
-    return [f"no {other} was found that suits the {wanted.hold}: both give way"]
+    free_part = "position" if request.hold == "orientation" else "orientation"
+    return [f"no {free_part} was found that suits the {request.hold}: both give way"]
 
 
 def why_without_limits(answer: Answer) -> str:
-    """What keeps an answer that no limit holds back from its target, as far as first order tells."""
+    """A phrase for the cause, to first order, that keeps an answer without active limits from its target."""
     if has_dependent_coordinates(answer.mechanism):
         return task_remark(answer.mechanism)
     inside, outside = missed(answer)
-    found = []
+    phrases = []
     if inside and are_stretched(answer.mechanism, answer._coordinates).any():
-        found.append(STRETCHED)
+        phrases.append(STRETCHED)
     if outside:
-        found.append(NO_FREEDOM)
-    return ", and ".join(found) or "nothing nearer was found"
+        phrases.append(NO_FREEDOM)
+    return ", and ".join(phrases) or "nothing nearer was found"
 
 
 def missed(answer: Answer) -> tuple[bool, bool]:
-    """Whether what is missed lies along motions of the end effector (at home and here), and whether across them.
+    """True if the position error has a part along motions of the end effector, at home and here; and a part across.
 
-    Of a rotation that is missed, only the first is said.
+    With a rotation error, (True, False).
     """
-    mechanism, wanted = answer.mechanism, answer._wanted
-    if wanted is None or answer.rotation_error > TOLERANCES.rotation:
+    mechanism, request = answer.mechanism, answer._request
+    if request is None or answer.rotation_error > TOLERANCES.rotation:
         return True, False
     axes = [axis in mechanism.task for axis in "xyz"]
-    offset = (wanted.targets[0] - answer.pose)[:3, 3][axes]
+    offset = (request.targets[0] - answer.pose)[:3, 3][axes]
     offset = offset / (np.abs(offset).max(initial=0.0) or 1.0)  # so that no square is too large
-    here = answer._coordinates
-    motions = np.hstack(list(forward_map(mechanism, np.concatenate([0.0 * here, here]))[:, :3][:, axes]))
+    q = answer._coordinates
+    motions = np.hstack(list(forward_map(mechanism, np.concatenate([0.0 * q, q]))[:, :3][:, axes]))
     along = motions @ np.linalg.lstsq(motions, offset, rcond=TOLERANCES.alignment)[0]
     least = TOLERANCES.alignment * float(np.linalg.norm(offset))
     return bool(np.linalg.norm(along) > least), bool(np.linalg.norm(offset - along) > least)
 
 
 def what_is_wrong(answer: Answer) -> str:
-    """Open loops or, where they are closed, the limits that are exceeded."""
+    """A phrase for open loops or, if they are closed, for the limits that are exceeded."""
     if answer.residual <= TOLERANCES.position * answer.mechanism.characteristic_length:
         return f"limits exceeded: {by_bound(exceeded(answer))}"
     return f"loops open by {loop_gap(answer)}"
 
 
 def distance(answer: Answer) -> str:
-    """Position error, rotation error, or both, where they exceed the tolerance."""
+    """Those of position error and rotation error that exceed the tolerance, with units."""
     mechanism = answer.mechanism
     parts = []
     if answer.position_error > TOLERANCES.position * mechanism.characteristic_length:
@@ -117,12 +118,12 @@ def distance(answer: Answer) -> str:
     return " and ".join(parts) or "a hair"
 
 
-def actuator_distance(answer: Answer, asked: Floats) -> str:
-    """The largest differences between actuator coordinates and the values asked for: ``up to 12.3 mm and 4 deg``."""
+def actuator_distance(answer: Answer, values: Floats) -> str:
+    """The largest differences between actuated coordinates and their target values: ``up to 12.3 mm and 4 deg``."""
     worst: dict[str, float] = {}
-    for readout, off in zip(readouts(answer.mechanism), np.abs(answer.actuators - asked), strict=True):
-        worst[readout.unit] = max(float(readout.display(off)), worst.get(readout.unit, 0.0))
-    return "actuators up to " + " and ".join(f"{off:.3g} {unit}" for unit, off in worst.items() if off > 0.0)
+    for readout, error in zip(readouts(answer.mechanism), np.abs(answer.actuators - values), strict=True):
+        worst[readout.unit] = max(float(readout.display(error)), worst.get(readout.unit, 0.0))
+    return "actuators up to " + " and ".join(f"{error:.3g} {unit}" for unit, error in worst.items() if error > 0.0)
 
 
 def loop_gap(answer: Answer) -> str:
@@ -131,7 +132,7 @@ def loop_gap(answer: Answer) -> str:
 
 
 def reasons(answer: Answer) -> list[str]:
-    """What holds a projected answer back, the hardest first, one phrase for those of a kind and value."""
+    """Phrases for the limits that block a projected answer, the largest multiplier first, one per kind and value."""
     names: dict[tuple[str, str], list[str]] = {}
     for limit in answer._limits[0]:
         is_plain = answer.mechanism.joint(limit.joint).type != "universal"  # length or angle: the bound's unit tells
@@ -140,7 +141,7 @@ def reasons(answer: Answer) -> list[str]:
 
 
 def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
-    """What kind of joint it is, and which of its bounds: ``("strut", "maximum 250 mm")``."""
+    """The kind of joint and the bound: ``("strut", "maximum 250 mm")``."""
     joint = mechanism.joint(limit.joint)
     noun = "joint" if joint.type != "prismatic" else "strut" if joint.along else "slider"
     angle = math.degrees(limit.limit)
@@ -152,12 +153,12 @@ def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
 
 
 def is_length(limit: ActiveLimit, joint: Joint) -> bool:
-    """Whether a limit is one of a length."""
+    """True if the limited coordinate is a length."""
     return limit.bound != "cone" and KINDS[joint.type].coordinates[limit.coordinate] == "length"
 
 
 def name_of(limit: ActiveLimit) -> str:
-    """The joint, and where it is not its first, which of its coordinates."""
+    """The joint's name, with the coordinate if it is not the first."""
     return f"{limit.joint} (second coordinate)" if limit.coordinate else limit.joint
 
 
@@ -172,24 +173,24 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
 
 
 def short_names(limits: Iterable[ActiveLimit]) -> str:
-    """Active limits in a cell of a table: ``B3 max; C1 cone``."""
+    """Active limits for a cell of a table: ``B3 max; C1 cone``."""
     return "; ".join(f"{name_of(limit)} {limit.bound}" for limit in limits)
 
 
 def exceeded(answer: Answer) -> list[ActiveLimit]:
-    """The limits that a failed answer exceeds, not those that it only lies on."""
+    """The limits that an answer exceeds, without those that it only lies on."""
     return [limit for limit in answer._limits[0] if is_exceeded(limit, answer.mechanism)]
 
 
 def is_exceeded(limit: ActiveLimit, mechanism: Mechanism) -> bool:
-    """Whether the coordinate is beyond its bound by more than the tolerance."""
+    """True if the coordinate is beyond its bound by more than the tolerance."""
     scale = mechanism.characteristic_length if is_length(limit, mechanism.joint(limit.joint)) else 1.0
     excess = limit.limit - limit.value if limit.bound == "min" else limit.value - limit.limit
     return excess > TOLERANCES.limit * scale
 
 
 def by_bound(limits: Iterable[ActiveLimit]) -> str:
-    """Limits in a few words: ``max of B1, B2; cone of C1``."""
+    """Limits grouped by bound: ``max of B1, B2; cone of C1``."""
     names: dict[str, dict[str, None]] = {}
     for limit in limits:
         names.setdefault(limit.bound, {})[name_of(limit)] = None

@@ -1,1 +1,1 @@
-"""The closure engine: the coordinates of all joints, loops closed to machine precision, for every mechanism."""
+"""The closure engine: solves for all joint coordinates of any mechanism, with loops closed to machine precision."""

@@ -20,40 +20,40 @@ from .descend import MOST_STEPS, nearest_actuators
 from .effort import descents_within
 from .starts import same_random_starts
 
-STRIDES = 8
-"""Steps in which actuators are taken from the start's values to the asked ones where one step strays."""
+CONTINUATION_STEPS = 8
+"""Steps of a continuation from the actuator values of the start to the target values, if one step fails."""
 
 STARTS = 48
-"""Random starts where nothing else assembles and no start says in which mode to stay."""
+"""Random starts, if nothing else assembles and there is no start whose mode is to be kept."""
 
 SAME = 1e-3
-"""Share by which distances or gaps may differ and still count as the same: those of mirror images are."""
+"""Relative difference below which distances or gaps count as equal, as those of mirror images are."""
 
 NEAR = 1e-6
-"""Actuators this near to the asked values need no search from elsewhere for nearer ones [L or rad]."""
+"""Actuator error below which no other seed is tried [L or rad]."""
 
 NOISE = 1e-4
-"""How far readings of more actuators than freedoms are off for noise alone [L or rad]: those that fit as well from a
-start contradict each other, and fit exactly nowhere else."""
+"""Actuator error that noise alone causes in readings of more actuators than freedoms [L or rad]: readings that fit this
+well from a start contradict each other, and fit exactly nowhere else."""
 
 PROJECTIONS = 12
-"""Random starts of the search for feasible values near those that no configuration has."""
+"""Random starts of the search for the nearest feasible values, if no configuration has the target values."""
 
-SIGHT = 3.0
-"""How far off asked values are at most looked for, where they are too far for a search to end [L or rad]."""
+LONGEST_SEARCH = 3.0
+"""Largest change of an actuator value, if the target values are too far for a search to converge [L or rad]."""
 
 
 def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, has_start: bool) -> Closing:
-    """Close the loops at actuated values (n, n_a), or at feasible ones as near as a search brings them.
+    """Close the loops at actuated values (n, n_a), or at the nearest feasible values that a local search finds.
 
-    Newton's method with the actuators locked; where it strays, the actuators led to their values in steps; then random
+    First Newton's method with the actuators locked; then continuation of the actuators to their values; then random
     starts; then the nearest feasible values.
 
     Parameters
     ----------
-    coordinates : joint coordinates to start from, (n, columns), deviations from home.
-    has_start : they are to stay in their mode where they assemble in it, within limits or not. Other starts, home the
-        first, only replace a projection.
+    coordinates : joint coordinates of the start, (n, columns), deviations from home.
+    has_start : keep the assembly mode of the start if the values can be assembled in it, within limits or not. Other
+        starts, home first, then only replace a projection.
 
     Returns
     -------
@@ -62,40 +62,41 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, has_s
     closure, poses = closure_of(mechanism), platform_poses(mechanism, coordinates)
     best = _locked(closure, coordinates, poses, values)
     if not best.feasible.all():
-        attempts = [] if is_over_determined(mechanism) else [_led]
-        for attempt in attempts if has_start else [*attempts, _scattered]:
-            rest = np.flatnonzero(~best.feasible)
-            if len(rest):
-                best.improve(rest, attempt(closure, coordinates[rest], poses[rest], values[rest]))
-    rest = np.flatnonzero(~best.feasible)
-    if not len(rest):
+        attempts = [] if is_over_determined(mechanism) else [_continue_to]
+        for attempt in attempts if has_start else [*attempts, _from_random_starts]:
+            unsolved = np.flatnonzero(~best.feasible)
+            if len(unsolved):
+                solutions = attempt(closure, coordinates[unsolved], poses[unsolved], values[unsolved])
+                best.put_better(unsolved, solutions)
+    unsolved = np.flatnonzero(~best.feasible)
+    if not len(unsolved):
         return best
-    strayed = best.gap[rest] > CLOSED
-    _project(closure, best, rest, (coordinates[rest], poses[rest]), values[rest], has_start)
+    was_open = best.gap[unsolved] > CLOSED
+    _project(closure, best, unsolved, (coordinates[unsolved], poses[unsolved]), values[unsolved], has_start)
     if has_start:
-        off = np.abs(actuator_errors(closure, best.coordinates[rest], values[rest])).max(axis=1, initial=0.0)
+        errors = np.abs(actuator_errors(closure, best.coordinates[unsolved], values[unsolved])).max(axis=1, initial=0.0)
         near = NOISE if is_over_determined(mechanism) else NEAR
-        missed = rest[strayed & ((off > near) | ~best.feasible[rest])]
+        missed = unsolved[was_open & ((errors > near) | ~best.feasible[unsolved])]
         if len(missed):
             _assemble_elsewhere(closure, best, missed, poses[missed], values[missed])
     return best
 
 
 def _assemble_elsewhere(closure: Closure, best: Closing, rows: NDArray[np.intp], poses: Floats, values: Floats) -> None:
-    """Assemble rows from home, or else from random starts, nearest to their own poses (n, 4, 4); where that fails they
-    stay as they are."""
+    """Assemble rows from home, or from random starts, nearest to their poses (n, 4, 4), and leave rows that fail."""
     home = np.zeros_like(best.coordinates[rows]), np.repeat(closure.mechanism.home_pose[None], len(rows), axis=0)
-    tried = _locked(closure, *home, values)
-    missed = np.flatnonzero(~tried.feasible)
-    if len(missed):
-        tried.improve(missed, _scattered(closure, home[0][missed], poses[missed], values[missed]))
-    reached = np.flatnonzero(tried.feasible)
-    best.take(rows[reached], tried, reached)
+    solutions = _locked(closure, *home, values)
+    unsolved = np.flatnonzero(~solutions.feasible)
+    if len(unsolved):
+        scattered = _from_random_starts(closure, home[0][unsolved], poses[unsolved], values[unsolved])
+        solutions.put_better(unsolved, scattered)
+    reached = np.flatnonzero(solutions.feasible)
+    best.put(rows[reached], solutions, reached)
 
 
 @lru_cache(maxsize=64)
 def is_over_determined(mechanism: Mechanism) -> bool:
-    """Whether there are more actuators than motions: then most values contradict each other. Never without loops."""
+    """True if there are more actuators than motions, so that most values contradict each other; False without loops."""
     if len(closure_of(mechanism).loops.paths) <= 2:
         return False
     counted = generic_of(mechanism).mobility
@@ -103,43 +104,43 @@ def is_over_determined(mechanism: Mechanism) -> bool:
 
 
 def _locked(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
-    """Newton's method with the actuators locked."""
+    """Close the loops by Newton's method with the actuators locked at values (n, n_a)."""
     start = coordinates.copy()
     closure.put_actuators(start, values)
     return close(closure, start, poses, locked=closure.driven)
 
 
-def _led(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
-    """The actuators led from where they are to the asked values."""
+def _continue_to(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
+    """Continuation of the actuators from their present values to the target values (n, n_a)."""
     begin = closure.actuators(coordinates)
-    for stride in range(1, STRIDES + 1):
-        found = _locked(closure, coordinates, poses, begin + (values - begin) * stride / STRIDES)
-        coordinates, poses = found.coordinates, found.poses
-    return found
+    for step in range(1, CONTINUATION_STEPS + 1):
+        closing = _locked(closure, coordinates, poses, begin + (values - begin) * step / CONTINUATION_STEPS)
+        coordinates, poses = closing.coordinates, closing.poses
+    return closing
 
 
-def _scattered(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
-    """Random starts; of each row's answers the best: the least open, of equals the nearest to where the row started."""
+def _from_random_starts(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
+    """The best of several random starts for each row: the least infeasible, of equals the nearest to its start."""
     best = _locked(closure, coordinates, poses, values)
-    off, from_start = _least_off(best), _distances(closure, best.poses, poses)
+    least, nearest = _infeasibility(best), _distances(closure, best.poses, poses)
     for start in same_random_starts(closure, STARTS, len(values)):
-        tried = _locked(closure, *start, values)
-        tried_off, distance = _least_off(tried), _distances(closure, tried.poses, poses)
-        equal = np.abs(tried_off - off) <= SAME * off
-        better = np.flatnonzero(np.where(equal, distance < from_start, tried_off < off))
-        off[better], from_start[better] = tried_off[better], distance[better]
-        best.take(better, tried, better)
+        trial = _locked(closure, *start, values)
+        infeasibility, distances = _infeasibility(trial), _distances(closure, trial.poses, poses)
+        is_equal = np.abs(infeasibility - least) <= SAME * least
+        better = np.flatnonzero(np.where(is_equal, distances < nearest, infeasibility < least))
+        least[better], nearest[better] = infeasibility[better], distances[better]
+        best.put(better, trial, better)
     return best
 
 
-def _least_off(closing: Closing) -> Floats:
-    """What keeps rows from being feasible, (n,) [L or rad]; the least tolerance where nothing does."""
+def _infeasibility(closing: Closing) -> Floats:
+    """Largest gap or excess of each row, (n,) [L or rad], at least the smaller of the two tolerances."""
     return np.asarray(np.maximum(closing.off.max(axis=1), min(TOLERANCES.position, TOLERANCES.limit)))
 
 
-def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:
-    """How far poses are apart, (n,): lengths relative to L, rotations as the chord of their angle."""
-    offset = (poses - others)[:, :3, :]
+def _distances(closure: Closure, poses: Floats, other_poses: Floats) -> Floats:
+    """Distances between poses, (n,): lengths relative to L, rotations as the chord of their angle."""
+    offset = (poses - other_poses)[:, :3, :]
     offset[:, :, 3] /= closure.mechanism.characteristic_length
     return np.asarray(np.sqrt((offset**2).sum(axis=(1, 2))))
 
@@ -147,74 +148,74 @@ def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:
 def _project(
     closure: Closure,
     best: Closing,
-    rest: NDArray[np.intp],
+    rows: NDArray[np.intp],
     start: tuple[Floats, Floats],
     values: Floats,
     has_start: bool,
 ) -> None:
-    """Feasible configurations with actuators near the asked values, for the rows `rest` of the best so far.
+    """Put the feasible configurations with actuators nearest to the target values into some rows of the best so far.
 
-    The search is local, so it begins from several places: where Newton ended, where the row started, and without a
-    start from random ones; the nearest is taken. The start itself, which is feasible, stands in for none at all.
+    The search is local, so it starts from several configurations: the end of Newton's method, the start of the row,
+    and without a given start random ones; the nearest result is taken. The fallback is the start, which is feasible.
     """
-    ended = best.coordinates[rest], best.poses[rest]
-    found = close(closure, *start, max_iterations=0)
-    distance = np.full(len(rest), np.inf)
+    newton_end = best.coordinates[rows], best.poses[rows]
+    solutions = close(closure, *start, max_iterations=0)
+    distances = np.full(len(rows), np.inf)
     ranged = np.isfinite(closure.loops.lo[closure.actuated]) | np.isfinite(closure.loops.hi[closure.actuated])
     n, steps = descents_within(closure, 2 if has_start else 2 + PROJECTIONS, MOST_STEPS, int(np.count_nonzero(ranged)))
-    others = () if has_start else _newton_ends(closure, values)
-    for coordinates, poses in islice(chain([ended, start], others), n):
-        waiting = np.flatnonzero(distance > NEAR)
-        if not len(waiting):
+    random_ends = () if has_start else _newton_ends(closure, values)
+    for coordinates, poses in islice(chain([newton_end, start], random_ends), n):
+        pending = np.flatnonzero(distances > NEAR)
+        if not len(pending):
             break
-        tried = nearest_actuators(closure, coordinates[waiting], poses[waiting], values[waiting], steps)
-        _take_nearer(closure, found, distance, waiting, tried, values)
-    waiting = np.flatnonzero(np.isinf(distance))
-    if len(waiting):
-        asked = _within_sight(closure, start[0][waiting], values[waiting])
-        tried = nearest_actuators(closure, start[0][waiting], start[1][waiting], asked, steps)
-        _take_nearer(closure, found, distance, waiting, tried, values)
-    feasible = np.flatnonzero(found.feasible)
-    best.take(rest[feasible], found, feasible)
+        trial = nearest_actuators(closure, coordinates[pending], poses[pending], values[pending], steps)
+        _put_nearer(closure, solutions, distances, pending, trial, values)
+    pending = np.flatnonzero(np.isinf(distances))
+    if len(pending):
+        clipped = _clip_values(closure, start[0][pending], values[pending])
+        trial = nearest_actuators(closure, start[0][pending], start[1][pending], clipped, steps)
+        _put_nearer(closure, solutions, distances, pending, trial, values)
+    feasible = np.flatnonzero(solutions.feasible)
+    best.put(rows[feasible], solutions, feasible)
 
 
 def _newton_ends(closure: Closure, values: Floats) -> Iterator[tuple[Floats, Floats]]:
-    """Where Newton's method leads from random starts: nearer, in fewer steps, than the search that follows."""
+    """Coordinates and poses where Newton's method ends from random starts: in fewer steps than the search after it."""
     for start in same_random_starts(closure, PROJECTIONS, len(values)):
-        ended = _locked(closure, *start, values)
-        yield ended.coordinates, ended.poses
+        closing = _locked(closure, *start, values)
+        yield closing.coordinates, closing.poses
 
 
-def _take_nearer(
-    closure: Closure, found: Closing, distance: Floats, rows: NDArray[np.intp], tried: Closing, values: Floats
+def _put_nearer(
+    closure: Closure, best: Closing, distances: Floats, rows: NDArray[np.intp], trial: Closing, values: Floats
 ) -> None:
-    """Take over the rows that are feasible with actuators clearly nearer to the values, and how near they are."""
-    errors = np.linalg.norm(actuator_errors(closure, tried.coordinates, values[rows]), axis=1)
-    better = np.flatnonzero(tried.feasible & (errors < (1.0 - SAME) * distance[rows]))
-    distance[rows[better]] = errors[better]
-    found.take(rows[better], tried, better)
+    """Put the rows of a trial that are feasible with actuators clearly nearer to the values, and their distances."""
+    errors = np.linalg.norm(actuator_errors(closure, trial.coordinates, values[rows]), axis=1)
+    better = np.flatnonzero(trial.feasible & (errors < (1.0 - SAME) * distances[rows]))
+    distances[rows[better]] = errors[better]
+    best.put(rows[better], trial, better)
 
 
-def _within_sight(closure: Closure, coordinates: Floats, values: Floats) -> Floats:
-    """Values no further than a few sizes of the machine, or radians, from where they are."""
-    far = SIGHT / closure.scale[closure.actuated]
+def _clip_values(closure: Closure, coordinates: Floats, values: Floats) -> Floats:
+    """Actuated values (n, n_a), clipped to within `LONGEST_SEARCH` of the present ones."""
+    most = LONGEST_SEARCH / closure.scale[closure.actuated]
     present = closure.actuators(coordinates)
-    return np.asarray(np.clip(values, present - far, present + far))
+    return np.asarray(np.clip(values, present - most, present + most))
 
 
 def actuator_errors(closure: Closure, coordinates: Floats, values: Floats) -> Floats:
-    """How far actuators are from values, (n, n_a) [L or rad]."""
-    off = closure.actuators(coordinates) - values
-    return np.asarray(off * closure.scale[closure.actuated])
+    """Actuated coordinates less target values, (n, n_a) [L or rad]."""
+    errors = closure.actuators(coordinates) - values
+    return np.asarray(errors * closure.scale[closure.actuated])
 
 
-def judged(
-    mechanism: Mechanism, found: Configurations, closing: Closing, values: Floats, tolerance: float
+def forward_answers(
+    mechanism: Mechanism, configurations: Configurations, closing: Closing, values: Floats, tolerance: float
 ) -> Configurations:
-    """Configurations as answers to actuated values (n, n_a): which are what was asked for, and which are feasible."""
+    """Set status and actuator error of configurations that answer actuated values (n, n_a); the same object."""
     error = np.abs(actuator_errors(closure_of(mechanism), closing.coordinates, values)).max(axis=1, initial=0.0)
-    found.rows.measures[:, ACTUATOR_ERROR] = error
-    asked, feasible = error <= tolerance, closing.feasible
-    open_or_beyond = np.where((closing.gap <= TOLERANCES.position) & asked, EXCEEDED, FAILED)
-    found.rows.status[:] = np.where(feasible, np.where(asked, REACHED, PROJECTED), open_or_beyond)
-    return found
+    configurations.rows.measures[:, ACTUATOR_ERROR] = error
+    has_values, feasible = error <= tolerance, closing.feasible
+    infeasible_status = np.where((closing.gap <= TOLERANCES.position) & has_values, EXCEEDED, FAILED)
+    configurations.rows.status[:] = np.where(feasible, np.where(has_values, REACHED, PROJECTED), infeasible_status)
+    return configurations

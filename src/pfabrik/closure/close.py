@@ -1,6 +1,6 @@
-"""The closure engine: the joint coordinates of a whole mechanism, its loops closed to machine precision.
+"""Closing the loops of a mechanism to machine precision, on the coordinates of all its joints.
 
-Bodies are posed by products of exponentials along the paths from the base to the end effector; nothing here is shared
+Bodies are posed by products of exponentials along the paths from the base to the end effector. Nothing here is shared
 with the reaching engine, so that each can check the other.
 """
 
@@ -31,20 +31,22 @@ EVERYTHING_FREE = (0.0,) * 6
 HELD = (K.LOCKED,) * 6
 
 CLOSED = 0.3 * TOLERANCES.position
-"""Gap of a path that counts as closed [L or rad]: loops, which lead along two paths, may add their gaps up."""
+"""Gap up to which a path counts as closed [L or rad]: a loop consists of two paths, whose gaps add up."""
 
 
 @dataclass(frozen=True)
 class Closure:
-    """A mechanism as the closure kernel takes it.
+    """A mechanism compiled for the closure kernel.
 
     Attributes
     ----------
-    scale : what a coordinate is multiplied by to be dimensionless: 1 / L for lengths, 1 for angles, (columns,).
+    loops : the table of loops that kernels read.
+    scale : factor that makes a coordinate dimensionless: 1 / L for lengths, 1 for angles, (columns,).
     turning : 1 for angles, 0 for lengths, (columns,).
     last_balls : columns of ball joints at the platform, each at the end of a path that shares no joint.
     actuated, home : columns of the actuators, and their values at home, (n_a,).
-    driven : the columns of the actuators and of locked joints: they stay where they are put.
+    driven : columns of actuators and locked joints, which stay fixed in forward kinematics.
+    whole : with all loops of the mechanism; see `closure_of`.
     """
 
     mechanism: Mechanism
@@ -59,14 +61,14 @@ class Closure:
 
     @property
     def idle(self) -> Mask:
-        """Which coordinates are on no path (a tool's hinge): they rest, and nothing but their limits counts."""
+        """Mask of coordinates on no path, such as a tool's hinge: they do not move, and only their limits matter."""
         idle = np.ones(len(self.scale), bool)
         idle[self.loops.row_columns] = False
         return idle
 
     @cached_property
     def cubes(self) -> float:
-        """Sum of the cubes of how many coordinates each group has, at least 1: what a step of closing takes."""
+        """Sum over groups of the cubed number of coordinates, at least 1: the cost of one closing step."""
         on_paths = self.loops.group_of[~self.idle]
         return float(max(1.0, (np.bincount(on_paths).astype(float) ** 3).sum()))
 
@@ -75,13 +77,13 @@ class Closure:
         return np.asarray(coordinates[:, self.actuated] + self.home)
 
     def put_actuators(self, coordinates: Floats, values: Floats) -> None:
-        """Write actuated values (n, n_a), and where locked joints are, into coordinates (n, columns)."""
+        """Write actuated values (n, n_a), and zero for locked joints, into coordinates (n, columns)."""
         coordinates[:, list(self.driven)] = 0.0
         coordinates[:, self.actuated] = values - self.home
 
     @cached_property
     def machine(self) -> Handle[K.Loops]:
-        """What kernels are given of the loops."""
+        """The handle by which kernels open the loops."""
         return Handle(self.loops)
 
 
@@ -91,17 +93,17 @@ def closure_of(mechanism: Mechanism, whole: bool = True) -> Closure:
 
     Parameters
     ----------
-    whole : with all loops; else with those alone that the pose of the end effector has to do with. The joints of the
-        others (a gripper's) are idle then.
+    whole : with all loops; else with those on paths to the end effector only, the joints of other loops (a gripper's)
+        being idle.
     """
     loops = loops_of(mechanism, whole=whole)
-    turning = np.array([float(each.kind == "angle") for each in mechanism.coordinates])
+    turning = np.array([float(coordinate.kind == "angle") for coordinate in mechanism.coordinates])
     scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
     actuated = np.array([drive.column for drive in mechanism.drives], np.int64)
     home = np.array([drive.home for drive in mechanism.drives])
     ending = loops.columns[loops.visits[loops.paths[1:][loops.last_balls == 1] - 1, 0]]
     balls = frozenset((ending[:, None] + np.arange(3)).ravel().tolist())
-    locked = [each.column for each in mechanism.coordinates if each.joint.is_rigid]
+    locked = [coordinate.column for coordinate in mechanism.coordinates if coordinate.joint.is_rigid]
     driven = frozenset([*actuated.tolist(), *locked])
     return Closure(mechanism, loops, scale, turning, actuated, driven, balls, home, whole)
 
@@ -110,7 +112,7 @@ def closure_of(mechanism: Mechanism, whole: bool = True) -> Closure:
 def _locking(
     mechanism: Mechanism, whole: bool, locked: frozenset[int]
 ) -> tuple[Handle[K.Layout], Scratch[ClosingScratch]]:
-    """The layout in which the coordinates of some columns do not move, and memory to close loops in it."""
+    """The layout with the coordinates of some columns locked, and scratch memory to close loops in it."""
     from ..kernels.closure.close import new_closing_scratch
 
     loops = closure_of(mechanism, whole).loops
@@ -127,23 +129,23 @@ def _locking(
 
 
 def platform_poses(mechanism: Mechanism, coordinates: Floats) -> Floats:
-    """Poses (n, 4, 4) of the end effector, or of the body that carries it where it is a joint."""
+    """Poses (n, 4, 4) of the end effector, or of the body to which a joint end effector belongs."""
     if not coordinates.any():
         return np.repeat(mechanism.home_pose[None], len(coordinates), axis=0)
     return np.asarray(displacements(mechanism, coordinates)[mechanism.end_effector_body] @ mechanism.home_pose)
 
 
 class Closing(NamedTuple):
-    """What a search for closed loops found, row by row; lengths in the mechanism's unit.
+    """The results of closing loops, row by row; lengths in the mechanism's unit.
 
     Attributes
     ----------
     coordinates : deviations from home, (n, columns).
     poses : of the platform, (n, 4, 4).
     gaps : largest gap of the loops of each group of paths, (n, groups) [L or rad].
-    excesses : largest excess over the limits of each group, likewise.
-    misses : largest distance of a joint's centre from where it was wished, likewise.
-    iterations : (n,).
+    excesses : largest excess over the limits of each group, (n, groups) [L or rad].
+    misses : largest distance of a joint centre from its target, per group, (n, groups) [L].
+    iterations : steps taken, (n,).
     """
 
     coordinates: Floats
@@ -155,33 +157,33 @@ class Closing(NamedTuple):
 
     @property
     def gap(self) -> Floats:
-        """The largest gap of each row [L or rad]."""
+        """Largest gap of each row, (n,) [L or rad]."""
         return np.asarray(self.gaps.max(axis=1, initial=0.0))
 
     @property
     def excess(self) -> Floats:
-        """The largest excess over any limit of each row [L or rad]."""
+        """Largest excess over any limit of each row, (n,) [L or rad]."""
         return np.asarray(self.excesses.max(axis=1, initial=0.0))
 
     @property
     def feasible(self) -> Mask:
-        """Which rows are closed within every limit, (n,)."""
+        """Mask of rows that are closed within every limit, (n,)."""
         return np.asarray((self.gap <= CLOSED) & (self.excess <= TOLERANCES.limit))
 
     @property
     def off(self) -> Floats:
-        """What keeps each group of each row from being feasible: its gap or its excess, (n, groups) [L or rad]."""
+        """Infeasibility of each group: the larger of gap and excess, (n, groups) [L or rad]."""
         return np.maximum(self.gaps, self.excesses)
 
-    def improve(self, places: NDArray[np.intp], tried: Closing) -> None:
-        """Put rows of another search in these places where they are feasible, or less far from it."""
-        better = np.flatnonzero(tried.feasible | (tried.off.max(axis=1) < self.off[places].max(axis=1)))
-        self.take(places[better], tried, better)
+    def put_better(self, places: NDArray[np.intp], trial: Closing) -> None:
+        """Write the rows of a trial that are feasible, or less infeasible, at these places."""
+        better = np.flatnonzero(trial.feasible | (trial.off.max(axis=1) < self.off[places].max(axis=1)))
+        self.put(places[better], trial, better)
 
-    def take(self, places: NDArray[np.intp], found: Closing, rows: Any = slice(None)) -> None:
-        """Put rows of another search in some places of this one."""
-        for array, own in zip(self, found, strict=True):
-            array[places] = own[rows]
+    def put(self, places: NDArray[np.intp], source: Closing, rows: Any = slice(None)) -> None:
+        """Write rows of another closing at these places."""
+        for array, source_array in zip(self, source, strict=True):
+            array[places] = source_array[rows]
 
 
 def close(
@@ -195,23 +197,23 @@ def close(
     centres: Floats | None = None,
     limits: bool = False,
     margin: float = 0.0,
-    plunging: bool = False,
+    undamped: bool = False,
     closeness: float = 1e-13,
     max_iterations: int = 100,
 ) -> Closing:
-    """Close loops from given configurations, nearest to what is wished; locked joints are put where they are locked.
+    """Close loops by least squares from given configurations; rigid joints are set to their locked value.
 
     Parameters
     ----------
-    coordinates, poses : where to start, (n, columns) and (n, 4, 4).
-    locked : columns of the coordinates that stay as they are.
-    platform : `LOCKED` for what of the platform's pose, position then rotation, stays where it starts; else 0.
-    frame : the axes of this rotation: those of the base, those of the pose (of which the first two tilt), or axes of
-        which the third yaws; one of `K.BASE_AXES`, `K.TARGET_AXES`, `K.HALF_WAY`.
-    centres : wished joint centres, (n, joints, 3); NaN for none.
-    limits : keep all limits too, by `margin` inside.
-    plunging : undamped steps, up and down: finds more of many solutions, but not the nearest.
-    max_iterations : with 0 configurations are measured as they are.
+    coordinates, poses : of the start, (n, columns) and (n, 4, 4).
+    locked : columns of the coordinates that stay fixed.
+    platform : `LOCKED` for each component of the platform's pose, position then rotation, that stays fixed; else 0.
+    frame : axes of this rotation: those of the base, those of the pose (the first two tilt), or axes of which the
+        third yaws; one of `K.BASE_AXES`, `K.TARGET_AXES`, `K.HALF_WAY`.
+    centres : target positions of joint centres, (n, joints, 3); NaN for none.
+    limits : keep all limits too, with `margin` to spare.
+    undamped : take undamped steps, also uphill: finds more of many solutions, but not the nearest.
+    max_iterations : most steps; with 0 configurations are measured, not changed.
     closeness : largest gap, excess and miss that ends the search [L or rad].
     """
     n, length = len(coordinates), closure.mechanism.characteristic_length
@@ -226,7 +228,7 @@ def close(
         limits=int(limits),
         margin=margin,
         balls_follow=int(follow),
-        plunging=int(plunging),
+        undamped=int(undamped),
         closeness=closeness,
         max_iterations=max_iterations,
     )
@@ -235,20 +237,20 @@ def close(
 
 
 def new_closed(closure: Closure, coordinates: Floats, poses: Floats, gap: float) -> K.Closed:
-    """What the kernels fill, from coordinates (n, columns), poses (n, 4, 4) [L], and gaps before anything is known."""
+    """Allocate the kernels' results from coordinates (n, columns) and poses (n, 4, 4) [L] of the start."""
     n, groups = len(coordinates), len(closure.loops.groups) - 1
     gaps, excesses, misses = np.full((3, n, groups), gap)
     return K.Closed(coordinates * closure.scale, poses, gaps, excesses, misses, np.zeros(n, np.int64))
 
 
 def closing_of(closure: Closure, closed: K.Closed) -> Closing:
-    """What they have filled, in the mechanism's unit."""
+    """The kernels' results in the mechanism's unit."""
     poses = in_lengths(closed.poses, closure.mechanism.characteristic_length)
     return Closing(closed.coordinates / closure.scale, poses, *closed[2:])
 
 
-def measured(mechanism: Mechanism, coordinates: Floats) -> Closing:
-    """Joint coordinates (n, columns), deviations from home, as they are: their loop gaps and limit excesses."""
+def measure_configurations(mechanism: Mechanism, coordinates: Floats) -> Closing:
+    """Measure loop gaps and limit excesses at joint coordinates (n, columns), deviations from home."""
     return close(closure_of(mechanism), coordinates, platform_poses(mechanism, coordinates), max_iterations=0)
 
 
@@ -256,15 +258,15 @@ ROWS_A_BLOCK = 64
 
 
 def _run(closure: Closure, locked: frozenset[int], problem: K.ClosureProblem, closed: K.Closed) -> None:
-    """The kernel over all rows, on all cores."""
+    """Run the kernel on all rows, on all cores."""
     from ..kernels.closure.close import close as close_rows
 
     machine = closure.machine.address
     layout, scratch = _locking(closure.mechanism, closure.whole, locked)
 
     def run(block: slice) -> None:
-        own = problem._replace(centres=problem.centres[block])
-        close_rows(machine, layout.address, scratch.address, own, K.Closed._make(array[block] for array in closed))
+        part = problem._replace(centres=problem.centres[block])
+        close_rows(machine, layout.address, scratch.address, part, K.Closed._make(array[block] for array in closed))
 
     n = len(closed.poses)
     if n <= ROWS_A_BLOCK:
@@ -280,7 +282,7 @@ def in_lengths(poses: Floats, scale: float) -> Floats:
 
 @lru_cache(maxsize=64)
 def _scaling(scale: float) -> Floats:
-    """What the numbers of a pose are multiplied with."""
+    """The factors (4, 4) of the entries of a pose."""
     factors = np.ones((4, 4))
     factors[:3, 3] = scale
     return factors

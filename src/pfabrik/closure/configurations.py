@@ -1,4 +1,4 @@
-"""Configurations found for a batch: what is told of them row by row, and the coordinates of all their joints."""
+"""Solutions of a batch: their rows of results, and the coordinates of all joints."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDIN
 from .close import Closing, Closure, closure_of
 
 Places: TypeAlias = NDArray[np.intp] | slice
-"""Which rows of a batch."""
+"""Indices of rows of a batch."""
 
 ROWS_A_CALL = 32
-"""What it takes to find the coordinates of a part of a batch, besides those of its rows [rows]."""
+"""Overhead of computing the coordinates of a part of a batch, as a number of rows."""
 
 STEPS_A_REPORT = 16
 """Steps along a path between two reports of progress."""
 
 
 def new_rows(mechanism: Mechanism, n: int) -> Rows:
-    """Room for n answers.
+    """Allocate n results.
 
-    All but the actuators, which callers keep, is one piece of memory: allocators hold on to about as much as was given
-    back at once, and to get what is more anew, page by page, takes longer than to answer.
+    All but the actuators, which callers keep, share one block of memory: allocators retain about as much as was freed
+    at once, and requesting more, page by page, takes longer than solving.
     """
-    room, actuators = np.empty((25, n)), np.empty((n, len(mechanism.actuator_names)))
-    room[16:] = 0.0
-    counters, status = room[21:24].view(np.int64).reshape(n, N_COUNTERS), room[24].view(np.int64)
+    block, actuators = np.empty((25, n)), np.empty((n, len(mechanism.actuator_names)))
+    block[16:] = 0.0
+    counters, status = block[21:24].view(np.int64).reshape(n, N_COUNTERS), block[24].view(np.int64)
     status[:] = PENDING
-    return Rows(status, counters, room[:16].reshape(n, 4, 4), actuators, room[16:21].reshape(n, 5))
+    return Rows(status, counters, block[:16].reshape(n, 4, 4), actuators, block[16:21].reshape(n, 5))
 
 
 def rows_at(rows: Rows, places: Any) -> Rows:
@@ -42,25 +42,25 @@ def rows_at(rows: Rows, places: Any) -> Rows:
     return Rows._make(array[places] for array in rows)
 
 
-def put_rows(rows: Rows, places: Any, others: Rows) -> None:
-    """Write other rows at some places."""
-    for array, own in zip(rows, others, strict=True):
-        array[places] = own
+def put_rows(rows: Rows, places: Any, source: Rows) -> None:
+    """Write rows at some places."""
+    for array, source_array in zip(rows, source, strict=True):
+        array[places] = source_array
 
 
-def steps_of(known: Mask, on_progress: Callable[[int, int], None] | None) -> Iterator[int]:
-    """The steps of a path that are poses, one after the other; every few steps it is told how far it is."""
-    for i, is_pose in enumerate(known.tolist()):
+def steps_of(is_valid: Mask, on_progress: Callable[[int, int], None] | None) -> Iterator[int]:
+    """Yield the indices of a path's valid targets, and report progress every few steps."""
+    for i, is_pose in enumerate(is_valid.tolist()):
         if is_pose:
             yield i
-        if on_progress is not None and ((i + 1) % STEPS_A_REPORT == 0 or i + 1 == len(known)):
-            on_progress(i + 1, len(known))
+        if on_progress is not None and ((i + 1) % STEPS_A_REPORT == 0 or i + 1 == len(is_valid)):
+            on_progress(i + 1, len(is_valid))
 
 
 def write_closing(closure: Closure, closing: Closing, rows: Rows) -> None:
-    """Pose, actuators, loop gaps, limit excesses and iterations of closed configurations, into as many rows.
+    """Write pose, actuators, loop gap, limit excess and iterations of closed configurations into as many rows.
 
-    A joint end effector has no orientation: home's is written.
+    A joint end effector has no orientation; that of home is written.
     """
     mechanism = closure.mechanism
     rows.poses[:] = closing.poses
@@ -75,24 +75,24 @@ def write_closing(closure: Closure, closing: Closing, rows: Rows) -> None:
 
 
 class Configurations:
-    """What was found for a batch.
+    """The solutions of a batch.
 
     Attributes
     ----------
     rows : status, pose, actuators and measures, row by row.
     coordinates : of all joints, deviations from home, (n, columns) [length or rad].
-    were_given : whether the coordinates were what was searched for; else they follow from the rows when asked for.
+    were_given : True if the coordinates were computed by the solver; else they are computed from the rows on access.
     """
 
     def __init__(self, rows: Rows, coordinates: Floats | Callable[[Places], Floats]) -> None:
-        """Coordinates that follow from the rows are those that a call gives for some places."""
+        """Wrap rows with their coordinates, or with a function that computes those of some places."""
         self.rows = rows
         self.were_given = not callable(coordinates)
         self._coordinates = coordinates
         self._taken = 0
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """As configurations whose coordinates were given: how they would be found is not pickled."""
+        """Pickle with coordinates, not with the function that computes them."""
         return type(self), (self.rows, self.coordinates)
 
     def __len__(self) -> int:
@@ -103,7 +103,7 @@ class Configurations:
         return self._coordinates(slice(None)) if callable(self._coordinates) else self._coordinates
 
     def coordinates_at(self, places: NDArray[np.intp]) -> Floats:
-        """The coordinates at some places: of these alone, until parts have taken as long as the whole would."""
+        """The coordinates at some places; all are computed once parts have cost as much as the whole batch would."""
         if not callable(self._coordinates) or "coordinates" in vars(self):
             return self.coordinates[places]
         self._taken += len(places) + ROWS_A_CALL
@@ -114,45 +114,45 @@ class Configurations:
         rows = Rows._make(np.ascontiguousarray(array[places]) for array in self.rows)
         if self.were_given:
             return Configurations(rows, self.coordinates[places])
-        return Configurations(rows, lambda own: self.coordinates_at(places[own]))
+        return Configurations(rows, lambda selected: self.coordinates_at(places[selected]))
 
-    def with_others(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
-        """These configurations with as many others at some places."""
+    def with_rows(self, places: NDArray[np.intp], source: Configurations) -> Configurations:
+        """A copy with other configurations at some places."""
         rows, coordinates = rows_at(self.rows, np.arange(len(self))), self.coordinates.copy()
-        put_rows(rows, places, others.rows)
-        coordinates[places] = others.coordinates
+        put_rows(rows, places, source.rows)
+        coordinates[places] = source.coordinates
         return Configurations(rows, coordinates)
 
-    def replace(self, places: NDArray[np.intp], others: Configurations, rows: Mask) -> None:
-        """Put some rows of other configurations in some places, in place."""
-        put_rows(self.rows, places, rows_at(others.rows, rows))
+    def put(self, places: NDArray[np.intp], source: Configurations, rows: Mask) -> None:
+        """Write some rows of other configurations at some places."""
+        put_rows(self.rows, places, rows_at(source.rows, rows))
         if self.were_given:
-            self.coordinates[places] = others.coordinates[rows]
+            self.coordinates[places] = source.coordinates[rows]
 
-    def among(self, known: Mask) -> Configurations:
-        """As many rows as `known` has, with these configurations where it is true, INVALID and NaN elsewhere."""
-        if known.all():
+    def scatter(self, mask: Mask) -> Configurations:
+        """A batch of the size of the mask: these configurations where it is true, INVALID and NaN elsewhere."""
+        if mask.all():
             return self
-        n = len(known)
+        n = len(mask)
         rows = Rows._make(_blank(array, n) for array in self.rows)
         rows.status[:] = INVALID
-        put_rows(rows, known, self.rows)
+        put_rows(rows, mask, self.rows)
         coordinates = _blank(self.coordinates, n)
-        coordinates[known] = self.coordinates
+        coordinates[mask] = self.coordinates
         return Configurations(rows, coordinates)
 
 
 def _blank(array: NDArray[Any], n: int) -> NDArray[Any]:
-    """Room for n rows like those of an array: NaN, or 0 for integers."""
+    """Allocate n rows like those of an array, filled with NaN, or with 0 for integers."""
     return np.full((n, *array.shape[1:]), np.nan if array.dtype.kind == "f" else 0, array.dtype)
 
 
 def joint_coordinates(mechanism: Mechanism, start: Configurations | None) -> Floats:
-    """Joint coordinates to start from, (n, columns) or (1, columns), as deviations from home; home's are zero."""
+    """Joint coordinates of the start, (n, columns) or (1, columns), as deviations from home; zero without a start."""
     return np.zeros((1, len(closure_of(mechanism).scale))) if start is None else start.coordinates
 
 
 def coordinates_for(mechanism: Mechanism, start: Configurations | None, n: int) -> Floats:
-    """The same for each of n rows, (n, columns), copied."""
+    """A copy of the joint coordinates of the start, one row for each of n targets, (n, columns)."""
     coordinates = joint_coordinates(mechanism, start)
     return np.repeat(coordinates, 1 if start is not None and len(start) > 1 else n, axis=0)

@@ -1,4 +1,4 @@
-"""The nearest feasible configuration, exactly: a local search on joint coordinates, and what holds it back."""
+"""The nearest feasible configuration by a local search on joint coordinates, and the multipliers of its limits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 MOST_STEPS = 200
-"""Steps of a search, including those that are taken back; most need a dozen."""
+"""Most steps of a search, rejected ones included; most searches need a dozen."""
 
 
 def nearest_configurations(
@@ -38,28 +38,28 @@ def nearest_configurations(
 
     Parameters
     ----------
-    coordinates : where to start, (n, columns): closed within all limits, or not far from it.
-    platform : what counts of the distance from the targets: weights of the squares of position [L] and rotation [rad];
-        LOCKED for what is to be as the target has it.
-    frame : of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY.
-    steps : each search may take.
+    coordinates : of the start, (n, columns): closed within all limits, or nearly so.
+    platform : weights (6,) of the squares of position [L] and rotation [rad] in the objective; LOCKED for components
+        that are held at the target's.
+    frame : part of the rotation that counts: all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY.
+    steps : most steps of each search.
 
     Returns
     -------
-    Closing : judge by `feasible`. Gaps and excesses are those of the whole, the same for every group.
+    Closing : valid where `feasible`. Gaps and excesses are those of the whole mechanism, repeated for every group.
     """
-    return _ended(closure, coordinates, _objective(closure, targets, platform, frame, steps))
+    return _minimise(closure, coordinates, _objective(closure, targets, platform, frame, steps))
 
 
 def nearest_actuators(
     closure: Closure, coordinates: Floats, poses: Floats, values: Floats, steps: int = MOST_STEPS
 ) -> Closing:
-    """Feasible configurations whose actuators differ least from the values (n, n_a), by least squares; a local search.
+    """Feasible configurations whose actuators differ least from the values (n, n_a), by least squares: local minima.
 
     Parameters
     ----------
-    coordinates, poses : where to start, (n, columns) and (n, 4, 4); need not be closed, nor within limits.
-    steps : each search may take; with none it ends where loops close within limits, from values put within ranges.
+    coordinates, poses : of the start, (n, columns) and (n, 4, 4); need not be closed, nor within limits.
+    steps : most steps of each search; with 0, loops are closed within limits from values clipped to their ranges.
     """
     anchors, weights = coordinates.copy(), np.zeros(len(closure.scale))
     closure.put_actuators(anchors, values)
@@ -72,51 +72,51 @@ def nearest_actuators(
     if steps == 0:
         return begin
     free = _objective(closure, begin.poses, EVERYTHING_FREE, BASE_AXES, steps)
-    return _ended(closure, begin.coordinates, free._replace(weights=weights, anchors=anchors * closure.scale))
+    return _minimise(closure, begin.coordinates, free._replace(weights=weights, anchors=anchors * closure.scale))
 
 
-def _ended(closure: Closure, coordinates: Floats, objective: Objective) -> Closing:
-    """Where searches from coordinates (n, columns) end."""
+def _minimise(closure: Closure, coordinates: Floats, objective: Objective) -> Closing:
+    """Minimise an objective by local searches from coordinates (n, columns)."""
     return closing_of(closure, _run(closure, coordinates, objective)[0])
 
 
-def weighed_limits(
+def limit_multipliers(
     closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
 ) -> Floats:
-    """How hard every limit holds configurations back from their targets: multipliers, (n, 2 columns + cones).
+    """Multipliers of all limits at configurations nearest to targets, (n, 2 columns + cones).
 
-    First the low and high bounds of the coordinates in turn, then the cones: by how much of L the target comes nearer,
-    per unit [L or rad] by which a limit gives way; 0 for limits that do not matter.
+    The order is low and high bound of each coordinate, then the cones. A multiplier is the decrease of the distance [L]
+    per unit [L or rad] by which the limit is relaxed; 0 for limits that are not active.
     """
     return _run(
-        closure, coordinates, _objective(closure, within_sight(closure.mechanism, targets), platform, frame, 0)
+        closure, coordinates, _objective(closure, clip_targets(closure.mechanism, targets), platform, frame, 0)
     )[1]
 
 
-def within_sight(mechanism: Mechanism, targets: Floats) -> Floats:
-    """Targets (n, 4, 4), those so far from home that no search could tell them from others there brought nearer."""
+def clip_targets(mechanism: Mechanism, targets: Floats) -> Floats:
+    """Targets (n, 4, 4), with positions farther than `SIGHT` from home moved towards home to that distance."""
     home, far = mechanism.home_pose[:3, 3], SIGHT * mechanism.characteristic_length
-    near, offset = targets.copy(), targets[:, :3, 3] - home
-    near[:, :3, 3] = home + offset * np.minimum(1.0, far / np.maximum(np.abs(offset).max(axis=1), far))[:, None]
-    return near
+    clipped, offset = targets.copy(), targets[:, :3, 3] - home
+    clipped[:, :3, 3] = home + offset * np.minimum(1.0, far / np.maximum(np.abs(offset).max(axis=1), far))[:, None]
+    return clipped
 
 
 def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[Closed, Floats]:
-    """The kernel over all rows, on all cores: where they ended, or what holds them where they are."""
+    """Run the kernel on all rows, on all cores: the local minima, or with 0 steps the multipliers of the limits."""
     from ..kernels.closure.descend import nearest_configuration
 
     closed = new_closed(closure, coordinates, np.tile(np.eye(4), (len(coordinates), 1, 1)), 0.0)
     scratch = _scratch(closure.mechanism, closure.whole)
-    weights = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
+    multipliers = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
 
     def run(block: slice) -> None:
-        own = Closed._make(array[block] for array in closed)
+        results = Closed._make(array[block] for array in closed)
         pose = objective.pose._replace(targets=objective.pose.targets[block])
-        asked = objective._replace(pose=pose, anchors=objective.anchors[block])
-        nearest_configuration(closure.machine.address, scratch.address, asked, own, weights[block])
+        part = objective._replace(pose=pose, anchors=objective.anchors[block])
+        nearest_configuration(closure.machine.address, scratch.address, part, results, multipliers[block])
 
     in_blocks(run, len(coordinates), rows_a_block=16)
-    return closed, weights
+    return closed, multipliers
 
 
 @lru_cache(maxsize=64)
@@ -127,8 +127,8 @@ def _scratch(mechanism: Mechanism, whole: bool) -> Scratch[DescentScratch]:
 
 
 def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> Objective:
-    """What is to come near where no coordinate counts."""
-    wanted = targets.copy()
-    wanted[:, :3, 3] /= closure.mechanism.characteristic_length
-    pose = PoseObjective(wanted, np.array(platform, dtype=float), frame, TOLERANCES.inside, TOLERANCES.active, steps)
+    """The objective of the distance from targets (n, 4, 4), with no weight on joint coordinates."""
+    scaled = targets.copy()
+    scaled[:, :3, 3] /= closure.mechanism.characteristic_length
+    pose = PoseObjective(scaled, np.array(platform, dtype=float), frame, TOLERANCES.inside, TOLERANCES.active, steps)
     return Objective(pose, np.zeros(len(closure.scale)), np.zeros((len(targets), 0)))

@@ -1,7 +1,7 @@
-"""How much is searched for, in operations that are counted: what searches cost grows with the cube of a chain's joints.
+"""Bounds on the operations of a search, whose cost grows with the cube of the number of coordinates.
 
-Machines have chains of a dozen coordinates, and are searched for without these bounds ever being met; chains of
-hundreds are searched for less, so that an answer takes seconds.
+Machines with a dozen coordinates per chain never reach these bounds. For chains of hundreds they limit starts and
+steps, so that an answer takes seconds.
 """
 
 from __future__ import annotations
@@ -11,51 +11,51 @@ import numpy as np
 from .close import Closure
 
 CLOSING = 5e9
-"""Operations that random starts may take all together: a step of closing takes as many as the cubes of the numbers of
-coordinates of all groups, in sum. About a second, where it tells at all: from some 130 coordinates on."""
+"""Operations of all random starts together: a closing step takes the sum over groups of the cubed number of
+coordinates. About a second; the bound matters from some 130 coordinates on."""
 
-LEADING = 1e10
-"""The same for all strides of leading a platform to its target, and for each closing from where a search starts."""
+CONTINUATION = 1e10
+"""Operations of a continuation to a target, and of each closing from the start of a search."""
 
 DESCENDING = 4e9
-"""Likewise for the steps of all descents of one answer: one takes the cube of the number of all coordinates, several
-times."""
+"""Operations of all descents of one answer: a step takes several times the cube of the number of all coordinates."""
 
-TAKEN_UP = 4
-"""What taking up a limit costs, in squares of the number of coordinates."""
+LIMIT_COST = 4
+"""Cost of adding a limit to the active set, in squares of the number of coordinates."""
 
 ENOUGH = 20
-"""Steps that a closing may always take: those that arrive need ten to fifteen, however long the chain."""
+"""Steps that every closing may take: those that converge need ten to fifteen, however long the chain."""
 
 FEWEST, A_DESCENT = 4, 15
-"""Steps of a descent, or of a stride, below which it is not worth beginning; and those that most descents need."""
+"""Fewest steps for which a descent or a continuation step is tried; and the steps that most descents need."""
 
 
 def steps_within(closure: Closure, most: int) -> int:
-    """How many steps a closing may take."""
-    return min(most, max(ENOUGH, int(LEADING / closure.cubes)))
+    """Most steps of a closing."""
+    return min(most, max(ENOUGH, int(CONTINUATION / closure.cubes)))
 
 
 def starts_within(closure: Closure, most: int, steps: int) -> int:
-    """How many starts, of as many steps each, are closed at most."""
+    """Most starts of a search that takes `steps` steps from each."""
     return min(most, int(CLOSING / (steps * closure.cubes)))
 
 
-def stride_within(closure: Closure, most: int, strides: int) -> int:
-    """How many steps each stride of leading may take; 0 where too few are left to lead at all."""
-    steps = min(most, int(LEADING / (strides * closure.cubes)))
+def steps_per_continuation_step(closure: Closure, most: int, n: int) -> int:
+    """Most closing steps of each of n continuation steps; 0 if too few are affordable."""
+    steps = min(most, int(CONTINUATION / (n * closure.cubes)))
     return steps if steps >= FEWEST else 0
 
 
-def descents_within(closure: Closure, starts: int, most: int, met: int = 0) -> tuple[int, int]:
-    """How many descents of so many begin, and how many steps each may take; no steps where too few are left.
+def descents_within(closure: Closure, starts: int, most: int, n_limits: int = 0) -> tuple[int, int]:
+    """Most descents, and most steps of each; 0 steps if too few are affordable.
 
     Parameters
     ----------
-    met : how many limits a step may meet: it takes them up one by one.
+    starts, most : descents and steps that are wanted.
+    n_limits : limits that a step may add to the active set, one by one.
     """
     moving = max(1, int(np.count_nonzero(~closure.idle)))
-    steps = int(DESCENDING / (moving**2 * (moving + TAKEN_UP * met)))
+    steps = int(DESCENDING / (moving**2 * (moving + LIMIT_COST * n_limits)))
     n = min(starts, max(1, steps // A_DESCENT))
     steps = min(most, steps // n)
     return n, steps if steps >= FEWEST else 0

@@ -19,11 +19,11 @@ from ..tolerances import TOLERANCES
 
 
 def loops_of(mechanism: Mechanism, *, whole: bool = True) -> K.Loops:
-    """The paths of a mechanism, its limits and cones, as the closure kernel takes them: lengths in L.
+    """The table of paths, limits and cones that the closure kernels read; lengths in L.
 
     Parameters
     ----------
-    whole : all loops; else only those on a way from the base to the end effector.
+    whole : all loops; else only those on a path from the base to the end effector.
     """
     builder = _Builder(mechanism)
     for path in independent_paths(mechanism, detours=whole):
@@ -34,7 +34,7 @@ def loops_of(mechanism: Mechanism, *, whole: bool = True) -> K.Loops:
 
 
 class _Builder:
-    """Collects unit motions and visits, path by path."""
+    """A builder of the table: collects unit motions and visits, path by path."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
@@ -64,7 +64,7 @@ class _Builder:
         self.marks.append(marks)
 
     def add_joint(self, joint: Joint) -> list[int]:
-        """Numbers of a joint's unit motions, in the order from its first body to its second."""
+        """Add a joint's unit motions once; their numbers, in the order from its first body to its second."""
         if joint.name not in self.units:
             first = self.columns[joint.name].start
             motions = _motions(self.mechanism, joint)
@@ -132,8 +132,8 @@ class _Builder:
             "cone_angles": np.array([joint.cone.half_angle for joint in joints if joint.cone]),
             "cone_outward": _ints(j.cone.fixed_to == j.connects[0] for j in joints if j.cone),
             "cone_slides": _pairs(pairwise(starts)),
-            "slides": _ints(j for each in slides for j, _ in each),
-            "slide_axes": _vectors(axis for each in slides for _, axis in each),
+            "slides": _ints(j for of_cone in slides for j, _ in of_cone),
+            "slide_axes": _vectors(axis for of_cone in slides for _, axis in of_cone),
         }
 
 
@@ -153,17 +153,17 @@ def _motions(mechanism: Mechanism, joint: Joint) -> list[tuple[int, Any]]:
 def _slides(
     mechanism: Mechanism, joint: Joint, end: Joint, line: Floats, places: Mapping[str, slice]
 ) -> list[tuple[int, Floats]]:
-    """The slides between a joint and the next that turn its line, and how the line moves with each."""
-    passed = [each for each in mechanism.joints if each.type in PASSED_THROUGH]
-    tree, found = spanning_tree(edges_of(passed), opposite(joint)), []
+    """The slides between a joint and the next that turn its line: the column and the motion of the line of each."""
+    passed = [passed_joint for passed_joint in mechanism.joints if passed_joint.type in PASSED_THROUGH]
+    tree, slides = spanning_tree(edges_of(passed), opposite(joint)), []
     for index, forward in tree.way(next(body for body in end.connects if body in tree.paths)):
         slide = passed[index]
         if slide.type == "prismatic":
             axis = np.array(mechanism.home_axis(slide.name)) * (1.0 if forward else -1.0)
             off = np.linalg.norm(np.cross(axis, line))
             if slide.along is None or off > TOLERANCES.position * np.linalg.norm(line):
-                found.append((places[slide.name].start, axis))
-    return found
+                slides.append((places[slide.name].start, axis))
+    return slides
 
 
 def _connected(sets: Sequence[set[int]]) -> list[list[int]]:
@@ -182,11 +182,11 @@ def _connected(sets: Sequence[set[int]]) -> list[list[int]]:
 def _ranges(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """Bounds of the deviations from home, (columns,) each, dimensionless; infinite where there are none.
 
-    A coordinate that is a distance has one even where the description gives none: it is not negative.
+    A coordinate that is a distance always has a lower bound, for it cannot be negative.
     """
     units = rate_units(mechanism).tolist()
-    room = [each.room(unit) for each, unit in zip(mechanism.coordinates, units, strict=True)]
-    lo, hi = np.ascontiguousarray(np.reshape(room, (-1, 2)).T)
+    bounds = [coordinate.room(unit) for coordinate, unit in zip(mechanism.coordinates, units, strict=True)]
+    lo, hi = np.ascontiguousarray(np.reshape(bounds, (-1, 2)).T)
     return lo, hi
 
 

@@ -1,4 +1,4 @@
-"""Ways of assembly: what a task leaves out of a pose, and whether it follows from the mechanism."""
+"""Components of a pose that a task leaves out: whether the mechanism determines them, and whether they vary."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from .close import Closure, closure_of, platform_poses
 
 @lru_cache(maxsize=64)
 def follows_task(mechanism: Mechanism) -> bool:
-    """Whether all that a task leaves out of a pose follows from the mechanism, which has no freedom beside the task.
+    """True if the mechanism determines every component of a pose that the task leaves out.
 
-    Then a target has one pose for each way of assembly. Told by the freedoms in general, not by those of home, which
-    may be singular; of a joint end effector nothing turns.
+    It then has no freedom beside the task, and a target has one pose per assembly mode. Freedoms are counted at generic
+    configurations, as home may be singular. False for a whole-pose task or a joint end effector, which has no rotation.
     """
     if mechanism.end_effector_is_joint or task_of(mechanism).is_whole_pose:
         return False
@@ -28,15 +28,15 @@ def follows_task(mechanism: Mechanism) -> bool:
 
 
 def asks_too_much(mechanism: Mechanism) -> bool:
-    """Whether a task sets more of a pose than the end effector has freedoms: hardly any target is within reach."""
+    """True if the task sets more components than the end effector has freedoms: hardly any target is reachable."""
     return generic_of(mechanism).mobility.platform < _asked(mechanism)
 
 
 def has_other_assemblies(mechanism: Mechanism) -> bool:
-    """Whether a target that one way of assembly misses is to be looked for in all others: they reach different ones.
+    """True if assembly modes reach different targets, so that a target missed in one must be tried in the others.
 
-    Not where nothing is left out but what never changes: positions, as the height of a planar machine, or what is left
-    of the rotation of a platform that does not turn at all.
+    False if the components left out never change: a position, such as the height of a planar machine, or the rest of
+    the rotation of a platform that does not rotate.
     """
     if not (follows_task(mechanism) and asks_too_much(mechanism)):
         return False
@@ -45,17 +45,17 @@ def has_other_assemblies(mechanism: Mechanism) -> bool:
 
 
 def _asked(mechanism: Mechanism) -> int:
-    """How many coordinates of a pose the task sets."""
+    """Number of components of a pose that the task sets."""
     task = task_of(mechanism)
     return sum(task.axes) + task.rotations
 
 
 @lru_cache(maxsize=64)
 def has_parasitic_motion(mechanism: Mechanism) -> bool:
-    """Whether what a task leaves out of a pose changes as the mechanism moves about home.
+    """True if the components of a pose that the task leaves out vary as the mechanism moves about home.
 
-    Not so where parallelograms keep an orientation. There a platform that has turned over on its rods is of no use,
-    though its loops close, and no answer.
+    False if, for instance, parallelograms keep the orientation. A platform that has flipped over on its rods is then no
+    answer, although its loops close.
     """
     poses = platform_poses(mechanism, around_home(mechanism))
     home = np.repeat(mechanism.home_pose[None], len(poses), axis=0)
@@ -63,8 +63,8 @@ def has_parasitic_motion(mechanism: Mechanism) -> bool:
     return bool((differences(closure_of(mechanism), poses, kept) > TOLERANCES.same_mode).any())
 
 
-def strays(mechanism: Mechanism, poses: Floats) -> Mask:
-    """Whether poses (n, 4, 4) are those of a platform that has turned over though its legs keep it as it is, (n,)."""
+def is_flipped(mechanism: Mechanism, poses: Floats) -> Mask:
+    """Mask of poses (n, 4, 4) with a flipped platform, for legs that keep its orientation about home, (n,)."""
     if not follows_task(mechanism) or has_parasitic_motion(mechanism):
         return np.zeros(len(poses), bool)
     home = np.repeat(mechanism.home_pose[None], len(poses), axis=0)
@@ -72,8 +72,8 @@ def strays(mechanism: Mechanism, poses: Floats) -> Mask:
     return np.asarray(differences(closure_of(mechanism), poses, kept) > TOLERANCES.same_mode)
 
 
-def differences(closure: Closure, poses: Floats, others: Floats) -> Floats:
-    """Largest difference of positions [L] and of entries of rotations, (n,)."""
+def differences(closure: Closure, poses: Floats, other_poses: Floats) -> Floats:
+    """Largest difference of positions [L] and of entries of rotation matrices between poses, (n,)."""
     scale = np.ones((3, 4))
     scale[:, 3] = 1.0 / closure.mechanism.characteristic_length
-    return np.asarray(np.abs((poses - others)[:, :3] * scale).max(axis=(1, 2), initial=0.0))
+    return np.asarray(np.abs((poses - other_poses)[:, :3] * scale).max(axis=(1, 2), initial=0.0))

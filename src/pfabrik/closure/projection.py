@@ -1,4 +1,4 @@
-"""Projection: the feasible configurations nearest to targets that are not reached."""
+"""Projection: the feasible configurations nearest to unreachable targets, by multistart local searches."""
 
 from __future__ import annotations
 
@@ -17,59 +17,63 @@ from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
 from .close import Closing, Closure, close, closure_of, platform_poses
-from .descend import MOST_STEPS, nearest_configurations, weighed_limits
+from .descend import MOST_STEPS, limit_multipliers, nearest_configurations
 from .effort import descents_within
-from .known import SEEDS, seeds_of
-from .parasitic import strays
+from .multistart import SEEDS, seeds_of
+from .parasitic import is_flipped
 
 SAME = 1e-7
-"""Share by which a later start must come nearer to be preferred to an earlier one."""
+"""Relative decrease of the distance by which a later search must improve on an earlier one."""
 
 AGREEMENTS = 7
-"""How many searches must end at the nearest configuration found before no other is looked for."""
+"""Searches that must end at the nearest configuration found before the multistart stops."""
+
+LONG_CHAIN_STEPS = 20
+"""Steps that bring a start of a long chain within its limits."""
+
+HOLD_COST = 1.0
+"""Most that a held component may add to the distance, per unit by which the start differs from the target in that
+component [L per rad, or rad per L]: a rotation about the middle of a machine moves no joint by more."""
 
 
-RESTING = 20
-"""Steps in which a start of a long chain is brought within its limits."""
+class ProjectionMode(NamedTuple):
+    """The objective of a projection.
 
-DRAGGED = 1.0
-"""How much farther than where it starts an answer may be that holds part of its target, for each unit by which that
-part differs at the start [L per rad, or per L]: a turn about the middle of a machine moves no joint by more."""
-
-
-class Way(NamedTuple):
-    """A way to project: weights of the platform's position [L] and rotation [rad], and what of them is held."""
+    Attributes
+    ----------
+    weights : of the squares of position [L] and rotation [rad]; LOCKED for components that are held.
+    hold : the part of the target that is held: HOLD_NOTHING, HOLD_ORIENTATION or HOLD_POSITION.
+    """
 
     weights: Weights
     hold: int
 
     @property
     def held(self) -> Weights:
-        """What is held alone."""
+        """The weights without an objective: LOCKED for held components, else 0."""
         return tuple(LOCKED if weight == LOCKED else 0.0 for weight in self.weights)
 
     def distances(self, closure: Closure, poses: Floats, targets: Floats) -> Floats:
-        """How far poses (n, 4, 4) are from targets in what counts, (n,) [L]."""
+        """Weighted distances of poses (n, 4, 4) from targets, (n,) [L]; held components do not count."""
         position, rotation = task_of(closure.mechanism).errors(poses, targets)
         turning = np.sqrt(max((weight for weight in self.weights[3:] if weight != LOCKED), default=0.0))
         return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, turning * rotation))
 
     def is_too_far(self, closure: Closure, distances: Floats, starts: Floats, targets: Floats) -> Mask:
-        """Whether answers that hold part of their targets are farther than the poses (n, 4, 4) where searches start,
-        and by more than holding it may cost, (n,).
+        """Mask of answers that are farther from their targets than holding a part of these may cost, (n,).
 
-        With d the distance of an answer and d0 that of its start in what is not held, and e0 how far the start is from
-        having what is: d > d0 + e0.
+        That is d > d0 + e0, where d and d0 are the distances of the answer and of the start (n, 4, 4) in components
+        that are not held, and e0 is the error of the start in those that are.
         """
         position, rotation = task_of(closure.mechanism).errors(starts, targets)
         position = position / closure.mechanism.characteristic_length
-        lacking = rotation if self.hold == HOLD_ORIENTATION else position
-        allowed = self.distances(closure, starts, targets) + DRAGGED * lacking
+        held_error = rotation if self.hold == HOLD_ORIENTATION else position
+        allowed = self.distances(closure, starts, targets) + HOLD_COST * held_error
         return np.asarray((distances < np.inf) & (distances > (1.0 + SAME) * allowed))
 
 
 class Projected(NamedTuple):
-    """Answers: configurations, how far they are from their targets (inf where none was found), and what they hold."""
+    """Projected configurations, their distances from the targets (inf if there is none), and what they hold."""
 
     closing: Closing
     distances: Floats
@@ -77,37 +81,43 @@ class Projected(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def ways_of(mechanism: Mechanism, hold: str | None, rotation_length: float | None) -> tuple[Way, ...]:
-    """The ways to project, in the order in which they are tried: what is to be held, then everything free."""
+def projection_modes(
+    mechanism: Mechanism, hold: str | None, rotation_length: float | None
+) -> tuple[ProjectionMode, ...]:
+    """The projection modes in the order in which they are tried: first with the held part, then with nothing held."""
     task = task_of(mechanism)
     turning = ((rotation_length or mechanism.rotation_length) / mechanism.characteristic_length) ** 2
-    free = Way(task.weights(1.0, turning), HOLD_NOTHING)
+    free = ProjectionMode(task.weights(1.0, turning), HOLD_NOTHING)
     if hold is None or not any(task.axes) or task.rotations == 0:
-        return (free,)  # nothing is to be held, or nothing else could give way
+        return (free,)  # nothing to hold, or no other component
     if hold == "orientation":
-        return Way(task.weights(1.0, LOCKED), HOLD_ORIENTATION), free
-    return Way(task.weights(LOCKED, turning), HOLD_POSITION), free
+        return ProjectionMode(task.weights(1.0, LOCKED), HOLD_ORIENTATION), free
+    return ProjectionMode(task.weights(LOCKED, turning), HOLD_POSITION), free
 
 
-def held_back(mechanism: Mechanism, coordinates: Floats, targets: Floats, way: Way) -> Floats:
-    """How hard every limit holds projected configurations (n, columns) back from targets: see `weighed_limits`."""
+def projection_multipliers(
+    mechanism: Mechanism, coordinates: Floats, targets: Floats, projection: ProjectionMode
+) -> Floats:
+    """Multipliers of all limits, as of `limit_multipliers`, at projected configurations (n, columns) of targets."""
     closure, frame = closure_of(mechanism), task_of(mechanism).frame
-    return weighed_limits(closure, coordinates, targets, platform=way.weights, frame=frame)
+    return limit_multipliers(closure, coordinates, targets, platform=projection.weights, frame=frame)
 
 
-def kept(mechanism: Mechanism, holds: Ints, position: Floats, rotation: Floats) -> Ints:
-    """What poses have of their targets, of what they were to hold, by how far they are: targets out of sight were not
-    sought."""
-    turned = (holds == HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
-    moved = (holds == HOLD_POSITION) & (position > TOLERANCES.held * mechanism.characteristic_length)
-    return np.where(turned | moved, HOLD_NOTHING, holds)
+def held_parts(mechanism: Mechanism, holds: Ints, position: Floats, rotation: Floats) -> Ints:
+    """The parts of targets that poses really hold, (n,), from their errors [length], [rad]; else HOLD_NOTHING.
+
+    An answer to a clipped target may miss the part that it was to hold.
+    """
+    is_turned = (holds == HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
+    is_moved = (holds == HOLD_POSITION) & (position > TOLERANCES.held * mechanism.characteristic_length)
+    return np.where(is_turned | is_moved, HOLD_NOTHING, holds)
 
 
 def project(
     closure: Closure,
     targets: Floats,
     starts: Sequence[Floats],
-    ways: Sequence[Way],
+    projections: Sequence[ProjectionMode],
     *,
     seeds: bool,
     has_start: bool,
@@ -116,112 +126,122 @@ def project(
 
     Parameters
     ----------
-    targets : (n, 4, 4); what does not count in them is as it may stay.
-    starts : joint coordinates (n, columns) each, feasible or nearly; of equal answers the first start's is taken.
-    ways : tried in turn, until one has an answer.
-    corners : search from the corners of the workspace too, there with what is held put in its place. Without, the
-        search stays about where it starts.
+    targets : (n, 4, 4); components without weight are free.
+    starts : joint coordinates (n, columns) each, feasible or nearly; of equal results that of the first start is taken.
+    projections : tried in turn, until one has an answer.
+    seeds : search from the seeds of the workspace too, moved there to hold what is to be held. Without them the search
+        stays near its starts.
     has_start : the first start was given: nothing held leads farther away than it is.
     """
     n, frame = len(targets), task_of(closure.mechanism).frame
     best = Projected(close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, HOLD_NOTHING))
     count, steps = descents_within(closure, len(starts) + (SEEDS if seeds else 0), MOST_STEPS)
     is_long = count < len(starts) or steps == 0
-    elsewhere = seeds_of(closure.mechanism) if seeds and count == len(starts) + SEEDS else ()
+    seed_coordinates = seeds_of(closure.mechanism) if seeds and count == len(starts) + SEEDS else ()
     if is_long:
-        starts = [_nearest_at_rest(closure, targets, starts, ways[-1])]
-    everywhere = [*starts, *(np.where(closure.idle, starts[0], corner) for corner in elsewhere)]
-    for way in ways if steps else ():
-        open_to_it, agreements = np.isinf(best.distances), np.zeros(n, np.int64)
-        for place, start in enumerate(everywhere):
-            waiting = np.flatnonzero(open_to_it & (agreements < AGREEMENTS))
-            if len(waiting):
-                begin = start[waiting]
+        starts = [_nearest_start(closure, targets, starts, projections[-1])]
+    all_starts = [*starts, *(np.where(closure.idle, starts[0], seed) for seed in seed_coordinates)]
+    for projection in projections if steps else ():
+        is_open, agreements = np.isinf(best.distances), np.zeros(n, np.int64)
+        for place, start in enumerate(all_starts):
+            pending = np.flatnonzero(is_open & (agreements < AGREEMENTS))
+            if len(pending):
+                begin = start[pending]
                 if place >= len(starts):
-                    begin = _placed(closure, begin, targets[waiting], way)
-                found = nearest_configurations(
-                    closure, begin, targets[waiting], platform=way.weights, frame=frame, steps=steps
+                    begin = _move_to_held(closure, begin, targets[pending], projection)
+                trial = nearest_configurations(
+                    closure, begin, targets[pending], platform=projection.weights, frame=frame, steps=steps
                 )
-                agreements[waiting] = _take_nearer(closure, best, waiting, found, targets, way, agreements[waiting])
-        lost = np.flatnonzero(np.isinf(best.distances))
-        if len(lost) and LOCKED in way.weights and not is_long:
-            begin = _placed(closure, starts[0][lost], targets[lost], way)
-            found = nearest_configurations(
-                closure, begin, targets[lost], platform=way.weights, frame=frame, steps=steps
+                agreements[pending] = _put_nearer(
+                    closure, best, pending, trial, targets, projection, agreements[pending]
+                )
+        unsolved = np.flatnonzero(np.isinf(best.distances))
+        if len(unsolved) and LOCKED in projection.weights and not is_long:
+            begin = _move_to_held(closure, starts[0][unsolved], targets[unsolved], projection)
+            trial = nearest_configurations(
+                closure, begin, targets[unsolved], platform=projection.weights, frame=frame, steps=steps
             )
-            _take_nearer(closure, best, lost, found, targets, way, np.zeros(len(lost), np.int64))
-    lost = np.flatnonzero(np.isinf(best.distances))
-    if len(lost):  # where a search starts is feasible, or nearly: better than no answer
-        _take_nearer(
-            closure, best, lost, _at_rest(closure, starts[0][lost]), targets, ways[-1], np.zeros(len(lost), np.int64)
-        )
-    if has_start and len(ways) > 1:
-        _let_go(closure, best, targets, starts, ways)
+            _put_nearer(closure, best, unsolved, trial, targets, projection, np.zeros(len(unsolved), np.int64))
+    unsolved = np.flatnonzero(np.isinf(best.distances))
+    if len(unsolved):  # the fallback is the start, which is feasible, or nearly
+        fallback, agreements = _measure(closure, starts[0][unsolved]), np.zeros(len(unsolved), np.int64)
+        _put_nearer(closure, best, unsolved, fallback, targets, projections[-1], agreements)
+    if has_start and len(projections) > 1:
+        _release_holds(closure, best, targets, starts, projections)
     return best
 
 
-def _at_rest(closure: Closure, coordinates: Floats) -> Closing:
-    """Joint coordinates as they are."""
+def _measure(closure: Closure, coordinates: Floats) -> Closing:
+    """Measure joint coordinates (n, columns), without changing them."""
     return close(closure, coordinates, platform_poses(closure.mechanism, coordinates), max_iterations=0)
 
 
-def _nearest_at_rest(closure: Closure, targets: Floats, starts: Sequence[Floats], way: Way) -> Floats:
-    """The starts that are nearest to targets once they are closed within limits, row by row; the first where none is.
+def _nearest_start(closure: Closure, targets: Floats, starts: Sequence[Floats], projection: ProjectionMode) -> Floats:
+    """The start nearest to its target once closed within limits, row by row; the first if none is feasible.
 
-    There is no time to search from each of them.
+    Used for long chains, for which a search from each start takes too long.
     """
-    best = Projected(_at_rest(closure, starts[0]), np.full(len(targets), np.inf), np.full(len(targets), HOLD_NOTHING))
-    every = np.arange(len(targets))
+    n = len(targets)
+    best = Projected(_measure(closure, starts[0]), np.full(n, np.inf), np.full(n, HOLD_NOTHING))
+    rows = np.arange(n)
     for start in starts:
         poses = platform_poses(closure.mechanism, start)
-        closed = close(closure, start, poses, limits=True, margin=TOLERANCES.inside, max_iterations=RESTING)
-        _take_nearer(closure, best, every, closed, targets, way, np.zeros(len(every), np.int64))
+        closed = close(closure, start, poses, limits=True, margin=TOLERANCES.inside, max_iterations=LONG_CHAIN_STEPS)
+        _put_nearer(closure, best, rows, closed, targets, projection, np.zeros(n, np.int64))
     return best.closing.coordinates
 
 
-def _let_go(closure: Closure, best: Projected, targets: Floats, starts: Sequence[Floats], ways: Sequence[Way]) -> None:
-    """Hold nothing where what was held leads farther from targets than the start is, and nothing held does not."""
-    begun = platform_poses(closure.mechanism, starts[0])
-    far = np.flatnonzero((best.holds == ways[0].hold) & ways[0].is_too_far(closure, best.distances, begun, targets))
+def _release_holds(
+    closure: Closure, best: Projected, targets: Floats, starts: Sequence[Floats], projections: Sequence[ProjectionMode]
+) -> None:
+    """Hold nothing in rows whose held part leads farther from the target than the start, if that leads nearer."""
+    holding, free = projections[0], projections[-1]
+    poses = platform_poses(closure.mechanism, starts[0])
+    far = np.flatnonzero((best.holds == holding.hold) & holding.is_too_far(closure, best.distances, poses, targets))
     if not len(far):
         return
-    other = project(closure, targets[far], [start[far] for start in starts], ways[-1:], seeds=False, has_start=True)
-    nearer = other.distances <= (1.0 + SAME) * ways[-1].distances(closure, begun[far], targets[far])
-    best.closing.take(far[nearer], other.closing, nearer)
-    best.distances[far[nearer]], best.holds[far[nearer]] = other.distances[nearer], other.holds[nearer]
+    released = project(
+        closure, targets[far], [start[far] for start in starts], projections[-1:], seeds=False, has_start=True
+    )
+    is_nearer = released.distances <= (1.0 + SAME) * free.distances(closure, poses[far], targets[far])
+    best.closing.put(far[is_nearer], released.closing, is_nearer)
+    best.distances[far[is_nearer]] = released.distances[is_nearer]
+    best.holds[far[is_nearer]] = released.holds[is_nearer]
 
 
-def _take_nearer(
+def _put_nearer(
     closure: Closure,
     best: Projected,
     rows: NDArray[np.intp],
-    found: Closing,
+    trial: Closing,
     targets: Floats,
-    way: Way,
+    projection: ProjectionMode,
     agreements: Ints,
 ) -> Ints:
-    """Take over the rows that are feasible, and nearer than the best so far; how often each best was found by now."""
-    counts = found.feasible & ~strays(closure.mechanism, found.poses)
-    distances = np.where(counts, way.distances(closure, found.poses, targets[rows]), np.inf)
+    """Put the rows of a trial that are feasible and nearer than the best so far; the new agreement counts, (n,)."""
+    is_valid = trial.feasible & ~is_flipped(closure.mechanism, trial.poses)
+    distances = np.where(is_valid, projection.distances(closure, trial.poses, targets[rows]), np.inf)
     least = best.distances[rows]
-    better = distances < (1.0 - SAME) * least
-    again = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)
-    best.distances[rows[better]], best.holds[rows[better]] = distances[better], way.hold
-    best.closing.take(rows[better], found, better)
-    return np.where(better, 1, agreements + again)
+    is_better = distances < (1.0 - SAME) * least
+    agrees = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)
+    best.distances[rows[is_better]], best.holds[rows[is_better]] = distances[is_better], projection.hold
+    best.closing.put(rows[is_better], trial, is_better)
+    return np.where(is_better, 1, agreements + agrees)
 
 
-def _placed(closure: Closure, start: Floats, targets: Floats, way: Way) -> Floats:
-    """Joint coordinates with the end effector put as it is to be held, and the loops closed on it.
+def _move_to_held(closure: Closure, start: Floats, targets: Floats, projection: ProjectionMode) -> Floats:
+    """Joint coordinates with the loops closed on an end effector that has the held part of its target.
 
-    A search from there finds what is held where no short way leads to it.
+    A search from there keeps what is held, even if no search leads to it from the start.
     """
-    if LOCKED not in way.weights:
+    if LOCKED not in projection.weights:
         return start
     task = task_of(closure.mechanism)
     begin = displacements(closure.mechanism, start)[closure.mechanism.end_effector_body] @ closure.mechanism.home_pose
-    held = np.zeros((4, 4), bool)
-    held[:3, 3], held[:3, :3] = np.array(way.weights[:3]) == LOCKED, LOCKED in way.weights[3:]
-    placed = np.where(held, task.completed(targets, begin), begin)
-    closed = close(closure, start, placed, platform=way.held, frame=task.frame, limits=True, margin=TOLERANCES.inside)
-    return closed.coordinates
+    is_held = np.zeros((4, 4), bool)
+    is_held[:3, 3], is_held[:3, :3] = np.array(projection.weights[:3]) == LOCKED, LOCKED in projection.weights[3:]
+    poses = np.where(is_held, task.completed(targets, begin), begin)
+    margin = TOLERANCES.inside
+    return close(
+        closure, start, poses, platform=projection.held, frame=task.frame, limits=True, margin=margin
+    ).coordinates

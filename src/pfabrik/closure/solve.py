@@ -1,4 +1,4 @@
-"""Inverse kinematics on the coordinates of all joints, for every mechanism: legs closed below platforms on targets."""
+"""Inverse kinematics in joint coordinates, for every mechanism: loops are closed with the platform on its target."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ..motion.limits import within_turns
 from ..options import Options
 from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
-from .assemble import assemble, judged
-from .close import HELD, Closing, Closure, close, closure_of, measured, platform_poses
+from .assemble import assemble, forward_answers
+from .close import HELD, Closing, Closure, close, closure_of, measure_configurations, platform_poses
 from .configurations import (
     Configurations,
     coordinates_for,
@@ -29,39 +29,39 @@ from .configurations import (
     steps_of,
     write_closing,
 )
-from .descend import within_sight
-from .effort import starts_within, steps_within, stride_within
-from .known import random_feasible
+from .descend import clip_targets
+from .effort import starts_within, steps_per_continuation_step, steps_within
+from .multistart import random_feasible
 from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
-from .projection import Way, held_back, kept, project, ways_of
+from .projection import ProjectionMode, held_parts, project, projection_modes, projection_multipliers
 from .starts import random_coordinates
-from .stretched import Bends
+from .stretched import BentConfiguration
 
-STRIDES = 8
-"""Steps in which the platform is taken from the seed's pose to the target where one step strays."""
+CONTINUATION_STEPS = 8
+"""Steps of a continuation of the platform from the pose of the start to the target, if one step fails."""
 
-STRIDE = 0.25
-"""How far one step goes where the working mode is to be kept: a longer one may leap over a singularity [L or rad]."""
+LONGEST_STEP = 0.25
+"""Longest single step that keeps the working mode: a longer one may jump over a singularity [L or rad]."""
 
 STRANGE = 0.1
-"""How far what a task leaves out may be from where it was before its way is looked at [L or rad]."""
+"""Largest change of components that the task leaves out, beyond which a step is replaced by continuation [L or rad]."""
 
 STARTS = 80
-"""Random starts of the legs that do not reach from where they are: a leg has a handful of branches."""
+"""Random starts of legs that are not closed from the given start: a leg has a handful of branches."""
 
 AGREEMENTS, SAME = 16, 1e-3
-"""How many of them must end at the least gap or excess found before a leg is given up, and the share by which two may
-differ and still be the same. A branch that is met half as often was by then met too, but for one time in 600."""
+"""Starts that must end at the least gap or excess found before a leg is given up, and the relative difference below
+which two count as equal. A branch found half as often has then been found too, but for one time in 600."""
 
 NEARBY = 64
-"""Known configurations that are tried before random ones, the nearest to the target first."""
+"""Random feasible configurations that are tried before random starts, the nearest to the target first."""
 
 STEPS = 30
-"""Steps each of them may take: those that arrive need fewer."""
+"""Most steps from each of these; those that converge need fewer."""
 
 
 class ClosureEngine:
-    """Answers found on joint coordinates."""
+    """The engine that solves in joint coordinates."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
@@ -70,10 +70,11 @@ class ClosureEngine:
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
-        """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        known, begin, has_start = are_poses(targets), begin_of(self.mechanism, start), start is not None
-        begin = begin[known] if len(begin) > 1 else np.repeat(begin, known.sum(), axis=0)
-        return _answer(self._closure, made_exact(targets[known]), begin, options, keep_mode, has_start).among(known)
+        """Solve for targets (n, 4, 4) independently, from one start or one for each; INVALID where no pose."""
+        is_valid, begin = are_poses(targets), start_coordinates(self.mechanism, start)
+        begin = begin[is_valid] if len(begin) > 1 else np.repeat(begin, is_valid.sum(), axis=0)
+        exact, has_start = made_exact(targets[is_valid]), start is not None
+        return _answer(self._closure, exact, begin, options, keep_mode, has_start).scatter(is_valid)
 
     def follow(
         self,
@@ -82,239 +83,253 @@ class ClosureEngine:
         options: Options,
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
-        """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        known, begin = are_poses(targets), begin_of(self.mechanism, start)
-        found = [np.zeros((0, begin.shape[1]))]
-        rows, bends = new_rows(self.mechanism, int(known.sum())), Bends(self.mechanism, options)
-        for i in steps_of(known, on_progress):
-            has_start = start is not None or len(found) > 1
-            answer = self._follow_one(made_exact(targets[i : i + 1]), begin, options, bends, has_start)
-            put_rows(rows, slice(len(found) - 1, len(found)), answer.rows)
+        """Solve a path (n, 4, 4), each target from the answer before it, in its working mode."""
+        is_valid, begin = are_poses(targets), start_coordinates(self.mechanism, start)
+        coordinates = [np.zeros((0, begin.shape[1]))]
+        rows, bent = new_rows(self.mechanism, int(is_valid.sum())), BentConfiguration(self.mechanism, options)
+        for i in steps_of(is_valid, on_progress):
+            has_start = start is not None or len(coordinates) > 1
+            answer = self._follow_one(made_exact(targets[i : i + 1]), begin, options, bent, has_start)
+            put_rows(rows, slice(len(coordinates) - 1, len(coordinates)), answer.rows)
             begin = answer.coordinates
-            found.append(begin)
-        return Configurations(rows, np.concatenate(found)).among(known)
+            coordinates.append(begin)
+        return Configurations(rows, np.concatenate(coordinates)).scatter(is_valid)
 
     def _follow_one(
-        self, target: Floats, begin: Floats, options: Options, bends: Bends, has_start: bool
+        self, target: Floats, begin: Floats, options: Options, bent: BentConfiguration, has_start: bool
     ) -> Configurations:
+        """Solve one target of a path, also from the last bent configuration if links are stretched out."""
         answer = _answer(self._closure, target, begin, options, True, has_start)
-        if bends.before is not None:
-            other = _answer(self._closure, target, bends.before, options, True, has_start)
-            answer = other if bends.prefer(target, answer.rows, other.rows) else answer
-        bends.note(int(answer.rows.status[0]), begin, answer.coordinates)
+        if bent.coordinates is not None:
+            bent_answer = _answer(self._closure, target, bent.coordinates, options, True, has_start)
+            answer = bent_answer if bent.is_preferred(target, answer.rows, bent_answer.rows) else answer
+        bent.update(int(answer.rows.status[0]), begin, answer.coordinates)
         return answer
 
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
-        """Go on to targets (n, 4, 4) in the working mode of as many configurations; FAILED where not reached."""
+        """Move as many configurations to targets (n, 4, 4) in their working modes; FAILED where not reached."""
         begin = start.coordinates
-        found = _reach(self._closure, targets, begin, platform_poses(self.mechanism, begin), keep_mode=True)
+        closing = _reach(self._closure, targets, begin, platform_poses(self.mechanism, begin), keep_mode=True)
         rows = new_rows(self.mechanism, len(targets))
-        write_closing(self._closure, found, rows)
-        rows.status[:] = np.where(found.feasible, REACHED, FAILED)
-        return Configurations(rows, found.coordinates)
+        write_closing(self._closure, closing, rows)
+        rows.status[:] = np.where(closing.feasible, REACHED, FAILED)
+        return Configurations(rows, closing.coordinates)
 
     def step(self, targets: Floats, start: Configurations) -> Configurations:
-        """Go on to targets (n, 4, 4) that are near as many configurations, in one step; FAILED where not reached.
+        """Move as many configurations to nearby targets (n, 4, 4) in one step each; FAILED where not reached.
 
-        Cheaper than `advance` where many are not: there the platform is led on, in case that the step was too long.
+        Cheaper than `advance` if many are not reached, for which `advance` tries continuation.
         """
         closure, task, begin = self._closure, task_of(self.mechanism), start.coordinates
-        wanted = targets if task.is_whole_pose else task.completed(targets, platform_poses(self.mechanism, begin))
-        leapt = np.zeros(len(targets), bool)
+        poses = targets if task.is_whole_pose else task.completed(targets, platform_poses(self.mechanism, begin))
+        has_jumped = np.zeros(len(targets), bool)
         held = HELD if follows_task(self.mechanism) else task.held
         if held == HELD and not task.is_whole_pose:
             free = task.held if has_parasitic_motion(self.mechanism) else HELD
-            assembled = close(closure, begin, wanted, platform=free, frame=task.frame, max_iterations=STEPS)
-            leapt = differences(closure, assembled.poses, wanted) > STRANGE
-            wanted = assembled.poses
-        found = _close_below(closure, begin, wanted, held, STEPS)
+            assembled = close(closure, begin, poses, platform=free, frame=task.frame, max_iterations=STEPS)
+            has_jumped = differences(closure, assembled.poses, poses) > STRANGE
+            poses = assembled.poses
+        closing = _close_below(closure, begin, poses, held, STEPS)
         rows = new_rows(self.mechanism, len(targets))
-        write_closing(closure, found, rows)
-        rows.status[:] = np.where(found.feasible & ~leapt, REACHED, FAILED)
-        return Configurations(rows, found.coordinates)
+        write_closing(closure, closing, rows)
+        rows.status[:] = np.where(closing.feasible & ~has_jumped, REACHED, FAILED)
+        return Configurations(rows, closing.coordinates)
 
-    def at(self, closing: Closing) -> Configurations:
-        """Configurations found elsewhere, as answers whose status is still to be told."""
+    def as_configurations(self, closing: Closing) -> Configurations:
+        """The configurations of a closing; their status is PENDING."""
         rows = new_rows(self.mechanism, len(closing.poses))
         write_closing(self._closure, closing, rows)
         return Configurations(rows, closing.coordinates)
 
-    def points(self, found: Configurations) -> Mapping[str, Floats]:
+    def points(self, configurations: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
-        return centres(self.mechanism, found.coordinates)
+        return centres(self.mechanism, configurations.coordinates)
 
-    def weighed_limits(self, found: Configurations, targets: Floats, way: Way) -> Floats:
-        """How hard every limit holds projected configurations back from targets (n, 4, 4): see `closure.descend`."""
-        return held_back(self.mechanism, found.coordinates, targets, way)
+    def limit_multipliers(self, configurations: Configurations, targets: Floats, projection: ProjectionMode) -> Floats:
+        """Multipliers of all limits at configurations that are projections of targets (n, 4, 4)."""
+        return projection_multipliers(self.mechanism, configurations.coordinates, targets, projection)
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
-        """The configurations that have actuated values (n, n_a), from one configuration or one for each."""
+        """Solve for configurations with actuated values (n, n_a), from one start or one for each."""
         coordinates = coordinates_for(self.mechanism, start, len(values))
         closing = assemble(self.mechanism, coordinates, values, has_start=start is not None)
-        return judged(self.mechanism, self.at(closing), closing, values, tolerance)
+        return forward_answers(self.mechanism, self.as_configurations(closing), closing, values, tolerance)
 
 
-def begin_of(mechanism: Mechanism, start: Configurations | None) -> Floats:
-    """Joint coordinates to start from, (n, columns) or (1, columns); loops beside the way to the end effector, which
-    will rest, are closed."""
+def start_coordinates(mechanism: Mechanism, start: Configurations | None) -> Floats:
+    """Joint coordinates of the start, (n, columns) or (1, columns).
+
+    Loops that are on no path to the end effector are closed first, as the search does not move their joints.
+    """
     begin = joint_coordinates(mechanism, start)
-    if not _has_loops_aside(mechanism):
+    if not _has_side_loops(mechanism):
         return begin
-    present = measured(mechanism, begin)
-    away = np.flatnonzero(~present.feasible)
-    if len(away):
-        closure, poses = closure_of(mechanism), present.poses[away]
-        present.take(away, close(closure, begin[away], poses, platform=HELD, limits=True, margin=TOLERANCES.inside))
-    return present.coordinates
+    closing = measure_configurations(mechanism, begin)
+    infeasible = np.flatnonzero(~closing.feasible)
+    if len(infeasible):
+        closure, poses, margin = closure_of(mechanism), closing.poses[infeasible], TOLERANCES.inside
+        closing.put(infeasible, close(closure, begin[infeasible], poses, platform=HELD, limits=True, margin=margin))
+    return closing.coordinates
 
 
 def _answer(
-    closure: Closure, wanted: Floats, start: Floats, options: Options, keep_mode: bool, has_start: bool
+    closure: Closure, targets: Floats, start: Floats, options: Options, keep_mode: bool, has_start: bool
 ) -> Configurations:
-    """Answer poses (n, 4, 4) from joint coordinates (n, columns), `has_start` or at home: reached, or projected."""
+    """Reach or project targets (n, 4, 4) from joint coordinates (n, columns)."""
     mechanism = closure.mechanism
-    found = _reach(closure, wanted, start, platform_poses(mechanism, start), keep_mode)
-    holds = np.full(len(wanted), HOLD_NOTHING)
-    away = np.flatnonzero(~found.feasible)
-    if len(away):
+    closing = _reach(closure, targets, start, platform_poses(mechanism, start), keep_mode)
+    holds = np.full(len(targets), HOLD_NOTHING)
+    unsolved = np.flatnonzero(~closing.feasible)
+    if len(unsolved):
         stays = keep_mode or follows_task(mechanism)
-        starts = [start[away]] if stays else [start[away], found.coordinates[away]]
-        sought = within_sight(mechanism, wanted[away])
-        ways = ways_of(mechanism, options.hold, options.rotation_length)
-        answers = project(closure, sought, starts, ways, seeds=not keep_mode, has_start=has_start)
-        holds[away] = kept(mechanism, answers.holds, *task_of(mechanism).errors(answers.closing.poses, wanted[away]))
-        found.take(away, answers.closing)
-    return told(closure, found, wanted, holds, options)
+        starts = [start[unsolved]] if stays else [start[unsolved], closing.coordinates[unsolved]]
+        clipped = clip_targets(mechanism, targets[unsolved])
+        projections = projection_modes(mechanism, options.hold, options.rotation_length)
+        projected = project(closure, clipped, starts, projections, seeds=not keep_mode, has_start=has_start)
+        errors = task_of(mechanism).errors(projected.closing.poses, targets[unsolved])
+        holds[unsolved] = held_parts(mechanism, projected.holds, *errors)
+        closing.put(unsolved, projected.closing)
+    return to_answers(closure, closing, targets, holds, options)
 
 
-def told(closure: Closure, found: Closing, wanted: Floats, holds: Ints, options: Options) -> Configurations:
-    """Configurations found for poses (n, 4, 4), as answers: with what they hold, their errors, and their status."""
+def to_answers(closure: Closure, closing: Closing, targets: Floats, holds: Ints, options: Options) -> Configurations:
+    """The configurations of a closing as answers to targets (n, 4, 4): with holds, errors and status."""
     mechanism = closure.mechanism
-    within_turns(mechanism, found.coordinates)
-    if _has_loops_aside(mechanism):
-        found = measured(mechanism, found.coordinates)._replace(iterations=found.iterations)
-    rows = new_rows(mechanism, len(wanted))
-    write_closing(closure, found, rows)
-    position, rotation = task_of(mechanism).errors(rows.poses, wanted)
+    within_turns(mechanism, closing.coordinates)
+    if _has_side_loops(mechanism):
+        closing = measure_configurations(mechanism, closing.coordinates)._replace(iterations=closing.iterations)
+    rows = new_rows(mechanism, len(targets))
+    write_closing(closure, closing, rows)
+    position, rotation = task_of(mechanism).errors(rows.poses, targets)
     rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR] = position, rotation
     rows.counters[:, HOLD] = holds
-    near = (position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)) & (
+    is_near = (position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)) & (
         rotation <= options.rotation_tolerance
     )
-    rows.status[:] = np.where(found.feasible, np.where(near, REACHED, PROJECTED), FAILED)
-    return Configurations(rows, found.coordinates)
+    rows.status[:] = np.where(closing.feasible, np.where(is_near, REACHED, PROJECTED), FAILED)
+    return Configurations(rows, closing.coordinates)
 
 
 @lru_cache(maxsize=64)
-def _has_loops_aside(mechanism: Mechanism) -> bool:
-    """Whether there are loops beside every way from the base to the end effector."""
+def _has_side_loops(mechanism: Mechanism) -> bool:
+    """True if some loops are on no path from the base to the end effector."""
     counts = [len(closure_of(mechanism, whole).loops.paths) for whole in (True, False)]
     return counts[0] > counts[1]
 
 
 def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_mode: bool) -> Closing:
-    """Close the legs below platforms on their targets, within limits; the rows that are feasible are reached."""
-    task, follows = task_of(closure.mechanism), follows_task(closure.mechanism)
-    wanted = targets if task.is_whole_pose else task.completed(targets, begin)
+    """Close the legs with platforms on their targets, within limits; feasible rows have reached them.
+
+    Parameters
+    ----------
+    start, begin : joint coordinates (n, columns) of the start, and its platform poses (n, 4, 4).
+    """
+    mechanism = closure.mechanism
+    task, follows = task_of(mechanism), follows_task(mechanism)
+    poses = targets if task.is_whole_pose else task.completed(targets, begin)
     rows = np.arange(len(targets))
     if follows:
-        assembled = _assembled(closure, wanted, start, begin)
-        wanted, rows = assembled.poses, np.flatnonzero(assembled.gap <= TOLERANCES.position)
+        assembled = _complete_poses(closure, poses, start, begin)
+        poses, rows = assembled.poses, np.flatnonzero(assembled.gap <= TOLERANCES.position)
     held = HELD if follows else task.held
-    found = _close_below(closure, start, wanted, held)
-    strayed = ~found.feasible
+    best = _close_below(closure, start, poses, held)
+    is_unsolved = ~best.feasible
     if keep_mode:
-        strayed |= _distances(closure, begin, wanted) > STRIDE
-    rest = np.flatnonzero(strayed)
-    if len(rest):
-        found.improve(rest, _led(closure, wanted[rest], start[rest], begin[rest], held, limits=True))
+        is_unsolved |= _distances(closure, begin, poses) > LONGEST_STEP
+    unsolved = np.flatnonzero(is_unsolved)
+    if len(unsolved):
+        continued = _continue_to(closure, poses[unsolved], start[unsolved], begin[unsolved], held, limits=True)
+        best.put_better(unsolved, continued)
     elif len(rows) == len(targets):
-        return found
+        return best
     if not keep_mode:
-        at_rest = follows or task.is_whole_pose
-        if not at_rest:
-            _start_nearby(closure, found, targets, task.held)
-        _search(closure, found, rows, wanted, held, at_rest=at_rest)
-    mechanism = closure.mechanism
+        is_pose_fixed = follows or task.is_whole_pose
+        if not is_pose_fixed:
+            _search_from_nearby(closure, best, targets, task.held)
+        _search_from_random(closure, best, rows, poses, held, is_pose_fixed=is_pose_fixed)
     if not keep_mode and follows and (has_parasitic_motion(mechanism) or asks_too_much(mechanism)):
         held = task.held if has_parasitic_motion(mechanism) else HELD
-        _start_nearby(closure, found, targets, held)  # in other ways of assembly, where this one does not reach
+        _search_from_nearby(closure, best, targets, held)  # in other assembly modes, if this one does not reach
         if asks_too_much(mechanism) or len(random_feasible(mechanism)[0]) < NEARBY:
-            anywhere = task.completed(targets, begin)
-            _search(closure, found, np.arange(len(targets)), anywhere, held, at_rest=False)
-    return found
+            completed = task.completed(targets, begin)
+            _search_from_random(closure, best, np.arange(len(targets)), completed, held, is_pose_fixed=False)
+    return best
 
 
-def _start_nearby(closure: Closure, found: Closing, targets: Floats, held: Weights) -> None:
-    """Look for what does not reach yet from known configurations whose end effectors are nearest to the targets."""
+def _search_from_nearby(closure: Closure, best: Closing, targets: Floats, held: Weights) -> None:
+    """Solve unsolved rows from the random feasible configurations whose end effectors are nearest to the targets."""
     coordinates, poses = random_feasible(closure.mechanism)
-    task, rest = task_of(closure.mechanism), np.flatnonzero(~found.feasible)
-    away = np.array([_distances(closure, poses, np.repeat(targets[[row]], len(poses), axis=0)) for row in rest])
-    nearby = starts_within(closure, NEARBY, STEPS)
-    for places in np.argsort(away, axis=1)[:, :nearby].T if len(rest) else ():
-        waiting = ~found.feasible[rest]
-        if not waiting.any():
+    task, unsolved = task_of(closure.mechanism), np.flatnonzero(~best.feasible)
+    distances = np.array(
+        [_distances(closure, poses, np.repeat(targets[[row]], len(poses), axis=0)) for row in unsolved]
+    )
+    n = starts_within(closure, NEARBY, STEPS)
+    for places in np.argsort(distances, axis=1)[:, :n].T if len(unsolved) else ():
+        is_pending = ~best.feasible[unsolved]
+        if not is_pending.any():
             break
-        rows, places = rest[waiting], places[waiting]
-        start = np.where(closure.idle, found.coordinates[rows], coordinates[places])
-        wanted = task.completed(targets[rows], poses[places])
-        found.improve(rows, _close_below(closure, start, wanted, held, STEPS))
+        rows, places = unsolved[is_pending], places[is_pending]
+        start = np.where(closure.idle, best.coordinates[rows], coordinates[places])
+        completed = task.completed(targets[rows], poses[places])
+        best.put_better(rows, _close_below(closure, start, completed, held, STEPS))
 
 
-def _search(
-    closure: Closure, found: Closing, rows: NDArray[np.intp], wanted: Floats, held: Weights, *, at_rest: bool
+def _search_from_random(
+    closure: Closure, best: Closing, rows: NDArray[np.intp], poses: Floats, held: Weights, *, is_pose_fixed: bool
 ) -> None:
-    """Look for the legs that do not reach yet from random configurations; with the platform `at_rest`, one by one.
+    """Solve unsolved rows from random starts; if the platform's pose is fixed, leg by leg.
 
-    A row whose platform rests is given up where one of its legs keeps ending where it came nearest.
+    With a fixed pose, a row is given up once enough starts of one of its legs agree on the least gap or excess.
     """
     rng = np.random.default_rng(0)
-    agreements = np.zeros(found.gaps.shape, np.int64)
+    agreements = np.zeros(best.gaps.shape, np.int64)
     for _ in range(starts_within(closure, STARTS, STEPS)):
-        rest = rows[~found.feasible[rows] & (agreements[rows].max(axis=1) < AGREEMENTS)]
-        if not len(rest):
+        unsolved = rows[~best.feasible[rows] & (agreements[rows].max(axis=1) < AGREEMENTS)]
+        if not len(unsolved):
             break
-        stays = _legs_reached(closure, found, rest) | closure.idle if at_rest else closure.idle
-        scattered = np.where(stays, found.coordinates[rest], random_coordinates(closure, 1, rng))
-        tried = _close_below(closure, scattered, wanted[rest], held, STEPS)
-        if at_rest:
-            agreements[rest] = _agreements(found.off[rest], tried.off, agreements[rest])
-            _take_legs(closure, found, rest, tried)
+        is_kept = _solved_coordinates(closure, best, unsolved) | closure.idle if is_pose_fixed else closure.idle
+        start = np.where(is_kept, best.coordinates[unsolved], random_coordinates(closure, 1, rng))
+        trial = _close_below(closure, start, poses[unsolved], held, STEPS)
+        if is_pose_fixed:
+            agreements[unsolved] = _count_agreements(best.off[unsolved], trial.off, agreements[unsolved])
+            _put_better_legs(closure, best, unsolved, trial)
         else:
-            found.improve(rest, tried)
+            best.put_better(unsolved, trial)
 
 
-def _agreements(best: Floats, tried: Floats, agreements: Ints) -> Ints:
-    """How often each leg has ended where it came nearest, (n, groups); 0 for those that reached."""
-    with np.errstate(invalid="ignore", over="ignore"):  # what is endlessly far off is neither nearer nor the same
-        nearer, again = tried < (1.0 - SAME) * best, np.abs(tried - best) <= SAME * best
-    counted = np.where(nearer, 1, agreements + again)
-    return np.where(np.minimum(best, tried) <= TOLERANCES.limit, 0, counted)
+def _count_agreements(best: Floats, trial: Floats, agreements: Ints) -> Ints:
+    """Updated agreement counts of each leg, (n, groups), from infeasibilities; 0 for legs that are feasible."""
+    with np.errstate(invalid="ignore", over="ignore"):  # an infinite value is neither nearer nor equal
+        is_nearer, agrees = trial < (1.0 - SAME) * best, np.abs(trial - best) <= SAME * best
+    counted = np.where(is_nearer, 1, agreements + agrees)
+    return np.where(np.minimum(best, trial) <= TOLERANCES.limit, 0, counted)
 
 
-def _assembled(closure: Closure, wanted: Floats, start: Floats, begin: Floats) -> Closing:
-    """The whole poses that the loops, without limits, make of targets, (n, 4, 4), in the assembly of the start.
+def _complete_poses(closure: Closure, poses: Floats, start: Floats, begin: Floats) -> Closing:
+    """Close the loops, without limits, on what the task sets of poses (n, 4, 4), in the assembly mode of the start.
 
-    Rows that are left open have none.
+    The resulting poses are complete; rows with open loops have none.
     """
     task = task_of(closure.mechanism)
     if not has_parasitic_motion(closure.mechanism):
-        return close(closure, start, wanted, platform=HELD)
-    found = close(closure, start, wanted, platform=task.held, frame=task.frame)
-    strange = np.flatnonzero((found.gap > TOLERANCES.position) | (differences(closure, found.poses, wanted) > STRANGE))
-    if len(strange):
-        found.take(strange, _led(closure, wanted[strange], start[strange], begin[strange], task.held, limits=False))
-    return found
+        return close(closure, start, poses, platform=HELD)
+    best = close(closure, start, poses, platform=task.held, frame=task.frame)
+    has_jumped = differences(closure, best.poses, poses) > STRANGE
+    unsolved = np.flatnonzero((best.gap > TOLERANCES.position) | has_jumped)
+    if len(unsolved):
+        continued = _continue_to(closure, poses[unsolved], start[unsolved], begin[unsolved], task.held, limits=False)
+        best.put(unsolved, continued)
+    return best
 
 
 def _close_below(
-    closure: Closure, start: Floats, wanted: Floats, held: Weights, max_iterations: int = 100, limits: bool = True
+    closure: Closure, start: Floats, poses: Floats, held: Weights, max_iterations: int = 100, limits: bool = True
 ) -> Closing:
-    """Close the legs, within limits, below platforms that are held where they are wanted."""
+    """Close the legs, within limits, below platforms that are held at poses (n, 4, 4)."""
     return close(
         closure,
         start,
-        wanted,
+        poses,
         platform=held,
         frame=BASE_AXES if held == HELD else task_of(closure.mechanism).frame,
         limits=limits,
@@ -323,38 +338,44 @@ def _close_below(
     )
 
 
-def _led(closure: Closure, targets: Floats, start: Floats, begin: Floats, held: Weights, *, limits: bool) -> Closing:
-    """The platform led from where it is to its target; where what is not held leaps on the way, nothing is found."""
-    task, present, steps = task_of(closure.mechanism), begin, stride_within(closure, 100, STRIDES)
-    if steps == 0:
+def _continue_to(
+    closure: Closure, targets: Floats, start: Floats, begin: Floats, held: Weights, *, limits: bool
+) -> Closing:
+    """Continuation of the platform from its pose at the start to its target.
+
+    Rows in which a component that is not held jumps on the way are marked as open.
+    """
+    task, present = task_of(closure.mechanism), begin
+    max_iterations = steps_per_continuation_step(closure, 100, CONTINUATION_STEPS)
+    if max_iterations == 0:
         return _close_below(closure, start, targets, held, 0 if limits else 100, limits=limits)
-    leapt = np.zeros(len(targets), bool)
-    for stride in range(1, STRIDES + 1):
-        way = between(begin, targets, stride / STRIDES)
-        way = way if held == HELD else task.completed(way, present)
-        found = _close_below(closure, start, way, held, steps, limits=limits)
-        leapt |= differences(closure, found.poses, way) > STRANGE + differences(closure, way, present)
-        start, present = found.coordinates, found.poses
-    found.gaps[leapt] = np.inf
-    return found
+    has_jumped = np.zeros(len(targets), bool)
+    for step in range(1, CONTINUATION_STEPS + 1):
+        poses = between(begin, targets, step / CONTINUATION_STEPS)
+        poses = poses if held == HELD else task.completed(poses, present)
+        closing = _close_below(closure, start, poses, held, max_iterations, limits=limits)
+        has_jumped |= differences(closure, closing.poses, poses) > STRANGE + differences(closure, poses, present)
+        start, present = closing.coordinates, closing.poses
+    closing.gaps[has_jumped] = np.inf
+    return closing
 
 
-def _legs_reached(closure: Closure, found: Closing, rows: NDArray[np.intp]) -> Mask:
-    """Which coordinates belong to groups that are feasible, (m, columns)."""
-    reached = found.off[rows] <= TOLERANCES.limit
-    return np.asarray(reached[:, closure.loops.group_of])
+def _solved_coordinates(closure: Closure, closing: Closing, rows: NDArray[np.intp]) -> Mask:
+    """Mask of the coordinates whose groups are feasible, (m, columns)."""
+    is_feasible = closing.off[rows] <= TOLERANCES.limit
+    return np.asarray(is_feasible[:, closure.loops.group_of])
 
 
-def _take_legs(closure: Closure, found: Closing, rest: NDArray[np.intp], tried: Closing) -> None:
-    """Take over the groups that came nearer."""
-    better = tried.off < found.off[rest]
-    columns = better[:, closure.loops.group_of]
-    found.coordinates[rest] = np.where(columns, tried.coordinates, found.coordinates[rest])
-    for array, own in ((found.gaps, tried.gaps), (found.excesses, tried.excesses)):
-        array[rest] = np.where(better, own, array[rest])
+def _put_better_legs(closure: Closure, best: Closing, rows: NDArray[np.intp], trial: Closing) -> None:
+    """Put the groups of a trial that are less infeasible than the best."""
+    is_better = trial.off < best.off[rows]
+    columns = is_better[:, closure.loops.group_of]
+    best.coordinates[rows] = np.where(columns, trial.coordinates, best.coordinates[rows])
+    for array, trial_array in ((best.gaps, trial.gaps), (best.excesses, trial.excesses)):
+        array[rows] = np.where(is_better, trial_array, array[rows])
 
 
-def _distances(closure: Closure, poses: Floats, others: Floats) -> Floats:
-    """How far poses are apart in what counts, (n,): lengths relative to L, angles in rad."""
-    position, rotation = task_of(closure.mechanism).errors(poses, others)
+def _distances(closure: Closure, poses: Floats, other_poses: Floats) -> Floats:
+    """Distances between poses in the components of the task, (n,): lengths relative to L, angles in rad."""
+    position, rotation = task_of(closure.mechanism).errors(poses, other_poses)
     return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, rotation))

@@ -1,4 +1,4 @@
-"""Random configurations to start searches from."""
+"""Random starts of searches."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .close import Closure
 
 
 def random_starts(closure: Closure, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Coordinates (n, columns) as of `random_coordinates`, platform poses (n, 4, 4) of any rotation around home."""
+    """Coordinates (n, columns), as of `random_coordinates`, and poses (n, 4, 4) around home with any rotation."""
     mechanism = closure.mechanism
     poses = np.repeat(mechanism.home_pose[None], n, axis=0)
     poses[:, :3, :3] = from_quaternion(random_quaternions(n, rng))
@@ -22,7 +22,7 @@ def random_starts(closure: Closure, n: int, rng: np.random.Generator) -> tuple[F
 
 
 def same_random_starts(closure: Closure, starts: int, n: int) -> Iterator[tuple[Floats, Floats]]:
-    """Random starts, each the same for all of n rows and in every call: no row depends on which others there are."""
+    """Yield random starts, each repeated for n rows, and equal in every call: rows do not depend on each other."""
     rng = np.random.default_rng(0)
     for _ in range(starts):
         coordinates, poses = random_starts(closure, 1, rng)
@@ -30,7 +30,7 @@ def same_random_starts(closure: Closure, starts: int, n: int) -> Iterator[tuple[
 
 
 def random_coordinates(closure: Closure, n: int, rng: np.random.Generator) -> Floats:
-    """Coordinates (n, columns) with any angles; idle ones at home, and lengths, from where they follow the platform."""
+    """Coordinates (n, columns) with random angles; lengths, which follow the platform, and idle coordinates are 0."""
     coordinates = rng.uniform(-np.pi, np.pi, (n, len(closure.scale))) * closure.turning
     for name, span in columns(closure.mechanism).items():
         if closure.mechanism.joint(name).type == "spherical":

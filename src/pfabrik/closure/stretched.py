@@ -1,4 +1,4 @@
-"""Links that were stretched out on a path: they are to bend back the way they did."""
+"""Stretched links on a path, which bend back to the side from which they came."""
 
 from __future__ import annotations
 
@@ -9,56 +9,58 @@ from ..options import Options
 from .close import closure_of
 from .first_order import are_stretched
 from .parasitic import differences
-from .projection import SAME, ways_of
+from .projection import SAME, projection_modes
 
 SAME_POSE = 1e-7
-"""Largest difference of poses that are the same to a search for the nearest [L and entries of rotations]."""
+"""Largest difference of poses that count as equal [L and entries of rotation matrices]."""
 
 
-class Bends:
-    """What a path must remember of the answers on it where links are stretched out.
+class BentConfiguration:
+    """The last configuration on a path before links were stretched out.
 
-    Such an answer is the same in two working modes, and a search that starts from it may go on in either, or not at
-    all: along stretched links nothing moves to first order. The last answer before it knows better.
+    A stretched configuration belongs to two working modes. A search that starts from it may continue in either, or
+    stay, for along stretched links nothing moves to first order. So a second search starts from the last bent one.
 
     Attributes
     ----------
-    before : joint coordinates (1, columns) of the last answer whose links were bent; None while that is the last one.
+    coordinates : joint coordinates (1, columns) of the last answer with bent links; None if that is the last answer.
     """
 
     def __init__(self, mechanism: Mechanism, options: Options) -> None:
         self._mechanism = mechanism
-        self._ways = ways_of(mechanism, options.hold, options.rotation_length)
-        self.before: Floats | None = None
+        self._projections = projection_modes(mechanism, options.hold, options.rotation_length)
+        self.coordinates: Floats | None = None
 
-    def note(self, status: int, start: Floats, found: Floats) -> None:
-        """Remember what came of one target, by joint coordinates (1, columns) before and after."""
-        if status == REACHED and self.before is None:
-            return  # inside the workspace links are hardly ever stretched out, and it would take time to see
-        is_stretched = bool(are_stretched(self._mechanism, found)[0])
-        self.before = (start if self.before is None else self.before) if is_stretched else None
+    def update(self, status: int, start: Floats, end: Floats) -> None:
+        """Update after a step of the path, from joint coordinates (1, columns) before and after it."""
+        if status == REACHED and self.coordinates is None:
+            return  # inside the workspace links are hardly ever stretched out, and the check takes time
+        is_stretched = bool(are_stretched(self._mechanism, end)[0])
+        self.coordinates = (start if self.coordinates is None else self.coordinates) if is_stretched else None
 
-    def prefer(self, target: Floats, found: Rows, other: Rows) -> bool:
-        """Whether an answer to a target (1, 4, 4) that was found from `before` is to replace the one found.
+    def is_preferred(self, target: Floats, rows: Rows, bent_rows: Rows) -> bool:
+        """True if the answer to a target (1, 4, 4) from the bent start is to replace the one from the last answer.
 
-        It is if it is reached or nearer, where the one found is not, or if it has the same pose, and so is bent as
-        links were.
+        It is preferred if it is better, or has the same pose and thus bends links to the side from which they came.
         """
-        return self._is_alike(found, other) or self._is_better(target, found, other)
+        return self._is_same(rows, bent_rows) or self._is_better(target, rows, bent_rows)
 
-    def _is_alike(self, found: Rows, other: Rows) -> bool:
-        apart = differences(closure_of(self._mechanism), other.poses, found.poses)[0]
-        return bool(other.status[0] == found.status[0] and apart <= SAME_POSE)
+    def _is_same(self, rows: Rows, bent_rows: Rows) -> bool:
+        apart = differences(closure_of(self._mechanism), bent_rows.poses, rows.poses)[0]
+        return bool(bent_rows.status[0] == rows.status[0] and apart <= SAME_POSE)
 
-    def _is_better(self, target: Floats, found: Rows, other: Rows) -> bool:
-        if other.status[0] != found.status[0]:
-            return bool(other.status[0] < found.status[0])
-        if found.status[0] != PROJECTED:
+    def _is_better(self, target: Floats, rows: Rows, bent_rows: Rows) -> bool:
+        """True if the second answer has a better status, holds more of the target, or is nearer to it."""
+        if bent_rows.status[0] != rows.status[0]:
+            return bool(bent_rows.status[0] < rows.status[0])
+        if rows.status[0] != PROJECTED:
             return False
-        holds = [way.hold for way in self._ways]
-        ours, theirs = (holds.index(rows.holds[0]) for rows in (found, other))
-        if ours != theirs:
-            return theirs < ours
-        closure, way = closure_of(self._mechanism), self._ways[ours]
-        here, there = (way.distances(closure, rows.poses, target)[0] for rows in (found, other))
-        return bool(there < (1.0 - SAME) * here)
+        holds = [projection.hold for projection in self._projections]
+        place, bent_place = (holds.index(answer.holds[0]) for answer in (rows, bent_rows))
+        if place != bent_place:
+            return bent_place < place
+        closure, projection = closure_of(self._mechanism), self._projections[place]
+        distance, bent_distance = (
+            projection.distances(closure, answer.poses, target)[0] for answer in (rows, bent_rows)
+        )
+        return bool(bent_distance < (1.0 - SAME) * distance)

@@ -46,7 +46,7 @@ _PASSES = (
     np.zeros((0, 4, 4)),
     P.Seeds(*_values("f3 f3 f2")),
     P.Settings(*_values("f i i i")),
-    P.Reached(*_values("f3 f3 f2 f1 i1 i1")),
+    P.PassResults(*_values("f3 f3 f2 f1 i1 i1")),
 )
 
 _POSE_OBJECTIVE = PoseObjective(*_values("f3 f1 i f f i"))

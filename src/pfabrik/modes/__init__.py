@@ -1,1 +1,1 @@
-"""Searches for every configuration: all assembly modes of actuator values, all working modes of a target."""
+"""Searches for all assembly modes of actuator values and all working modes of a target."""

@@ -11,7 +11,7 @@ from ..closure.close import Closing, Closure, close, closure_of, platform_poses
 from ..closure.starts import random_starts
 from ..description.mechanism import Mechanism
 from ..errors import ContinuumOfSolutions, InvalidArgument
-from ..fk import Actuators, as_values, assembled
+from ..fk import Actuators, as_values, solution_at
 from ..motion.walks import stepped_freely
 from ..tolerances import TOLERANCES
 from .fingerprints import pose_marks
@@ -20,17 +20,17 @@ from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes, as_count
 
 @dataclass(frozen=True)
 class AssemblyModes(Modes):
-    """The assembly modes that were found, nearest to home first, and what that is worth: see `Modes`."""
+    """The assembly modes that were found, nearest to home first, with how often; see `Modes` for the fields."""
 
 
 def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: int = 40_000) -> AssemblyModes:
     """All poses in which the mechanism can be assembled with given actuator values, limits or not.
 
-    Newton's method from random configurations of all joints, undamped, until every mode has been found ten times and
-    at least 4096 starts have been made, or `most_starts`. This is a search, not a proof: each mode listed exists, its
-    loops are closed to machine precision, and it is listed once; a mode whose basin is far smaller than those of the
-    others can be missed, and `unseen` of the result says how likely another start is to find one. The same call gives
-    the same answer. Modes are told apart by the end effector's pose (its position, if it is a joint).
+    Newton's method, undamped, starts from random configurations of all joints until every mode has been found ten times
+    and at least 4096 starts have been made, or `most_starts`. This is a search, not a proof: each mode listed exists,
+    its loops are closed to machine precision, and it is listed once; a mode whose basin is far smaller than those of
+    the others can be missed. `unseen` of the result estimates the probability that another start finds a new one. The
+    same call gives the same answer. Modes differ in the end effector's pose (its position, if it is a joint).
 
     Parameters
     ----------
@@ -50,18 +50,18 @@ def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: i
     most_starts = as_count("most_starts", most_starts, 1)
     search = _Search(closure_of(mechanism), values)
     while search.starts < most_starts and not search.is_done:
-        search.go_on(BATCH)
-    order = np.argsort(search.from_home, kind="stable")
+        search.add_starts(BATCH)
+    order = np.argsort(search.distances_from_home, kind="stable")
     coordinates = np.zeros((len(order), len(search.closure.scale)))
     for row, place in enumerate(order):
-        coordinates[row] = search.found.coordinates[place]
+        coordinates[row] = search.clusters.coordinates[place]
     polished = close(search.closure, coordinates, platform_poses(mechanism, coordinates), locked=search.locked)
-    modes = assembled(mechanism, polished.coordinates, np.repeat(values, len(order), axis=0))
-    return AssemblyModes(tuple(modes), tuple(search.found.hits[place] for place in order), search.starts)
+    modes = solution_at(mechanism, polished.coordinates, np.repeat(values, len(order), axis=0))
+    return AssemblyModes(tuple(modes), tuple(search.clusters.hits[place] for place in order), search.starts)
 
 
 class _Search:
-    """Modes found so far."""
+    """A search for assembly modes, with the modes found so far as clusters."""
 
     def __init__(self, closure: Closure, values: Floats) -> None:
         self.closure = closure
@@ -69,65 +69,67 @@ class _Search:
         self.locked = closure.driven
         self.rng = np.random.default_rng(0)
         self.starts = 0
-        self.found = Clusters()
+        self.clusters = Clusters()
 
     @property
     def is_done(self) -> bool:
-        return self.starts >= LEAST_STARTS and self.found.are_well_known
+        """True if there were enough starts and every mode was found often enough."""
+        return self.starts >= LEAST_STARTS and self.clusters.are_well_known
 
     @property
-    def from_home(self) -> Floats:
-        """How far the end effector of each mode is from home, (modes,)."""
+    def distances_from_home(self) -> Floats:
+        """Distance of the end effector of each mode from home, (modes,)."""
         home = self._marks(self.closure.mechanism.home_pose[None])
-        return np.asarray(np.linalg.norm(np.reshape(self.found.marks, (-1, home.size)) - home, axis=1))
+        return np.asarray(np.linalg.norm(np.reshape(self.clusters.marks, (-1, home.size)) - home, axis=1))
 
-    def go_on(self, n: int) -> None:
-        """Try n more starts."""
+    def add_starts(self, n: int) -> None:
+        """Search from n more random starts, the first of all from home."""
         coordinates, poses = random_starts(self.closure, n, self.rng)
         if self.starts == 0:
             coordinates[0], poses[0] = 0.0, platform_poses(self.closure.mechanism, coordinates[:1] * 0.0)[0]
         self.starts += n
         self.closure.put_actuators(coordinates, np.repeat(self.values, n, axis=0))
-        found = close(
-            self.closure, coordinates, poses, locked=self.locked, plunging=True, closeness=1e-11, max_iterations=STEPS
+        trial = close(
+            self.closure, coordinates, poses, locked=self.locked, undamped=True, closeness=1e-11, max_iterations=STEPS
         )
-        self._sort(close(self.closure, found.coordinates, found.poses, locked=self.locked, max_iterations=4))
+        self._assign(close(self.closure, trial.coordinates, trial.poses, locked=self.locked, max_iterations=4))
 
-    def _sort(self, found: Closing) -> None:
-        """Count the closed ones among the known modes, or as new ones."""
-        closed = found.gap <= TOLERANCES.position
-        coordinates, poses = found.coordinates[closed], found.poses[closed]
+    def _assign(self, closing: Closing) -> None:
+        """Assign the closed configurations to clusters, known or new."""
+        is_closed = closing.gap <= TOLERANCES.position
+        coordinates, poses = closing.coordinates[is_closed], closing.poses[is_closed]
 
-        def settle(row: int) -> tuple[Floats, Floats]:
-            ended = close(self.closure, coordinates[[row]], poses[[row]], locked=self.locked, closeness=0.0)
-            return self._marks(ended.poses)[0], ended.coordinates[0]
+        def polish(row: int) -> tuple[Floats, Floats]:
+            polished = close(self.closure, coordinates[[row]], poses[[row]], locked=self.locked, closeness=0.0)
+            return self._marks(polished.poses)[0], polished.coordinates[0]
 
-        known = len(self.found.hits)
-        places = self.found.count(self._marks(poses), settle)
+        n_known = len(self.clusters.hits)
+        places = self.clusters.count(self._marks(poses), polish)
         for row, place in enumerate(places):
-            self.found.prefer(int(place), coordinates[row], (float(np.abs(coordinates[row]).sum()),))
-        self._refuse_continuum(range(known, len(self.found.hits)))
+            self.clusters.prefer(int(place), coordinates[row], (float(np.abs(coordinates[row]).sum()),))
+        self._refuse_continuum(range(n_known, len(self.clusters.hits)))
 
-    def _refuse_continuum(self, fresh: range) -> None:
-        """Raise where a new mode is one of a continuum: steps along its free motion, closed again, stay away.
+    def _refuse_continuum(self, new_places: range) -> None:
+        """Raise if a new mode is one of a continuum: steps along its free motion, closed again, do not return to it.
 
-        And stay apart from each other: of two single modes that have nearly met, steps of any length lead to the other.
+        Steps of two lengths must also end apart: near two isolated modes that nearly meet, steps of any length lead to
+        the other one.
         """
-        for place in fresh:
-            (ends, stay), (nearer, stay_too) = (self._stepped(place, along) for along in (ALONG, 0.5 * ALONG))
-            gone_on = stay & stay_too & (np.abs(ends - nearer).max(axis=1) > 0.05 * ALONG)
-            if gone_on.any():
-                raise ContinuumOfSolutions(self.closure.mechanism.name, int(gone_on.sum()))
+        for place in new_places:
+            (whole, stays), (half, half_stays) = (self._step_freely(place, along) for along in (ALONG, 0.5 * ALONG))
+            is_free = stays & half_stays & (np.abs(whole - half).max(axis=1) > 0.05 * ALONG)
+            if is_free.any():
+                raise ContinuumOfSolutions(self.closure.mechanism.name, int(is_free.sum()))
 
-    def _stepped(self, place: int, along: float) -> tuple[Floats, Mask]:
-        """Where steps along each free motion of a mode end once they are closed again, and which stay about so far."""
-        moved = stepped_freely(self.closure.mechanism, self.found.coordinates[place], along)
+    def _step_freely(self, place: int, along: float) -> tuple[Floats, Mask]:
+        """Marks after a step along each free motion of a mode, closed again; mask of steps that keep their length."""
+        moved = stepped_freely(self.closure.mechanism, self.clusters.coordinates[place], along)
         closed = close(self.closure, moved, platform_poses(self.closure.mechanism, moved), locked=self.locked)
         marks = self._marks(closed.poses)
-        apart = np.abs(marks - self.found.marks[place]).max(axis=1)
+        apart = np.abs(marks - self.clusters.marks[place]).max(axis=1)
         return marks, (apart > 0.1 * along) & (apart < 2.0 * along) & (closed.gap <= TOLERANCES.position)
 
     def _marks(self, poses: Floats) -> Floats:
-        """What modes are told apart by, (n, 3 or 12): positions [L], and rotation matrices of a body."""
+        """Marks of modes, (n, 3 or 12): positions [L], and rotation matrices of a body."""
         marks = pose_marks(self.closure.mechanism, poses)
         return marks[:, :3] if self.closure.mechanism.end_effector_is_joint else marks

@@ -1,4 +1,4 @@
-"""What working modes are told apart by, and what moves although the end effector rests on its target."""
+"""Fingerprints that distinguish working modes, and a test for motions that leave the end effector on its target."""
 
 from __future__ import annotations
 
@@ -19,30 +19,31 @@ from .lists import ALONG
 Read = Callable[[Closing], Floats]
 
 SHAKES = 16
-"""Random directions in which a configuration is moved to see what of it does not stay; more than motions are free."""
+"""Random directions in which a configuration is moved to test what is free; more than there are free motions."""
 
 SHIFT = 1e-3
-"""How far what does not stay moves at least, relative to how far it was moved: the errors of a double root are less."""
+"""Least move of a free quantity, relative to the move of the configuration: errors at a double root are smaller."""
 
 STRAIGHT = 0.2
-"""How far a move may be from twice the move of half the size, relative to it. Where it ended at another solution, or at
-the same as the half, it is off by all of it."""
+"""Largest relative difference of a move from twice the move of half the size. If one of them ended at another solution,
+or both at the same one, it is 1."""
 
 
 class Fingerprints:
-    """What working modes are told apart by: where the platform is, and for each leg actuators and joint centres.
+    """Fingerprints of working modes: the platform's pose, and for each leg actuator values and joint centres.
 
-    What moves while actuators and end effector rest, as the elbow of a rod that spins, tells nothing. If that is the
-    platform itself (a rod that ends in the point asked for), legs are not independent below it, and count as one.
+    Centres that move while actuators and end effector rest, such as the elbow of a spinning rod, are left out. If the
+    platform itself moves then (a rod that ends in the target point), legs are not independent below it, and count as
+    one.
 
     Attributes
     ----------
-    pose_rests : whether the platform is where it is because of actuators and end effector.
-    leg_of_group, leg_of_column, leg_of_mark : which leg owns what.
+    pose_rests : True if actuators and end effector determine the platform's pose.
+    leg_of_group, leg_of_column, leg_of_mark : the leg to which each group, column and mark belongs.
     """
 
     def __init__(self, closure: Closure, coordinates: Floats, pose: Floats) -> None:
-        """See what rests at a closed configuration, (columns,) and (4, 4)."""
+        """Choose the quantities that are determined at a closed configuration, (columns,) and (4, 4)."""
         mechanism = self.mechanism = closure.mechanism
         self._closure = closure
         locked = closure.driven
@@ -55,14 +56,16 @@ class Fingerprints:
         self.leg_of_group = groups if self.pose_rests else 0 * groups
         self.leg_of_column = self.leg_of_group[closure.loops.group_of]
         self._joints = [joint.name for joint in mechanism.joints if joint.at is not None and joint.type != "fixed"]
-        kept = rests(lambda closing: self._centres(closing.coordinates))
-        self._joints = [name for name, rest in zip(self._joints, kept, strict=True) if rest]
+        centres_rest = rests(lambda closing: self._centres(closing.coordinates))
+        self._joints = [name for name, centre_rests in zip(self._joints, centres_rest, strict=True) if centre_rests]
         self._actuated = closure.actuated
         self._turning = closure.turning[closure.actuated] > 0.0
         self._scale = closure.scale[closure.actuated]
-        own = self.leg_of_column[self._actuated]
-        last = [self.leg_of_column[columns(mechanism)[name].start] for name in self._joints]
-        self.leg_of_mark = np.concatenate([own, own, np.repeat(last, 3)]).astype(np.intp)
+        leg_of_actuator = self.leg_of_column[self._actuated]
+        leg_of_joint = [self.leg_of_column[columns(mechanism)[name].start] for name in self._joints]
+        self.leg_of_mark = np.concatenate([leg_of_actuator, leg_of_actuator, np.repeat(leg_of_joint, 3)]).astype(
+            np.intp
+        )
         self._home = self.of_legs(np.zeros((1, len(closure.scale))))[0]
 
     @property
@@ -70,7 +73,7 @@ class Fingerprints:
         return int(self.leg_of_group.max()) + 1
 
     def of_poses(self, poses: Floats) -> Floats:
-        """Fingerprints of platforms (n, 4, 4): positions [L], rotation matrices; (n, 0) if platforms tell nothing."""
+        """Fingerprints of platforms (n, 4, 4): positions [L], rotation matrices; (n, 0) if the pose does not rest."""
         return pose_marks(self.mechanism, poses) if self.pose_rests else np.zeros((len(poses), 0))
 
     def of_legs(self, coordinates: Floats) -> Floats:
@@ -82,31 +85,31 @@ class Fingerprints:
         return np.concatenate([first, second, points.reshape(len(points), -1)], axis=1)
 
     def pose_from_home(self, marks: Floats) -> float:
-        """Square of the distance of a platform from home's, from its marks."""
+        """Squared distance of the marks of a platform from those of home."""
         return float(((marks - self.of_poses(self.mechanism.home_pose[None])[0]) ** 2).sum())
 
     def legs_from_home(self, leg: int, marks: Floats) -> Floats:
-        """Squares of the distances of a leg's branches from home's, (n,), from their marks (n, own)."""
+        """Squared distances of the marks (n, k) of a leg's branches from those of home, (n,)."""
         return np.asarray(((marks - self._home[self.leg_of_mark == leg]) ** 2).sum(axis=1))
 
-    def wished_centres(self, coordinates: Floats) -> Floats:
-        """Joint centres as the closure kernel wishes for them, (n, joints, 3) [length]; NaN if they tell nothing."""
-        wished = np.full((len(coordinates), len(self.mechanism.joints), 3), np.nan)
+    def target_centres(self, coordinates: Floats) -> Floats:
+        """Target positions of joint centres for the closure kernel, (n, joints, 3) [length]; NaN for those left out."""
+        targets = np.full((len(coordinates), len(self.mechanism.joints), 3), np.nan)
         points = self._centres(coordinates) * self.mechanism.characteristic_length
         for place, joint in enumerate(self.mechanism.joints):
             if joint.name in self._joints:
-                wished[:, place] = points[:, self._joints.index(joint.name)]
-        return wished
+                targets[:, place] = points[:, self._joints.index(joint.name)]
+        return targets
 
     def _centres(self, coordinates: Floats) -> Floats:
-        """Centres of the joints that are looked at, (n, looked at, 3) [L]."""
+        """Centres of the joints of the fingerprint, (n, k, 3) [L]."""
         points = centres(self.mechanism, coordinates)
-        own = [points[name] for name in self._joints]
-        return np.reshape(own, (-1, len(coordinates), 3)).swapaxes(0, 1) / self.mechanism.characteristic_length
+        chosen = [points[name] for name in self._joints]
+        return np.reshape(chosen, (-1, len(coordinates), 3)).swapaxes(0, 1) / self.mechanism.characteristic_length
 
 
 def pose_marks(mechanism: Mechanism, poses: Floats) -> Floats:
-    """What platforms (n, 4, 4) are told apart by: positions [L], and rotation matrices, (n, 12)."""
+    """Marks of platforms (n, 4, 4): positions [L] and rotation matrices, (n, 12)."""
     positions = poses[:, :3, 3] / mechanism.characteristic_length
     return np.concatenate([positions, poses[:, :3, :3].reshape(-1, 9)], axis=1)
 
@@ -114,18 +117,18 @@ def pose_marks(mechanism: Mechanism, poses: Floats) -> Floats:
 def shifts(
     closure: Closure, coordinates: Floats, pose: Floats, read: Read, locked: frozenset[int] = frozenset()
 ) -> Floats:
-    """How far what is read of a configuration (columns,) moves with the end effector on its target.
+    """Moves of quantities of a configuration (columns,) that are free with the end effector on its target.
 
-    The configuration is shaken by `ALONG` and by half of it, and closed again each time: what is one of a continuum
-    ends as far off as it was moved, and half as far; what stands alone comes back, or goes to another solution.
+    The configuration is moved by `ALONG` and by half of it, and closed again each time. A free quantity stays moved,
+    and by half for half the move; one that is determined returns, or goes to another solution.
 
     Parameters
     ----------
-    read : what is looked at, (n, things, numbers) [L or rad].
+    read : reads the quantities, (n, quantities, numbers) [L or rad], off a closing.
 
     Returns
     -------
-    (SHAKES, things, numbers), relative to how far the configuration was moved; zero for what comes back.
+    (SHAKES, quantities, numbers), relative to the move of the configuration; zero for quantities that are determined.
     """
     rng = np.random.default_rng(0)
     shakes, twists = rng.normal(size=(SHAKES, len(coordinates))), rng.normal(size=(SHAKES, 6))
@@ -135,8 +138,8 @@ def shifts(
     moves = []
     for size in (0.0, 0.5 * lengths, lengths):
         begin = _moved(pose, size * twists, closure.mechanism.characteristic_length)
-        wanted = task_of(closure.mechanism).completed(np.repeat(pose[None], SHAKES, axis=0), begin)
-        closed = close_on_target(closure, coordinates + size * shakes / closure.scale, wanted, locked=locked)
+        completed = task_of(closure.mechanism).completed(np.repeat(pose[None], SHAKES, axis=0), begin)
+        closed = close_on_target(closure, coordinates + size * shakes / closure.scale, completed, locked=locked)
         moves.append(np.where((closed.gap <= TOLERANCES.position)[:, None, None], read(closed), np.nan))
     half, whole = moves[1] - moves[0], moves[2] - moves[0]
     size = np.linalg.norm(whole, axis=2, keepdims=True)
@@ -154,13 +157,13 @@ def _moved(pose: Floats, twists: Floats, length: float) -> Floats:
 
 
 def close_on_target(closure: Closure, coordinates: Floats, poses: Floats, **options: Any) -> Closing:
-    """Close legs below platforms (n, 4, 4) that are held in all that the task asks for; options as of `close`."""
+    """Close legs below platforms (n, 4, 4) that are held in the components of the task; options as of `close`."""
     task = task_of(closure.mechanism)
     return close(closure, coordinates, poses, platform=task.held, frame=task.frame, **options)
 
 
 def count_from_home(closure: Closure, coordinates: Floats) -> None:
-    """Count angles by whole turns, in place: nearest to home, or into their ranges."""
+    """Shift angles by full turns, in place: nearest to home, or into their ranges."""
     turns = closure.turning > 0.0
     for name, span in columns(closure.mechanism).items():
         if closure.mechanism.joint(name).type == "spherical":

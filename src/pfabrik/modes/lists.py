@@ -1,4 +1,4 @@
-"""Searches for every mode: lists of what was found, and what such a list is worth."""
+"""Lists of modes, the clusters of a search, and the estimate of how complete a list is."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from ..errors import InvalidArgument
 from ..tolerances import TOLERANCES
 
 BATCH = 512
-"""Starts between two looks at what was found."""
+"""Starts between two checks whether a search is done."""
 
 LEAST_STARTS = 4096
 """Starts before a search may end: a mode that one start in 500 finds is missed by all of them once in 3600 searches."""
 
 HITS = 10
-"""How often every mode is found before a search ends: an unseen mode as rare as the rarest seen is then unlikely."""
+"""Starts that must lead to every mode before a search ends: an unseen mode as rare as the rarest is then unlikely."""
 
 STEPS = 80
 """Newton steps a start may take; most need fewer than 20."""
 
 ALONG = 1e-3
-"""How far a solution is moved to see whether it is one of a continuum [L or rad]: far enough to tell one from a double
-root, not so far as to meet another solution."""
+"""Step that tests whether a solution is one of a continuum [L or rad]: large enough to distinguish it from a double
+root, too small to reach another solution."""
 
 
 def as_count(name: str, value: Any, least: int) -> int:
-    """A whole number of things, checked."""
+    """A whole number, checked."""
     if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise InvalidArgument(name, shown(value), f"a whole number, at least {least}")
     return int(value)
@@ -47,8 +47,8 @@ class Modes(Sequence[Solution]):
     Attributes
     ----------
     modes : one Solution each: REACHED within all limits; EXCEEDED beyond some, which `active_limits` names.
-    hits : how many starts led to each.
-    starts : how many starts were made.
+    hits : number of starts that led to each.
+    starts : number of starts.
     """
 
     modes: tuple[Solution, ...]
@@ -57,15 +57,15 @@ class Modes(Sequence[Solution]):
 
     @property
     def total(self) -> int:
-        """How many modes there are of all that was found."""
+        """Number of modes that were found."""
         return len(self.modes)
 
     @property
     def unseen(self) -> float:
-        """Probability, about, that another start would find something new: what was found once over all starts.
+        """Estimated probability that another start finds something new: n_1 / n, by Good and Turing.
 
-        That is the estimate of Good and Turing. Where all was found more often, the 95 % bound for something not yet
-        seen, three over all starts.
+        n_1 is the number of modes found once, n that of starts. With n_1 < 3 it is the 95 % bound for a mode not yet
+        seen, 3 / n.
         """
         return max(3, self._found_once) / self.starts
 
@@ -85,12 +85,12 @@ class Modes(Sequence[Solution]):
 
 
 class Clusters:
-    """Configurations found so far, each once, told apart by their marks: numbers that differ where modes do.
+    """Clusters of configurations, one per mode, distinguished by marks: numbers that differ between modes.
 
     Attributes
     ----------
-    marks, coordinates : of each, (k,) [L or 1] and (columns,) [length or rad].
-    hits : how often each was met.
+    marks, coordinates : of each cluster, (k,) [L or 1] and (columns,) [length or rad].
+    hits : number of configurations in each.
     """
 
     def __init__(self) -> None:
@@ -101,42 +101,42 @@ class Clusters:
 
     @property
     def are_well_known(self) -> bool:
-        """Whether each was met often enough for a search to end."""
+        """True if every cluster has enough configurations for a search to end."""
         return min(self.hits, default=HITS) >= HITS
 
-    def count(self, marks: Floats, settle: Callable[[int], tuple[Floats, Floats]]) -> NDArray[np.intp]:
-        """Count rows of marks (n, k) among what is known, or as something new; the number of each row, (n,).
+    def count(self, marks: Floats, polish: Callable[[int], tuple[Floats, Floats]]) -> NDArray[np.intp]:
+        """Count rows of marks (n, k) into their clusters, or into new ones; the cluster of each row, (n,).
 
         Parameters
         ----------
-        settle : marks and coordinates where a row that is not known really ends. Near solutions that are singular the
-            loops are as good as closed some way off, and what looks new may end at something known.
+        polish : marks and coordinates of a row after iterating to convergence. Near a singular solution loops are
+            almost closed at some distance from it, so a row that seems new may converge to a known solution.
         """
-        places = self._known(marks, 0)
-        while len(rest := np.flatnonzero(places < 0)):
-            known = len(self.marks)
-            mark, coordinates = settle(int(rest[0]))
-            place = int(self._known(mark[None], 0)[0])
+        places = self._nearest(marks, 0)
+        while len(unassigned := np.flatnonzero(places < 0)):
+            n_known = len(self.marks)
+            mark, coordinates = polish(int(unassigned[0]))
+            place = int(self._nearest(mark[None], 0)[0])
             if place < 0:
-                place = known
+                place = n_known
                 self.marks.append(mark)
                 self.coordinates.append(coordinates)
                 self.hits.append(0)
                 self._ranks.append((np.inf,))
-            places[rest[1:]] = self._known(marks[rest[1:]], known)
-            places[rest[0]] = place
+            places[unassigned[1:]] = self._nearest(marks[unassigned[1:]], n_known)
+            places[unassigned[0]] = place
         for place in places:
             self.hits[place] += 1
         return places
 
     def prefer(self, place: int, coordinates: Floats, rank: tuple[float, ...]) -> None:
-        """Let other coordinates stand for what is known, if their rank is less than that of those that did."""
+        """Replace the coordinates of a cluster if the new rank is less than the present one."""
         if rank < self._ranks[place]:
             self._ranks[place] = rank
             self.coordinates[place] = coordinates
 
-    def _known(self, marks: Floats, first: int) -> NDArray[np.intp]:
-        """What is nearest to each row, from number `first` on, (n,); -1 where nothing is near enough to be the same."""
+    def _nearest(self, marks: Floats, first: int) -> NDArray[np.intp]:
+        """The cluster nearest to each row, from number `first` on, (n,); -1 if none is within `same_mode`."""
         if len(self.marks) == first:
             return np.full(len(marks), -1)
         apart = np.abs(marks[:, None] - np.array(self.marks[first:])).max(axis=2, initial=0.0)

@@ -24,13 +24,13 @@ from .lists import BATCH, Modes, as_count
 
 @dataclass(frozen=True)
 class WorkingModes(Modes):
-    """The working modes that were found, nearest to home first, and what that is worth: see `Modes`.
+    """The working modes that were found, nearest to home first, with how often; see `Modes` for the other fields.
 
     Attributes
     ----------
-    hits : how many starts led to the rarest branch of a leg in each.
-    branches : for every pose of the platform and each leg, how many starts led to each branch of the leg. There are as
-        many modes as combinations of one branch a leg, and more than are listed where the list was cut.
+    hits : number of starts that led to the rarest branch of a leg in each.
+    branches : for every pose of the platform and each leg, the number of starts that led to each branch of the leg.
+        Modes are the combinations of one branch per leg; there may be more than are listed.
     """
 
     branches: tuple[tuple[tuple[int, ...], ...], ...]
@@ -45,22 +45,22 @@ class WorkingModes(Modes):
 
 
 def working_modes(mechanism: Mechanism, target: Target, *, most_starts: int = 40_000, most: int = 4096) -> WorkingModes:
-    """All configurations that have the end effector on a target in what the task counts, limits or not.
+    """All configurations that have the end effector on a target in the components of the task, limits or not.
 
-    Newton's method from random configurations of all joints, undamped, until every branch of every leg has been found
-    ten times and at least 1024 starts have been made, or `most_starts`. Below a platform at rest legs are independent,
-    and so modes are all combinations of their branches; where the task leaves part of the pose open, for every pose
-    that is found. This is a search, not a proof: each mode listed exists, its loops are closed to machine precision,
-    and it is listed once; `unseen` of the result says how likely another start is to find a branch that is not. The
-    same call gives the same answer.
+    Newton's method, undamped, starts from random configurations of all joints until every branch of every leg has been
+    found ten times and at least 1024 starts have been made, or `most_starts`. With the platform fixed, legs are
+    independent, so modes are all combinations of their branches; if the task leaves part of the pose open, for every
+    pose that is found. This is a search, not a proof: each mode listed exists, its loops are closed to machine
+    precision, and it is listed once. `unseen` of the result estimates the probability that another start finds a new
+    branch. The same call gives the same answer.
 
-    Modes are told apart by actuator values and joint centres. The spin of a rod, or a strut turned half about itself
-    by the universal joint at its end, makes no further ones: given is the configuration nearest to home within limits.
+    Modes differ in actuator values or joint centres. The spin of a rod, or half a turn of a strut about itself by the
+    universal joint at its end, makes no other mode: the configuration nearest to home within limits is listed.
 
     Parameters
     ----------
     target : one pose (4, 4) of the end effector in the base frame [length], or position (3,) at home orientation.
-    most : modes listed at most, the nearest to home; `total` of the result is how many there are.
+    most : most modes that are listed, the nearest to home; `total` of the result counts all.
 
     Returns
     -------
@@ -70,20 +70,20 @@ def working_modes(mechanism: Mechanism, target: Target, *, most_starts: int = 40
     ------
     ContinuumOfSolutions : actuators still move with the end effector on the target: a redundant machine, a task that
         asks for less than the actuators do, or a serial singularity (a stretched wrist). The message names them.
-    InvalidArgument : a batch of targets, or what is no pose.
+    InvalidArgument : a batch of targets, or a target that is no pose.
     """
     pose = _as_pose(mechanism, target)
     most_starts, most = as_count("most_starts", most_starts, 1), as_count("most", most, 0)
     search = BranchSearch(closure_of(mechanism), pose)
     while search.starts < most_starts and not search.is_done:
-        search.go_on(BATCH)
+        search.add_starts(BATCH)
     listed = search.listed(most)
     branches = tuple(tuple(tuple(leg.hits) for leg in legs) for legs in search.legs)
     return WorkingModes(tuple(_answered(mechanism, pose, listed)), listed.hits, search.starts, branches)
 
 
 def _as_pose(mechanism: Mechanism, target: Target) -> Floats:
-    """The one target as an exact pose (4, 4)."""
+    """The single target as an exact pose (4, 4)."""
     targets, shape = as_targets(mechanism, target)
     if shape != ():
         raise InvalidArgument("target", f"batch shape {shape}", "one target: a pose (4, 4) or a position (3,)")
@@ -94,13 +94,13 @@ def _as_pose(mechanism: Mechanism, target: Target) -> Floats:
 
 
 def _answered(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
-    """Configurations as answers to one target: measured, not changed."""
+    """A solution of listed configurations for one target: measured, not changed."""
     closing = close(closure_of(mechanism), listed.coordinates, listed.poses, max_iterations=0)
-    found = engine_of(mechanism).at(closing)
-    rows, n = found.rows, len(found)
+    configurations = engine_of(mechanism).as_configurations(closing)
+    rows, n = configurations.rows, len(configurations)
     if mechanism.end_effector_is_joint:
         rows.poses[:, :3, :3] = target[:3, :3]
     rows.status[:] = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
     position, rotation = task_of(mechanism).errors(rows.poses, np.repeat(target[None], n, axis=0))
     rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR] = position, rotation
-    return Solution(mechanism, found, (n,))
+    return Solution(mechanism, configurations, (n,))

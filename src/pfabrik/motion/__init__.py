@@ -1,1 +1,1 @@
-"""Where bodies are and how they move to first order, in plain NumPy: the referee of what the kernels find."""
+"""Poses of bodies and their first-order motion, in plain NumPy: an independent check of the kernels."""

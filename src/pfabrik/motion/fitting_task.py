@@ -1,4 +1,4 @@
-"""Tasks that fit a mechanism: coordinates of a target that its end effector can vary independently of each other."""
+"""Tasks that fit a mechanism: sets of pose coordinates that its end effector can vary independently."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ TURNS: dict[str, tuple[bool, bool, bool]] = {
     "yaw": (False, False, True),
     "rotation": (True, True, True),
 }
-"""What a task may say of a rotation, in the order of preference -> which rotations that are, about x, y and z."""
+"""Rotation words of a task, in the order of preference -> the rotations they set, about x, y and z."""
 
 POSITION, ALIKE = 0.25, 0.9
-"""Share of the best conditioning from which on the whole position is taken, as users ask for it first; and from which
-on other tasks count as equally good."""
+"""Share of the best conditioning from which a task with the whole position is preferred, as users need it first; and
+from which other tasks count as equally good."""
 
 
 @dataclass(frozen=True)
 class FittingTask:
-    """A task, and how well the end effector can set its coordinates.
+    """A task, and the conditioning of its coordinates.
 
     Attributes
     ----------
-    count : how many coordinates it sets; of those that never vary, as the tilt out of a plane, none.
+    count : number of coordinates that vary.
     conditioning : smallest singular value of the end effector's motions, orthonormal twists, in these coordinates
-        [L and rad], the median of configurations around home: 1 where they are all that it can vary, 0 where they
-        depend on each other.
-    n_constant : how many more coordinates it has, which never vary.
+        [L and rad], the median of configurations around home: 1 if they are all that it can vary, 0 if they depend on
+        each other.
+    n_constant : number of coordinates that never vary, such as the tilt out of a plane.
     """
 
     words: tuple[str, ...]
@@ -49,7 +49,7 @@ class FittingTask:
 
     @property
     def kind(self) -> tuple[int, int]:
-        """Tasks that are compared by their conditioning have this in common."""
+        """The key of tasks whose conditioning is compared."""
         return self.count, self.n_constant
 
     def __str__(self) -> str:
@@ -58,17 +58,17 @@ class FittingTask:
 
 @lru_cache(maxsize=64)
 def fitting_tasks(mechanism: Mechanism) -> tuple[FittingTask, ...]:
-    """Tasks with independent coordinates, the one that suits best first; empty where nothing moves.
+    """Tasks with independent coordinates, the best first; empty if nothing moves.
 
-    Those come first that set all freedoms of the end effector; of these, those with the fewest coordinates that are
-    constant; of these, those with the whole position, then the best conditioned. Where several are alike, those with
-    most of the position come first, and the tilt before the yaw.
+    They are ordered by the number of freedoms that they set, the most first; then by the number of constant
+    coordinates, the fewest first; then tasks with the whole position come before others, then the best conditioned. Of
+    equally good ones, those with most of the position come first, and tilt before yaw.
     """
-    bases, turned = _motions(mechanism)
-    found = [_judged(words, bases, turned) for words in _candidates(mechanism)]
-    sound = [task for task in found if task is not None and task.conditioning >= TOLERANCES.independent]
+    bases, n_rows = _motions(mechanism)
+    tasks = [_evaluate_task(words, bases, n_rows) for words in _candidates(mechanism)]
+    independent = [task for task in tasks if task is not None and task.conditioning >= TOLERANCES.independent]
     best: dict[tuple[int, int], float] = {}
-    for task in sound:
+    for task in independent:
         best[task.kind] = max(task.conditioning, best.get(task.kind, 0.0))
 
     def rank(task: FittingTask) -> tuple[float, ...]:
@@ -78,25 +78,25 @@ def fitting_tasks(mechanism: Mechanism) -> tuple[FittingTask, ...]:
         order = [*AXES, *TURNS]
         return -task.count, task.n_constant, goodness, -positions, *(order.index(word) for word in task.words)
 
-    return tuple(sorted(sound, key=rank))
+    return tuple(sorted(independent, key=rank))
 
 
 def has_dependent_coordinates(mechanism: Mechanism) -> bool:
-    """Whether the task has coordinates that follow from its others, so that hardly any target can be reached.
+    """True if coordinates of the task depend on each other, so that hardly any target can be reached.
 
-    What is always the same, as a position out of the plane of a planar machine, asks for nothing. Of machines with so
-    many joints that counting freedoms takes long, it is not said.
+    Coordinates that never vary, such as a position out of the plane of a planar machine, do not count. False for
+    machines with so many joints that counting freedoms takes long.
     """
     if len(mechanism.joints) > MOST_JOINTS_FOR_FREEDOM:
         return False
     generic = generic_of(mechanism)
     counts = _counted(mechanism.task)[: len(generic.directions)]
-    asked = int(np.linalg.matrix_rank(generic.directions[counts], TOLERANCES.alignment))
-    return int(counts.sum()) > generic.mobility.platform < asked
+    n_varying = int(np.linalg.matrix_rank(generic.directions[counts], TOLERANCES.alignment))
+    return int(counts.sum()) > generic.mobility.platform < n_varying
 
 
 def task_remark(mechanism: Mechanism) -> str:
-    """Why hardly any target of a task that asks too much can be reached, and which task fits, in words."""
+    """A sentence that says why hardly any target of a task that asks too much is reachable, and which task fits."""
     tasks, freedoms = fitting_tasks(mechanism), generic_of(mechanism).mobility.platform
     fits = f"a task that fits is {' '.join(tasks[0].words)}" if tasks else "no task fits, for nothing moves"
     return (
@@ -106,7 +106,7 @@ def task_remark(mechanism: Mechanism) -> str:
 
 
 def motions_at(mechanism: Mechanism, q: Floats) -> Floats:
-    """Twists (r, k) of the end effector, one for each motion that its loops allow at coordinates q (1, c)."""
+    """Twists (r, k) of the end effector, one for each motion that the loops allow at coordinates q (1, c)."""
     closure, twist = first_order(mechanism, q)
     values, right = right_singular(closure)
     return np.asarray(twist[0] @ right[0, np.count_nonzero(values > TOLERANCES.alignment) :].T)
@@ -120,15 +120,15 @@ def _candidates(mechanism: Mechanism) -> list[tuple[str, ...]]:
 
 
 def _counted(words: tuple[str, ...]) -> Mask:
-    """Which rows of a twist [velocity; angular velocity] a task counts, (6,)."""
+    """Mask of the rows of a twist [velocity; angular velocity] that a task sets, (6,)."""
     turns = next((TURNS[word] for word in words if word in TURNS), (False,) * 3)
     return np.array([axis in words for axis in AXES] + list(turns))
 
 
 def _motions(mechanism: Mechanism) -> tuple[list[Floats], int]:
-    """Orthonormal twists (r, freedoms) of the end effector at generic configurations around home, and how many rows.
+    """Orthonormal twists (r, freedoms) of the end effector at generic configurations around home, and their rows r.
 
-    Motions that a joint's turn by one hardly shows in are none: they are what axes leave that meet up to some digits.
+    Motions with a tiny twist per joint rate are left out: they come from axes that intersect only to some digits.
     """
     closure, twist = first_order(mechanism, around_home(mechanism))
     values, right = right_singular(closure)
@@ -136,13 +136,14 @@ def _motions(mechanism: Mechanism) -> tuple[list[Floats], int]:
     rank = int(ranks.max())
     spread = twist[ranks == rank] @ np.swapaxes(right[ranks == rank, rank:], -1, -2)
     left, sizes, _ = np.linalg.svd(spread, full_matrices=False)
-    shown = np.count_nonzero(sizes > TOLERANCES.nearly_implied, axis=-1)
-    freedoms = int(shown.max(initial=0))
-    return [basis[:, :freedoms] for basis, own in zip(left, shown, strict=True) if own == freedoms], spread.shape[1]
+    n_motions = np.count_nonzero(sizes > TOLERANCES.nearly_implied, axis=-1)
+    freedoms = int(n_motions.max(initial=0))
+    bases = [basis[:, :freedoms] for basis, n in zip(left, n_motions, strict=True) if n == freedoms]
+    return bases, spread.shape[1]
 
 
-def _judged(words: tuple[str, ...], bases: list[Floats], n_rows: int) -> FittingTask | None:
-    """How well a task fits; None where some of its coordinates follow from the others."""
+def _evaluate_task(words: tuple[str, ...], bases: list[Floats], n_rows: int) -> FittingTask | None:
+    """The conditioning of a task; None if some of its coordinates depend on the others."""
     counts = _counted(words)[:n_rows]
     rows = [basis[counts] for basis in bases]
     freedoms = bases[0].shape[1] if bases else 0
@@ -150,5 +151,5 @@ def _judged(words: tuple[str, ...], bases: list[Floats], n_rows: int) -> Fitting
     n_constant = int(counts.sum()) - varied
     if not 0 < varied <= freedoms or (len(rows) < 2 and n_constant):  # one configuration does not tell what is constant
         return None
-    sizes = np.array([np.linalg.svd(each, compute_uv=False)[varied - 1] for each in rows])
+    sizes = np.array([np.linalg.svd(basis, compute_uv=False)[varied - 1] for basis in rows])
     return FittingTask(words, varied, float(np.median(sizes)), n_constant)

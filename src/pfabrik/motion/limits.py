@@ -1,4 +1,4 @@
-"""The limited coordinates and cone angles of configurations, and angles counted into their ranges."""
+"""Limited coordinates and cone angles of configurations, and the shift of angles into their ranges."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Ranges(NamedTuple):
 
     Attributes
     ----------
-    joints, places : whose coordinate it is, and which of that joint.
+    joints, places : joint of each coordinate, and its place among those of the joint.
     columns : its place in q, (k,).
-    home, low, high : its value at home and its bounds, as the description counts them, (k,) [rad or length].
+    home, low, high : its value at home and its bounds, with the zero of the description, (k,) [rad or length].
     units : L for lengths, 1 for angles, (k,).
     """
 
@@ -36,21 +36,21 @@ class Ranges(NamedTuple):
     units: Floats
 
     def values(self, coordinates: Floats) -> Floats:
-        """Values (n, k), as the description counts them, in joint coordinates (n, c)."""
+        """Values (n, k) of the ranged coordinates, with the zeros of the description, from q (n, c)."""
         return np.asarray(coordinates[:, self.columns] + self.home)
 
 
 @lru_cache(maxsize=64)
 def ranges_of(mechanism: Mechanism) -> Ranges:
     """The ranges of a mechanism."""
-    own = [each for each in mechanism.coordinates if each.joint.range is not None]
-    columns = np.array([each.column for each in own], np.intp)
-    low, high = np.ascontiguousarray(np.reshape([each.limits for each in own], (-1, 2)).T, np.float64)
+    ranged = [coordinate for coordinate in mechanism.coordinates if coordinate.joint.range is not None]
+    columns = np.array([coordinate.column for coordinate in ranged], np.intp)
+    low, high = np.ascontiguousarray(np.reshape([coordinate.limits for coordinate in ranged], (-1, 2)).T, np.float64)
     return Ranges(
-        tuple(each.joint for each in own),
-        tuple(each.place for each in own),
+        tuple(coordinate.joint for coordinate in ranged),
+        tuple(coordinate.place for coordinate in ranged),
         columns,
-        np.array([each.home for each in own], float),
+        np.array([coordinate.home for coordinate in ranged], float),
         low,
         high,
         rate_units(mechanism)[columns],
@@ -58,8 +58,8 @@ def ranges_of(mechanism: Mechanism) -> Ranges:
 
 
 def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
-    """Count the angles of ranged joints about one axis by whole turns into their ranges, if possible, in place."""
-    places, low, high = _turning(mechanism)
+    """Shift the angles of ranged joints about one axis by full turns into their ranges, if possible, in place."""
+    places, low, high = _ranged_angles(mechanism)
     values = coordinates[:, places]
     outside = (values < low) | (values > high)
     if outside.any():
@@ -68,16 +68,16 @@ def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
 
 
 @lru_cache(maxsize=64)
-def _turning(mechanism: Mechanism) -> tuple[NDArray[np.intp], Floats, Floats]:
-    """Columns of ranged angles about one axis, and the bounds of their deviations with what counts as on them."""
+def _ranged_angles(mechanism: Mechanism) -> tuple[NDArray[np.intp], Floats, Floats]:
+    """Columns of ranged angles about one axis, and the bounds of their deviations, widened by the limit tolerance."""
     ranges = ranges_of(mechanism)
-    own = [
+    chosen = [
         k
         for k, (joint, place) in enumerate(zip(ranges.joints, ranges.places, strict=True))
         if joint.type in ("revolute", "cylindrical") and place == 0
     ]
-    low, high = (bound[own] - ranges.home[own] for bound in (ranges.low, ranges.high))
-    return ranges.columns[own], low - TOLERANCES.limit, high + TOLERANCES.limit
+    low, high = (bound[chosen] - ranges.home[chosen] for bound in (ranges.low, ranges.high))
+    return ranges.columns[chosen], low - TOLERANCES.limit, high + TOLERANCES.limit
 
 
 class _Cones(NamedTuple):

@@ -1,4 +1,4 @@
-"""How many independent motions a mechanism has in general, counted at configurations around home."""
+"""Mobility: the number of independent motions of a mechanism, counted at generic configurations around home."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .first_order import actuated_columns, first_order, right_singular
 from .walks import around_home
 
 COUNTING, FEWEST = 4e9, 2
-"""Cubes of the number of joint coordinates that motions are counted at in sum, so that it takes seconds of the longest
-chains; and at how many configurations at least: home may be special."""
+"""Largest sum of the cubed number of joint coordinates over configurations, which takes seconds for the longest chains;
+and the fewest configurations, as home may be special."""
 
 MOST_NAMED, TAKES_PART = 6, 0.1
-"""Most joints that are named of a motion, and the least of their rates, as a share of the largest."""
+"""Most joints that are named for a motion, and the least of their rates as a share of the largest."""
 
 
 @dataclass(frozen=True)
 class NearlyFree:
-    """A motion that the loops hardly resist, in general: by rounded axes, or next to a singularity.
+    """A motion that the loops hardly resist at generic configurations: by rounded axes, or near a singularity.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class NearlyFree:
 
 @dataclass(frozen=True)
 class Mobility:
-    """How many independent motions a mechanism has in general; home may be special and is not taken for it.
+    """Numbers of independent motions of a mechanism at generic configurations; home may be special.
 
     Attributes
     ----------
@@ -53,8 +53,8 @@ class Mobility:
     actuators : number of actuated joints.
     uncontrolled : freedoms that the end effector keeps with all actuators locked.
     over_constraints : loop conditions that follow from the others.
-    nearly_free : motions that the loops hardly resist, the freest first: those up to `TOLERANCES.alignment` are counted
-        as motions, the others as none.
+    nearly_free : motions that the loops hardly resist, the freest first; those with a resistance up to
+        `TOLERANCES.alignment` are counted as motions, the others are not.
     """
 
     mobility: int
@@ -72,7 +72,7 @@ class Mobility:
         return self.actuators - self.platform
 
     def _repr_html_(self) -> str:
-        """Every count with what it counts, for notebooks."""
+        """Every count with its meaning, for notebooks."""
         rows = [(name.replace("_", "-"), str(getattr(self, name)), words) for name, words in _IN_WORDS.items()]
         return card("Mobility", (), ("", "count", "of"), rows, "")
 
@@ -91,12 +91,14 @@ _IN_WORDS = {
 
 @dataclass(frozen=True)
 class Generic:
-    """What holds in general: the counts, and an orthonormal basis (r, k) of all twists that the platform ever has.
+    """Properties at generic configurations.
 
     Attributes
     ----------
-    rank : how many of the loops' conditions are independent.
-    home_is_singular : whether loops are singular at home: they let more move there than in general.
+    mobility : the counts of motions.
+    directions : orthonormal basis (r, k) of all twists that the platform ever has.
+    rank : number of independent loop conditions.
+    home_is_singular : True if the loops allow more motions at home than at generic configurations.
     """
 
     mobility: Mobility
@@ -107,17 +109,17 @@ class Generic:
 
 @lru_cache(maxsize=64)
 def generic_of(mechanism: Mechanism) -> Generic:
-    around = around_home(mechanism)
-    closure, twist = first_order(mechanism, around[: max(FEWEST, int(COUNTING / max(1, around.shape[1]) ** 3))])
-    locked = sum(each.joint.is_rigid for each in mechanism.coordinates)
+    q = around_home(mechanism)
+    closure, twist = first_order(mechanism, q[: max(FEWEST, int(COUNTING / max(1, q.shape[1]) ** 3))])
+    locked = sum(coordinate.joint.is_rigid for coordinate in mechanism.coordinates)
     values, right = right_singular(closure)
     ranks = _rank(values)
     rank = int(ranks.max())
     motions = np.swapaxes(right[ranks == rank, rank:], -1, -2)
     twists, actuators = twist[ranks == rank] @ motions, motions[:, actuated_columns(mechanism)]
     shown, platform, driven = (
-        int(_rank(np.linalg.svd(each, compute_uv=False)).max())
-        for each in (np.concatenate([twists, actuators], axis=1), twists, actuators)
+        int(_rank(np.linalg.svd(matrices, compute_uv=False)).max())
+        for matrices in (np.concatenate([twists, actuators], axis=1), twists, actuators)
     )
     counts = Mobility(
         mobility=motions.shape[-1] - locked,
@@ -137,11 +139,11 @@ def _nearly_free(mechanism: Mechanism, values: Floats, right: Floats) -> tuple[N
     """The motions that are nearly free in every configuration, from singular values (n, k) and vectors (n, c, c)."""
     small = np.count_nonzero(values < TOLERANCES.nearly_implied, axis=1).min()
     exact = np.count_nonzero(values <= TOLERANCES.rank, axis=1).min()
-    found = []
+    motions = []
     for place in range(values.shape[1] - exact - 1, values.shape[1] - small - 1, -1):
         row = int(values[:, place].argmax())
-        found.append(NearlyFree(float(values[row, place]), _fastest(mechanism, right[row, place])))
-    return tuple(found)
+        motions.append(NearlyFree(float(values[row, place]), _fastest(mechanism, right[row, place])))
+    return tuple(motions)
 
 
 def _fastest(mechanism: Mechanism, motion: Floats) -> tuple[str, ...]:

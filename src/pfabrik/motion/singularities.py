@@ -1,4 +1,4 @@
-"""How near a configuration is to a singularity, and of which kind.
+"""The distance of a configuration from each kind of singularity.
 
 All motions that the loops allow are combinations of orthonormal joint rates: the null space of the loop conditions C.
 On them, T gives the twist of the end effector and A the actuators' rates. The left singular vectors of [T; A], split
@@ -31,7 +31,7 @@ NUMBERS = (*KINDS, "lost", "gained")
 
 @dataclass(frozen=True, eq=False)
 class Singularity:
-    """How near a configuration is to each kind of singularity: four measures that are 0 there, and grow with distance.
+    """Measures of the distance from each kind of singularity: 0 at a singularity, growing with the distance.
 
     Measures are scale free (lengths in units of L, angles in rad), (...,) each; inf where nothing can be lost
     or gained. Where `constraint` or `passive` is 0, the motions are not determined to first order, and the other
@@ -62,7 +62,7 @@ class Singularity:
     kinds: tuple[str, ...] | list[tuple[str, ...]]
 
     def _repr_html_(self) -> str:
-        """Every measure and whether it is singular, for notebooks; of a batch, the least, and how many rows are."""
+        """Every measure and whether it is singular, for notebooks; of a batch, the least, and the singular rows."""
         is_one = np.ndim(self.serial) == 0
         rows = []
         for kind in KINDS:
@@ -82,25 +82,25 @@ def measures(mechanism: Mechanism, q: Floats) -> Singularity:
     motion = _motion(mechanism, q)
     serial, lost = _nearest_lost(generic_of(mechanism), motion)
     parallel, gained = _nearest_gained(motion)
-    found = np.stack([serial, parallel, motion.constraint, motion.passive])
-    for array in (found.T, lost, gained):
+    values = np.stack([serial, parallel, motion.constraint, motion.passive])
+    for array in (values.T, lost, gained):
         array[invalid] = np.nan
-    return singularity_of(found.T, lost, gained)
+    return singularity_of(values.T, lost, gained)
 
 
-def singularity_of(found: Floats, lost: Floats, gained: Floats) -> Singularity:
+def singularity_of(values: Floats, lost: Floats, gained: Floats) -> Singularity:
     """A `Singularity` of measures (n, 4), in the order of `KINDS`, and twists (n, r) of any length."""
-    near = TOLERANCES.singular > found
-    kinds = [tuple(compress(KINDS, row)) for row in near]
-    return Singularity(**dict(zip(KINDS, found.T, strict=True)), lost=_unit(lost), gained=_unit(gained), kinds=kinds)
+    is_singular = TOLERANCES.singular > values
+    kinds = [tuple(compress(KINDS, row)) for row in is_singular]
+    return Singularity(**dict(zip(KINDS, values.T, strict=True)), lost=_unit(lost), gained=_unit(gained), kinds=kinds)
 
 
 def parallel_signs(mechanism: Mechanism, q: Floats) -> Floats:
-    """On which side of the parallel singularities coordinates q (n, c) are, (n,): 1 or -1; 0 on one; NaN if untold.
+    """The side of the parallel singularities on which coordinates q (n, c) are, (n,): 1, -1, 0 on one, NaN if unknown.
 
-    It is the sign of det Q_A det D'Q_T, the same for any basis of the motions, with D the directions of the end
-    effector's freedoms. It changes where the actuators lose hold, or the end effector a freedom. It is told where there
-    are as many actuators as freedoms, which are the same everywhere or those of the task.
+    It is the sign of det Q_A det D'Q_T, which does not depend on the basis of the motions, with D the directions of the
+    end effector's freedoms. It changes at parallel and serial singularities. It is known if there are as many actuators
+    as freedoms, and these are the same everywhere or those of the task.
     """
     invalid, q = _set_aside(q)
     generic, freedoms = generic_of(mechanism), generic_of(mechanism).mobility.platform
@@ -116,15 +116,15 @@ def parallel_signs(mechanism: Mechanism, q: Floats) -> Floats:
 def _of_task(mechanism: Mechanism, q: Floats) -> Floats:
     """The twists that a task sets at coordinates q (n, c), (n, 6, k): of a tilt, about the platform's x and y axes."""
     task = task_of(mechanism)
-    every = np.repeat(np.eye(6)[None], len(q), axis=0)
+    twists = np.repeat(np.eye(6)[None], len(q), axis=0)
     if task.rotations == 2:
-        moved = displacements(mechanism, q)[mechanism.end_effector_body]
-        every[:, 3:, 3:] = (moved @ mechanism.home_pose)[:, :3, :3]
-    return every[:, :, [*task.axes, *task.turns]]
+        displaced = displacements(mechanism, q)[mechanism.end_effector_body]
+        twists[:, 3:, 3:] = (displaced @ mechanism.home_pose)[:, :3, :3]
+    return twists[:, :, [*task.axes, *task.turns]]
 
 
 def _set_aside(q: Floats) -> tuple[Mask, Floats]:
-    """Which rows are NaN, and q with home in their place."""
+    """Mask of rows that are NaN, and q with home in their place."""
     invalid = np.asarray(np.isnan(q).any(axis=1))
     return invalid, np.where(invalid[:, None], 0.0, q)
 
@@ -180,8 +180,8 @@ def _nearest_lost(generic: Generic, motion: _Motion) -> tuple[Floats, Floats]:
     sines = np.linalg.norm(motion.actuators @ np.swapaxes(right, -1, -2), axis=1)
     ratios = _ratios(cosines[:, :freedoms], sines[:, :freedoms])
     serial, lost = _least(ratios, left[..., :freedoms])
-    stuck = np.linalg.svd(generic.directions.T @ motion.all_twists)[0][..., freedoms - 1]
-    lost = np.where(_rules(motion.passive, serial)[:, None], stuck, lost)
+    slowest = np.linalg.svd(generic.directions.T @ motion.all_twists)[0][..., freedoms - 1]
+    lost = np.where(_is_nearer(motion.passive, serial)[:, None], slowest, lost)
     return serial, lost @ generic.directions.T
 
 
@@ -193,17 +193,17 @@ def _nearest_gained(motion: _Motion) -> tuple[Floats, Floats]:
     parallel, gained = _least(_ratios(sines, np.linalg.norm(twists, axis=1)), twists)
     held = np.einsum("nra,na->nr", motion.twists @ _pseudo_inverse(motion.actuators), motion.extra_rates)
     freed = motion.extra_twist - held
-    moves = _rules(motion.constraint, parallel) & (np.linalg.norm(freed, axis=1) > TOLERANCES.alignment)
+    moves = _is_nearer(motion.constraint, parallel) & (np.linalg.norm(freed, axis=1) > TOLERANCES.alignment)
     return parallel, np.where(moves[:, None], freed, gained)
 
 
-def _rules(measure: Floats, other: Floats) -> Mask:
-    """Whether the first kind of singularity has been met, and the other is not nearer still."""
+def _is_nearer(measure: Floats, other: Floats) -> Mask:
+    """True where the first measure is singular and less than the other."""
     return np.asarray(measure < np.minimum(other, TOLERANCES.singular))
 
 
 def _ratios(small: Floats, large: Floats) -> Floats:
-    """small / large; inf where the large vanishes: the pair is no motion, or one that costs nothing."""
+    """small / large; inf where the large one vanishes."""
     return np.asarray(np.divide(small, large, out=np.full(small.shape, np.inf), where=large > TOLERANCES.rank))
 
 

@@ -1,4 +1,4 @@
-"""Walks from a configuration along motions that the loops allow, or hardly hinder."""
+"""Walks from a configuration along motions that the loops allow, or hardly resist."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .displacements import gaps, loop_errors, screws
 from .first_order import actuated_columns, at_reference, first_order, graph_of, moved, right_singular
 
 SAMPLES, STEPS, STEP = 8, 3, 0.1
-"""Walks from home to generic configurations: how many, of how many steps, of which largest joint motion [rad or L]."""
+"""Number of walks from home to generic configurations, steps of each, and largest joint motion of a step [rad or L]."""
 NEWTON_STEPS = 20
-"""Most steps to close the loops after one of them; a walk that takes more is left out."""
+"""Most steps to close the loops after a step of a walk; a walk that needs more is left out."""
 
 
 @lru_cache(maxsize=64)
@@ -35,9 +35,9 @@ def around_home(mechanism: Mechanism) -> Floats:
 
 
 def _closed(mechanism: Mechanism, q: Floats) -> Floats:
-    """The loops closed by Gauss-Newton steps of the smallest joint motions; one more once they count as closed.
+    """Close the loops by Gauss-Newton steps of the smallest joint motions, and take one more step when they are closed.
 
-    Directions in which the loops hardly resist are left alone, so that a walk may start in a singularity.
+    Directions in which the loops hardly resist are not corrected, so that a walk may start in a singularity.
     """
     graph = graph_of(mechanism)
     for _ in range(NEWTON_STEPS):
@@ -52,10 +52,10 @@ def _closed(mechanism: Mechanism, q: Floats) -> Floats:
 
 
 def stepped_freely(mechanism: Mechanism, q: Floats, step: float) -> Floats:
-    """Coordinates (k, c), moved from one configuration q (c,) by a step along each motion that nothing hinders.
+    """Coordinates (k, c), moved from one configuration q (c,) by a step along each free motion.
 
-    Those are the motions of the end effector with locked actuators to which the loops object, to first order, by less
-    than `TOLERANCES.singular`; whether they go on is for the caller to see.
+    Free motions are those of the end effector with locked actuators that the loops resist, to first order, by less than
+    `TOLERANCES.singular`. The caller tests whether they are finite motions.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class LegAnswers(Configurations):
     def with_others(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
         """A copy with the rows at some places replaced by others; coordinates are still computed on access."""
         if not isinstance(others, LegAnswers):
-            return super().with_others(places, others)
+            return super().with_rows(places, others)
         rows, sides = rows_at(self.rows, np.arange(len(self))), self.sides.copy()
         put_rows(rows, places, others.rows)
         sides[places] = others.sides

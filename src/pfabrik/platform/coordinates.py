@@ -69,7 +69,7 @@ def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, start: Float
         closure.put_actuators(restarts, actuators[unsolved])
         candidate = close(closure, restarts, poses[unsolved], locked=locked, platform=platform)
         is_better = candidate.gap < closing.gap[unsolved]
-        closing.take(unsolved[is_better], candidate, is_better)
+        closing.put(unsolved[is_better], candidate, is_better)
     return closing.coordinates
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Records
 from ..closure.close import closure_of, in_lengths
-from ..closure.projection import SAME, Way, ways_of
+from ..closure.projection import SAME, ProjectionMode, projection_modes
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
@@ -80,7 +80,7 @@ class SearchPlan(NamedTuple):
 
     mechanism: Mechanism
     length: float
-    projections: tuple[Way, ...]
+    projections: tuple[ProjectionMode, ...]
     searches: tuple[NearestPose, ...]
     fallback: NearestPose | None  # another projection, for legs that complete poses step by step
 
@@ -101,9 +101,9 @@ def _search_plan(
     settings = {"steps": MOST_STEPS, "stays": int(keep_mode), "rotation": rotation_tolerance}
     settings["position"] = tolerance or TOLERANCES.position * length
     seed_starts = seeds_of(mechanism) if seeds else no_starts(table)
-    projections = ways_of(mechanism, hold, rotation_length)
+    projections = projection_modes(mechanism, hold, rotation_length)
     searches = tuple(_new_search(mechanism, table, projection, settings, seed_starts) for projection in projections)
-    with_orientation = ways_of(mechanism, "orientation", rotation_length)
+    with_orientation = projection_modes(mechanism, "orientation", rotation_length)
     fallback = None
     if table.is_completed and len(with_orientation) > 1:
         fallback = (
@@ -115,7 +115,11 @@ def _search_plan(
 
 
 def _new_search(
-    mechanism: Mechanism, table: LegTable, projection: Way, settings: Mapping[str, float], seed_starts: Starts
+    mechanism: Mechanism,
+    table: LegTable,
+    projection: ProjectionMode,
+    settings: Mapping[str, float],
+    seed_starts: Starts,
 ) -> NearestPose:
     """The search of one projection: from each row's start, then from seeds."""
     length = mechanism.characteristic_length
@@ -155,7 +159,7 @@ def _may_be_too_far(plan: SearchPlan, targets: Floats, starts: Starts, solution:
 def _release(plan: SearchPlan, targets: Floats, starts: Starts, solution: PoseSolutions) -> None:
     """Hold nothing in rows that end too far from their targets because of what is held, if that brings them nearer.
 
-    Too far is defined by `Way.is_too_far`.
+    Too far is defined by `ProjectionMode.is_too_far`.
     """
     holding, free = plan.projections
     closure = closure_of(plan.mechanism)
@@ -176,12 +180,12 @@ def _release(plan: SearchPlan, targets: Floats, starts: Starts, solution: PoseSo
     solution.put(far[is_nearer], block.at(is_nearer))
 
 
-def weighed_limits(
-    mechanism: Mechanism, table: LegTable, targets: Floats, configurations: Starts, projection: Way
+def limit_multipliers(
+    mechanism: Mechanism, table: LegTable, targets: Floats, configurations: Starts, projection: ProjectionMode
 ) -> Floats:
     """The multipliers of all limits at configurations, for targets (n, 4, 4) [length].
 
-    In the order of `closure.descend.weighed_limits`.
+    In the order of `closure.descend.limit_multipliers`.
     """
     multipliers = _multipliers(mechanism, table, projection).weigh(targets, configurations)
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
@@ -195,7 +199,7 @@ def weighed_limits(
 
 
 @lru_cache(maxsize=256)
-def _multipliers(mechanism: Mechanism, table: LegTable, projection: Way) -> NearestPose:
+def _multipliers(mechanism: Mechanism, table: LegTable, projection: ProjectionMode) -> NearestPose:
     """The kernel call that takes no steps and gives the multipliers of limits."""
     return NearestPose(mechanism, table, projection.weights, {"steps": 0}, no_starts(table))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..closure.close import in_lengths
 from ..closure.configurations import new_rows
-from ..closure.parasitic import strays
+from ..closure.parasitic import is_flipped
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
@@ -121,7 +121,7 @@ def _random_feasible(mechanism: Mechanism, table: LegTable, rng: np.random.Gener
     weights = (1.0, 1.0, 1.0, ROTATION_WEIGHT, ROTATION_WEIGHT, ROTATION_WEIGHT)
     nearest_pose = NearestPose(mechanism, table, weights, {"frame": BASE_AXES, "steps": DRAW_STEPS}, no_starts(table))
     solution = nearest_pose.find(targets, Starts(poses, q, sides))
-    is_usable = np.isfinite(solution.distances) & ~strays(mechanism, solution.poses)
+    is_usable = np.isfinite(solution.distances) & ~is_flipped(mechanism, solution.poses)
     solution.poses[:] = in_lengths(solution.poses, 1.0 / mechanism.characteristic_length)
     return Starts(*solution[1:4]).at(np.flatnonzero(is_usable))
 

@@ -12,7 +12,7 @@ from ..arrays import Floats, Mask
 from ..closure.close import Closing, in_lengths
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
 from ..closure.parasitic import has_other_assemblies
-from ..closure.projection import Way
+from ..closure.projection import ProjectionMode
 from ..closure.solve import ClosureEngine
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
@@ -28,7 +28,7 @@ from ..tolerances import TOLERANCES
 from .answers import LegAnswers, answer_coordinates, sides_at, start_coordinates_of
 from .coordinates import joint_coordinates
 from .forward import forward_kinematics
-from .nearest import move_redundant_joints, weighed_limits
+from .nearest import limit_multipliers, move_redundant_joints
 from .nearest_pose import starts_at
 from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
 from .table import TableHandle, legs_at_rest, local_table, table_handle
@@ -165,7 +165,7 @@ class LegsEngine:
         for i in steps_of(is_pose, on_progress):
             previous = answers[-1] if answers else start
             answers.append(self.answer(targets[i : i + 1], previous, options, keep_mode=True, nearby=True))
-        return self._joined(answers, start).among(is_pose)
+        return self._joined(answers, start).scatter(is_pose)
 
     def _joined(self, answers: Sequence[Configurations], start: Configurations | None) -> Configurations:
         """Single answers as one batch; the first of them began at `start`."""
@@ -244,9 +244,9 @@ class LegsEngine:
             coordinates[unsolved] = fallback.coordinates
         return Configurations(rows, coordinates)
 
-    def at(self, closing: Closing) -> Configurations:
+    def as_configurations(self, closing: Closing) -> Configurations:
         """Configurations found in joint coordinates, as answers whose status is not set yet."""
-        return self._joint_space.at(closing)
+        return self._joint_space.as_configurations(closing)
 
     def points(self, answers: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
@@ -255,21 +255,21 @@ class LegsEngine:
         centres = centres_at(self.mechanism, answers.rows.poses, answers.rows.actuators)
         return centres if centres is not None else self._joint_space.points(answers)
 
-    def weighed_limits(self, answers: Configurations, targets: Floats, way: Way) -> Floats:
+    def limit_multipliers(self, answers: Configurations, targets: Floats, way: ProjectionMode) -> Floats:
         """The multipliers of all limits at projected configurations, for targets (n, 4, 4); as of `closure.descend`."""
         if not isinstance(answers, LegAnswers) or answers.q_proximal is None:
-            return self._joint_space.weighed_limits(answers, targets, way)
+            return self._joint_space.limit_multipliers(answers, targets, way)
         has_proximal = np.isfinite(answers.q_proximal).all(axis=1)
         by_legs, by_joints = np.flatnonzero(has_proximal), np.flatnonzero(~has_proximal)
         scale = 1.0 / self.mechanism.characteristic_length
         solutions = Starts(
             in_lengths(answers.rows.poses[by_legs], scale), answers.q_proximal[by_legs], answers.sides[by_legs]
         )
-        weights = weighed_limits(self.mechanism, self._table, targets[by_legs], solutions, way)
+        weights = limit_multipliers(self.mechanism, self._table, targets[by_legs], solutions, way)
         all_weights = np.empty((len(targets), weights.shape[1]))
         all_weights[by_legs] = weights
         if len(by_joints):
-            all_weights[by_joints] = self._joint_space.weighed_limits(answers.at(by_joints), targets[by_joints], way)
+            all_weights[by_joints] = self._joint_space.limit_multipliers(answers.at(by_joints), targets[by_joints], way)
         return all_weights
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Mask
 from ..closure.close import in_lengths
 from ..closure.configurations import new_rows, put_rows, rows_at
-from ..closure.parasitic import strays
+from ..closure.parasitic import is_flipped
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..kernels.platform.records import PoseSolutions, Starts
@@ -147,7 +147,7 @@ def _reach_from_seeds(seeds: Starts, request: Request, unreached: Unreached) -> 
         candidates = Unreached(targets, start_poses, end_sides, np.empty_like(end_sides), rows)
         _reach_from_poses(legs, start_poses, end_sides, candidates)
         is_reached = rows.status == REACHED
-        is_reached[is_reached] = ~strays(request.mechanism, rows.poses[is_reached])
+        is_reached[is_reached] = ~is_flipped(request.mechanism, rows.poses[is_reached])
         is_reached = is_reached.reshape(n, k)
         is_solved = is_reached.any(axis=1)
         if np.count_nonzero(is_solved):

@@ -1,1 +1,1 @@
-"""P-FABRIK on joint positions: targets answered by passes and closed forms; joints from positions and back."""
+"""P-FABRIK on joint positions, by forward and backward passes, and its conversion from and to joint coordinates."""

@@ -1,4 +1,4 @@
-"""Between the paper's method and joint coordinates: positions of nodes from coordinates, and coordinates from them."""
+"""Conversion between the joint positions of the paper's method and joint coordinates."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 
 RESTARTS = 24
-"""Random starts for coordinates that do not follow joint centres from where they began: each finds most legs' turns."""
+"""Random starts for rows whose joint coordinates do not fit the joint centres; each start fits most legs."""
 
 
 def positions_of(mechanism: Mechanism, compiled: CompiledPlan, coordinates: Floats) -> P.Seeds:
-    """The nodes and trunks of joint coordinates (n, columns), deviations from home."""
+    """Node positions and trunk coordinates at joint coordinates (n, columns), deviations from home."""
     plan, bodies = compiled.plan, displacements(mechanism, coordinates)
     home, n = compiled.home_seed, len(coordinates)
     nodes, trunks = np.repeat(home.nodes, n, axis=0), np.zeros((n, home.trunks.shape[1]))
@@ -37,14 +37,14 @@ def positions_of(mechanism: Mechanism, compiled: CompiledPlan, coordinates: Floa
 
 
 def holding(mechanism: Mechanism) -> Weights:
-    """What holds the platform where it is; of a joint end effector nothing holds its body's orientation."""
+    """Weights that hold the platform's pose; a joint end effector has no orientation to hold."""
     return (*HELD[:3], 0.0, 0.0, 0.0) if mechanism.end_effector_is_joint else HELD
 
 
-def new_reached(compiled: CompiledPlan, n: int) -> P.Reached:
-    """Room for where n rows end."""
+def new_pass_results(compiled: CompiledPlan, n: int) -> P.PassResults:
+    """Allocate n results."""
     home = compiled.home_seed
-    return P.Reached(
+    return P.PassResults(
         poses=np.empty((n, 4, 4)),
         nodes=np.empty((n, *home.nodes.shape[1:])),
         trunks=np.empty((n, home.trunks.shape[1])),
@@ -54,49 +54,49 @@ def new_reached(compiled: CompiledPlan, n: int) -> P.Reached:
     )
 
 
-def place(mechanism: Mechanism, compiled: CompiledPlan, begin: Floats, reached: P.Reached) -> Closing:
-    """Joint coordinates that follow where joint centres and platforms are, from others (n, columns).
+def place(mechanism: Mechanism, compiled: CompiledPlan, begin: Floats, results: P.PassResults) -> Closing:
+    """Joint coordinates that fit joint centres and platform poses, by least squares from a start (n, columns).
 
-    What centres leave open (a rod's spin) stays next to where it began. Loops are open by about the gap of the chains;
-    rows that follow worse are tried from elsewhere.
+    What the centres leave open (a rod's spin) stays near the start. Loops are open by about the gap of the chains; rows
+    that fit worse are repeated from random starts.
     """
-    closure, poses = closure_of(mechanism, whole=False), reached.poses
-    platform, centres = holding(mechanism), _centres(mechanism, compiled, reached)
+    closure, poses = closure_of(mechanism, whole=False), results.poses
+    platform, centres = holding(mechanism), _centres(mechanism, compiled, results)
     placed = close(closure, begin, poses, platform=platform, centres=centres)
-    near = 2.0 * reached.gaps / mechanism.characteristic_length + TOLERANCES.position
+    near = 2.0 * results.gaps / mechanism.characteristic_length + TOLERANCES.position
     rng = np.random.default_rng(0)
     for _ in range(RESTARTS):
-        rest = np.flatnonzero(_off(placed) > near)
-        if not len(rest):
+        unsolved = np.flatnonzero(_misfit(placed) > near)
+        if not len(unsolved):
             break
         turns = np.where(closure.idle, 0.0, rng.uniform(-np.pi, np.pi, begin.shape[1]) * closure.turning)
-        tried = close(closure, begin[rest] + turns, poses[rest], platform=platform, centres=centres[rest])
-        better = _off(tried) < _off(placed)[rest]
-        placed.take(rest[better], tried, better)
+        trial = close(closure, begin[unsolved] + turns, poses[unsolved], platform=platform, centres=centres[unsolved])
+        is_better = _misfit(trial) < _misfit(placed)[unsolved]
+        placed.put(unsolved[is_better], trial, is_better)
     return placed
 
 
-def _off(placed: Closing) -> Floats:
-    """Largest gap or miss of each row [L or rad]."""
-    return np.asarray(np.maximum(placed.gap, placed.misses.max(axis=1, initial=0.0)))
+def _misfit(closing: Closing) -> Floats:
+    """Largest gap or distance of a joint centre from its target in each row, (n,) [L or rad]."""
+    return np.asarray(np.maximum(closing.gap, closing.misses.max(axis=1, initial=0.0)))
 
 
-def _centres(mechanism: Mechanism, compiled: CompiledPlan, reached: P.Reached) -> Floats:
-    """Joint centres as the closure kernel wishes for them, (n, joints, 3); NaN for those that cannot be read."""
-    readable = _readable_centres(mechanism)
-    wished = np.full((len(reached.poses), len(mechanism.joints), 3), np.nan)
-    points = joint_points(compiled, reached)
+def _centres(mechanism: Mechanism, compiled: CompiledPlan, results: P.PassResults) -> Floats:
+    """Target positions of joint centres for the closure kernel, (n, joints, 3); NaN for centres that are unknown."""
+    joints_with_centre = _joints_with_centre(mechanism)
+    centres = np.full((len(results.poses), len(mechanism.joints), 3), np.nan)
+    points = joint_points(compiled, results)
     for place, joint in enumerate(mechanism.joints):
-        if joint.name in readable:
-            wished[:, place] = points[joint.name]
-    return wished
+        if joint.name in joints_with_centre:
+            centres[:, place] = points[joint.name]
+    return centres
 
 
 @lru_cache(maxsize=64)
-def _readable_centres(mechanism: Mechanism) -> frozenset[str]:
-    """Joints whose centres positions tell: not those merged with others into one at a common centre."""
+def _joints_with_centre(mechanism: Mechanism) -> frozenset[str]:
+    """Names of joints whose centres follow from node positions: not those merged with others into one joint."""
     compiled = compile_plan(mechanism)
-    home = new_reached(compiled, 1)._replace(**compiled.home_seed._asdict())
+    home = new_pass_results(compiled, 1)._replace(**compiled.home_seed._asdict())
     near = TOLERANCES.position * mechanism.characteristic_length
     return frozenset(
         name
@@ -105,31 +105,32 @@ def _readable_centres(mechanism: Mechanism) -> frozenset[str]:
     )
 
 
-def joint_points(compiled: CompiledPlan, reached: P.Reached) -> dict[str, Floats]:
+def joint_points(compiled: CompiledPlan, results: P.PassResults) -> dict[str, Floats]:
     """Joint name -> position of its centre in the base frame, (n, 3); joints that act as one share a centre."""
-    carriers, screw_points = _carriers(compiled.plan, reached.trunks)
-    found = {name: screw_points[joint] for name, joint in compiled.trunk_points}
+    carriers, trunk_centres = _carriers(compiled.plan, results.trunks)
+    points = {name: trunk_centres[joint] for name, joint in compiled.trunk_points}
     for point in compiled.points:
-        turning = reached.poses[:, :3, :3] if point.carrier < 0 else carriers[point.carrier][:, :3, :3]
-        found[point.joint] = _node(compiled.plan, reached, point.node, carriers) + turning @ (point.shift * point.axis)
-    return found
+        rotations = results.poses[:, :3, :3] if point.carrier < 0 else carriers[point.carrier][:, :3, :3]
+        node = _node(compiled.plan, results, point.node, carriers)
+        points[point.joint] = node + rotations @ (point.shift * point.axis)
+    return points
 
 
-def _node(plan: P.Plan, reached: P.Reached, k: int, carriers: list[Floats]) -> Floats:
+def _node(plan: P.Plan, results: P.PassResults, k: int, carriers: list[Floats]) -> Floats:
     """Positions (n, 3) of node k: stored, on the platform, or on its carrier."""
     node = plan.nodes[k]
     if node["stored"] >= 0:
-        return reached.nodes[:, node["stored"]]
+        return results.nodes[:, node["stored"]]
     branch = plan.branches[np.searchsorted(plan.branches["last"], k)]
     if k == branch["last"]:
-        T, point = reached.poses, branch["end"]
+        T, point = results.poses, branch["end"]
     else:
         T, point = carriers[branch["carrier"]], node["home"]
     return cast(Floats, T[:, :3, :3] @ point + T[:, :3, 3])
 
 
 def _carriers(plan: P.Plan, trunk_values: Floats) -> tuple[list[Floats], list[Floats]]:
-    """Poses (n, 4, 4) of the base and of every trunk's body, and the present centres (n, 3) of the trunk joints."""
+    """Poses (n, 4, 4) of the carriers (the base and every trunk's body), and the centres (n, 3) of the trunk joints."""
     n = len(trunk_values)
     carriers = [np.broadcast_to(np.eye(4), (n, 4, 4))]
     centres: list[Floats] = []
@@ -144,13 +145,13 @@ def _carriers(plan: P.Plan, trunk_values: Floats) -> tuple[list[Floats], list[Fl
 
 
 def _motion(joint: Any, values: Floats) -> Floats:
-    """The motions (n, 4, 4) of one trunk joint at its home place."""
+    """The displacements (n, 4, 4) of one trunk joint about or along its axis at home."""
     axis, point = joint["axis"], joint["point"]
-    moved = np.zeros((len(values), 4, 4))
-    moved[:] = np.eye(4)
+    T = np.zeros((len(values), 4, 4))
+    T[:] = np.eye(4)
     if joint["kind"] == P.SLIDE:
-        moved[:, :3, 3] = values[:, None] * axis
-        return moved
-    moved[:, :3, :3] = from_rotvec(values[:, None] * axis)
-    moved[:, :3, 3] = point - moved[:, :3, :3] @ point
-    return moved
+        T[:, :3, 3] = values[:, None] * axis
+        return T
+    T[:, :3, :3] = from_rotvec(values[:, None] * axis)
+    T[:, :3, 3] = point - T[:, :3, :3] @ point
+    return T

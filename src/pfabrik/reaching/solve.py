@@ -1,4 +1,4 @@
-"""The paper's method: targets answered by passes on joint positions, and projected where these do not reach."""
+"""The paper's method: passes on joint positions that reach targets, and its projection of those they do not reach."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..closure.close import Closing, close, closure_of
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
-from ..closure.descend import within_sight
-from ..closure.projection import Way, kept, ways_of
-from ..closure.solve import ClosureEngine, begin_of, told
+from ..closure.descend import clip_targets
+from ..closure.projection import ProjectionMode, held_parts, projection_modes
+from ..closure.solve import ClosureEngine, start_coordinates, to_answers
 from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
@@ -28,23 +28,23 @@ from ..platform.answers import sides_at
 from ..platform.solve import LegsEngine
 from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
-from .positions import holding, new_reached, place, positions_of
+from .positions import holding, new_pass_results, place, positions_of
 
 NEAR = 1e-3
-"""Share of L within which passes bring the ends of chains where exact answers are asked for: loops close from there."""
+"""Tolerance of the passes [L] if exact answers follow: loops are closed from there."""
 
 STEPS = 8
-"""Steps to come as near as chains can, each round."""
+"""Steps of each round that bring the ends of chains as near as possible."""
 
 ROWS_A_BLOCK = 64
 
 
 class ReachingEngine:
-    """The paper's method on joint positions, for mechanisms whose chains these express.
+    """The paper's method, for mechanisms whose chains can be expressed by joint positions.
 
-    Passes bring the ends of chains near, and move the target where they do not; from there the loops are closed
-    exactly. With `Options.exact`, what another engine reaches is that one's answer; that engine also answers what the
-    passes leave no feasible configuration for.
+    Passes bring the ends of chains to the target, or else move the target; from there the loops are closed exactly.
+    With `Options.exact`, targets that another engine reaches are answered by that engine. It also answers targets for
+    which the passes end in no feasible configuration.
     """
 
     def __init__(self, mechanism: Mechanism, exact: LegsEngine | ClosureEngine) -> None:
@@ -55,25 +55,25 @@ class ReachingEngine:
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
-        """Answer targets (n, 4, 4), each for itself, from one configuration or one for each; INVALID where no pose."""
-        known = are_poses(targets)
+        """Solve for targets (n, 4, 4) independently, from one start or one for each; INVALID where no pose."""
+        is_valid = are_poses(targets)
         if options.exact:
-            found = self._exact.answer(targets, start, options, keep_mode=keep_mode)
-            away = np.flatnonzero(known & (found.rows.status != REACHED))
-            if not len(away):
-                return found
-            found = Configurations(found.rows, found.coordinates)
-            tried = self._by_passes(made_exact(targets[away]), _at(start, away), options, keep_mode)
-            good = tried.rows.status != FAILED
-            found.replace(away[good], tried, good)
-            return found
-        own = _at(start, np.flatnonzero(known))
-        found = self._by_passes(made_exact(targets[known]), own, options, keep_mode)
-        away = np.flatnonzero(found.rows.status == FAILED)
-        if len(away):
-            others = self._exact.answer(targets[known][away], _at(own, away), options, keep_mode=keep_mode)
-            found.replace(away, others, np.ones(len(away), bool))
-        return found.among(known)
+            solutions = self._exact.answer(targets, start, options, keep_mode=keep_mode)
+            missed = np.flatnonzero(is_valid & (solutions.rows.status != REACHED))
+            if not len(missed):
+                return solutions
+            solutions = Configurations(solutions.rows, solutions.coordinates)
+            projected = self._by_passes(made_exact(targets[missed]), _at(start, missed), options, keep_mode)
+            is_feasible = projected.rows.status != FAILED
+            solutions.put(missed[is_feasible], projected, is_feasible)
+            return solutions
+        starts = _at(start, np.flatnonzero(is_valid))
+        solutions = self._by_passes(made_exact(targets[is_valid]), starts, options, keep_mode)
+        failed = np.flatnonzero(solutions.rows.status == FAILED)
+        if len(failed):
+            fallback = self._exact.answer(targets[is_valid][failed], _at(starts, failed), options, keep_mode=keep_mode)
+            solutions.put(failed, fallback, np.ones(len(failed), bool))
+        return solutions.scatter(is_valid)
 
     def follow(
         self,
@@ -82,123 +82,126 @@ class ReachingEngine:
         options: Options,
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
-        """Answer a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        known, before = are_poses(targets), start
-        found = new_rows(self.mechanism, len(targets))
-        coordinates = np.zeros((len(targets), begin_of(self.mechanism, start).shape[1]))
-        for i in steps_of(known, on_progress):
-            answer = self.answer(targets[i : i + 1], before, options, keep_mode=True)
-            before = Configurations(answer.rows, answer.coordinates)
-            put_rows(found, slice(i, i + 1), before.rows)
-            coordinates[i] = before.coordinates[0]
-        return Configurations(rows_at(found, known), coordinates[known]).among(known)
+        """Solve a path (n, 4, 4), each target from the answer before it, in its working mode."""
+        is_valid, previous = are_poses(targets), start
+        rows = new_rows(self.mechanism, len(targets))
+        coordinates = np.zeros((len(targets), start_coordinates(self.mechanism, start).shape[1]))
+        for i in steps_of(is_valid, on_progress):
+            answer = self.answer(targets[i : i + 1], previous, options, keep_mode=True)
+            previous = Configurations(answer.rows, answer.coordinates)
+            put_rows(rows, slice(i, i + 1), previous.rows)
+            coordinates[i] = previous.coordinates[0]
+        return Configurations(rows_at(rows, is_valid), coordinates[is_valid]).scatter(is_valid)
 
     def _by_passes(
-        self, wanted: Floats, start: Configurations | None, options: Options, keep_mode: bool
+        self, targets: Floats, start: Configurations | None, options: Options, keep_mode: bool
     ) -> Configurations:
-        """Answer poses by passes; FAILED where these end in nothing feasible, or leave the mode to be kept."""
-        begin = begin_of(self.mechanism, start)
-        begin = np.repeat(begin, len(wanted), axis=0) if len(begin) == 1 else begin
-        way = ways_of(self.mechanism, options.hold, options.rotation_length)[0]
-        found = self._tried(wanted, begin, options, way)
+        """Solve for poses by passes; FAILED where infeasible, or where the working mode is to be kept and is not."""
+        begin = start_coordinates(self.mechanism, start)
+        begin = np.repeat(begin, len(targets), axis=0) if len(begin) == 1 else begin
+        projection = projection_modes(self.mechanism, options.hold, options.rotation_length)[0]
+        solutions = self._solve_from(targets, begin, options, projection)
         if keep_mode:
-            strayed = (self._sides(found) * self._sides(start) < 0.0).any(axis=1)
-            found.rows.status[strayed] = FAILED
-        return found
+            has_left_mode = (self._sides(solutions) * self._sides(start) < 0.0).any(axis=1)
+            solutions.rows.status[has_left_mode] = FAILED
+        return solutions
 
-    def _sides(self, found: Configurations | None) -> Floats:
-        """The working mode of configurations, home's for None: which of its two solutions each leg takes, (n, legs)."""
+    def _sides(self, configurations: Configurations | None) -> Floats:
+        """The working mode of configurations, or of home: the side of each leg, (n, legs); 0 for legs without one."""
         if not isinstance(self._table, LegTable):
             return np.zeros((1, 0))
         legs, home = self._table.legs, self._table.home_sides
-        chosen = (legs["kind"] != REDUNDANT) | (legs["orients"] == 1)
-        return np.where(chosen, home if found is None else sides_at(self.mechanism, self._table, found), 0.0)
+        has_side = (legs["kind"] != REDUNDANT) | (legs["orients"] == 1)
+        sides = home if configurations is None else sides_at(self.mechanism, self._table, configurations)
+        return np.where(has_side, sides, 0.0)
 
-    def _tried(self, wanted: Floats, begin: Floats, options: Options, way: Way) -> Configurations:
-        """Answer poses by passes one way, from joint coordinates (n, columns); FAILED where the loops do not close."""
+    def _solve_from(
+        self, targets: Floats, begin: Floats, options: Options, projection: ProjectionMode
+    ) -> Configurations:
+        """Solve for poses by passes from joint coordinates (n, columns); FAILED where the loops do not close."""
         closure = closure_of(self.mechanism, whole=False)
-        settings, sought = settings_of(self.mechanism, options, way), within_sight(self.mechanism, wanted)
+        settings, clipped = settings_of(self.mechanism, options, projection), clip_targets(self.mechanism, targets)
         if options.exact and not self._is_struts:
-            placed, reached = self._agree(sought, begin, settings)
+            placed, results = self._move_to_fit(clipped, begin, settings)
         else:
-            passes = settings._replace(max_iterations=1) if options.exact else settings
-            reached = self._run(sought, begin, passes)
-            placed = place(self.mechanism, self._compiled, begin, reached)
+            pass_settings = settings._replace(max_iterations=1) if options.exact else settings
+            results = self._run(clipped, begin, pass_settings)
+            placed = place(self.mechanism, self._compiled, begin, results)
         margin = TOLERANCES.inside
-        closed = close(closure, placed.coordinates, placed.poses, platform=way.held, limits=True, margin=margin)
-        errors = task_of(self.mechanism).errors(closed.poses, wanted)
-        slipped = np.flatnonzero((reached.rounds == 0) & (errors[0] > settings.enough))
-        if len(slipped):  # loops that close only off a target that chains came near to may close on it
-            start = placed.coordinates[slipped], placed.poses[slipped]
-            closed.improve(slipped, close(closure, *start, platform=self._held, limits=True, margin=margin))
-            errors = task_of(self.mechanism).errors(closed.poses, wanted)
-        holds = kept(self.mechanism, np.full(len(wanted), way.hold), *errors)
-        found = told(closure, closed, wanted, holds, options)
-        found.rows.counters[:, ITERATIONS], found.rows.counters[:, ROUNDS] = reached.iterations, reached.rounds
-        return found
+        closed = close(closure, placed.coordinates, placed.poses, platform=projection.held, limits=True, margin=margin)
+        errors = task_of(self.mechanism).errors(closed.poses, targets)
+        shifted = np.flatnonzero((results.rounds == 0) & (errors[0] > settings.enough))
+        if len(shifted):  # the chains came near this target, but closing the loops moved the platform: hold it
+            start = placed.coordinates[shifted], placed.poses[shifted]
+            closed.put_better(shifted, close(closure, *start, platform=self._held, limits=True, margin=margin))
+            errors = task_of(self.mechanism).errors(closed.poses, targets)
+        holds = held_parts(self.mechanism, np.full(len(targets), projection.hold), *errors)
+        solutions = to_answers(closure, closed, targets, holds, options)
+        solutions.rows.counters[:, ITERATIONS] = results.iterations
+        solutions.rows.counters[:, ROUNDS] = results.rounds
+        return solutions
 
-    def _agree(self, wanted: Floats, begin: Floats, settings: P.Settings) -> tuple[Closing, P.Reached]:
-        """Configurations with their platforms where chains that come as near as they can agree.
+    def _move_to_fit(self, targets: Floats, begin: Floats, settings: P.Settings) -> tuple[Closing, P.PassResults]:
+        """Move the platform round by round to where all chains reach it, each chain fitted by least squares.
 
-        Passes are caught by the ranges of joints. As near as it can is here what closes the chain's loops in the sense
-        of least squares, with all that it misses put at its ends.
+        This replaces passes, which can get stuck at the ranges of joints. The remaining gap of a chain is at its end.
         """
         closure = closure_of(self.mechanism, whole=False)
-        reached, rest = new_reached(self._compiled, len(wanted)), np.arange(len(wanted))
-        reached.rounds[:] = 0
-        placed = close(closure, begin, wanted, platform=self._held, limits=True, max_iterations=0)
+        results, unsolved = new_pass_results(self._compiled, len(targets)), np.arange(len(targets))
+        results.rounds[:] = 0
+        placed = close(closure, begin, targets, platform=self._held, limits=True, max_iterations=0)
         once = settings._replace(max_iterations=0, max_rounds=1)
         for _ in range(settings.max_rounds):
-            start, poses = placed.coordinates[rest], placed.poses[rest]
-            tried = close(closure, start, poses, platform=self._held, limits=True, max_iterations=STEPS)
-            ended = self._run(tried.poses.copy(), tried.coordinates, once)
+            start, poses = placed.coordinates[unsolved], placed.poses[unsolved]
+            fitted = close(closure, start, poses, platform=self._held, limits=True, max_iterations=STEPS)
+            revised = self._run(fitted.poses.copy(), fitted.coordinates, once)
             if not self.mechanism.end_effector_is_joint:
-                tried.poses[:] = ended.poses
-            tried.poses[:, :3, 3] = ended.poses[:, :3, 3]
-            placed.take(rest, tried)
-            rounds = reached.rounds[rest] + ended.rounds
-            for array, own in zip(reached, ended, strict=True):
-                array[rest] = own
-            reached.rounds[rest] = rounds
-            rest = rest[ended.gaps > settings.enough]
-            if not len(rest):
+                fitted.poses[:] = revised.poses
+            fitted.poses[:, :3, 3] = revised.poses[:, :3, 3]
+            placed.put(unsolved, fitted)
+            rounds = results.rounds[unsolved] + revised.rounds
+            for array, revised_array in zip(results, revised, strict=True):
+                array[unsolved] = revised_array
+            results.rounds[unsolved] = rounds
+            unsolved = unsolved[revised.gaps > settings.enough]
+            if not len(unsolved):
                 break
-        reached.iterations[:] = reached.rounds
-        return placed, reached
+        results.iterations[:] = results.rounds
+        return placed, results
 
     @cached_property
     def _is_struts(self) -> bool:
-        """Whether one pass brings all ends as near as they come: single segments on the base."""
+        """True if all branches are single segments on the base, whose ends one pass brings as near as possible."""
         branches = self._compiled.plan.branches
         return bool((branches["last"] - branches["first"] <= 1).all() and (branches["carrier"] == 0).all())
 
-    def _run(self, wanted: Floats, begin: Floats, settings: P.Settings) -> P.Reached:
-        """The kernel over all rows, on all cores."""
+    def _run(self, targets: Floats, begin: Floats, settings: P.Settings) -> P.PassResults:
+        """Run the kernel on all rows, on all cores; rotations of targets of a joint end effector are overwritten."""
         from ..kernels.reaching.solve import solve_by_passes
 
-        if self.mechanism.end_effector_is_joint:  # a point has no orientation: home's
-            wanted[:, :3, :3] = np.eye(3)
+        if self.mechanism.end_effector_is_joint:  # a point has no orientation; that of home is used
+            targets[:, :3, :3] = np.eye(3)
         seeds = positions_of(self.mechanism, self._compiled, begin)
-        reached = new_reached(self._compiled, len(wanted))
+        results = new_pass_results(self._compiled, len(targets))
 
         def run(block: slice) -> None:
-            own = P.Seeds._make(array[block] for array in seeds)
-            ends = P.Reached._make(array[block] for array in reached)
-            solve_by_passes(self._compiled.plan, wanted[block], own, settings, ends)
+            block_seeds = P.Seeds._make(array[block] for array in seeds)
+            block_results = P.PassResults._make(array[block] for array in results)
+            solve_by_passes(self._compiled.plan, targets[block], block_seeds, settings, block_results)
 
-        in_blocks(run, len(wanted), ROWS_A_BLOCK)
-        return reached
+        in_blocks(run, len(targets), ROWS_A_BLOCK)
+        return results
 
 
 def _at(start: Configurations | None, places: NDArray[np.intp]) -> Configurations | None:
-    """Where rows start: one configuration for all stays one."""
+    """The starts of some rows; a single start for all rows is returned as it is."""
     return start if start is None or len(start) == 1 else start.at(places)
 
 
 @lru_cache(maxsize=256)
-def settings_of(mechanism: Mechanism, options: Options, way: Way) -> P.Settings:
-    """Options as the kernel takes them; where exact steps follow, passes end sooner."""
-    length, free = mechanism.characteristic_length, [weight != LOCKED and weight > 0.0 for weight in way.weights]
+def settings_of(mechanism: Mechanism, options: Options, projection: ProjectionMode) -> P.Settings:
+    """Options as the kernel reads them; passes end sooner if exact steps follow."""
+    length, free = mechanism.characteristic_length, [weight != LOCKED and weight > 0.0 for weight in projection.weights]
     tolerance = float(options.tolerance or TOLERANCES.position * length)
     return P.Settings(
         enough=max(tolerance, NEAR * length) if options.exact else tolerance,

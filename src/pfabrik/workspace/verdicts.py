@@ -75,7 +75,9 @@ class Question:
         if self.has_margins or self.hold == "position" or len(self.turns) > 1 or not isinstance(engine, ClosureEngine):
             return None
         home = home_coordinates(self.mechanism)
-        start = configuration(self.mechanism, home)._found if self.start is None else self.start._found
+        start = (
+            configuration(self.mechanism, home)._configurations if self.start is None else self.start._configurations
+        )
         at = self.space.start
         return Explorer(engine, start, self.space.poses(at[None])[0], at / self._lengths)
 

@@ -1,4 +1,4 @@
-"""Closing loops: Levenberg-Marquardt on all joint coordinates and the platform's pose at once.
+"""Closing loops by Levenberg-Marquardt on all joint coordinates and the platform's pose at once.
 
 The residual of a path is how its last body differs from the platform: position [L] and rotation vector [rad]. Every
 group of paths has coordinates of its own, so its share of the normal equations is eliminated by itself, and six
@@ -43,19 +43,19 @@ from .path_kinematics import (
 LONGEST_STEP = 0.5
 """Longest step of any coordinate [rad or L]: beyond it the linear model says nothing."""
 
-# What the next look at the equations is for: a step just tried, the way back from a bad one, or the last measures.
+# Purpose of the next evaluation of the equations: of a trial step, of the best after a rejected step, of the end.
 TRY, RETURN, MEASURE = 0, 1, 2
 
 DAMPING = 0.01
 """Damping at the start, relative to the sum of squares."""
 
 LEAST_DAMPING, MOST_DAMPING = 1e-14, 1e6
-"""Damping of the normal equations, whose entries are of order one: the least keeps idle motions (a rod's own spin)
-still without slowing convergence, the most ends a search that finds no way down."""
+"""Damping of the normal equations, whose entries are of order one: the least stops idle motions (a rod's own spin)
+without slowing convergence; the most ends a search in which no step reduces the cost."""
 
 FEW = 100
-"""Coordinates of one group up to which the least damping is above the rounding of its factor, which grows with the
-cube of their number: six equations leave all but six of its pivots to damping."""
+"""Coordinates of one group up to which the least damping exceeds the rounding errors of the factor. These grow with the
+cube of the number of coordinates, as six equations leave all but six pivots to damping."""
 
 
 class ClosingScratch(NamedTuple):
@@ -75,8 +75,8 @@ open_scratch = opener(new_closing_scratch(LOOPS, LAYOUT))
 
 
 @inlined
-def note(eq: Equations, row: int, closed: Closed) -> None:
-    """What was measured of the configuration that is the best so far."""
+def store_measures(eq: Equations, row: int, closed: Closed) -> None:
+    """Write gaps, excesses and misses of the present configuration to a row of the results."""
     for group in range(len(eq.gaps)):
         closed.gaps[row, group] = eq.gaps[group]
         closed.excesses[row, group] = eq.excesses[group]
@@ -84,15 +84,14 @@ def note(eq: Equations, row: int, closed: Closed) -> None:
 
 
 LONG, BESIDE = 48, 8
-"""Coordinates of one group from which on it is factorised by rows, which are long enough then to be worth it; and how
-many of them beside each other."""
+"""Coordinates of one group from which on it is factorised by rows, and rows per block."""
 
 
 @routine
 def factorise_long(A: Floats, size: int, damping: float, L: Floats) -> None:
-    """The Cholesky factor L L^T = A + damping, one over its diagonal there, by the rows of L^T.
+    """The Cholesky factor of A + damping = L L^T, with the inverse of its diagonal on the diagonal, by rows of L^T.
 
-    Entry by entry the same sums as `eliminate` takes, in an order in which they are contiguous.
+    It takes the sums of `eliminate` in an order that accesses memory contiguously.
     """
     for first in range(0, size, BESIDE):
         last = min(first + BESIDE, size)
@@ -193,7 +192,7 @@ def solve(layout: Layout, damping: float, eq: Equations) -> None:
 
 @inlined
 def move(loops: Loops, layout: Layout, eq: Equations, state: State) -> float:
-    """Take the step, shortened where it turns too far, or slides farther than the largest gap; its largest part."""
+    """Apply the step, shortened if it turns too far or slides farther than the largest gap; its largest component."""
     gap = 1.0
     for group in range(len(layout.sizes)):
         gap = max(gap, eq.gaps[group] / LONGEST_STEP)
@@ -232,7 +231,7 @@ def move(loops: Loops, layout: Layout, eq: Equations, state: State) -> float:
 
 @inlined
 def is_close(problem: ClosureProblem, eq: Equations) -> bool:
-    """Whether all that must hold does."""
+    """True if gaps, misses and, if they are to be kept, excesses are within `closeness`."""
     largest = 0.0
     for group in range(len(eq.gaps)):
         largest = max(largest, eq.gaps[group], eq.misses[group])
@@ -243,7 +242,7 @@ def is_close(problem: ClosureProblem, eq: Equations) -> bool:
 
 @inlined
 def least_damping(layout: Layout) -> float:
-    """The least damping of groups as large as these."""
+    """The least damping for the size of the largest group."""
     largest = FEW
     for group in range(len(layout.sizes)):
         largest = max(largest, layout.sizes[group])
@@ -254,22 +253,22 @@ def least_damping(layout: Layout) -> float:
 def close_row(
     loops: Loops, layout: Layout, problem: ClosureProblem, row: int, scratch: ClosingScratch, closed: Closed
 ) -> int:
-    """Close the loops of a row, from `scratch.trial`, into `scratch.best`; how many steps it took."""
+    """Close the loops of a row, from `scratch.trial`, into `scratch.best`; the number of steps."""
     best, trial, eq = scratch.best, scratch.trial, scratch.eq
     least = least_damping(layout)
-    plunging, keeps_yaw = problem.plunging == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
+    undamped, keeps_yaw = problem.undamped == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
     copy_state(trial, best)
     cost, factor, step = math.inf, 1.0, math.inf
-    iterations, turn = 0, TRY
+    iterations, phase = 0, TRY
     while True:
         clear(layout, eq)
-        found = 0.0
-        if turn != MEASURE:
-            found += add_paths(loops, layout, problem, row, trial, eq)
-        if problem.limits == 1 or turn == MEASURE:
-            found += add_ranges(loops, layout.slots, trial, problem.margin, eq)
-            found += add_cones(loops, layout.slots, trial, problem.margin, eq)
-        if turn == MEASURE:
+        trial_cost = 0.0
+        if phase != MEASURE:
+            trial_cost += add_paths(loops, layout, problem, row, trial, eq)
+        if problem.limits == 1 or phase == MEASURE:
+            trial_cost += add_ranges(loops, layout.slots, trial, problem.margin, eq)
+            trial_cost += add_cones(loops, layout.slots, trial, problem.margin, eq)
+        if phase == MEASURE:
             for group in range(len(layout.sizes)):
                 closed.excesses[row, group] = eq.excesses[group]
             break
@@ -277,33 +276,33 @@ def close_row(
             pose_frame(trial, problem, eq)
             turn_equations(eq.frame, layout, eq)
         hold_platform(problem, eq)
-        if turn == TRY:
-            if found < cost or plunging:
-                gained, cost = cost - found, found
+        if phase == TRY:
+            if trial_cost < cost or undamped:
+                reduction, cost = cost - trial_cost, trial_cost
                 copy_state(trial, best)
-                note(eq, row, closed)
+                store_measures(eq, row, closed)
                 factor = max(factor / 4.0, 1e-3)
-                if is_close(problem, eq) or (gained <= 1e-13 * cost and not plunging):
-                    turn = MEASURE
+                if is_close(problem, eq) or (reduction <= 1e-13 * cost and not undamped):
+                    phase = MEASURE
             else:
                 factor *= 8.0
-                turn = MEASURE if step < 1e-12 else RETURN
+                phase = MEASURE if step < 1e-12 else RETURN
                 copy_state(best, trial)
-        elif turn == RETURN:
-            turn = TRY
-        damping = least if plunging else max(least, DAMPING * factor * min(cost, 1.0))
-        if turn == TRY and (iterations == problem.max_iterations or not damping < MOST_DAMPING):
-            turn = MEASURE
-        if turn == TRY:
+        elif phase == RETURN:
+            phase = TRY
+        damping = least if undamped else max(least, DAMPING * factor * min(cost, 1.0))
+        if phase == TRY and (iterations == problem.max_iterations or not damping < MOST_DAMPING):
+            phase = MEASURE
+        if phase == TRY:
             solve(layout, damping, eq)
             if problem.frame != BASE_AXES:
                 out_of_frame(eq.frame, eq.twist)
             yaw = yaw_of(trial.X) if keeps_yaw else 0.0
             step = move(loops, layout, eq, trial)
             if keeps_yaw:
-                turn_about_z(trial.X, yaw - yaw_of(trial.X))  # what it yawed to second order
+                turn_about_z(trial.X, yaw - yaw_of(trial.X))  # undo the yaw of second order
             iterations += 1
-        elif turn == MEASURE:
+        elif phase == MEASURE:
             if problem.balls_follow == 1:
                 follow_platform(loops, best, eq)
             copy_state(best, trial)
@@ -312,14 +311,13 @@ def close_row(
 
 @search
 def close(machine: int, locked: int, scratch_address: int, problem: ClosureProblem, closed: Closed) -> None:
-    """Close the loops of every row, nearest to what is wished.
+    """Close the loops of every row, by least squares.
 
-    A row ends when all that must hold is within `problem.closeness`, when its steps or gains vanish, or after
-    `problem.max_iterations`; what was measured of it tells how far it came.
+    The iteration of a row ends when `is_close`, when steps or reductions vanish, or after `problem.max_iterations`.
 
     Parameters
     ----------
-    machine, locked, scratch : see `open_loops`, `open_layout` and `new_closing_scratch`.
+    machine, locked, scratch_address : addresses of `Loops`, `Layout` and `ClosingScratch`.
     """
     loops, layout, scratch = open_loops(machine), open_layout(locked), open_scratch(scratch_address)
     for row in range(len(closed.coordinates)):

@@ -1,7 +1,7 @@
-"""The nearest feasible configuration: a descent on joint coordinates along closed loops, within every limit.
+"""The nearest feasible configuration by a descent in joint coordinates along closed loops, within every limit.
 
-Its unknowns are the motions that the loops leave free, found anew at each configuration; each step is brought back
-onto the loops before it is judged, so that every configuration on the way is feasible.
+The unknowns are the motions that the loops leave free, computed anew at each configuration. Each step is restored onto
+the loops before it is accepted, so that every accepted configuration is feasible.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from .pose_objective import pose_gradient
 def lagrangian_gradient(
     loops: Loops, row: int, objective: Objective, state: State, scratch: DescentScratch, out: Floats
 ) -> None:
-    """Gradient of the Lagrangian at a configuration, by multipliers of limits and the `balance` of the loops."""
+    """Gradient of the Lagrangian at a configuration, with multipliers of limits and, in `balance`, of the loops."""
     n, paths, multipliers = len(loops.lo), len(loops.paths) - 1, scratch.hessian.multipliers
     walk_all(loops, state, scratch)
     _, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, scratch.gradient, True)
@@ -75,9 +75,9 @@ def lagrangian_gradient(
 def lagrangian_hessian(
     loops: Loops, row: int, objective: Objective, scratch: DescentScratch, reduced: FreeMotions
 ) -> float:
-    """Curvature of objective and active limits along the loops, at `scratch.best`; the largest on the diagonal.
+    """Reduced Hessian of the Lagrangian at `scratch.best`; its largest diagonal entry.
 
-    By differences of the gradient of the Lagrangian, whose multipliers of the loops balance it at pivot coordinates.
+    By differences of the gradient of the Lagrangian. The multipliers of the loops make this zero at pivot coordinates.
     """
     n, linear, H, trial = len(loops.lo), reduced.linear, scratch.hessian.H, scratch.trial
     motions = linear.totals[0]["motions"]
@@ -102,7 +102,7 @@ def lagrangian_hessian(
 
 @routine
 def move(loops: Loops, step: Floats, share: float, state: State) -> None:
-    """Take a share of a step."""
+    """Add a share of a step to a configuration."""
     for k in range(len(loops.kinds)):
         j = loops.columns[k]
         if loops.kinds[k] == BALL:
@@ -112,8 +112,8 @@ def move(loops: Loops, step: Floats, share: float, state: State) -> None:
 
 
 @routine
-def take(loops: Loops, reduced: FreeMotions, x: Floats, state: State, scratch: DescentScratch) -> float:
-    """Take a step of the free motions, and with it one that closes the loops; the share of it that is not too long."""
+def take_step(loops: Loops, reduced: FreeMotions, x: Floats, state: State, scratch: DescentScratch) -> float:
+    """Take a step of the free motions, with the one that closes the loops to first order; the share that was taken."""
     put_step(x, reduced, scratch.row)
     share = LONGEST_STEP / max(longest(scratch.row, len(loops.lo)), LONGEST_STEP)
     move(loops, scratch.row, share, state)
@@ -130,24 +130,24 @@ def restore_feasibility(
     scratch: DescentScratch,
     reduced: FreeMotions,
 ) -> bool:
-    """Bring a configuration, at which `reduced` is, onto its loops and within its limits, by the shortest way.
+    """Restore a configuration, linearised in `reduced`, onto its loops and within its limits by shortest steps.
 
-    Both to a tolerance; where rounding keeps it from that, to what counts as closed.
+    True if both hold to the tolerance, or after all steps, if rounding prevents that, to `NEARLY_CLOSED`.
     """
     for _step in range(RESTORING):
         if is_closed(reduced.linear, tolerance):
             return True
-        if not restoring_step(reduced, False, scratch.p):  # by all, steps leap over wrists' singularities
+        if not restoring_step(reduced, False, scratch.p):  # using all motions, steps jump over wrist singularities
             return False
-        take(loops, reduced, scratch.p.x, state, scratch)
+        take_step(loops, reduced, scratch.p.x, state, scratch)
         linearise(loops, row, objective, state, scratch, reduced)
     return is_closed(reduced.linear, max(tolerance, NEARLY_CLOSED))
 
 
 @routine
 def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratch) -> int:
-    """From a feasible `scratch.best`, at which `scratch.first` is, down to the nearest; how many steps it took."""
-    reduced, other, best, trial, p = scratch.first, scratch.second, scratch.best, scratch.trial, scratch.p
+    """Descend from a feasible `scratch.best`, linearised in `scratch.first`, to a local minimum; the steps."""
+    reduced, trial_reduced, best, trial, p = scratch.first, scratch.second, scratch.best, scratch.trial, scratch.p
     hessian, control, most = scratch.hessian, scratch.control[0], objective.pose.max_iterations
     scratch.gradient.unit[0] = scale_objective(reduced.linear)
     begin_descent(reduced.linear, hessian, control)
@@ -157,14 +157,14 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
         while not is_accepted and control["is_done"] == 0:
             if plan_step(reduced.linear, hessian, control, most, p):
                 copy_state(best, trial)
-                share = take(loops, reduced, p.x, trial, scratch)
-                linearise(loops, row, objective, trial, scratch, other)
+                share = take_step(loops, reduced, p.x, trial, scratch)
+                linearise(loops, row, objective, trial, scratch, trial_reduced)
                 tolerance = allowed_violation(control, share)
-                feasible = restore_feasibility(loops, row, objective, trial, tolerance, scratch, other)
-                is_accepted = judge_step(reduced.linear, other.linear, feasible, share, control)
+                feasible = restore_feasibility(loops, row, objective, trial, tolerance, scratch, trial_reduced)
+                is_accepted = judge_step(reduced.linear, trial_reduced.linear, feasible, share, control)
                 if is_accepted:
                     copy_state(trial, best)
-                    reduced, other = other, reduced
+                    reduced, trial_reduced = trial_reduced, reduced
             if is_stuck_infeasible(reduced.linear, is_accepted, most, control):
                 if restore_feasibility(loops, row, objective, best, CLOSED, scratch, reduced):
                     resume(control)
@@ -177,14 +177,14 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
 def nearest_configuration(
     machine: int, scratch_address: int, objective: Objective, closed: Closed, weights: Floats
 ) -> None:
-    """Bring every row, from a configuration that is closed within its limits or nearly so, as near as it comes.
+    """Minimise the objective of every row, from a configuration that is closed within its limits or nearly so.
 
-    With no steps to take, tell instead how hard every limit holds each row back where it is, (n, 2 columns + cones):
-    the multiplier of the limit, by how much nearer the target comes per unit by which it gives way; else 0.
+    With `max_iterations` 0, write instead the multipliers of the limits of each row, (n, 2 columns + cones): the
+    decrease of the distance per unit by which the limit is relaxed; 0 for limits that are not active.
 
     Parameters
     ----------
-    machine, scratch : see `open_loops` and `new_descent_scratch`.
+    machine, scratch_address : addresses of `Loops` and `DescentScratch`.
     """
     loops, scratch = open_loops(machine), open_scratch(scratch_address)
     best, first = scratch.best, scratch.first
@@ -202,7 +202,7 @@ def nearest_configuration(
             closed.iterations[row] = descend(loops, row, objective, scratch)
         linearise(loops, row, objective, best, scratch, first)
         store_row(loops, row, best, closed)
-        for group in range(closed.gaps.shape[1]):  # the loops are looked at as a whole
+        for group in range(closed.gaps.shape[1]):  # the measures of the whole mechanism, for every group
             closed.gaps[row, group] = first.linear.totals[0]["gap"]
             closed.excesses[row, group] = max(first.linear.totals[0]["excess"] - objective.pose.margin, 0.0)
             closed.misses[row, group] = 0.0

@@ -1,10 +1,10 @@
-"""The normal equations of closing loops, summed up term by term: paths, wishes, limits, cones and the platform.
+"""The normal equations of closing loops, term by term: paths, joint centres, limits, cones and the platform.
 
-Unknown are the free joint coordinates q, group by group, and the platform's twist V. With X the platform's pose and
-FK_i(q) the pose at the end of path i, the residuals are
+The unknowns are the free joint coordinates q, group by group, and the platform's twist V. With X the platform's pose
+and FK_i(q) the pose at the end of path i, the residuals are
 
     paths       position of FK_i - X [L], and the rotation vector of R_i R_X^T [rad]
-    wishes      centres of joints less where they are wished [L]
+    centres     centres of joints less their targets [L]
     limits      q_j - hi, lo - q_j and angle - half_angle of cones, where they are positive
 
 and every group adds its J^T J to A (its own coordinates), C (with the twist), and b = J^T r; the twist's own are in G.
@@ -23,7 +23,7 @@ from .path_kinematics import Equations, State, compare_end, end_path, pose_cone,
 
 @inlined
 def add_path(loops: Loops, slots: Ints, group: int, path: int, eq: Equations) -> float:
-    """The path's share of its group's equations and of the platform's; the square of its residual."""
+    """Add a path to the equations of its group and of the platform; the square of its residual."""
     first, last = loops.visit_rows[loops.paths[path]], loops.visit_rows[loops.paths[path + 1]]
     A, C, b, e, rows = eq.A[group], eq.C[group], eq.b[group], eq.e, eq.rows
     square = 0.0
@@ -44,7 +44,7 @@ def add_path(loops: Loops, slots: Ints, group: int, path: int, eq: Equations) ->
                 product = 0.0
                 for i in range(6):
                     product += rows[r, i] * rows[r2, i]
-                twice = s == s2 and r != r2  # a joint that the path passes on its way out and back
+                twice = s == s2 and r != r2  # a joint that the path passes twice, out and back
                 A[max(s, s2), min(s, s2)] += 2.0 * product if twice else product
     return square
 
@@ -53,13 +53,13 @@ def add_path(loops: Loops, slots: Ints, group: int, path: int, eq: Equations) ->
 def add_last_ball(
     loops: Loops, slots: Ints, group: int, path: int, last: int, state: State, eq: Equations
 ) -> tuple[float, float]:
-    """The share of a path whose last ball joint follows the platform: its centre is all that must meet.
+    """Add a path whose last ball joint follows the platform, so that only its centre must meet.
 
-    The square of its residual, and the residual.
+    The square of its residual, and the residual [L].
     """
     point = loops.points[loops.visits[last, 0]]
     end_path(loops, path, last, point, eq)
-    C, b, e, r, X, G = eq.C[group], eq.b[group], eq.e, eq.arm, state.X, eq.G
+    C, b, e, r, X, G = eq.C[group], eq.b[group], eq.e, eq.lever, state.X, eq.G
     square = 0.0
     for i in range(3):
         r[i] = 0.0
@@ -100,7 +100,7 @@ def add_last_ball(
 
 @inlined
 def follow_platform(loops: Loops, state: State, eq: Equations) -> None:
-    """Turn the last ball joints to where the platform has them."""
+    """Set the last ball joints to the orientation of the platform."""
     T, w = eq.T, eq.e
     for path in range(len(loops.last_balls)):
         if loops.last_balls[path] == 1:
@@ -119,16 +119,16 @@ def follow_platform(loops: Loops, state: State, eq: Equations) -> None:
 def add_centres(
     loops: Loops, slots: Ints, group: int, path: int, state: State, centres: Floats, eq: Equations
 ) -> float:
-    """ClosureProblem for joint centres along a path, as rows of its group; the square of their residuals."""
+    """Add joint centres along a path, less their targets, as rows of its group; the sum of their squares."""
     square = 0.0
     A, b, rows, at = eq.A[group], eq.b[group], eq.rows, eq.at
     for mark in range(loops.path_marks[path], loops.path_marks[path + 1]):
-        visit, wish = loops.marks[mark, 0], centres[loops.marks[mark, 1]]
-        if math.isnan(wish[0]):
+        visit, target = loops.marks[mark, 0], centres[loops.marks[mark, 1]]
+        if math.isnan(target[0]):
             continue
         here = loops.visit_rows[visit]
         for i in range(3):
-            off = at[here, i] - wish[i]
+            off = at[here, i] - target[i]
             square += off * off
             eq.misses[group] = max(eq.misses[group], abs(off))
             j, k = (i + 1) % 3, (i + 2) % 3
@@ -139,27 +139,27 @@ def add_centres(
                     if s < 0:
                         continue
                     if slides:
-                        own = rows[r, i]
+                        rate = rows[r, i]
                     else:
-                        own = rows[r, 3 + j] * (at[here, k] - at[r, k]) - rows[r, 3 + k] * (at[here, j] - at[r, j])
-                    eq.Y[group, s, 6] = own  # Y is not in use yet: a row of the Jacobian, for a moment
+                        rate = rows[r, 3 + j] * (at[here, k] - at[r, k]) - rows[r, 3 + k] * (at[here, j] - at[r, j])
+                    eq.Y[group, s, 6] = rate  # Y is not in use yet; its last column holds a row of the Jacobian here
             for before in range(loops.paths[path], visit):
                 for r in range(loops.visit_rows[before], loops.visit_rows[before + 1]):
                     s = slots[loops.row_columns[r]]
                     if s < 0:
                         continue
-                    own = eq.Y[group, s, 6]
-                    b[s] += own * off
+                    rate = eq.Y[group, s, 6]
+                    b[s] += rate * off
                     for r2 in range(loops.visit_rows[loops.paths[path]], r + 1):
                         s2 = slots[loops.row_columns[r2]]
                         if s2 >= 0:
-                            A[max(s, s2), min(s, s2)] += own * eq.Y[group, s2, 6]
+                            A[max(s, s2), min(s, s2)] += rate * eq.Y[group, s2, 6]
     return square
 
 
 @inlined
 def add_ranges(loops: Loops, slots: Ints, state: State, margin: float, eq: Equations) -> float:
-    """Ranges that are exceeded; the sum of the squares of the excesses."""
+    """Add ranges that are exceeded; the sum of the squares of the excesses."""
     square = 0.0
     for j in range(len(slots)):
         low, high = loops.lo[j] + margin, loops.hi[j] - margin
@@ -176,7 +176,7 @@ def add_ranges(loops: Loops, slots: Ints, state: State, margin: float, eq: Equat
 
 @inlined
 def add_cones(loops: Loops, slots: Ints, state: State, margin: float, eq: Equations) -> float:
-    """Cones that are exceeded, as rows of their groups; the sum of the squares of the excesses."""
+    """Add cones that are exceeded, as rows of their groups; the sum of the squares of the excesses."""
     square = 0.0
     for cone in range(len(loops.cone_angles)):
         length = pose_cone(loops, cone, state, eq)
@@ -213,7 +213,7 @@ def add_cones(loops: Loops, slots: Ints, state: State, margin: float, eq: Equati
 
 @inlined
 def hold_platform(problem: ClosureProblem, eq: Equations) -> None:
-    """Hold what of the platform's pose stays where it is, in its own equations."""
+    """Add LOCKED to the platform's equations for the components of its pose that are held."""
     for i in range(6):
         if problem.platform[i] == LOCKED:
             eq.G[i, i] += LOCKED
@@ -221,7 +221,7 @@ def hold_platform(problem: ClosureProblem, eq: Equations) -> None:
 
 @inlined
 def pose_frame(state: State, problem: ClosureProblem, eq: Equations) -> None:
-    """The axes about which the platform's rotation is held, into `frame`."""
+    """Write the axes about which the platform's rotation is held to `eq.frame`."""
     F = eq.frame
     if problem.frame == TARGET_AXES:
         for i in range(3):
@@ -233,7 +233,7 @@ def pose_frame(state: State, problem: ClosureProblem, eq: Equations) -> None:
     if length < UPSIDE_DOWN:
         x, y, z, length = 0.0, 0.0, 1.0, 1.0
     a, b, c = x / length, y / length, z / length
-    # the shortest turn of the z axis to half way
+    # the shortest rotation of the z axis to half way
     F[0, 0], F[0, 1], F[0, 2] = 1.0 - a * a / (1.0 + c), -a * b / (1.0 + c), a
     F[1, 0], F[1, 1], F[1, 2] = -a * b / (1.0 + c), 1.0 - b * b / (1.0 + c), b
     F[2, 0], F[2, 1], F[2, 2] = -a, -b, c
@@ -241,7 +241,7 @@ def pose_frame(state: State, problem: ClosureProblem, eq: Equations) -> None:
 
 @inlined
 def into_frame(F: Floats, v: Floats) -> None:
-    """Three components of a vector in base axes, in place, as those along the axes of a pose."""
+    """Transform a vector from base axes to the axes of a pose, in place."""
     x, y, z = v[0], v[1], v[2]
     for i in range(3):
         v[i] = F[0, i] * x + F[1, i] * y + F[2, i] * z
@@ -249,7 +249,7 @@ def into_frame(F: Floats, v: Floats) -> None:
 
 @inlined
 def out_of_frame(F: Floats, twist: Floats) -> None:
-    """The angular part of a twist along the axes of a pose, in place, in base axes."""
+    """Transform the angular part of a twist from the axes of a pose to base axes, in place."""
     x, y, z = twist[3], twist[4], twist[5]
     for i in range(3):
         twist[3 + i] = F[i, 0] * x + F[i, 1] * y + F[i, 2] * z
@@ -257,12 +257,12 @@ def out_of_frame(F: Floats, twist: Floats) -> None:
 
 @routine
 def turn_equations(F: Floats, layout: Layout, eq: Equations) -> None:
-    """Make the platform's angular velocity one about the axes of a pose, in all equations in which it occurs."""
+    """Express the platform's angular velocity about the axes of a pose, in all equations in which it occurs."""
     for group in range(len(layout.sizes)):
         for s in range(layout.sizes[group]):
             into_frame(F, eq.C[group, s, 3:])
     G = eq.G
-    for i in range(3, 6):  # only the lower triangle is filled: that of the angular part is completed first
+    for i in range(3, 6):  # only the lower triangle is filled; complete that of the angular part first
         for j in range(i + 1, 6):
             G[i, j] = G[j, i]
     for j in range(7):
@@ -292,7 +292,7 @@ def clear(layout: Layout, eq: Equations) -> None:
 
 @inlined
 def add_paths(loops: Loops, layout: Layout, problem: ClosureProblem, row: int, state: State, eq: Equations) -> float:
-    """All paths, and the joint centres wished on them; the sum of their squares."""
+    """Add all paths, and the joint centres on them that have targets; the sum of squares."""
     square = 0.0
     for group in range(len(layout.sizes)):
         eq.gaps[group] = eq.misses[group] = 0.0
@@ -302,8 +302,8 @@ def add_paths(loops: Loops, layout: Layout, problem: ClosureProblem, row: int, s
             last -= 1 if follows else 0
             walk_path(loops, path, last, state, eq)
             if follows:
-                own, gap = add_last_ball(loops, layout.slots, group, path, last, state, eq)
-                square += own
+                path_square, gap = add_last_ball(loops, layout.slots, group, path, last, state, eq)
+                square += path_square
                 eq.gaps[group] = max(eq.gaps[group], gap)
                 continue
             end_path(loops, path, last, loops.end, eq)

@@ -1,4 +1,4 @@
-"""What a configuration of closed loops looks like to first order: free motions, the objective and limits on them."""
+"""Linearisation of a configuration: the motions that the loops leave free, and objective and limits on them."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ class DescentScratch(NamedTuple):
     hessian: Hessian
     control: Records  # (1,): CONTROL
     gaps: Floats  # (paths, 6): between the ends of each path and of the first
-    elimination: Elimination  # used: by how many paths, the first counted twice: it is in the equations of all
+    elimination: Elimination  # `used` counts paths per coordinate, the first path twice: it is in all equations
     row: Floats  # (columns,)
-    force: Floats  # (paths, 6): what pulls at the end of each path
-    balance: Floats  # (rows,): multipliers of the loops and of what is held
+    force: Floats  # (paths, 6): force and moment at the end of each path
+    balance: Floats  # (rows,): multipliers of the loops and of the held components
     here: Floats  # (columns,)
     there: Floats  # (columns,)
 
@@ -93,7 +93,7 @@ open_scratch = opener(new_descent_scratch(LOOPS))
 
 @routine
 def walk_all(loops: Loops, state: State, scratch: DescentScratch) -> float:
-    """Pose the end effector by the first path, and compare the ends of the others with it; the largest gap."""
+    """Pose the end effector by the first path, and compare the ends of the other paths with it; the largest gap."""
     eq, gap = scratch.eq, 0.0
     for path in range(len(loops.paths) - 1):
         last = loops.paths[path + 1]
@@ -112,7 +112,7 @@ def walk_all(loops: Loops, state: State, scratch: DescentScratch) -> float:
 
 @routine
 def add_force(loops: Loops, path: int, force: Floats, scratch: DescentScratch, out: Floats) -> None:
-    """What a force and moment at the end of a path do at every coordinate, added to `out`."""
+    """Add the generalised forces of a force and moment at the end of a path to `out`: J^T f."""
     rows, columns = scratch.eq.rows, loops.row_columns
     for r in range(loops.visit_rows[loops.paths[path]], loops.visit_rows[loops.paths[path + 1]]):
         a = rows[r]
@@ -122,7 +122,7 @@ def add_force(loops: Loops, path: int, force: Floats, scratch: DescentScratch, o
 
 @routine
 def add_anchors(row: int, objective: Objective, state: State, unit: float, out: Floats) -> float:
-    """Half the weighted squares of distances of coordinates from their anchors, the gradient added to `out`."""
+    """Half the weighted sum of squared distances of coordinates from their anchors; the gradient is added to `out`."""
     value = 0.0
     for j in range(objective.weights.shape[0]):
         if objective.weights[j] > 0.0:
@@ -136,7 +136,7 @@ def add_anchors(row: int, objective: Objective, state: State, unit: float, out: 
 def linearise(
     loops: Loops, row: int, objective: Objective, state: State, scratch: DescentScratch, reduced: FreeMotions
 ) -> None:
-    """Look at a configuration."""
+    """Linearise loops, objective and limits at a configuration into `reduced`."""
     linear, n, here = reduced.linear, len(loops.lo), scratch.here
     gap = walk_all(loops, state, scratch)
     value, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, scratch.gradient, True)
@@ -155,7 +155,7 @@ def linearise(
 
 @routine
 def lay_out(loops: Loops, held: int, scratch: DescentScratch) -> int:
-    """The equations of the loops and of what is held, with an identity beside them; how many."""
+    """Write the equations of the loops and of the held components, with an identity beside them; their number."""
     paths, n, A, eq = len(loops.paths) - 1, len(loops.lo), scratch.elimination.A, scratch.eq
     first = 6 * (paths - 1)
     rows, holds = eq.rows, scratch.gradient.holds
@@ -171,8 +171,8 @@ def lay_out(loops: Loops, held: int, scratch: DescentScratch) -> int:
                 if path > 0:
                     A[6 * (path - 1) + i, j] += rows[r, i]
                     continue
-                for other in range(paths - 1):
-                    A[6 * other + i, j] -= rows[r, i]
+                for loop in range(paths - 1):
+                    A[6 * loop + i, j] -= rows[r, i]
                 for k in range(held):
                     A[first + k, j] += holds[k, i] * rows[r, i]
     return first + held
@@ -180,7 +180,7 @@ def lay_out(loops: Loops, held: int, scratch: DescentScratch) -> int:
 
 @routine
 def linearise_limits(loops: Loops, margin: float, state: State, scratch: DescentScratch, reduced: FreeMotions) -> None:
-    """Excess and gradient of every limit within reach."""
+    """Excess and reduced gradient of every limit that a step may reach."""
     linear = reduced.linear
     basis, shift, G, row = reduced.basis, reduced.shift, linear.G, scratch.row
     n, k, excess = len(loops.lo), 0, -math.inf
@@ -208,7 +208,7 @@ def linearise_limits(loops: Loops, margin: float, state: State, scratch: Descent
 
 @routine
 def cone_excess(loops: Loops, cone: int, margin: float, state: State, scratch: DescentScratch) -> float:
-    """Excess over a cone; its joint is posed for `add_cone`."""
+    """Excess over a cone [rad]; poses its joint for `add_cone`."""
     pose_cone(loops, cone, state, scratch.eq)
     moved, stayed = scratch.eq.twist[:3], scratch.eq.twist[3:]
     x = moved[1] * stayed[2] - moved[2] * stayed[1]
@@ -232,17 +232,17 @@ def add_cone(loops: Loops, cone: int, factor: float, scratch: DescentScratch, ou
     column = loops.columns[first]
     for m in range(3 if loops.kinds[first] == BALL else 2):
         out[column + m] -= factor * (eq.S[m, 0] * x + eq.S[m, 1] * y + eq.S[m, 2] * z) / sine
-    # a slide moves the line; the angle changes with what of that is across the line, toward the axis
+    # a slide moves the line; the angle changes with the part of this motion across the line, towards the axis
     outward = loops.cone_outward[cone] == 1
     line, axis = (a, b) if outward else (b, a)
     square = line[0] ** 2 + line[1] ** 2 + line[2] ** 2
     for slide in range(loops.cone_slides[cone, 0], loops.cone_slides[cone, 1]):
         rate = 0.0
         for i in range(3):
-            own = loops.slide_axes[slide, i]
+            motion = loops.slide_axes[slide, i]
             if outward:
-                own = 0.0
+                motion = 0.0
                 for j in range(3):
-                    own += eq.T[i, j] * loops.slide_axes[slide, j]
-            rate -= own * (axis[i] - cosine / square * line[i])
+                    motion += eq.T[i, j] * loops.slide_axes[slide, j]
+            rate -= motion * (axis[i] - cosine / square * line[i])
         out[loops.slides[slide]] += factor * rate / sine

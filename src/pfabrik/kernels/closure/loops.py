@@ -1,7 +1,7 @@
-"""What the closure kernel is given: the loops of a mechanism as paths of unit motions, and what is asked of them.
+"""Inputs and results of the closure kernels: loops as paths of unit motions, problems and objectives.
 
 Lengths are in units of L, the characteristic length; coordinates are deviations from home. Every path leads from the
-base to the end effector. Paths that share joints form a group: with the platform at rest, groups move independently.
+base to the end effector. Paths that share joints form a group: with the platform fixed, groups move independently.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from ...arrays import Floats, Ints
 
-# What weights of a rotation are about: the axes of the base; those of the target, of which the first two turn its z
-# axis (the tilt); or axes of which the third is half way between the z axes of base and platform, about which the
-# platform yaws: the twist about z has its gradient there.
+# Axes that the weights of a rotation refer to: those of the base; those of the target, of which the first two turn its
+# z axis (the tilt); or axes of which the third is half way between the z axes of base and platform. The platform yaws
+# about this one: the gradient of the twist about z is along it.
 BASE_AXES, TARGET_AXES, HALF_WAY = 0, 1, 2
 
 # Unit motions: about an axis, along an axis, about a point.
@@ -49,22 +49,22 @@ class Loops(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Which coordinates are free: their places in the equations of their groups."""
+    """Places of the free coordinates in the equations of their groups."""
 
     slots: Ints  # (columns,): place among the free coordinates of its group, or -1 if it is locked
     sizes: Ints  # (groups,): free coordinates of each group
 
 
 class ClosureProblem(NamedTuple):
-    """What is asked beyond closed loops; lengths in L, angles in radians."""
+    """Conditions beyond closed loops, and settings of the iteration; lengths in L, angles in radians."""
 
-    platform: Floats  # (6,): LOCKED for what of the pose, position then rotation, stays where it starts; else 0
+    platform: Floats  # (6,): LOCKED for components of the pose, position then rotation, that are held; else 0
     frame: int  # the axes of this rotation: BASE_AXES, TARGET_AXES (those of the pose) or HALF_WAY
-    centres: Floats  # (n, joints, 3): where joint centres are wished to be; NaN where they are not
+    centres: Floats  # (n, joints, 3): targets of joint centres; NaN for none
     limits: int  # 1: limits are to be kept
-    margin: float  # by how much inside
+    margin: float  # distance inside the limits
     balls_follow: int  # 1: the ball joints of `last_balls` follow the platform; they are locked in the layout
-    plunging: int  # 1: undamped steps, up and down: finds more of many solutions, but not the nearest
+    undamped: int  # 1: undamped steps, also uphill: finds more of many solutions, but not the nearest
     closeness: float  # largest gap that ends the search
     max_iterations: int
 
@@ -72,17 +72,17 @@ class ClosureProblem(NamedTuple):
 LOCKED = 1e12
 
 SIGHT = 1e6
-"""How far off targets are looked for [L]: farther ones in the same direction have the same nearest pose."""
+"""Largest distance of a target from home [L]: farther ones in the same direction have the same nearest pose."""
 
 
 class Closed(NamedTuple):
-    """What is worked on, row by row."""
+    """Starts and results of closing loops, row by row."""
 
-    coordinates: Floats  # (n, columns): where to start; where it ended
-    poses: Floats  # (n, 4, 4): of the platform, likewise
+    coordinates: Floats  # (n, columns): of the start, then of the result
+    poses: Floats  # (n, 4, 4): of the platform, at the start, then of the result
     gaps: Floats  # (n, groups): largest gap of a group's loops
     excesses: Floats  # (n, groups): largest excess over a limit
-    misses: Floats  # (n, groups): largest distance of a joint's centre from where it was wished
+    misses: Floats  # (n, groups): largest distance of a joint centre from its target
     iterations: Ints  # (n,)
 
 
@@ -116,18 +116,18 @@ class FirstOrder(NamedTuple):
 
 
 class PoseObjective(NamedTuple):
-    """What is to come near: lengths in L."""
+    """The objective of the end effector's pose; lengths in L."""
 
     targets: Floats  # (n, 4, 4)
-    platform: Floats  # (6,): weights of the squares of position and rotation; 0 for what does not count; LOCKED holds
-    frame: int  # of the rotation counts all with BASE_AXES, the tilt with TARGET_AXES, the yaw with HALF_WAY
-    margin: float  # by how much inside their limits coordinates stay
-    near: float  # limits farther away are not looked at when multipliers are asked for
+    platform: Floats  # (6,): weights of the squares of position and rotation; 0 for free, LOCKED for held components
+    frame: int  # part of the rotation that counts: all with BASE_AXES, the tilt with TARGET_AXES, yaw with HALF_WAY
+    margin: float  # distance inside the limits that coordinates keep
+    near: float  # limits farther away have no multipliers
     max_iterations: int
 
 
 class Objective(NamedTuple):
-    """What is to come near, on joint coordinates: the pose, and coordinates to their anchors; lengths in L."""
+    """The objective in joint coordinates: of the pose, and of distances from anchors; lengths in L."""
 
     pose: PoseObjective
     weights: Floats  # (columns,): of the squares of the coordinates' distances from their anchors

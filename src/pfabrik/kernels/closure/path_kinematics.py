@@ -1,4 +1,4 @@
-"""Where joint coordinates put the ends of paths, and how these move with each of them."""
+"""Kinematics of paths: poses of their ends, and the Jacobian with respect to the joint coordinates."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .loops import BALL, SLIDE, Closed, Layout, Loops
 
 
 class State(NamedTuple):
-    """One configuration under work."""
+    """One configuration, changed in place."""
 
     q: Floats  # (columns,): turns and slides
     balls: Floats  # (units, 4): quaternions of ball joints
@@ -23,20 +23,20 @@ class State(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """Normal equations, group by group, and what they are made of."""
+    """Normal equations, group by group, and scratch memory to build and solve them."""
 
     rows: Floats  # (rows, 6): columns of the Jacobian: velocity of the path's end, angular velocity
     at: Floats  # (rows, 3): a point of the axis of each
-    T: Floats  # (3, 4): the body a path has come to
+    T: Floats  # (3, 4): displacement of the present body of a path
     e: Floats  # (6,)
-    arm: Floats  # (3,): from the platform's reference point to a joint of it
+    lever: Floats  # (3,): from the platform's reference point to a joint of it
     A: Floats  # (groups, m, m)
     C: Floats  # (groups, m, 6)
     b: Floats  # (groups, m)
     factor: Floats  # (m, m)
-    Y: Floats  # (groups, m, 7): what the platform's twist does to each coordinate, and what is left for it to do
+    Y: Floats  # (groups, m, 7): step of each coordinate per component of the platform's twist, and without twist
     G: Floats  # (6, 7): the platform's equations, right-hand side last
-    S: Floats  # (6, 7): the same, being solved
+    S: Floats  # (6, 7): their Schur complement
     twist: Floats  # (6,)
     frame: Floats  # (3, 3): axes that the platform turns about, one a column
     gaps: Floats  # (groups,)
@@ -45,12 +45,12 @@ class Equations(NamedTuple):
 
 
 def new_state(loops: Loops) -> State:
-    """Memory for a configuration."""
+    """Allocate a configuration."""
     return State(np.zeros(len(loops.lo)), np.zeros((len(loops.kinds), 4)), np.zeros((3, 4)))
 
 
 def new_equations(loops: Loops, layout: Layout) -> Equations:
-    """Memory for the equations of one thread."""
+    """Allocate the equations of one thread."""
     groups, m, rows = len(loops.groups) - 1, max(1, layout.sizes.max(initial=0)), len(loops.row_columns)
     return Equations(
         np.zeros((rows, 6)),
@@ -81,11 +81,12 @@ LOOPS = Loops._make(np.zeros((2,) * int(each[1]), f"{each[0]}8") for each in _TY
 LAYOUT = Layout(np.zeros(2, np.int64), np.zeros(1, np.int64))
 
 open_loops, open_layout = opener(LOOPS), opener(LAYOUT)
-"""The loops of a mechanism, and what of them moves, of which kernels are given the addresses of a `Handle`."""
+"""Functions that open the `Loops` and the `Layout` at the address of a `Handle`."""
 
 
 @inlined
 def copy_state(source: State, target: State) -> None:
+    """Copy a configuration."""
     for j in range(len(source.q)):
         target.q[j] = source.q[j]
     for k in range(len(source.balls)):
@@ -98,7 +99,7 @@ def copy_state(source: State, target: State) -> None:
 
 @inlined
 def load_row(loops: Loops, row: int, closed: Closed, state: State) -> None:
-    """The configuration where a row starts."""
+    """Load the configuration of the start of a row."""
     for j in range(len(state.q)):
         state.q[j] = closed.coordinates[row, j]
     for k in range(len(loops.kinds)):
@@ -114,7 +115,7 @@ def load_row(loops: Loops, row: int, closed: Closed, state: State) -> None:
 
 @inlined
 def store_row(loops: Loops, row: int, state: State, closed: Closed) -> None:
-    """The configuration where a row ended."""
+    """Store a configuration as the result of a row."""
     for j in range(len(state.q)):
         closed.coordinates[row, j] = state.q[j]
     for k in range(len(loops.kinds)):
@@ -129,7 +130,7 @@ def store_row(loops: Loops, row: int, state: State, closed: Closed) -> None:
 
 @inlined
 def walk_path(loops: Loops, path: int, last: int, state: State, eq: Equations) -> None:
-    """Pose a path's bodies from the base outward up to a visit, noting the axis of every motion as it is passed."""
+    """Pose a path's bodies from the base outward up to a visit, and write the axis of every motion on the way."""
     T = eq.T
     for i in range(3):
         for j in range(4):
@@ -162,7 +163,7 @@ def walk_path(loops: Loops, path: int, last: int, state: State, eq: Equations) -
 def note_axes(
     T: Floats, is_ball: bool, sign: float, axis: Floats, point: Floats, row: int, rows: Floats, at: Floats
 ) -> None:
-    """The present axis of a turn, or the three of a ball joint, and the point they pass through."""
+    """Write the present axis of a turn, or the three of a ball joint, and the point they pass through."""
     for i in range(3):
         centre = T[i, 0] * point[0] + T[i, 1] * point[1] + T[i, 2] * point[2] + T[i, 3]
         at[row, i] = centre
@@ -176,7 +177,7 @@ def note_axes(
 
 @routine
 def turn_about(T: Floats, point: Floats, w: float, x: float, y: float, z: float) -> None:
-    """T = T times the rotation of a quaternion about a point."""
+    """Multiply T by the rotation of a quaternion (w, x, y, z) about a point."""
     for i in range(3):
         T[i, 3] += T[i, 0] * point[0] + T[i, 1] * point[1] + T[i, 2] * point[2]
     rotate_by(T, w, x, y, z)
@@ -186,7 +187,7 @@ def turn_about(T: Floats, point: Floats, w: float, x: float, y: float, z: float)
 
 @inlined
 def end_path(loops: Loops, path: int, last: int, end: Floats, eq: Equations) -> None:
-    """T's last column becomes a point of the body a path has come to; its velocities under the path's motions."""
+    """Set T's last column to a point of the path's last body, and `rows` to its velocities under the path's motions."""
     T = eq.T
     for i in range(3):
         T[i, 3] += T[i, 0] * end[0] + T[i, 1] * end[1] + T[i, 2] * end[2]
@@ -201,7 +202,7 @@ def end_path(loops: Loops, path: int, last: int, end: Floats, eq: Equations) -> 
 
 @inlined
 def compare_end(loops: Loops, state: State, eq: Equations) -> float:
-    """The path's residual; its largest part."""
+    """Write the path's residual to `e`; the larger of its position [L] and rotation [rad]."""
     difference(eq.T, state.X, eq.e[3:])
     position = rotation = 0.0
     for i in range(3):
@@ -215,8 +216,9 @@ def compare_end(loops: Loops, state: State, eq: Equations) -> float:
 def pose_cone(loops: Loops, cone: int, state: State, eq: Equations) -> float:
     """Pose the joint of a cone in its first body; the length of its line.
 
-    T's rotation becomes the joint's, S's first rows the axes of its motions, at most three. The first half of the twist
-    becomes what turns with the second body, the line or the cone's axis, and the second half the one that stays.
+    T's rotation is set to the joint's, S's first rows to the axes of its motions, at most three. The first half of the
+    twist is set to the vector that turns with the second body, the line or the cone's axis; the second half to the
+    other one.
     """
     T, line, pair = eq.T, eq.e, eq.twist
     for i in range(3):
@@ -235,8 +237,8 @@ def pose_cone(loops: Loops, cone: int, state: State, eq: Equations) -> float:
         else:
             axis, half = loops.axes[k], 0.5 * state.q[loops.columns[k]]
             for i in range(3):
-                own = T[i, 0] * axis[0] + T[i, 1] * axis[1] + T[i, 2] * axis[2]
-                eq.S[k - loops.cone_units[cone, 0], i] = own
+                turned = T[i, 0] * axis[0] + T[i, 1] * axis[1] + T[i, 2] * axis[2]
+                eq.S[k - loops.cone_units[cone, 0], i] = turned
             sine = math.sin(half)
             w, x, y, z = math.cos(half), sine * axis[0], sine * axis[1], sine * axis[2]
         rotate_by(T, w, x, y, z)

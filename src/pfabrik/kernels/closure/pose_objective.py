@@ -1,4 +1,4 @@
-"""The objective of a search: squares of the distance of an end effector from its target, with some of it held."""
+"""The pose objective: half the weighted squared distance of the end effector from its target, with held components."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ ALIGNED = 1e-9
 class PoseGradient(NamedTuple):
     """The gradient of the objective in the twist of the end effector, and the components of the twist that are held."""
 
-    force: Floats  # (6,): gradient of the objective in its twist
-    holds: Floats  # (6, 6): what of its twist is held, one a row
-    errors: Floats  # (6,): by how much each of these is off
-    unit: Floats  # (1,): what the objective is multiplied by, so that its gradient is of order one
+    force: Floats  # (6,): gradient of the objective in the twist
+    holds: Floats  # (6, 6): gradients of the held components in the twist, one per row
+    errors: Floats  # (6,): errors of the held components
+    unit: Floats  # (1,): factor of the objective that makes its gradient of order one
     turn: Floats  # (6,)
 
 
@@ -29,7 +29,7 @@ class PoseGradient(NamedTuple):
 def pose_gradient(
     objective: PoseObjective, target: Floats, X: Floats, gradient: PoseGradient, turns: bool
 ) -> tuple[float, int]:
-    """The objective, and how many components of the twist are held; a rotation that does not turn is the target's."""
+    """The objective, and the number of held components; without `turns` the rotation counts as that of the target."""
     w, force, unit = gradient.turn, gradient.force, gradient.unit[0]
     value, held, w[3], w[4], w[5] = 0.0, 0, 0.0, 0.0, 0.0
     if turns and objective.frame == BASE_AXES:
@@ -63,7 +63,7 @@ def pose_gradient(
 
 @routine
 def hold(gradient: PoseGradient, held: int, component: int, error: float) -> int:
-    """Note one more component of the twist that is held."""
+    """Add a held component of the twist; the number of held components."""
     gradient.errors[held] = error
     for i in range(6):
         gradient.holds[held, i] = 1.0 if i == component else 0.0
@@ -72,10 +72,10 @@ def hold(gradient: PoseGradient, held: int, component: int, error: float) -> int
 
 @routine
 def hold_tilt(target: Floats, X: Floats, gradient: PoseGradient, held: int) -> int:
-    """The z axis keeps the target's direction: it has no part along the target's x and y axes.
+    """Hold the z axis along that of the target: its components along the target's x and y axes are zero.
 
-    The opposite direction has none either. So a z axis that is farther away than a right angle is asked to turn by the
-    shortest way, and not across it.
+    They are zero for the opposite direction too. So beyond a right angle the held components are the angle, and the
+    motion across the shortest rotation to the target.
     """
     axis, angle = turn_of_tilt(target, X)
     if angle > 0.5 * math.pi:
@@ -99,13 +99,13 @@ def hold_tilt(target: Floats, X: Floats, gradient: PoseGradient, held: int) -> i
 
 @routine
 def yaw_gradient(X: Floats, axis: int) -> float:
-    """How fast the platform yaws as it turns about an axis of the base: (z + z') / (1 + z z'), of both z axes."""
+    """Gradient of the yaw in the rotation about an axis of the base: (z + z') / (1 + z . z'), with both z axes."""
     return (X[axis, 2] + (1.0 if axis == 2 else 0.0)) / max(1.0 + X[2, 2], UPSIDE_DOWN)
 
 
 @routine
 def tilt(target: Floats, weight: float, X: Floats, force: Floats) -> float:
-    """Half the weighted square of the angle between z axes, its gradient added to the force."""
+    """Half the weighted square of the angle between the z axes; the gradient is added to `force`."""
     axis, angle = turn_of_tilt(target, X)
     for i in range(3):
         force[3 + i] -= weight * angle * axis[i]
@@ -114,7 +114,7 @@ def tilt(target: Floats, weight: float, X: Floats, force: Floats) -> float:
 
 @routine
 def turn_of_tilt(target: Floats, X: Floats) -> tuple[Vec, float]:
-    """The shortest turn of the z axis to the target's: about which axis, and how far; half a turn about any."""
+    """Axis and angle of the shortest rotation of the z axis to the target's; half a turn is about its x axis."""
     here, there = (X[0, 2], X[1, 2], X[2, 2]), (target[0, 2], target[1, 2], target[2, 2])
     axis = cross(here, there)
     sine, cosine = norm(axis), dot(here, there)

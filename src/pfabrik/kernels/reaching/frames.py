@@ -1,4 +1,4 @@
-"""What moves together: carriers, the bodies branches hang on, and the ends of branches."""
+"""Poses of the carriers, the bodies that branches are mounted on, and positions of the ends of branches."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from .plan import TURN, Configuration, Plan
 
 @routine
 def identity_pose(T: Floats) -> None:
+    """Set a pose, (3, 4) or (4, 4), to the identity."""
     for i in range(T.shape[0]):
         for j in range(4):
             T[i, j] = 1.0 if i == j else 0.0
 
 
 @routine
-def move_carriers(plan: Plan, now: Configuration) -> None:
-    """Pose every carrier from its trunk's joint values; leave each trunk joint's present point and axis in `screws`."""
-    carriers, screws, trunk_values = now.carriers, now.screws, now.trunks
+def move_carriers(plan: Plan, config: Configuration) -> None:
+    """Pose every carrier from its trunk's joint values, and write each trunk joint's point and axis to `screws`."""
+    carriers, screws, trunk_values = config.carriers, config.screws, config.trunks
     identity_pose(carriers[0])
     for k in range(plan.trunks.shape[0]):
         T = carriers[k + 1]
@@ -39,17 +40,18 @@ def move_carriers(plan: Plan, now: Configuration) -> None:
 
 @routine
 def set_position(T: Floats, p: Vec) -> None:
+    """Set the position of a pose."""
     T[0, 3] = p[0]
     T[1, 3] = p[1]
     T[2, 3] = p[2]
 
 
 @routine
-def place_ends(plan: Plan, c: int, now: Configuration) -> None:
-    """Put the first and last nodes of a chain where carrier and platform have them."""
+def place_ends(plan: Plan, c: int, config: Configuration) -> None:
+    """Place the first node of each branch of a chain on its carrier, and the last one on the platform."""
     for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
         branch = plan.branches[b]
         first, last = branch["first"], branch["last"]
         if branch["rail"] == 0:
-            put(now.nodes[first], move(now.carriers[branch["carrier"]], vec(plan.nodes[first]["home"])))
-        put(now.nodes[last], move(now.pose, vec(branch["end"])))
+            put(config.nodes[first], move(config.carriers[branch["carrier"]], vec(plan.nodes[first]["home"])))
+        put(config.nodes[last], move(config.pose, vec(branch["end"])))

@@ -1,8 +1,8 @@
-"""What the passes are given and what they fill: the mechanism as flat records, and the configurations of a batch.
+"""Inputs and results of the passes: the mechanism as flat records, and the configurations of a batch.
 
-Lengths are divided by nothing: every array is in the mechanism's own unit, angles in radians. Vectors named `home` are
-in base coordinates at home; a branch that hangs on a trunk moves rigidly with it (its carrier); what is fixed to the
-platform is given relative to the reference point, at home orientation.
+Lengths are in the mechanism's own unit, angles in radians. Vectors named `home` are in base coordinates at home. The
+carrier of a branch is the body it is mounted on: the base, or the last body of a trunk. Vectors fixed to the platform
+are relative to the reference point, at home orientation.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Records
 
-# What the axis of a cone is fixed to: the branch's carrier, the previous link, the platform.
+# The body that the axis of a cone is fixed to: the branch's carrier, the previous link, the platform.
 CARRIER_CONE, LINK_CONE, PLATFORM_CONE = 0, 1, 2
 # Trunk joints.
 TURN, SLIDE = 0, 1
@@ -23,7 +23,7 @@ _vector = ("f8", (3,))
 NODE = np.dtype(
     [
         ("home", *_vector),
-        ("stored", "i8"),  # its place in Reached.nodes; -1 if it follows from the pose and the trunks
+        ("stored", "i8"),  # its place in PassResults.nodes; -1 if it follows from the pose and the trunks
         ("lo", "f8"),  # length of the segment from the previous node
         ("hi", "f8"),
         ("hinge", "i8"),  # 1: the next segment stays in the branch's plane
@@ -58,7 +58,7 @@ TRUNK_SPAN = np.dtype([("first", "i8"), ("last", "i8")])
 TRUNK_JOINT = np.dtype([("kind", "i8"), ("point", *_vector), ("axis", *_vector), ("lo", "f8"), ("hi", "f8")])
 
 
-# What a revised target may do: bits of Settings.free.
+# Motions of a revised target: bits of Settings.free.
 TRANSLATES, TURNS = 1, 2
 
 
@@ -82,12 +82,12 @@ class Configuration(NamedTuple):
     trunks: Floats  # (n_trunk_joints,): deviation from home
     carriers: Floats  # (n_trunks + 1, 3, 4); the first is the base
     screws: Floats  # (n_trunk_joints, 2, 3): present point and axis
-    wanted: Floats  # (n_branches, 3): where each branch would have its first node
+    first_nodes: Floats  # (n_branches, 3): position of each branch's first node after a forward pass
     system: Floats  # (n, n + 1): the normal equations of a fit, right-hand side in the last column
 
 
 class Seeds(NamedTuple):
-    """Where to start: one configuration for all rows, or one a row."""
+    """Configurations that passes start from: one for all rows, or one per row."""
 
     poses: Floats
     nodes: Floats
@@ -100,15 +100,15 @@ class Settings(NamedTuple):
     enough: float  # E: passes end where the chains' ends are this close to their targets
     max_iterations: int  # K; 0 for a pass outward alone
     max_rounds: int
-    free: int  # what a target that is not reached may do: TRANSLATES, TURNS, or both
+    free: int  # motions of a target that is not reached: TRANSLATES, TURNS, or both
 
 
-class Reached(NamedTuple):
-    """Where chains and targets end, row by row: configurations whose loops are closed but for the gap."""
+class PassResults(NamedTuple):
+    """Results of the passes, row by row: configurations whose loops are closed up to the gap."""
 
     poses: Floats  # (n, 4, 4)
     nodes: Floats  # (n, n_stored, 3): the nodes that do not follow from the pose and the trunks
     trunks: Floats  # (n, n_trunk_joints): deviation from home
     gaps: Floats  # (n,): largest distance of a chain's end from its place on the platform
     iterations: Ints  # (n,)
-    rounds: Ints  # (n,): how often the target was revised
+    rounds: Ints  # (n,): number of revisions of the target

@@ -1,4 +1,4 @@
-"""Restrictions on positions: strokes, hinges, cones; as clamps of a segment's direction and length."""
+"""Clamps of a segment's direction and length to strokes, hinges and cones."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from .plan import CARRIER_CONE, PLATFORM_CONE, Plan
 
 # Below this a vector has no direction; far under any length of a machine, far over the smallest normal number.
 NO_LENGTH = 1e-150
-# A vector within this angle of a cone's axis, or of its opposite, points to no side of it: the rest is rounding.
+# A vector within this angle of a cone's axis, or of its opposite, has no direction across it but rounding.
 NO_SIDE = 1e-12
 # A clamp to a cone keeps at least this share of the length, so that the direction survives.
 LEAST_SHARE = 1e-3
-# A sweep over the restrictions that turns a step by no more than rounding was the last.
+# Sweeps over the restrictions end when one turns the step by no more than rounding, as a share of its length.
 UNMOVED = 1e-15
 
 
 @routine
 def clamp_stroke(length: float, lo: float, hi: float) -> float:
-    """The paper's rule: a length inside its limits is left alone."""
+    """The length clamped to its limits."""
     return min(max(length, lo), hi)
 
 
@@ -88,7 +88,7 @@ def cone_axis(cone: Records, carrier: Floats, pose: Floats, normal: Vec, nodes: 
 
 @routine
 def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Floats, nodes: Floats, d: Vec) -> Vec:
-    """Turn the step `d` from node k-1 to node k until hinges and cones at its two ends allow it."""
+    """Turn the step `d` from node k-1 to node k until the hinges and cones at both ends allow it."""
     normal = turn(carrier, vec(branch["normal"]))
     before = plan.nodes[k - 1]
     at_end = k == branch["last"]

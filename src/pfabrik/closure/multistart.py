@@ -1,0 +1,85 @@
+"""Seeds of multistart searches: feasible configurations of a mechanism, computed once."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.mechanism import Mechanism
+from ..description.task import task_of
+from ..kernels.closure.loops import BASE_AXES
+from ..poses import pose
+from ..tolerances import TOLERANCES
+from .close import EVERYTHING_FREE, close, closure_of
+from .descend import MOST_STEPS, nearest_configurations
+from .effort import descents_within, starts_within
+from .parasitic import differences, follows_task, has_parasitic_motion
+from .starts import random_starts
+
+SEED_DISTANCE, SEED_TURN = 0.5, 0.5
+"""Distance [L] and rotation [rad] from home of the poses for which the first seeds are the nearest configurations."""
+
+SEEDS, RANDOM_STARTS, RANDOM_STEPS = 8, 128, 20
+"""Most seeds; random configurations that are closed to find them; about as many steps are spent on each."""
+
+
+@lru_cache(maxsize=64)
+def seeds_of(mechanism: Mechanism) -> tuple[Floats, ...]:
+    """Feasible configurations far from home and from each other, as joint coordinates (columns,).
+
+    They are chosen from the configurations nearest to poses in four directions from home, and from random ones, which
+    may lie in components of the workspace that are not connected with home.
+    """
+    closure = closure_of(mechanism, whole=False)
+    directions = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]) / np.sqrt(3.0)
+    offsets = SEED_DISTANCE * mechanism.characteristic_length * directions
+    poses = [
+        pose(mechanism.home_pose[:3, 3] + offset, rotvec=SEED_TURN * direction)
+        for offset, direction in zip(offsets, directions, strict=True)
+    ]
+    turning = 0.0 if mechanism.end_effector_is_joint else 1.0
+    home = np.zeros((len(directions), len(closure.scale)))
+    _, steps = descents_within(closure, SEEDS, MOST_STEPS)
+    platform = (1.0, 1.0, 1.0, turning, turning, turning)
+    nearest = nearest_configurations(closure, home, np.array(poses), platform=platform, steps=max(steps, 1))
+    coordinates, candidate_poses = random_feasible(mechanism)
+    is_feasible = nearest.feasible
+    coordinates = np.concatenate([home[:1], nearest.coordinates[is_feasible], coordinates])
+    candidate_poses = np.concatenate([mechanism.home_pose[None], nearest.poses[is_feasible], candidate_poses])
+    n, chosen = len(candidate_poses), [0]
+    while len(chosen) <= min(SEEDS, n - 1):
+        apart = [
+            differences(closure, candidate_poses, np.repeat(candidate_poses[i : i + 1], n, axis=0)) for i in chosen
+        ]
+        chosen.append(int(np.min(apart, axis=0).argmax()))
+    return tuple(coordinates[chosen[1:]])
+
+
+@lru_cache(maxsize=64)
+def random_feasible(mechanism: Mechanism) -> tuple[Floats, Floats]:
+    """Random feasible configurations: joint coordinates (k, columns), and poses (k, 4, 4).
+
+    If what the task leaves out of a pose never changes, it is that of home.
+    """
+    closure, task = closure_of(mechanism, whole=False), task_of(mechanism)
+    n = starts_within(closure, RANDOM_STARTS, RANDOM_STEPS)
+    coordinates, poses = random_starts(closure, n, np.random.default_rng(0))
+    left_out = task.left_out
+    is_fixed = follows_task(mechanism) and not has_parasitic_motion(mechanism)
+    if is_fixed:
+        poses = task.completed(poses, np.repeat(mechanism.home_pose[None], n, axis=0))
+    platform, frame = (left_out.held, left_out.frame) if is_fixed else (EVERYTHING_FREE, BASE_AXES)
+    closing = close(
+        closure,
+        coordinates,
+        poses,
+        platform=platform,
+        frame=frame,
+        limits=True,
+        margin=TOLERANCES.inside,
+        max_iterations=100 if n == RANDOM_STARTS else RANDOM_STEPS,
+    )
+    feasible = closing.feasible
+    return closing.coordinates[feasible], closing.poses[feasible]
