@@ -22,7 +22,7 @@ from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, U
 from pfabrik.files import LARGEST_FILE, MOST_DOTS, dumps, load, loads, save
 from pfabrik.files.reading import MOST_JOINTS
 from pfabrik.files.units import exact_degrees
-from pfabrik.writing import whole_path
+from pfabrik.whole_files import whole_path
 
 HEAD = 'schema = 1\nname = "m"\nend_effector = "platform"\nreference_point = [0, 0, 3]\n'
 TRIPOD = (

@@ -16,7 +16,7 @@ from in_mujoco import Model
 from machines import closure
 from pfabrik.errors import InvalidArgument, UnknownName
 from pfabrik.interop import from_mjcf, to_mjcf, verify
-from pfabrik.interop.configurations import reached_at_random
+from pfabrik.interop.referee_configurations import reached_at_random
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 NAMES = pf.catalog()

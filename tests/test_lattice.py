@@ -7,9 +7,9 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pfabrik.workspace.lattice import codes, places_of, ways
 from pfabrik.workspace.numbering import Numbering
 from pfabrik.workspace.parts import connected
+from pfabrik.workspace.sampled_lattice import codes, places_of, ways
 
 
 @pytest.mark.parametrize("d", [2, 3])

@@ -29,7 +29,7 @@ from PIL import Image
 
 from pfabrik.view.looks import HELD
 from pfabrik.view.plane import plane_of
-from pfabrik.view.saving import save_picture
+from pfabrik.view.save_picture import save_picture
 
 pyplot.switch_backend("Agg")
 

@@ -31,7 +31,7 @@ Run = Callable[..., Result]
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Run a command line in a folder of its own, with parts of 16 steps and paths of at most 200."""
     monkeypatch.chdir(tmp_path)
-    for module in ("table", "read_path", "sampling"):
+    for module in ("csv_table", "read_path", "sampling"):
         monkeypatch.setattr(f"pfabrik.paths.{module}.BLOCK", 16)
     for module in ("read_path", "sampling"):
         monkeypatch.setattr(f"pfabrik.paths.{module}.MOST_STEPS", 200)

@@ -23,7 +23,7 @@ from machines import closure
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument, PfabrikError
 from pfabrik.workspace.border import groups_of
-from pfabrik.workspace.verdicts import Question
+from pfabrik.workspace.verdicts import MapQuestion
 
 Array = NDArray[np.float64]
 
@@ -478,7 +478,7 @@ def test_what_no_closed_form_answers_is_explored_to_the_workspace_of_what_it_nea
     asked = {"fixed": {"z": -200.0}, "resolution": 15.0}
     begin = np.array([0.0, 0.0])
     with monkeypatch.context() as patched:
-        patched.setattr(Question, "_answers", None)  # what projects all that is out of reach
+        patched.setattr(MapQuestion, "_answers", None)  # what projects all that is out of reach
         explored = pf.workspace(apart, **asked)
         assert pf.workspace(apart, **asked, executor=NoExecutor()).size == explored.size
     known = pf.workspace(exact, **asked)

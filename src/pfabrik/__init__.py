@@ -70,8 +70,8 @@ _NAMES = {
     "view.animation": ("animate",),
     "view.live.viewer": ("Viewer", "view"),
     "view.machine": ("plot",),
-    "view.track": ("plot_track",),
-    "view.travel": ("plot_travel",),
+    "view.plot_track": ("plot_track",),
+    "view.plot_travel": ("plot_travel",),
     "warm_up": ("warm_up",),
     "workspace.ask": ("workspace",),
     "workspace.inscribed": ("Inscribed",),
@@ -125,8 +125,8 @@ if TYPE_CHECKING:
     from .view.animation import animate as animate
     from .view.live.viewer import Viewer as Viewer, view as view
     from .view.machine import plot as plot
-    from .view.track import plot_track as plot_track
-    from .view.travel import plot_travel as plot_travel
+    from .view.plot_track import plot_track as plot_track
+    from .view.plot_travel import plot_travel as plot_travel
     from .warm_up import warm_up as warm_up
     from .workspace.ask import workspace as workspace
     from .workspace.inscribed import Inscribed as Inscribed

@@ -17,7 +17,7 @@ from .answers.words import NO_FREEDOM, STRETCHED, short_names
 from .arrays import Floats, Mask
 from .closure.first_order import are_stretched
 from .description.mechanism import Mechanism
-from .description.notebook import card
+from .description.mechanism_html import card
 from .description.task import task_of
 from .engine import engine_of
 from .errors import InvalidArgument, counted
@@ -192,7 +192,7 @@ def travel(
     lines = _lines(mechanism, along, default)
     axes = _axes(mechanism, solution, about, default)
     centre = solution.pose[:3, 3] if pivot is None else _vector("pivot", pivot)
-    search = _Search(solution, lines, axes, centre)
+    search = _TravelSearch(solution, lines, axes, centre)
     distances = search.run()
     ends = Solution(mechanism, search.farthest, (len(distances),))
     named = active_limits(mechanism, ends._coordinates)
@@ -284,7 +284,7 @@ def _vector(name: str, given: ArrayLike) -> Floats:
     return vector
 
 
-class _Search:
+class _TravelSearch:
     """A line search from one pose in several directions at once.
 
     Attributes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, shaped
-from ..description.notebook import card
+from ..description.mechanism_html import card
 from ..frozen import FrozenMapping
 from ..motion.limits import coned, ranges_of
 from ..tolerances import TOLERANCES

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..description.notebook import bound_text, card
+from ..description.mechanism_html import bound_text, card
 from ..description.readouts import readouts
 from ..description.sketch import sketch
 from .words import as_sentence

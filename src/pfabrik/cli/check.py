@@ -14,7 +14,7 @@ import numpy as np
 import pfabrik as pf
 
 from ..description.graph_faults import leaves
-from ..description.rods import odd_rods, uneven_rods, with_lengths
+from ..description.rod_lengths import odd_rods, uneven_rods, with_lengths
 from ..errors import InvalidMechanism, counted
 from ..motion.fitting_task import has_dependent_coordinates, task_remark
 from .info import NOT_COUNTED, counted_mobility, nearly_free

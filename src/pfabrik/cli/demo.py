@@ -21,7 +21,7 @@ from ..arrays import Floats
 from ..extras import require
 from ..telling import telling
 from .outputs import check_outputs, real
-from .picture import picture
+from .pictures import picture
 from .whole import new_folder, whole_folder
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ import pfabrik as pf
 
 from ..description.readouts import readouts
 from ..errors import counted
-from .answer import describe, pose_header, pose_texts, tell_modes
 from .finite import is_finite
 from .mech import MECH, load
+from .report import describe, pose_header, pose_texts, tell_modes
 
 if TYPE_CHECKING:
     from ..answers.solution import Solution

@@ -9,9 +9,9 @@ import click
 
 import pfabrik as pf
 
-from .answer import describe, in_units, margins_table, pose_header, pose_texts, tell_modes
 from .mech import MECH, load
 from .projecting import note_left_out, note_unused, options_projecting, projecting
+from .report import describe, in_units, margins_table, pose_header, pose_texts, tell_modes
 from .target import Triple, target_of, targeted
 
 if TYPE_CHECKING:

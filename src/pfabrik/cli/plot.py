@@ -10,7 +10,7 @@ import pfabrik as pf
 
 from .mech import MECH, load
 from .outputs import check_outputs
-from .picture import picture
+from .pictures import picture
 from .target import Triple, target_of, targeted
 
 

@@ -20,7 +20,7 @@ from ..telling import telling
 from .finite import FINITE
 from .mech import MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs
-from .picture import picture
+from .pictures import picture
 from .projecting import options_projecting, projecting
 from .speeds import own_limits, speed_limits, speed_option
 from .track_checks import checked
@@ -117,7 +117,7 @@ def track(
 
 def refuse_early(picture_path: Path | None, film_path: Path | None) -> None:
     """Stop before the work begins where a picture or film cannot be written."""
-    from ..view.saving import FILMS, PICTURES
+    from ..view.save_picture import FILMS, PICTURES
 
     for path, endings in ((picture_path, PICTURES), (film_path, FILMS)):
         if path is not None:
@@ -168,9 +168,9 @@ def answered(
     """Follow a path part by part, write its rows and sum it up; the answers to the last part."""
     from ..paths.along import largest_tilts, least_margins
     from ..paths.follow import follow_parts
-    from .track_rows import Rows
+    from .track_rows import TrackRows
 
-    rows: Rows | None = None
+    rows: TrackRows | None = None
     with telling(f"tracking {counted(total, 'target') if total else 'targets'}") as tell:
         on_progress = None if tell is None else lambda done: tell(done, total or 0)
         parts = follow_parts(mechanism, blocks, options=options, speed_limits=limits or None, on_progress=on_progress)
@@ -178,7 +178,7 @@ def answered(
             room, tilts = least_margins(followed), largest_tilts(followed)
             told.add(path, followed, room, tilts, first)
             if handle is not None:
-                rows = rows or Rows(handle, mechanism, path, tilts is not None)
+                rows = rows or TrackRows(handle, mechanism, path, tilts is not None)
                 rows.write(path, followed, room, tilts, first)
     return followed
 

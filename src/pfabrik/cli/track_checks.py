@@ -60,7 +60,7 @@ class Moves:
 
 def note_misspelt(others: Iterable[str]) -> None:
     """Say so where a further column is named nearly like one of a pose."""
-    from ..paths.table import NUMERIC
+    from ..paths.csv_table import NUMERIC
 
     for name in others:
         hint = "" if name in NUMERIC else near_miss(name, NUMERIC)

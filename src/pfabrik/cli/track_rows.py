@@ -25,7 +25,7 @@ POSITION = ("x", "y", "z")
 ANGLES = ("roll", "pitch", "yaw")
 
 
-class Rows:
+class TrackRows:
     """Writes answers to an open file: a header, then one row for each target.
 
     A row has the target, its time if the path says, further columns, pose, status, actuators with their speeds and
@@ -106,7 +106,7 @@ class Rows:
 def write_track(handle: TextIO, path: Path, followed: Track) -> None:
     """A whole path and its answers."""
     room, tilts = least_margins(followed), largest_tilts(followed)
-    Rows(handle, followed.mechanism, path, tilts is not None).write(path, followed, room, tilts)
+    TrackRows(handle, followed.mechanism, path, tilts is not None).write(path, followed, room, tilts)
 
 
 def _rows(values: Floats) -> list[Any]:

@@ -12,7 +12,7 @@ import pfabrik as pf
 from .finite import FINITE
 from .mech import MECH, load
 from .outputs import STANDARD, check_outputs
-from .picture import picture
+from .pictures import picture
 from .target import Triple, target_of, targeted
 
 

@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from ..writing import whole_path
+from ..whole_files import whole_path
 from .outputs import STANDARD, real, refuse_input
 
 

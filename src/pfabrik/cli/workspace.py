@@ -17,13 +17,13 @@ import pfabrik as pf
 from ..answers.table import aligned
 from ..checks import require_ending
 from ..extras import require
-from ..view.saving import PICTURES
+from ..view.save_picture import PICTURES
 from ..workspace.saving import ENDINGS
 from .finite import FINITE, is_finite
 from .group import complain
 from .mech import MECH, load
 from .outputs import STANDARD, check_outputs
-from .picture import picture
+from .pictures import picture
 from .target import Triple
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def plain_object(found: Workspace, shape: Inscribed | None) -> dict[str, object]
 
 def describe(found: Workspace, shape: Inscribed | None) -> str:
     """Size, ends, what forms the border, and parts."""
-    from ..workspace.words import in_words, kind_of
+    from ..workspace.sizes import in_words, kind_of
 
     if not len(found.faces):
         return "nothing within reach"
@@ -224,6 +224,6 @@ def describe(found: Workspace, shape: Inscribed | None) -> str:
 
 
 def described_part(found: Workspace, part: Workspace) -> str:
-    from ..workspace.words import in_words
+    from ..workspace.sizes import in_words
 
     return f"{'with' if part is found.at_start else 'apart from'} the start: {in_words(part)}"

@@ -21,7 +21,7 @@ _LOOSE = re.compile(rf"[{''.join(_TYPES)}*\s_–-]{{1,99}}", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class Step:
+class ChainJoint:
     """One joint of a chain; `letter` is its place in the chain."""
 
     letter: str
@@ -34,12 +34,12 @@ class Step:
         return self.type != "prismatic"
 
 
-def read_chain(chain: Any) -> tuple[Step, ...]:
+def read_chain(chain: Any) -> tuple[ChainJoint, ...]:
     """The joints of a chain, from the base outward; none where the text is no chain."""
     if not isinstance(chain, str) or not _CHAIN.fullmatch(chain):
         return ()
     parts = zip(LETTERS, chain.split("-"), strict=False)
-    return tuple(Step(letter, _TYPES[part[0]], part.endswith("*")) for letter, part in parts)
+    return tuple(ChainJoint(letter, _TYPES[part[0]], part.endswith("*")) for letter, part in parts)
 
 
 def chain_faults(place: str, chain: Any) -> Iterator[Fault]:

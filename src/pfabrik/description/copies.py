@@ -54,7 +54,7 @@ class Copy:
 
 
 @dataclass(frozen=True)
-class Layout:
+class Patterns:
     """The patterns of a file, with the base and the end effector, which are never copied."""
 
     patterns: tuple[Pattern, ...]

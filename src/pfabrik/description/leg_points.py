@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import Fault
-from .chains import Step
+from .chains import ChainJoint
 from .form_faults import number_faults, shown
 from .joints import Vector
 from .legs import Leg
@@ -21,7 +21,7 @@ class Point:
     place: str
 
 
-def leg_points(leg: Leg, steps: Sequence[Step], place: str, faults: list[Fault]) -> list[list[Point]]:
+def leg_points(leg: Leg, steps: Sequence[ChainJoint], place: str, faults: list[Fault]) -> list[list[Point]]:
     """The centres of the joints that have one, from the base outward: for each of them one point for each leg.
 
     All lists are equally long. Faults are added to the list.

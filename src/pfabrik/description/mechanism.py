@@ -20,7 +20,7 @@ from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import faults_of_legs, legs_name, placed_joints
 from .legs import Leg, as_legs
-from .notebook import mechanism_html
+from .mechanism_html import mechanism_html
 from .structure import Structure
 
 __all__ = [

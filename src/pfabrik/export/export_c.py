@@ -11,8 +11,8 @@ from typing import Literal, TypeAlias, get_args
 from ..checks import require_names
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism, counted
-from ..writing import whole_path
-from .machine import Machine
+from ..whole_files import whole_path
+from .machine_data import Machine
 from .source import source
 from .wording import Precision
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
-from .machine import Coordinate, Leg, Machine
+from .machine_data import Coordinate, ExportedLeg, Machine
 
 
 class Tower(NamedTuple):
@@ -65,11 +65,11 @@ def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
     return [(*driven, offset) for driven, offset in zip(ends, offsets, strict=True)]
 
 
-def _length(leg: Leg) -> float:
+def _length(leg: ExportedLeg) -> float:
     return float(np.asarray(leg.numbers["length"]))
 
 
-def _pair(machine: Machine, driven: Coordinate, proximal: int) -> tuple[Leg, Leg] | None:
+def _pair(machine: Machine, driven: Coordinate, proximal: int) -> tuple[ExportedLeg, ExportedLeg] | None:
     """The two rods on an actuator, if it is the proximal joint asked for: a crank, or a carriage."""
     pair = [leg for leg in machine.legs if leg.main == driven.leg]
     return (pair[0], pair[1]) if len(pair) == 2 and pair[0].record["proximal"] == proximal else None

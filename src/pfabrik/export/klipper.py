@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..description.mechanism import Mechanism
-from ..description.rods import uneven_rods, with_lengths
+from ..description.rod_lengths import uneven_rods, with_lengths
 from ..errors import UnsupportedMechanism
 from ..tolerances import TOLERANCES
 from .fits import Thigh, Tower, angle_of, thighs_of, towers_of
-from .machine import Machine
+from .machine_data import Machine
 from .wording import comment
 
 LETTERS = "abc"

@@ -12,7 +12,7 @@ from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .fits import Thigh, Tower, angle_of, struts_of, thighs_of, towers_of
 from .linuxcnc_module import module
-from .machine import Machine
+from .machine_data import Machine
 from .wording import comment
 
 TOWERS = (90.0, 210.0, -30.0)

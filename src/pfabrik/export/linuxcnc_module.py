@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .export_c import c_source
-from .machine import Machine
+from .machine_data import Machine
 from .wording import comment
 
 INVERSE = """\

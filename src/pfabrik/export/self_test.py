@@ -15,7 +15,7 @@ from ..ik import solve_ik
 from ..motion.mobility import generic_of
 from ..options import Options
 from ..poses import pose
-from .machine import Machine
+from .machine_data import Machine
 from .wording import Precision
 
 N_POSES = 50

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from importlib import resources
 
-from .machine import Machine
+from .machine_data import Machine
 from .self_test import AGREEMENT, checks_of
 from .tables import checks_h, features, machine_h, tables_h
 from .wording import Precision, comment, in_words

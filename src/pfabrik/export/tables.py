@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Record
 from ..decomposition.leg_table import COMPLETED_WITHIN
 from ..kernels.legs import records as K
-from .machine import Coordinate, Leg, Machine
+from .machine_data import Coordinate, ExportedLeg, Machine
 from .self_test import Checks
 from .wording import ACCURACY, Precision, comment, literal, quoted
 
@@ -141,7 +141,7 @@ def _members(routines: str, struct: str) -> dict[str, str]:
     return members
 
 
-def _leg(leg: Leg, members: Mapping[str, str]) -> str:
+def _leg(leg: ExportedLeg, members: Mapping[str, str]) -> str:
     """A leg, member by member in order: C++ has had designated initialisers only since 2020."""
     record = leg.record
     fields = {"kind": KINDS[int(record["kind"])], "proximal": PROXIMAL_JOINTS.get(int(record["proximal"]), "")}

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from .machine import Number
+from .machine_data import Number
 
 Precision = Literal["double", "float"]
 

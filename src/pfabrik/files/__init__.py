@@ -11,7 +11,7 @@ from ..catalog import catalog, catalog_file
 from ..description.form_faults import shown
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import Fault, InvalidArgument, InvalidMechanism, UnknownName
-from ..writing import whole_path
+from ..whole_files import whole_path
 from .reading import read_mechanism
 from .writing import dumps
 

@@ -12,9 +12,9 @@ import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
-from ..description.chains import Step, read_chain
+from ..description.chains import ChainJoint, read_chain
 from ..description.coercion import numbers
-from ..description.copies import Copy, Layout, Pattern, count_of, read_copies
+from ..description.copies import Copy, Pattern, Patterns, count_of, read_copies
 from ..description.faults import in_order, joint_index, merged
 from ..description.form_faults import is_name, joint_faults, key_faults, name_faults, number_faults, shown
 from ..description.joints import Cone, Joint
@@ -139,7 +139,7 @@ def _leg_hint(key: str, letters: Sequence[str]) -> str:
     return " here: it is one of the file, above its first table" if of_the_file else near_miss(key, LEG_KEYS)
 
 
-def _said(table: Any, step: Step | None, angle_unit: str) -> Any:
+def _said(table: Any, step: ChainJoint | None, angle_unit: str) -> Any:
     """What is said of one joint of a leg, angles in radians; anything but a table as it is."""
     if not isinstance(table, dict):
         return table
@@ -159,7 +159,7 @@ def _expanded(table: Table, patterns: Sequence[Pattern], legs: Sequence[Leg], fa
     placed, found = _placed(base, end_effector, patterns, legs)
     faults = merged(faults, found)
     joints = (*patterns, *(Pattern(each.joint) for each in placed))
-    layout = Layout(joints, base, end_effector)
+    layout = Patterns(joints, base, end_effector)
     if not unclear and not found:
         misfits = faults_of_legs(list(_misfits(layout)), len(patterns), placed)
         unclear, faults = bool(misfits), [*faults, *misfits]
@@ -182,7 +182,7 @@ def _placed(
     return placed_joints(legs, base, end_effector, [each.joint.name for each in patterns])
 
 
-def _misfits(layout: Layout) -> Iterator[Fault]:
+def _misfits(layout: Patterns) -> Iterator[Fault]:
     count = count_of(layout.patterns)
     if count > MOST_JOINTS:
         yield Fault("joint", f"{count} joints with their copies", f"at most {MOST_JOINTS}")
@@ -196,7 +196,7 @@ def _hides_joints(fault: Fault) -> bool:
     return root in ("base", "end_effector", "units", "joint", "leg") or ".copies" in fault.place
 
 
-def _built(table: Table, layout: Layout, placed: Sequence[LegJoint], faults: list[Fault]) -> Mechanism:
+def _built(table: Table, layout: Patterns, placed: Sequence[LegJoint], faults: list[Fault]) -> Mechanism:
     copies = layout.expanded()
     head: Table = {"name": None, "joints": tuple(copy.joint for copy in copies)}
     head |= {key: table[key] for key in ("name", "base", "end_effector", "reference_point", "task") if key in table}
@@ -214,7 +214,7 @@ def _built(table: Table, layout: Layout, placed: Sequence[LegJoint], faults: lis
     return mechanism
 
 
-def _as_written(faults: Sequence[Fault], layout: Layout, copies: Sequence[Copy]) -> list[Fault]:
+def _as_written(faults: Sequence[Fault], layout: Patterns, copies: Sequence[Copy]) -> list[Fault]:
     """The faults of expanded joints at the places of their file, each place reported from one copy only."""
     written: list[Fault] = []
     reporter: dict[str, int] = {}

@@ -14,7 +14,7 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..poses import as_floats
-from ..writing import whole_path
+from ..whole_files import whole_path
 from .cuts import CutTree, cut_tree
 from .mjcf_bodies import Names, as_attributes, bodies, names_of, vector
 from .physics import STEP, Physics, physics

@@ -14,9 +14,9 @@ import numpy as np
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..tolerances import TOLERANCES
-from .configurations import Travelled, reached_at_random, travelled
 from .original import Original
 from .referee import Referee
+from .referee_configurations import Travelled, reached_at_random, travelled
 
 FAR = 0.25
 """Share of its range, or of what was tried, that some actuator must have gone through: poses nearer to home than that

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
-from ..description.notebook import card
+from ..description.mechanism_html import card
 from ..tolerances import TOLERANCES
 from .first_order import actuated_columns, first_order, right_singular
 from .walks import around_home

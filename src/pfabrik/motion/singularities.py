@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
-from ..description.notebook import card
+from ..description.mechanism_html import card
 from ..description.task import task_of
 from ..tolerances import TOLERANCES
 from .displacements import displacements

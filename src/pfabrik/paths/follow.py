@@ -20,7 +20,7 @@ BACK = BLOCK // 4
 """How many steps a part is begun before the end of the one before it, at most."""
 
 
-class Part(NamedTuple):
+class TrackPart(NamedTuple):
     """A part of a path and its answers; the rows before `first` were in the part before it too."""
 
     path: Path
@@ -35,7 +35,7 @@ def follow_parts(
     options: Options | None = None,
     speed_limits: Mapping[str, float] | None = None,
     on_progress: Callable[[int], None] | None = None,
-) -> Iterator[Part]:
+) -> Iterator[TrackPart]:
     """Answers along a path as of `track`, a part at a time.
 
     Each part begins at an answer of the one before it, and with what follows there: two steps, for accelerations, or
@@ -65,7 +65,7 @@ def follow_parts(
             speed_limits=None if path.times is None else speed_limits,
             on_progress=report,
         )
-        yield Part(path, answers, first)
+        yield TrackPart(path, answers, first)
         done += len(block.lines)
         place = _last_sure(answers.status)
         if place is not None:

@@ -51,7 +51,7 @@ ONE_PLACE = 1e-9
 """Angle of an arc whose ends are one place, which goes all the way round, up to rounding [rad]."""
 
 
-class Step(NamedTuple):
+class Move(NamedTuple):
     """A place on the way: x, y, z, and a, b, c [deg]; the feed toward it, as of a `Path`; the line."""
 
     place: Floats
@@ -60,7 +60,7 @@ class Step(NamedTuple):
 
 
 @dataclass
-class State:
+class ModalState:
     """What holds until another word changes it.
 
     Attributes
@@ -81,7 +81,7 @@ class State:
     units: dict[int, float] = field(default_factory=dict)
 
 
-def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: float, longest: float) -> Iterator[Step]:
+def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: float, longest: float) -> Iterator[Move]:
     """The steps of a program, the first at home.
 
     Parameters
@@ -93,8 +93,8 @@ def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: fl
     """
     unit = METRES.get(length_unit.strip(), METRES["mm"])
     inches, millimetres = METRES["in"] / unit, METRES["mm"] / unit
-    state = State(np.array(home, dtype=float), millimetres, units={20: inches, 21: millimetres})
-    yield Step(state.place.copy(), math.nan, 0)
+    state = ModalState(np.array(home, dtype=float), millimetres, units={20: inches, 21: millimetres})
+    yield Move(state.place.copy(), math.nan, 0)
     for number, text in enumerate(lines, 1):
         words = _words(text, number)
         _obey(state, words, number)
@@ -136,7 +136,7 @@ def _is_setting(plain: str) -> bool:
     return code in MESSAGES or (is_printers and f"M{code}" not in CODES and code not in CALLS and "G" not in plain)
 
 
-def _obey(state: State, words: dict[str, list[float]], number: int) -> None:
+def _obey(state: ModalState, words: dict[str, list[float]], number: int) -> None:
     """Take in what is no motion."""
     if "O" in words:
         if state.has_number or state.motion is not None:
@@ -168,7 +168,9 @@ def _obey(state: State, words: dict[str, list[float]], number: int) -> None:
             raise WrongPath(f"line {number}: found F{state.feed:g}; expected a feed above zero")
 
 
-def _move(state: State, words: dict[str, list[float]], number: int, tolerance: float, longest: float) -> Iterator[Step]:
+def _move(
+    state: ModalState, words: dict[str, list[float]], number: int, tolerance: float, longest: float
+) -> Iterator[Move]:
     end = state.place.copy()
     for place, letter in enumerate(AXES):
         if letter in words:
@@ -184,7 +186,7 @@ def _move(state: State, words: dict[str, list[float]], number: int, tolerance: f
         count = _parts(float(np.linalg.norm(end[:3] - begin[:3])), longest, number)
         places = (begin + (end - begin) * (part / count) for part in range(1, count + 1))
     for each in places:
-        yield Step(each, feed, number)
+        yield Move(each, feed, number)
     state.place = end
 
 
@@ -197,7 +199,7 @@ def _parts(length: float, longest: float, number: int) -> int:
 
 
 def _arc(
-    state: State, words: dict[str, list[float]], end: Floats, number: int, tolerance: float, longest: float
+    state: ModalState, words: dict[str, list[float]], end: Floats, number: int, tolerance: float, longest: float
 ) -> Iterator[Floats]:
     """Places on a circle or a helix, clockwise (G2) or not, seen against the plane's normal."""
     if words.get("P", [1.0])[-1] != 1.0:

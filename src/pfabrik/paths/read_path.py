@@ -20,11 +20,11 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..poses import pose
 from ..rotations import to_rpy
+from .csv_table import SAID, CsvTable
 from .encodings import as_text
-from .gcode import COMMENT, Step, steps_of
+from .gcode import COMMENT, Move, steps_of
 from .path import BLOCK, MOST_STEPS, Path, WrongPath, joined
 from .sampling import at_rate, divided, timed
-from .table import SAID, Table
 
 GCODE = (".gcode", ".nc", ".ngc", ".g", ".gco", ".tap")
 CHORD, LONGEST = 1e-5, 1e-2
@@ -105,7 +105,7 @@ def path_blocks(
         with _opened(file) as handle:
             is_table, lines = _begun(_text(handle), file.suffix.lower())
             if is_table:
-                table = Table(lines, mechanism)
+                table = CsvTable(lines, mechanism)
                 blocks, has_times = _counted(table.blocks()), table.has_times
                 if longest is not None:
                     blocks = divided(blocks, longest)
@@ -180,7 +180,7 @@ def _home(mechanism: Mechanism) -> Floats:
     return np.concatenate([pose_at_home[:3, 3], np.degrees(to_rpy(pose_at_home[:3, :3]))])
 
 
-def _program(steps: Iterator[Step]) -> Iterator[Path]:
+def _program(steps: Iterator[Move]) -> Iterator[Path]:
     """The steps of a program, in parts."""
     count = 0
     while part := list(islice(steps, BLOCK)):

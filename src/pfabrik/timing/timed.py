@@ -15,7 +15,7 @@ from ..description.readouts import readouts
 from ..errors import counted
 from ..extras import require
 from ..rotations import to_rpy
-from ..writing import whole_path
+from ..whole_files import whole_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,14 +18,14 @@ from ..drawing import SMALL
 from ..errors import MissingLibrary
 from ..extras import require
 from ..telling import OnProgress, telling
-from ..writing import whole_path
+from ..whole_files import whole_path
 from .canvas import canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD
 from .machine import draw_key, draw_machine
 from .plane import plane_of
-from .saving import FILMS
+from .plot_track import checked_track, ways_of
+from .save_picture import FILMS
 from .skeleton import Skeleton, skeleton_of
-from .track import checked_track, ways_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,7 +16,7 @@ from .canvas import Canvas, canvas_on
 from .labels import place_names
 from .looks import ACTUATED, EDGE, HELD, LINK, MARKERS, PASSIVE, PLATFORM, of_a_body
 from .plane import plane_of
-from .skeleton import Mark, Part, Skeleton, checked_shown, skeleton_of
+from .skeleton import BodyShape, Mark, Skeleton, checked_shown, skeleton_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -79,7 +79,7 @@ def draw_machine(canvas: Canvas, skeleton: Skeleton) -> list[Artist]:
     return artists + _joints(canvas, skeleton.marks)
 
 
-def _body(canvas: Canvas, part: Part, is_held: bool) -> list[Artist]:
+def _body(canvas: Canvas, part: BodyShape, is_held: bool) -> list[Artist]:
     """A body: base and end effector light and broad, links dark and narrow; links of a joint at its limit orange."""
     is_link = part.role == "link"
     colour = HELD if is_link and is_held else of_a_body(part.role)

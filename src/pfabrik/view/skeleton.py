@@ -20,7 +20,7 @@ SAME_ANGLE = 6
 
 
 @dataclass(frozen=True)
-class Part:
+class BodyShape:
     """A body through its joints: a line between two corners, a face of three and more, (k, 3) [length], in order."""
 
     body: str
@@ -48,7 +48,7 @@ class Skeleton:
     """
 
     mechanism: Mechanism
-    parts: tuple[Part, ...]
+    parts: tuple[BodyShape, ...]
     marks: tuple[Mark, ...]
     rails: Floats
     reference: Floats
@@ -91,7 +91,8 @@ def skeleton_of(shown: Mechanism | Solution) -> Skeleton:
     return Skeleton(
         mechanism,
         tuple(
-            Part(body, _role(mechanism, body), _corners(mechanism, body, places, rails)) for body in mechanism.bodies
+            BodyShape(body, _role(mechanism, body), _corners(mechanism, body, places, rails))
+            for body in mechanism.bodies
         ),
         tuple(Mark(joint, places[joint.name], tuple(held.get(joint.name, ()))) for joint in mechanism.joints),
         np.reshape(list(rails.values()), (-1, 2, 3)),

@@ -19,12 +19,12 @@ from ..description.task import task_of
 from ..errors import InvalidArgument, UnknownName
 from ..poses import SupportsMatrix
 from ..telling import OnProgress, telling
-from .blocks import Measure
+from .border_search import searched, step_of
+from .measuring import Measure
 from .orientations import tilts_up_to
 from .result import Workspace
-from .search import searched, step_of
 from .space import Space, space_of
-from .verdicts import Question
+from .verdicts import MapQuestion
 
 FEWEST_CELLS = 24
 """Cells across the shortest side of a workspace; where the default resolution gives fewer, it is halved."""
@@ -89,13 +89,13 @@ def workspace(
         if tilt is not None:
             raise InvalidArgument("tilt", "an angle", "None with orientation='any'")
     hold: Literal["orientation", "position"] = "position" if is_any else "orientation"
-    question = Question(space, begin, _turns(space, tilt), hold, *_ends(space, within))
+    question = MapQuestion(space, begin, _turns(space, tilt), hold, *_ends(space, within))
     with telling("workspace", on_progress) as tell:
         return _found(question, resolution, executor, tell)
 
 
 def _found(
-    question: Question, resolution: float | None, executor: Executor | None, tell: OnProgress | None
+    question: MapQuestion, resolution: float | None, executor: Executor | None, tell: OnProgress | None
 ) -> Workspace:
     """At the resolution asked for; else at the default one, or finer, until enough cells go across."""
     step = step_of(question, resolution)

@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .lattice import Lattice, codes, corners
 from .numbering import Numbering
 from .refining import Cells, Refined
+from .sampled_lattice import Lattice, codes, corners
 
 
 class Parts:

@@ -11,7 +11,7 @@ from ..arrays import Floats, Ints
 from ..drawing import SMALL
 from .axes import axes_for
 from .border import REST, Group, groups_of
-from .words import in_words
+from .sizes import in_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

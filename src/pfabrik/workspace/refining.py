@@ -8,8 +8,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
-from .lattice import MIDDLE, Lattice, codes, corners, ways
 from .numbering import Numbering
+from .sampled_lattice import MIDDLE, Lattice, codes, corners, ways
 
 GROWS = 0.5
 """By which share of its size a box grows to the side where something touches it."""

@@ -11,8 +11,8 @@ from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
 from ..poses import as_floats
 from .parts import Parts
-from .surface import Mesh
-from .verdicts import Limits, Question
+from .surface import BorderMesh
+from .verdicts import Limits, MapQuestion
 
 EXPONENTS = {1: "", 2: "²", 3: "³"}
 
@@ -21,7 +21,13 @@ class Region:
     """The fields of a `Workspace`, which says what they are; what draws, writes or fills one reads these."""
 
     def __init__(
-        self, question: Question, resolution: Floats, mesh: Mesh, coarser: Mesh, parts: Parts, part: int | None = None
+        self,
+        question: MapQuestion,
+        resolution: Floats,
+        mesh: BorderMesh,
+        coarser: BorderMesh,
+        parts: Parts,
+        part: int | None = None,
     ) -> None:
         self._question, self._mesh, self._coarser, self._parts, self._part = question, mesh, coarser, parts, part
         self.mechanism, self.names, self.units = question.mechanism, question.space.names, question.space.units

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from .border_search import sliced
 from .inscribed import Inscribed, Kind, inscribed
 from .region import Region
 from .saving import save
-from .search import sliced
-from .words import in_words
+from .sizes import in_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -126,7 +126,7 @@ class Workspace(Region):
 
     def _repr_html_(self) -> str:
         """Size, ends, what forms the border and, over two coordinates, its outline, for notebooks."""
-        from .notebook import workspace_html
+        from .workspace_html import workspace_html
 
         return workspace_html(self)
 

@@ -13,7 +13,7 @@ from ..arrays import Ints
 from ..cells import CsvWriter
 from ..checks import require_ending
 from ..errors import InvalidArgument
-from ..writing import whole_path
+from ..whole_files import whole_path
 
 if TYPE_CHECKING:
     from .region import Region

@@ -20,11 +20,11 @@ from ..ik import solve_ik
 from ..motion.singularities import NUMBERS, Singularity, parallel_signs
 from ..options import Options
 from ..telling import OnProgress, telling
-from .lattice import codes, corners
 from .numbering import Numbering
 from .parts import connected
 from .refining import Cells
 from .result import Workspace
+from .sampled_lattice import codes, corners
 from .singular_picture import plot_map, plot_track
 from .surface import crossed_edges
 

@@ -15,9 +15,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
-from .blocks import Measure
-from .lattice import Lattice, places_of
+from .measuring import Measure
 from .refining import Cells
+from .sampled_lattice import Lattice, places_of
 
 CLOSE, CLOSE_ONE_BY_ONE = 1e-3, 1e-2
 """How exactly a vertex is on the border, where closed forms tell margins and elsewhere [steps of the lattice]."""
@@ -29,7 +29,7 @@ Edge: TypeAlias = tuple[int, int]
 Face: TypeAlias = tuple[Edge, ...]
 
 
-class Mesh(NamedTuple):
+class BorderMesh(NamedTuple):
     """A closed mesh: triangles that turn right-handed as seen from outside; segments with the inside on their left.
 
     Attributes
@@ -67,20 +67,20 @@ class Mesh(NamedTuple):
             return np.asarray(np.linalg.norm(sides[:, 0], axis=1))
         return np.asarray(0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1))
 
-    def among(self, chosen: Mask) -> Mesh:
+    def among(self, chosen: Mask) -> BorderMesh:
         """The faces all of whose vertices, (v,), are chosen, and these alone."""
         faces = self.faces[chosen[self.faces].all(axis=1)]
         used = np.zeros(len(self.vertices), bool)
         used[faces] = True
         place = np.cumsum(used) - 1
-        return Mesh(self.vertices[used], place[faces], self.limits[used], self.inner[used])
+        return BorderMesh(self.vertices[used], place[faces], self.limits[used], self.inner[used])
 
 
-def mesh_of(lattice: Lattice, cells: Cells) -> Mesh:
+def mesh_of(lattice: Lattice, cells: Cells) -> BorderMesh:
     """The mesh of the border through cells that it does not leave."""
     ends, faces = crossed_edges(cells, len(lattice.points))
     vertices, limits, inner = _vertices(lattice, ends, cells.width)
-    return Mesh(vertices, faces, limits, inner)
+    return BorderMesh(vertices, faces, limits, inner)
 
 
 def crossed_edges(cells: Cells, n: int) -> tuple[Ints, Ints]:

@@ -36,7 +36,7 @@ GEOMETRY = ("", "reach")
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class MapQuestion:
     """What is asked of every point of a map.
 
     Attributes

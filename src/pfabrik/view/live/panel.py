@@ -24,7 +24,7 @@ from .session import DIGITS, Session
 if TYPE_CHECKING:
     import viser
 
-    from .workspace import Patch
+    from .border_patches import Patch
 
 BARS = 8
 """Margins that have a bar; of further ones only the number is told."""

@@ -11,13 +11,13 @@ from ...answers.tracked import Track
 from ...arrays import Floats
 from ...description.mechanism import Mechanism
 from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, PLATFORM, of_a_body, rgb
-from ..skeleton import Mark, Part, Skeleton
+from ..skeleton import BodyShape, Mark, Skeleton
 from .shapes import SHAPES, cylinder, fan, quaternion, upright_to
 
 if TYPE_CHECKING:
     import viser
 
-    from .workspace import Patch
+    from .border_patches import Patch
 
 RADIUS, LINK_RADIUS = 0.016, 0.010
 """Of the edges of base and end effector, and of links [L]."""
@@ -180,7 +180,7 @@ class Scene:
                 self._labels[name] = self._scene.add_label(f"{MACHINE}/held/{name}", name, position=at)
 
 
-def _colour_of(part: Part) -> tuple[int, int, int]:
+def _colour_of(part: BodyShape) -> tuple[int, int, int]:
     return rgb(BASE if part.role == "base" else of_a_body(part.role))
 
 

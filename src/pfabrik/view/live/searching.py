@@ -9,8 +9,8 @@ from ...answers.solution import Solution
 from ...answers.words import by_bound, exceeded
 from ...modes.assembly import assembly_modes
 from ...modes.working import working_modes
+from .live_machine import LiveMachine
 from .newest import Newest
-from .stage import Stage
 
 
 class Searches:
@@ -24,7 +24,7 @@ class Searches:
 
     def __init__(
         self,
-        stage: Callable[[], Stage],
+        stage: Callable[[], LiveMachine],
         lock: AbstractContextManager[object],
         on_error: Callable[[Exception], None],
     ) -> None:
@@ -64,7 +64,7 @@ class Searches:
             panel.tell(f"looking for the workspace: {100 * done // max(total, 1)} %")
 
         def search() -> None:
-            from .workspace import border_of
+            from .border_patches import border_of
 
             patches, size = border_of(start, progress)
             with self._lock:

@@ -18,14 +18,14 @@ from ...errors import InvalidArgument, PfabrikError
 from ...extras import require
 from ...files import load
 from ...warm_up import warm_up
-from ...writing import whole_path
+from ...whole_files import whole_path
+from .live_machine import LiveMachine, Shown, checked
 from .newest import Newest
 from .panel import Actions
 from .player import Player
 from .searching import Searches
 from .serving import quietly, serve
 from .session import Session, moved
-from .stage import Shown, Stage, checked
 from .watching import Watch
 
 LOOPBACK, PORT = "127.0.0.1", 8080
@@ -199,11 +199,11 @@ class Viewer:
         self._take_step(step)
         self._stage.panel.show_step(step)
 
-    def _ask(self, question: Callable[[Stage], None]) -> None:
+    def _ask(self, question: Callable[[LiveMachine], None]) -> None:
         stage = self._stage
         self._newest.post(lambda: self._answer(question) if self._stage is stage else None)
 
-    def _answer(self, question: Callable[[Stage], None]) -> None:
+    def _answer(self, question: Callable[[LiveMachine], None]) -> None:
         with self._lock:
             question(self._stage)
             self._stage.refresh()
@@ -226,7 +226,7 @@ class Viewer:
         with self._lock:
             if self._player is not None:
                 self._player.stop()
-            self._stage = Stage(self._server, shown, self._drag, actions)
+            self._stage = LiveMachine(self._server, shown, self._drag, actions)
         if self._server.get_clients():
             self._prepare()
 

@@ -15,7 +15,7 @@ from ..extras import require
 @contextmanager
 def picture(path: Path, quiet: bool = False) -> Iterator[None]:
     """Write to a file what a block draws in one new figure, and say so; a name that cannot be, before it draws."""
-    from ..view.saving import PICTURES, save_picture
+    from ..view.save_picture import PICTURES, save_picture
 
     require_ending(path, PICTURES)
     require("pictures", "matplotlib", "plot")

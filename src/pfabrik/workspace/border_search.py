@@ -12,12 +12,12 @@ from ..arrays import Floats
 from ..checks import require_positive
 from ..errors import InvalidArgument
 from ..telling import telling
-from .blocks import Measure
-from .lattice import Lattice
+from .measuring import Measure
 from .parts import Parts
 from .refining import refined
-from .surface import Mesh, mesh_of
-from .verdicts import Question
+from .sampled_lattice import Lattice
+from .surface import BorderMesh, mesh_of
+from .verdicts import MapQuestion
 
 FINENESS, FINENESS_OF_SETS, FINENESS_ONE_BY_ONE = 1 / 100, 1 / 50, 1 / 25
 """Resolutions [L or rad]: where closed forms tell margins; where they do for each of many tilts; elsewhere."""
@@ -29,7 +29,7 @@ FIRST_REACH = {True: 2.5, False: 1.5}
 """How far the first look goes to each side [L or rad], likewise."""
 
 
-def searched(question: Question, step: Floats, measure: Measure) -> tuple[Mesh, Mesh, Parts]:
+def searched(question: MapQuestion, step: Floats, measure: Measure) -> tuple[BorderMesh, BorderMesh, Parts]:
     """The border at cells of size `step`, (d,), the same at cells twice as large, and the parts that hang together."""
     space, exact = question.space, question.has_margins
     lattice = Lattice(space.start, step, measure)
@@ -41,7 +41,7 @@ def searched(question: Question, step: Floats, measure: Measure) -> tuple[Mesh, 
     return mesh_of(lattice, cells.border), mesh_of(lattice, cells.coarser), Parts(lattice, cells)
 
 
-def step_of(question: Question, resolution: float | None) -> Floats:
+def step_of(question: MapQuestion, resolution: float | None) -> Floats:
     """The size of the smallest cells, (d,) [length or rad]."""
     space, length = question.space, question.mechanism.characteristic_length
     unit = np.where(space.is_angle, 1.0, length)
@@ -57,8 +57,8 @@ def step_of(question: Question, resolution: float | None) -> Floats:
 
 
 def sliced(
-    question: Question, fixed: Mapping[str, float], resolution: Floats | float
-) -> tuple[Question, Floats, Mesh, Mesh, Parts]:
+    question: MapQuestion, fixed: Mapping[str, float], resolution: Floats | float
+) -> tuple[MapQuestion, Floats, BorderMesh, BorderMesh, Parts]:
     """A question with further coordinates fixed, the size of the smallest cells, and what was found."""
     space = question.space.with_fixed(fixed)
     kept = [question.space.names.index(name) for name in space.names]

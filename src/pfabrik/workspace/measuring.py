@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..telling import OnProgress
-from .verdicts import Question
+from .verdicts import MapQuestion
 
 POSES_A_BLOCK = 1 << 14
 """Poses of a block: enough to be worth sending to another process."""
@@ -30,7 +30,7 @@ class Measure:
     total : about how many points there will be, as far as can be told.
     """
 
-    def __init__(self, question: Question, executor: Executor | None, on_progress: OnProgress | None) -> None:
+    def __init__(self, question: MapQuestion, executor: Executor | None, on_progress: OnProgress | None) -> None:
         self.question = question
         self.total = 0
         self._done = 0
@@ -41,7 +41,7 @@ class Measure:
         self._points_a_block = max(1, POSES_A_BLOCK // (slower * len(question.turns)))
 
     def __call__(self, points: Floats) -> tuple[Floats, Ints]:
-        """Margins and bindings of points (n, d), as of `Question.measure`."""
+        """Margins and bindings of points (n, d), as of `MapQuestion.measure`."""
         if self._explorer is not None:
             return self.question.explored(points, self._explorer, self._tell)
         blocks = [points[i : i + self._points_a_block] for i in range(0, len(points), self._points_a_block)]
@@ -72,7 +72,7 @@ class Measure:
                 future.cancel()
 
     def name_limits(self, points: Floats) -> Ints:
-        """Which limits points (n, d) just beyond the border are beyond, as of `Question.name_limits`."""
+        """Which limits points (n, d) just beyond the border are beyond, as of `MapQuestion.name_limits`."""
         return self.question.name_limits(points, self._explorer)
 
     def _told(self, found: tuple[Floats, Ints], n: int) -> tuple[Floats, Ints]:
@@ -92,6 +92,6 @@ def measure_block(sent: bytes, points: Floats) -> tuple[Floats, Ints]:
 
 
 @lru_cache(maxsize=4)
-def _question(sent: bytes) -> Question:
-    question: Question = pickle.loads(sent)
+def _question(sent: bytes) -> MapQuestion:
+    question: MapQuestion = pickle.loads(sent)
     return question

@@ -12,7 +12,7 @@ import click
 from ..answers.table import aligned, plain
 from ..answers.words import as_sentence, by_bound, exceeded, loop_gap
 from ..arrays import Floats
-from ..description.notebook import bound_text
+from ..description.mechanism_html import bound_text
 from ..description.readouts import readouts
 from ..errors import ContinuumOfSolutions, counted
 from ..rotations import to_rpy

@@ -11,7 +11,7 @@ from ...answers.solution import Solution
 from ...arrays import Floats
 from ...workspace.ask import workspace
 from ...workspace.border import groups_of
-from ...workspace.words import in_words
+from ...workspace.sizes import in_words
 
 POSITIONS = ("x", "y", "z")
 

@@ -41,7 +41,7 @@ SAID = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 EXPECTED = "expected x, y, z and roll, pitch, yaw or qx, qy, qz, qw"
 
 
-class Table:
+class CsvTable:
     """The lines of a table, of which only the header is read at first.
 
     Attributes

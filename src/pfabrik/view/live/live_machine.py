@@ -12,8 +12,8 @@ from ...answers.status import Status
 from ...answers.tracked import Track
 from ...arrays import Floats
 from ...description.mechanism import Mechanism
+from ..plot_track import checked_track
 from ..skeleton import checked_shown, skeleton_of
-from ..track import checked_track
 from .handles import Handles
 from .panel import Actions, Panel
 from .player import due_after
@@ -28,7 +28,7 @@ Shown: TypeAlias = tuple[Mechanism, Solution | None, Track | None]
 """A machine, the configuration that it is first shown in (default: home), and the path that can be played."""
 
 
-class Stage:
+class LiveMachine:
     """A machine in the page, in place of what was there before.
 
     Attributes

@@ -20,7 +20,7 @@ SIDE_BY_SIDE = 0.3
 """Angle up to which two rods between the same two bodies count as a pair [rad]: one that is too long leans a little."""
 
 
-class Rod(NamedTuple):
+class RodBody(NamedTuple):
     """A body that two passive joints hold.
 
     Attributes
@@ -41,7 +41,7 @@ class Rod(NamedTuple):
         return float(np.linalg.norm(self.span))
 
 
-def rods_of(mechanism: Structure) -> list[Rod]:
+def rods_of(mechanism: Structure) -> list[RodBody]:
     """All rods, in the order of their bodies; a cross between hinges that meet in a point is part of a joint."""
     graph, found = _Graph(mechanism), []
     for name, (one, other) in graph.held.items():
@@ -52,7 +52,7 @@ def rods_of(mechanism: Structure) -> list[Rod]:
         if first != last:
             tip = mechanism.end_effector
             kinds = sorted([(foot.type, first == tip), (head.type, last == tip)])
-            found.append(Rod(name, (first, last), (kinds[0], kinds[1]), _place(head) - _place(foot)))
+            found.append(RodBody(name, (first, last), (kinds[0], kinds[1]), _place(head) - _place(foot)))
     return found
 
 
@@ -108,7 +108,7 @@ def _place(joint: Joint) -> Floats:
     return np.array(joint.at, dtype=float)
 
 
-def uneven_rods(mechanism: Structure) -> list[tuple[Rod, ...]]:
+def uneven_rods(mechanism: Structure) -> list[tuple[RodBody, ...]]:
     """Rods that stand side by side between the same two bodies, and are not of one length."""
     small = TOLERANCES.alignment * mechanism.characteristic_length
     found = []
@@ -124,10 +124,10 @@ def uneven_rods(mechanism: Structure) -> list[tuple[Rod, ...]]:
     return found
 
 
-def odd_rods(mechanism: Structure) -> list[tuple[tuple[Rod, ...], tuple[Rod, ...]]]:
+def odd_rods(mechanism: Structure) -> list[tuple[tuple[RodBody, ...], tuple[RodBody, ...]]]:
     """The rods of one leg that are not as long as those of all its copies, with those."""
     small = TOLERANCES.alignment * mechanism.characteristic_length
-    alike: dict[object, list[tuple[Rod, ...]]] = defaultdict(list)
+    alike: dict[object, list[tuple[RodBody, ...]]] = defaultdict(list)
     for rods in _by_bodies(rods_of(mechanism)):
         if np.ptp([rod.length for rod in rods]) <= small:
             alike[len(rods), rods[0].kind].append(tuple(rods))
@@ -142,19 +142,19 @@ def odd_rods(mechanism: Structure) -> list[tuple[tuple[Rod, ...], tuple[Rod, ...
     return found
 
 
-def with_lengths(rods: Sequence[Rod], unit: str) -> str:
+def with_lengths(rods: Sequence[RodBody], unit: str) -> str:
     """Rods by name, each with its length: 'a' (250 mm) and 'b' (273 mm)."""
     told = [f"'{rod.name}' ({rod.length:.9g} {unit})" for rod in rods]
     return " and ".join([", ".join(told[:-1]), told[-1]]) if len(told) > 1 else told[0]
 
 
-def _by_bodies(rods: Sequence[Rod]) -> list[list[Rod]]:
-    found: dict[tuple[str, str], list[Rod]] = defaultdict(list)
+def _by_bodies(rods: Sequence[RodBody]) -> list[list[RodBody]]:
+    found: dict[tuple[str, str], list[RodBody]] = defaultdict(list)
     for rod in rods:
         found[rod.between].append(rod)
     return list(found.values())
 
 
-def _are_side_by_side(one: Rod, other: Rod) -> bool:
+def _are_side_by_side(one: RodBody, other: RodBody) -> bool:
     cosine = float(one.span @ other.span) / (one.length * other.length)
     return bool(cosine >= np.cos(SIDE_BY_SIDE))

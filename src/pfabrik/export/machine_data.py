@@ -45,7 +45,7 @@ class Coordinate(NamedTuple):
         return self.turns and self.hi - self.lo > 2.0 * np.pi
 
 
-class Leg(NamedTuple):
+class ExportedLeg(NamedTuple):
     """A leg as it is exported.
 
     Attributes
@@ -141,8 +141,8 @@ def _coordinate(record: Record, kind: str) -> Coordinate:
     )
 
 
-def _legs(mechanism: Mechanism, table: LegTable) -> list[Leg]:
-    legs: list[Leg] = []
+def _legs(mechanism: Mechanism, table: LegTable) -> list[ExportedLeg]:
+    legs: list[ExportedLeg] = []
     first, length = 0, mechanism.characteristic_length
     for place, (form, record) in enumerate(zip(table.forms, table.legs, strict=True)):
         first = first if record["proximal"] == K.SHARED else place
@@ -150,7 +150,9 @@ def _legs(mechanism: Mechanism, table: LegTable) -> list[Leg]:
             numbers = _rod_numbers(form, record, length)
         else:
             numbers = (_redundant_numbers if isinstance(form, RedundantJoint) else _pivot_numbers)(record, length)
-        legs.append(Leg(first, record, numbers, tuple(dict.fromkeys(element.joint.name for element in form.elements))))
+        legs.append(
+            ExportedLeg(first, record, numbers, tuple(dict.fromkeys(element.joint.name for element in form.elements)))
+        )
     return legs
 
 

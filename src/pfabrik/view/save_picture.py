@@ -6,7 +6,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from ..checks import require_ending
-from ..writing import whole_path
+from ..whole_files import whole_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .blocks import Measure
+from .measuring import Measure
 from .numbering import Numbering
 
 BITS = 20

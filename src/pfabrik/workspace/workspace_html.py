@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..description.notebook import card
+from ..description.mechanism_html import card
 from ..description.sketch import HEIGHT, MARGIN, WIDTH
 from .border import REST, groups_of
-from .words import in_words, kind_of
+from .sizes import in_words, kind_of
 
 if TYPE_CHECKING:
     from .region import Region
