@@ -20,6 +20,7 @@ from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
 from .legs.maps import margins_in_blocks
 from .platform.forward import assemble
+from .platform.jacobians import jacobians
 from .platform.nearest import nearest_pose
 from .platform.otherwise import answer_otherwise
 from .platform.read import read
@@ -59,6 +60,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (solve_by_passes, _PASSES),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
     (read, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
+    (jacobians, (*_values("i i f3 f2 i f3"), np.zeros(0, np.bool_))),
     (first_order, (*_values("i i"), PLAN, _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
     (answer_otherwise, _ANSWERS),
