@@ -60,7 +60,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (solve_by_passes, _PASSES),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
     (read, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
-    (jacobians, (*_values("i i f3 f2 i f3"), np.zeros(0, np.bool_))),
+    (jacobians, tuple(_values("i f3 i f3"))),
     (first_order, (*_values("i i"), PLAN, _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
     (answer_otherwise, _ANSWERS),

@@ -12,27 +12,32 @@ from ..arrays import Floats
 from ..closure.configurations import Configurations
 from ..closure.first_order import forward_map as forward_by_joints
 from ..closure.first_order import inverse_map as inverse_by_joints
+from ..closure.first_order import units_of
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..motion.mobility import generic_of
 from .answers import LegAnswers
-from .table import Machine, reading_table
+from .coordinates import NO_ROWS
+from .table import Machine, reading_of, reading_table
 
 if TYPE_CHECKING:
     from ..kernels.platform.jacobians import JacobianTables
+    from ..kernels.platform.read import Reading
 
 ROWS_A_BLOCK = 512
 """Rows of one call of the kernel."""
 
 
 class ByLegs(NamedTuple):
-    """What the kernel is given of a machine, and the shape of its forward Jacobian."""
+    """What kernels are given of a machine whose legs tell its Jacobians."""
 
     legs: Machine
+    reading: Scratch[Reading]
     scratch: Scratch[JacobianTables]
-    shape: tuple[int, int]
+    rows: int  # how many constraints the legs have
+    units: tuple[Floats, Floats]  # of the inverse Jacobian (n_a, r), and of the forward one (r, n_a)
 
 
 def forward_map(mechanism: Mechanism, found: Configurations) -> Floats:
@@ -53,40 +58,51 @@ def _map(
     is_forward: int,
 ) -> Floats:
     """Jacobians by the legs where these tell them, by all joint coordinates elsewhere."""
-    own = by_legs(mechanism) if isinstance(found, LegAnswers) else None
-    if own is None:
+    by_legs = _by_legs(mechanism) if isinstance(found, LegAnswers) else None
+    if by_legs is None:
         return by_joints(mechanism, found.coordinates)
-    from ..kernels.platform.jacobians import jacobians
-
     assert isinstance(found, LegAnswers)
-    n, sides = len(found), found.sides
-    poses = np.require(found.rows.poses, requirements=["C", "W"])
-    maps, is_told = np.empty((n, *own.shape[:: 1 if is_forward else -1])), np.empty(n, np.bool_)
+    units = by_legs.units[is_forward]
+    maps = np.empty((len(found), *units.shape))
 
     def run(block: slice) -> int:
-        machine, scratch = own.legs.address, own.scratch.address
-        return jacobians(machine, scratch, poses[block], sides[block], is_forward, maps[block], is_told[block])
+        return _put_maps(by_legs, found.rows.poses[block], found.sides[block], is_forward, maps[block])
 
-    if sum(in_blocks(run, n, ROWS_A_BLOCK)):
-        rest = np.flatnonzero(~is_told)
+    left = in_blocks(run, len(found), ROWS_A_BLOCK)
+    maps *= units
+    if any(left):
+        rest = np.flatnonzero(np.isnan(maps[:, 0, 0]))
         maps[rest] = by_joints(mechanism, found.coordinates_at(rest))
     return maps
 
 
+def _put_maps(own: ByLegs, poses: Floats, sides: Floats, is_forward: int, maps: Floats) -> int:
+    """Fill Jacobians at poses (n, 4, 4) [length]; how many are not told, which are NaN."""
+    from ..kernels.platform.jacobians import jacobians
+    from ..kernels.platform.read import read
+
+    n, actuators = len(poses), len(own.units[0])
+    rows, slopes = np.empty((n, own.rows)), np.empty((n, own.rows + actuators, 6))
+    poses = np.require(poses, requirements=["C", "W"])
+    read(own.legs.address, own.reading.address, poses, sides, NO_ROWS, NO_ROWS, rows, slopes)
+    return jacobians(own.scratch.address, slopes, is_forward, maps)
+
+
 @lru_cache(maxsize=64)
-def by_legs(mechanism: Mechanism) -> ByLegs | None:
-    """What the kernel is given; None where legs do not tell Jacobians.
+def _by_legs(mechanism: Mechanism) -> ByLegs | None:
+    """What kernels are given; None where legs do not tell Jacobians.
 
     They do where the pose tells all coordinates of the legs, and all motions of actuators move the end effector.
     """
-    table, counts = leg_table(mechanism), generic_of(mechanism).mobility
-    twists, actuators = 3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)
-    if not isinstance(table, LegTable) or len(table.redundant) or counts.internal or counts.uncontrolled:
-        return None
-    rank = twists - counts.platform
-    if counts.platform == 0 or rank > table.task["rows"][0]:
-        return None
     from ..kernels.platform.jacobians import new_jacobian_tables
 
-    legs = reading_table(table)
-    return ByLegs(legs, Scratch(new_jacobian_tables, legs.record, rank, twists), (twists, actuators))
+    table, counts = leg_table(mechanism), generic_of(mechanism).mobility
+    if not isinstance(table, LegTable) or len(table.redundant) or counts.internal or counts.uncontrolled:
+        return None
+    twists, actuators = units_of(mechanism)
+    rows, rank = int(table.task["rows"][0]), len(twists) - counts.platform
+    if not 0 < counts.platform or rank > rows:
+        return None
+    scratch = Scratch(new_jacobian_tables, rows, rank, len(twists), len(actuators))
+    units = actuators[:, None] / twists, twists[:, None] / actuators
+    return ByLegs(reading_table(table), reading_of(table), scratch, rows, units)

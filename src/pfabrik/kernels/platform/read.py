@@ -1,4 +1,4 @@
-"""What legs in closed form tell at poses: the coordinates of their joints, and the constraints that are left."""
+"""What legs in closed form tell at poses: the coordinates of their joints, the constraints that are left, and slopes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,32 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats
-from .._jit import search
+from .._jit import routine, search
 from ..legs.answer import deviation, place_legs, put_rows, put_slopes
 from ..legs.endings import LEAST_MARGIN
 from ..legs.frames import set_frames
 from ..legs.poses import load_pose
 from ..legs.records import Table
+from ..legs.rods import put_proximal_slope
 from ..legs.table import SAMPLE, open_table
 from ..references import opener
 from ..vectors import copy_row
-from .equations import LegEvaluation, PlatformState, new_leg_evaluation, new_platform_state, place
+from .equations import (
+    LegEvaluation,
+    PlatformState,
+    direction,
+    has_proximal,
+    new_leg_evaluation,
+    new_platform_state,
+    place,
+)
+from .limits import coordinate_slope
+
+# Square of the sine of the angle from a dead point, or from aligned hinges, from which on slopes of actuators are exact
+# to some thousand times rounding.
+SURE = 1e-6
+# Constraint up to which legs are closed [L or rad].
+CLOSED = 1e-9
 
 
 class Reading(NamedTuple):
@@ -56,7 +72,9 @@ def read(
     carriers : coordinates of the legs' carriers, (n or 0, legs) [L or rad]; NaN to ask closed forms.
     found : filled with the coordinates that legs tell, deviations from home, (n or 0, columns) [length or rad].
     rows, slopes : filled with the constraints of all legs, (n or 0, rows), and their derivatives by the pose and by
-        arms, (n or 0, rows, 6 + arms) [L, rad]: NaN where a leg is at a dead point, or beyond.
+        arms, (n or 0, rows, 6 + arms) [L, rad]: NaN where a leg with constraints is at a dead point, or beyond. Where
+        slopes have room for those of actuators after them, of machines without arms, (n, rows + n_a, 6), they are NaN
+        near dead points of any leg, and where legs are not closed.
     """
     table, scratch = open_table(machine), open_reading(scratch_address)
     state, leg_eval, legs, known = scratch.state, scratch.leg_eval, table.legs, table.known
@@ -69,17 +87,40 @@ def read(
             copy_row(q_proximal[row], state.q)
             for k in range(state.q.shape[0]):
                 total += state.q[k]
-        margin_of_rows = 1.0
+        margin, margin_of_rows = 1.0, 1.0
         if abs(total) < math.inf:
             place(table, state, leg_eval)
         else:
             set_frames(state.pose, table.task[0], leg_eval.frames)
-            _, margin_of_rows = place_legs(legs, leg_eval.frames, state.sides, leg_eval.values, leg_eval.lines)
+            margin, margin_of_rows = place_legs(legs, leg_eval.frames, state.sides, leg_eval.values, leg_eval.lines)
         for i in range(known.shape[0] if found.shape[0] > 0 else 0):
             found[row, known[i]["column"]] = deviation(known[i], leg_eval.values) * known[i]["unit"]
         if rows.shape[0] > 0:
-            put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
-            put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.proximal_slopes, slopes[row])
-            for i in range(rows.shape[1] if not margin_of_rows > LEAST_MARGIN * LEAST_MARGIN else 0):
-                for j in range(slopes.shape[2]):
-                    slopes[row, i, j] = math.nan
+            m, own = rows.shape[1], slopes[row]
+            worst = put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
+            put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.proximal_slopes, own[:m])
+            is_sure = margin_of_rows > LEAST_MARGIN * LEAST_MARGIN
+            if own.shape[0] > m:
+                is_sure = margin > SURE and worst <= CLOSED
+                put_actuator_slopes(table, leg_eval, scratch.proximal_slopes, own[m:])
+            for i in range(own.shape[0] if not is_sure else 0):
+                for j in range(own.shape[1]):
+                    own[i, j] = math.nan
+
+
+@routine
+def put_actuator_slopes(table: Table, leg_eval: LegEvaluation, proximal_slopes: Floats, slopes: Floats) -> None:
+    """Fill derivatives of actuators by the pose (n_a, 6), carriers going where their rods have their lengths."""
+    legs, slope = table.legs, leg_eval.slope
+    for k in range(legs.shape[0]):
+        if has_proximal(legs[k]) and legs[k]["has_rows"] == 0:
+            frame, u = leg_eval.frames[legs[k]["frame"]], direction(leg_eval.lines[k])
+            put_proximal_slope(legs[k], frame, leg_eval.values[k], u, proximal_slopes[k])
+    for i in range(table.driven.shape[0]):
+        coordinate_slope(table, table.driven[i], leg_eval)
+        own = slopes[table.driven[i]["column"]]
+        copy_row(slope[:6], own)
+        for k in range(legs.shape[0]):
+            column = table.columns[k]
+            for j in range(6 if column >= 0 and slope[column] != 0.0 else 0):
+                own[j] += slope[column] * proximal_slopes[k, j]
