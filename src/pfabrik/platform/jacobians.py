@@ -65,8 +65,10 @@ def _map(
     units = by_legs.units[is_forward]
     maps = np.empty((len(found), *units.shape))
 
+    given = NO_ROWS if found.q_proximal is None else found.q_proximal
+
     def run(block: slice) -> int:
-        return _put_maps(by_legs, found.rows.poses[block], found.sides[block], is_forward, maps[block])
+        return _put_maps(by_legs, found.rows.poses[block], found.sides[block], given[block], is_forward, maps[block])
 
     left = in_blocks(run, len(found), ROWS_A_BLOCK)
     maps *= units
@@ -76,15 +78,20 @@ def _map(
     return maps
 
 
-def _put_maps(own: ByLegs, poses: Floats, sides: Floats, is_forward: int, maps: Floats) -> int:
-    """Fill Jacobians at poses (n, 4, 4) [length]; how many are not told, which are NaN."""
+def _put_maps(own: ByLegs, poses: Floats, sides: Floats, q_proximal: Floats, is_forward: int, maps: Floats) -> int:
+    """Fill Jacobians at poses (n, 4, 4) [length]; how many are not told, which are NaN.
+
+    Parameters
+    ----------
+    sides, q_proximal : of `LegAnswers`; no rows of these where closed forms tell all.
+    """
     from ..kernels.platform.jacobians import jacobians
     from ..kernels.platform.read import read
 
     n, actuators = len(poses), len(own.units[0])
     rows, slopes = np.empty((n, own.rows)), np.empty((n, own.rows + actuators, 6))
     poses = np.require(poses, requirements=["C", "W"])
-    read(own.legs.address, own.reading.address, poses, sides, NO_ROWS, NO_ROWS, rows, slopes)
+    read(own.legs.address, own.reading.address, poses, sides, q_proximal, NO_ROWS, rows, slopes)
     return jacobians(own.scratch.address, slopes, is_forward, maps)
 
 
@@ -101,7 +108,7 @@ def _by_legs(mechanism: Mechanism) -> ByLegs | None:
         return None
     twists, actuators = units_of(mechanism)
     rows, rank = int(table.task["rows"][0]), len(twists) - counts.platform
-    if not 0 < counts.platform or rank > rows:
+    if not counts.platform > 0 or rank > rows:
         return None
     scratch = Scratch(new_jacobian_tables, rows, rank, len(twists), len(actuators))
     units = actuators[:, None] / twists, twists[:, None] / actuators

@@ -20,7 +20,7 @@ from ..references import opener
 # Slope up to which a constraint follows from others [L or rad].
 IMPLIED = 1e-9
 # Size of a slope below which it may be that of a singular configuration, the inverse of the largest [L or rad].
-REGULAR = 1e-4
+REGULAR = 1e-3
 # Share of a row that has to be left of it beside others, for it to be orthogonal to them at once.
 ENOUGH = 0.5
 

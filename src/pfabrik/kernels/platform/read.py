@@ -1,4 +1,4 @@
-"""What legs in closed form tell at poses: the coordinates of their joints, the constraints that are left, and slopes."""
+"""What legs in closed form tell at poses: coordinates of joints, the constraints that are left, and their slopes."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from .equations import (
 )
 from .limits import coordinate_slope
 
-# Square of the sine of the angle from a dead point, or from aligned hinges, from which on slopes of actuators are exact
-# to some thousand times rounding.
-SURE = 1e-6
+# Square of the sine of the angle from a dead point, or from aligned hinges, from which on slopes of actuators are told:
+# they go with the inverse of the sine, which poses of 16 digits tell to 12 there.
+SURE = 1e-4
 # Constraint up to which legs are closed [L or rad].
 CLOSED = 1e-9
 
@@ -87,21 +87,21 @@ def read(
             copy_row(q_proximal[row], state.q)
             for k in range(state.q.shape[0]):
                 total += state.q[k]
-        margin, margin_of_rows = 1.0, 1.0
-        if abs(total) < math.inf:
-            place(table, state, leg_eval)
-        else:
+        margin, margin_of_rows, gap = 1.0, 1.0, 0.0
+        if rows.shape[0] > 0 or not abs(total) < math.inf:
             set_frames(state.pose, table.task[0], leg_eval.frames)
             margin, margin_of_rows = place_legs(legs, leg_eval.frames, state.sides, leg_eval.values, leg_eval.lines)
+        if abs(total) < math.inf:
+            gap = place(table, state, leg_eval)
         for i in range(known.shape[0] if found.shape[0] > 0 else 0):
             found[row, known[i]["column"]] = deviation(known[i], leg_eval.values) * known[i]["unit"]
         if rows.shape[0] > 0:
             m, own = rows.shape[1], slopes[row]
-            worst = put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
+            gap = max(gap, put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row]))
             put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.proximal_slopes, own[:m])
             is_sure = margin_of_rows > LEAST_MARGIN * LEAST_MARGIN
             if own.shape[0] > m:
-                is_sure = margin > SURE and worst <= CLOSED
+                is_sure = margin > SURE and gap <= CLOSED
                 put_actuator_slopes(table, leg_eval, scratch.proximal_slopes, own[m:])
             for i in range(own.shape[0] if not is_sure else 0):
                 for j in range(own.shape[1]):
