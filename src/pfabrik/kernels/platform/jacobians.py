@@ -61,24 +61,26 @@ def jacobians(scratch_address: int, slopes: Floats, is_forward: int, found: Floa
     width, twists, left = pairs.shape[1], table.shape[1], 0
     rows = table.shape[0] - width
     for row in range(slopes.shape[0]):
+        total = 0.0
         for j in range(twists):
             for i in range(rows):
                 table[i, j] = slopes[row, i, j]
+                total += table[i, j]
             for i in range(twists):
                 table[rows + i, j] = 1.0 if i == j else 0.0
             for i in range(rows, slopes.shape[1]):
                 table[twists + i, j] = slopes[row, i, j]
         to, first = (0, twists) if is_forward == 1 else (twists, 0)
-        if not put_pairs(rows, table, pairs) or (is_forward == 1 and not orthogonalise(pairs, first)):
+        is_told = abs(total) < math.inf and put_pairs(rows, table, pairs)
+        if not is_told or (is_forward == 1 and not orthogonalise(pairs, first)):
             found[row, 0, 0] = math.nan
             left += 1
             continue
         for i in range(found.shape[1]):
             for j in range(found.shape[2]):
-                total = 0.0
+                found[row, i, j] = 0.0
                 for k in range(pairs.shape[0]):
-                    total += pairs[k, to + i] * pairs[k, first + j]
-                found[row, i, j] = total
+                    found[row, i, j] += pairs[k, to + i] * pairs[k, first + j]
     return left
 
 
