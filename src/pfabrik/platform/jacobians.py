@@ -63,8 +63,7 @@ def _map(
         return by_joints(mechanism, found.coordinates)
     assert isinstance(found, LegAnswers)
     units = by_legs.units[is_forward]
-    maps = np.empty((len(found), *units.shape))
-
+    maps = np.zeros((len(found), *units.shape))
     given = NO_ROWS if found.q_proximal is None else found.q_proximal
 
     def run(block: slice) -> int:
