@@ -17,10 +17,12 @@ from machines import MACHINES, planar, ring
 from pfabrik import Joint, Mechanism, Solution
 from pfabrik.answers.differential import Mobility, forward_jacobian, inverse_jacobian, mobility, singularity
 from pfabrik.closure.configurations import Configurations, new_rows
-from pfabrik.closure.first_order import forward_map, inverse_map, singularities
+from pfabrik.closure.first_order import forward_map, inverse_map, singularities, units_of
 from pfabrik.description.graph import tree_of
 from pfabrik.description.home_mobility import column_joints
 from pfabrik.errors import InvalidArgument
+from pfabrik.kernels.handle import Handle
+from pfabrik.kernels.platform.jacobians import jacobians, new_jacobian_tables
 from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units, screws
 from pfabrik.motion.mobility import generic_of
 from pfabrik.motion.singularities import KINDS, measures
@@ -416,6 +418,143 @@ class TestJacobians:
         for function in (forward_jacobian, inverse_jacobian, singularity, pf.closure_residual):
             with pytest.raises(InvalidArgument, match="solution: found ndarray; expected a Solution"):
                 function(closed("stewart")[1])
+
+
+def drawn(machine: Mechanism, n: int, reach: float = 0.15) -> Solution:
+    """Answers to targets about home at random."""
+    random, base = np.random.default_rng(5), machine.home_pose
+    shifts = random.uniform(-reach, reach, (n, 3)) * machine.characteristic_length
+    targets = pf.pose(base[:3, 3] + shifts, rotvec=random.uniform(-reach, reach, (n, 3)))
+    targets[:, :3, :3] = targets[:, :3, :3] @ base[:3, :3]
+    return pf.solve_ik(machine, targets)
+
+
+def off(machine: Mechanism, found: np.ndarray, expected: np.ndarray, *, forward: bool) -> np.ndarray:
+    """Largest differences of Jacobians (n, a, b), with lengths in L, relative to the largest entry, (n,)."""
+    twists, actuators = units_of(machine)
+    scale = actuators / twists[:, None] if forward else twists / actuators[:, None]
+    largest = np.abs(scale * expected).max(axis=(1, 2))
+    return np.abs(scale * (found - expected)).max(axis=(1, 2)) / np.where(largest > 0.0, largest, 1.0)
+
+
+OF_LEGS = [name for name in pf.catalog() if name not in ("nrpm", "serial_arm")]
+
+
+class TestJacobiansOfLegs:
+    """New answers of legs in closed form, whose joint coordinates nobody has asked for."""
+
+    @pytest.mark.parametrize("name", OF_LEGS)
+    def test_they_are_those_of_all_joint_coordinates_in_batches_and_alone(self, name):
+        """In and out of reach: some are stretched, most are limited, and tasks leave some of the pose open."""
+        machine = pf.load(name)
+        batch = drawn(machine, 24, 0.3)
+        assembled = pf.solve_fk(machine, batch.actuators[:6])
+        found = [(each, forward_jacobian(each), inverse_jacobian(each)) for each in (batch, assembled, batch[3:4])]
+        for solution, forward, inverse in found:
+            q = solution._coordinates
+            assert off(machine, forward, forward_map(machine, q), forward=True).max() < 1e-11
+            assert off(machine, inverse, inverse_map(machine, q), forward=False).max() < 1e-11
+        one = pf.solve_ik(machine, batch.pose[3])
+        assert np.array_equal(forward_jacobian(one), forward_jacobian(pf.solve_ik(machine, batch.pose[3:4]))[0])
+
+    @pytest.mark.parametrize("name", OF_LEGS)
+    def test_they_take_no_joint_coordinates(self, name):
+        machine = pf.load(name)
+        solution = pf.solve_ik(machine, machine.home_pose if name != "g1_ankle" else drawn(machine, 1).pose[0])
+        forward_jacobian(solution), inverse_jacobian(solution)
+        assert "coordinates" not in vars(solution._found)
+
+    @pytest.mark.parametrize("name", OF_LEGS)
+    def test_forward_jacobian_is_the_slope_of_forward_kinematics(self, name):
+        machine = pf.load(name).without_limits()
+        here = pf.solve_fk(machine, drawn(pf.load(name), 1, 0.05).actuators[0])
+        forward, h = forward_jacobian(here), 1e-5
+        for k, unit in enumerate(rate_units(machine)[drives(machine)]):
+            step = np.zeros(len(here.actuators))
+            step[k] = h * unit
+            T, T0 = (pf.solve_fk(machine, here.actuators + sign * step, start=here).pose for sign in (1, -1))
+            velocity = (T - T0)[:3, 3] / (2 * step[k])
+            angular = Rotation.from_matrix(T[:3, :3] @ T0[:3, :3].T).as_rotvec() / (2 * step[k])
+            expected = velocity if machine.end_effector_is_joint else np.concatenate([velocity, angular])
+            lengths = np.where(np.arange(len(expected)) < 3, machine.characteristic_length, 1.0)
+            assert np.abs((forward[:, k] - expected) / lengths).max() < 1e-6 * np.abs(forward[:, k] / lengths).max()
+
+    @pytest.mark.parametrize("name", ["delta", "hexaglide", "rrr", "servo_hexapod"])
+    def test_at_dead_points_and_next_to_them_they_are_those_of_joint_coordinates(self, name):
+        """Far targets stretch a leg out; from there inward, its slopes grow until they are lost."""
+        machine = pf.load(name).without_limits()
+        center = machine.home_pose[:3, 3]
+        aside = machine.characteristic_length * (X if name == "rrr" else Z)
+        far = pf.solve_ik(machine, center + 3.0 * aside).pose
+        shares = np.concatenate([1.0 - 10.0 ** np.arange(-1.0, -13.0, -1.0), [1.0, 1.2]])
+        targets = np.repeat(far[None], len(shares), axis=0)
+        targets[:, :3, 3] = center + shares[:, None] * (far[:3, 3] - center)
+        solution = pf.solve_ik(machine, targets)
+        forward, inverse = forward_jacobian(solution), inverse_jacobian(solution)
+        q = solution._coordinates
+        assert off(machine, forward, forward_map(machine, q), forward=True).max() < 1e-11
+        assert off(machine, inverse, inverse_map(machine, q), forward=False).max() < 1e-11
+        assert inverse_map(machine, q)[-1] == pytest.approx(inverse[-1], abs=0)
+
+    def test_a_strut_along_the_outer_hinge_of_its_universal_joint_loses_a_freedom(self):
+        """Nothing of the strut's length says so: its foot cannot swing across both hinges."""
+        bases = np.array(ring(100, 0, [-10, 10, 110, 130, 230, 250]))
+        tops = np.array(ring(60, 120, [-50, 50, 70, 170, 190, 290]))
+        machine, outer = hexapod(bases, tops), np.array([0.6, 0.0, 0.8])
+        joints = [
+            dataclasses.replace(joint, axes=(outer, np.cross(outer, tops[0] - bases[0])))
+            if joint.name == "A0"
+            else joint
+            for joint in machine.joints
+        ]
+        machine = Mechanism("aligned", joints, "platform", machine.reference_point)
+        away = np.array([0.0, 1e-6, 1e-3, 0.1])
+        targets = np.repeat(machine.home_pose[None], len(away), axis=0)
+        targets[:, :3, 3] += bases[0] + 150.0 * outer - tops[0] + 150.0 * away[:, None] * Y
+        solution = pf.solve_ik(machine, targets)
+        assert solution
+        forward, inverse = forward_jacobian(solution), inverse_jacobian(solution)
+        q = solution._coordinates
+        assert off(machine, forward, forward_map(machine, q), forward=True).max() < 1e-11
+        assert off(machine, inverse, inverse_map(machine, q), forward=False).max() < 1e-11
+        ranks = np.linalg.matrix_rank(inverse / np.linalg.norm(inverse, axis=(1, 2), keepdims=True), tol=1e-6)
+        assert ranks.tolist() == [5, 6, 6, 6]
+
+    def test_rows_that_are_no_poses_are_nan(self):
+        machine = pf.load("stewart")
+        targets = np.stack([machine.home_pose, np.full((4, 4), np.nan), machine.home_pose])
+        marked = pf.solve_ik(machine, targets, options=pf.Options(on_invalid="mark"))
+        found = inverse_jacobian(marked)
+        assert np.isnan(found[1]).all()
+        assert np.array_equal(found[0], found[2])
+
+    @pytest.mark.parametrize("actuators", [3, 5])
+    def test_kernel_gives_moore_penrose_inverses_on_what_constraints_allow(self, actuators):
+        """Four constraints of rank three, so that three freedoms are left, with as many actuators or more."""
+        random = np.random.default_rng(actuators)
+        slopes = random.normal(size=(20, 4 + actuators, 6))
+        slopes[:, 3] = slopes[:, 0] - 2.0 * slopes[:, 1]
+        scratch = Handle(new_jacobian_tables(4, 3, 6, actuators))
+        forward, inverse = np.empty((20, 6, actuators)), np.empty((20, actuators, 6))
+        assert jacobians(scratch.address, slopes, 1, forward) == jacobians(scratch.address, slopes, 0, inverse) == 0
+        for own, ahead, back in zip(slopes, forward, inverse, strict=True):
+            free = null_space(own[:3])
+            assert back == pytest.approx(own[4:] @ free @ free.T, abs=1e-11)
+            assert ahead == pytest.approx(free @ np.linalg.pinv(own[4:] @ free), abs=1e-10)
+
+    def test_kernel_tells_nothing_where_rank_differs_or_an_actuator_does_not_move(self):
+        random = np.random.default_rng(0)
+        slopes = random.normal(size=(3, 5, 6))
+        slopes[0, 1] = slopes[0, 0]  # a constraint less than in general
+        slopes[1, 4] = slopes[1, 3]  # two actuators that move as one
+        scratch = Handle(new_jacobian_tables(2, 2, 6, 3))
+        found = np.zeros((3, 6, 3))
+        jacobians(scratch.address, slopes, 1, found)
+        assert np.isnan(found[:, 0, 0]).all()  # four freedoms, three actuators
+        scratch = Handle(new_jacobian_tables(3, 3, 6, 2))
+        found = np.zeros((3, 2, 6))
+        assert jacobians(scratch.address, slopes, 0, found) == 1
+        assert np.isnan(found[:, 0, 0]).tolist() == [True, False, False]
 
 
 class TestSingularity:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from .answers.differential import forward_jacobian
+from .answers.differential import forward_jacobian, singularity
 from .answers.solution import Solution
 from .checks import require_callable
 from .description.mechanism import Mechanism, checked_mechanism
@@ -65,6 +65,6 @@ def _questions(mechanism: Mechanism) -> Iterator[Step]:
     yield "targets out of reach", partial(solve_ik, mechanism, far)
     yield "paths", partial(track, mechanism, np.stack([home, far]))
     yield "coordinates of all joints", lambda: solve_ik(mechanism, np.stack([home, far])).q
-    yield "Jacobians", lambda: forward_jacobian(solve_ik(mechanism, home))
+    yield "Jacobians", lambda: (forward_jacobian(solve_ik(mechanism, home)), singularity(solve_ik(mechanism, home)))
     yield "forward kinematics", partial(forward, 0.0)
     yield "actuator values out of reach", partial(forward, shift)

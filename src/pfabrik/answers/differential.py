@@ -7,10 +7,12 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats, shaped
-from ..closure.first_order import forward_map, inverse_map, singularities
+from ..closure.configurations import Configurations
+from ..closure.first_order import singularities
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..motion.mobility import Mobility, NearlyFree, generic_of
 from ..motion.singularities import NUMBERS, Singularity
+from ..platform.jacobians import forward_map, inverse_map
 from .solution import Solution, checked_solution
 
 __all__ = ["Mobility", "NearlyFree", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]
@@ -53,12 +55,13 @@ def inverse_jacobian(solution: Solution) -> Floats:
 
 def singularity(solution: Solution) -> Singularity:
     """How near every configuration of a solution is to a singularity of each kind; INVALID rows are NaN."""
-    found = singularities(*_of(solution))
+    mechanism, configurations = _of(solution)
+    found = singularities(mechanism, configurations.coordinates)
     numbers = {name: shaped(np.asarray(getattr(found, name)), solution.shape) for name in NUMBERS}
     kinds = cast(list[tuple[str, ...]], found.kinds)
     return Singularity(**numbers, kinds=kinds[0] if solution.shape == () else kinds)
 
 
-def _of(solution: Solution) -> tuple[Mechanism, Floats]:
-    """The mechanism of a solution, and its joint coordinates as deviations from home, (n, c)."""
-    return checked_solution(solution).mechanism, solution._coordinates
+def _of(solution: Solution) -> tuple[Mechanism, Configurations]:
+    """The mechanism of a solution, and its configurations."""
+    return checked_solution(solution).mechanism, solution._configurations

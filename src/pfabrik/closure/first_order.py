@@ -27,13 +27,13 @@ ROWS_A_BLOCK = 64
 
 def forward_map(mechanism: Mechanism, q: Floats) -> Floats:
     """Twists per actuator rate at coordinates q, (n, c): (n, 6, n_a) or (n, 3, n_a); NaN where q is."""
-    twists, actuators = _units(mechanism)
+    twists, actuators = units_of(mechanism)
     return np.asarray(twists[:, None] * _first_order(mechanism, q, whole=False).forward / actuators)
 
 
 def inverse_map(mechanism: Mechanism, q: Floats) -> Floats:
     """Actuator rates per twist at coordinates q, (n, c): (n, n_a, 6) or (n, n_a, 3); NaN where q is."""
-    twists, actuators = _units(mechanism)
+    twists, actuators = units_of(mechanism)
     return np.asarray(actuators[:, None] * _first_order(mechanism, q, whole=False).inverse / twists)
 
 
@@ -107,7 +107,7 @@ def _plan(mechanism: Mechanism, whole: bool) -> FirstOrderPlan:
 
 
 @lru_cache(maxsize=64)
-def _units(mechanism: Mechanism) -> tuple[Floats, Floats]:
+def units_of(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """What one stands for in a twist, (r,), and in actuator rates, (n_a,): L for a length, 1 for an angle."""
     twists = np.ones(3 if mechanism.end_effector_is_joint else 6)
     twists[:3] = mechanism.characteristic_length

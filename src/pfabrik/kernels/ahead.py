@@ -22,6 +22,7 @@ from .legs.margin_blocks import margins_in_blocks
 from .platform.any_mode import answer_in_any_mode
 from .platform.evaluate import evaluate_poses
 from .platform.forward import assemble
+from .platform.jacobians import jacobians
 from .platform.nearest import nearest_pose
 from .reaching import plan as P
 from .reaching.solve import solve_by_passes
@@ -59,6 +60,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (solve_by_passes, _PASSES),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
     (evaluate_poses, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
+    (jacobians, tuple(_values("i f3 i f3"))),
     (first_order, (*_values("i i"), PLAN, _F2, _FIRST_ORDER)),
     (feasibility, tuple(_values("i f3 f3 f2 f1 i1"))),
     (answer_in_any_mode, _ANSWERS),

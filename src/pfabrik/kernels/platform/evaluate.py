@@ -1,4 +1,4 @@
-"""Joint coordinates and constraints of legs in closed form, at poses of the platform."""
+"""Joint coordinates, constraints and slopes of legs in closed form, at poses of the platform."""
 
 from __future__ import annotations
 
@@ -8,16 +8,32 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats
-from .._jit import search
+from .._jit import routine, search
 from ..legs.answer import deviation, place_legs, put_rows, put_slopes
 from ..legs.endings import LEAST_MARGIN
 from ..legs.frames import set_frames
 from ..legs.poses import load_pose
 from ..legs.records import Table
+from ..legs.rods import put_proximal_slope
 from ..legs.table import SAMPLE, open_table
 from ..references import opener
 from ..vectors import copy_row
-from .equations import LegEvaluation, PlatformState, evaluate_legs, new_leg_evaluation, new_platform_state
+from .equations import (
+    LegEvaluation,
+    PlatformState,
+    direction,
+    evaluate_legs,
+    has_proximal,
+    new_leg_evaluation,
+    new_platform_state,
+)
+from .limits import coordinate_slope
+
+# Singularity margin (squared sine of the angle from a dead point, or from aligned hinges) below which actuators have no
+# slopes: these go with the inverse of the sine, which poses of 16 digits give to 12 there.
+LEAST_SLOPE_MARGIN = 1e-4
+# Constraint up to which legs are closed [L or rad].
+CLOSED = 1e-9
 
 
 class EvaluationScratch(NamedTuple):
@@ -59,6 +75,8 @@ def evaluate_poses(
     coordinates : filled with the joint coordinates of legs, deviations from home, (n or 0, columns) [length or rad].
     rows, slopes : filled with the constraints of all legs, (n or 0, rows), and their derivatives by the pose and by
         redundant joints, (n or 0, rows, 6 + n_redundant) [L, rad]: NaN if a leg with rows is at or beyond a dead point.
+        If slopes have room for those of actuators behind them, of machines without redundant joints,
+        (n, rows + n_a, 6), they are NaN near dead points of any leg, and if legs are not closed.
     """
     table, scratch = open_table(machine), open_evaluation_scratch(scratch_address)
     state, leg_eval, legs, known = scratch.state, scratch.leg_eval, table.legs, table.known
@@ -71,17 +89,40 @@ def evaluate_poses(
             copy_row(q_proximal[row], state.q)
             for k in range(state.q.shape[0]):
                 total += state.q[k]
-        margin_of_rows = 1.0
-        if abs(total) < math.inf:
-            evaluate_legs(table, state, leg_eval)
-        else:
+        margin, margin_of_rows, gap = 1.0, 1.0, 0.0
+        if rows.shape[0] > 0 or not abs(total) < math.inf:
             set_frames(state.pose, table.task[0], leg_eval.frames)
-            _, margin_of_rows = place_legs(legs, leg_eval.frames, state.sides, leg_eval.values, leg_eval.lines)
+            margin, margin_of_rows = place_legs(legs, leg_eval.frames, state.sides, leg_eval.values, leg_eval.lines)
+        if abs(total) < math.inf:
+            gap = evaluate_legs(table, state, leg_eval)
         for i in range(known.shape[0] if coordinates.shape[0] > 0 else 0):
             coordinates[row, known[i]["column"]] = deviation(known[i], leg_eval.values) * known[i]["unit"]
         if rows.shape[0] > 0:
-            put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row])
-            put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.proximal_slopes, slopes[row])
-            for i in range(rows.shape[1] if not margin_of_rows > LEAST_MARGIN * LEAST_MARGIN else 0):
-                for j in range(slopes.shape[2]):
-                    slopes[row, i, j] = math.nan
+            m, own = rows.shape[1], slopes[row]
+            gap = max(gap, put_rows(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, rows[row]))
+            put_slopes(legs, leg_eval.frames, leg_eval.values, leg_eval.lines, scratch.proximal_slopes, own[:m])
+            is_regular = margin_of_rows > LEAST_MARGIN * LEAST_MARGIN
+            if own.shape[0] > m:
+                is_regular = margin > LEAST_SLOPE_MARGIN and gap <= CLOSED
+                put_actuator_slopes(table, leg_eval, scratch.proximal_slopes, own[m:])
+            for i in range(own.shape[0] if not is_regular else 0):
+                for j in range(own.shape[1]):
+                    own[i, j] = math.nan
+
+
+@routine
+def put_actuator_slopes(table: Table, leg_eval: LegEvaluation, proximal_slopes: Floats, slopes: Floats) -> None:
+    """Fill the derivatives of actuators by the pose, (n_a, 6); proximal joints move so that rods keep their lengths."""
+    legs, slope = table.legs, leg_eval.slope
+    for k in range(legs.shape[0]):
+        if has_proximal(legs[k]) and legs[k]["has_rows"] == 0:
+            frame, u = leg_eval.frames[legs[k]["frame"]], direction(leg_eval.lines[k])
+            put_proximal_slope(legs[k], frame, leg_eval.values[k], u, proximal_slopes[k])
+    for i in range(table.driven.shape[0]):
+        coordinate_slope(table, table.driven[i], leg_eval)
+        own = slopes[table.driven[i]["column"]]
+        copy_row(slope[:6], own)
+        for k in range(legs.shape[0]):
+            column = table.columns[k]
+            for j in range(6 if column >= 0 and slope[column] != 0.0 else 0):
+                own[j] += slope[column] * proximal_slopes[k, j]

@@ -1,0 +1,114 @@
+"""Jacobians of answers: of legs in closed form by the legs' own slopes, of all others by their joint coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats
+from ..closure.configurations import Configurations
+from ..closure.first_order import forward_map as forward_by_joints
+from ..closure.first_order import inverse_map as inverse_by_joints
+from ..closure.first_order import units_of
+from ..decomposition.leg_table import LegTable, leg_table
+from ..description.mechanism import Mechanism
+from ..kernels.handle import Scratch
+from ..kernels.threads import in_blocks
+from ..motion.mobility import generic_of
+from .answers import LegAnswers
+from .coordinates import NO_ROWS
+from .table import TableHandle, reading_scratch, reading_table
+
+if TYPE_CHECKING:
+    from ..kernels.platform.evaluate import EvaluationScratch
+    from ..kernels.platform.jacobians import JacobianTables
+
+ROWS_A_BLOCK = 512
+"""Rows of one call of the kernel."""
+
+
+class ByLegs(NamedTuple):
+    """A machine whose Jacobians follow from its legs, as the kernels take it."""
+
+    legs: TableHandle
+    reading: Scratch[EvaluationScratch]
+    scratch: Scratch[JacobianTables]
+    rows: int  # how many constraints the legs have
+    units: tuple[Floats, Floats]  # of the inverse Jacobian (n_a, r), and of the forward one (r, n_a)
+
+
+def forward_map(mechanism: Mechanism, found: Configurations) -> Floats:
+    """Twists per actuator rate at configurations: (n, 6, n_a) or (n, 3, n_a) [length, rad]; NaN where these are."""
+    return _map(mechanism, found, forward_by_joints, is_forward=1)
+
+
+def inverse_map(mechanism: Mechanism, found: Configurations) -> Floats:
+    """Actuator rates per twist at configurations: (n, n_a, 6) or (n, n_a, 3) [length, rad]; NaN where these are."""
+    return _map(mechanism, found, inverse_by_joints, is_forward=0)
+
+
+def _map(
+    mechanism: Mechanism,
+    found: Configurations,
+    by_joints: Callable[[Mechanism, Floats], Floats],
+    *,
+    is_forward: int,
+) -> Floats:
+    """Jacobians from the legs' slopes where they exist, from all joint coordinates elsewhere."""
+    by_legs = _by_legs(mechanism) if isinstance(found, LegAnswers) else None
+    if by_legs is None:
+        return by_joints(mechanism, found.coordinates)
+    assert isinstance(found, LegAnswers)
+    units = by_legs.units[is_forward]
+    maps = np.zeros((len(found), *units.shape))
+    given = NO_ROWS if found.q_proximal is None else found.q_proximal
+
+    def run(block: slice) -> int:
+        return _put_maps(by_legs, found.rows.poses[block], found.sides[block], given[block], is_forward, maps[block])
+
+    left = in_blocks(run, len(found), ROWS_A_BLOCK)
+    maps *= units
+    if any(left):
+        rest = np.flatnonzero(np.isnan(maps[:, 0, 0]))
+        maps[rest] = by_joints(mechanism, found.coordinates_at(rest))
+    return maps
+
+
+def _put_maps(own: ByLegs, poses: Floats, sides: Floats, q_proximal: Floats, is_forward: int, maps: Floats) -> int:
+    """Fill Jacobians at poses (n, 4, 4) [length]; return how many are not solved, which are NaN.
+
+    Parameters
+    ----------
+    sides, q_proximal : of `LegAnswers`; no rows of these if closed forms solve all.
+    """
+    from ..kernels.platform.evaluate import evaluate_poses
+    from ..kernels.platform.jacobians import jacobians
+
+    n, actuators = len(poses), len(own.units[0])
+    rows, slopes = np.empty((n, own.rows)), np.empty((n, own.rows + actuators, 6))
+    poses = np.require(poses, requirements=["C", "W"])
+    evaluate_poses(own.legs.address, own.reading.address, poses, sides, q_proximal, NO_ROWS, rows, slopes)
+    return jacobians(own.scratch.address, slopes, is_forward, maps)
+
+
+@lru_cache(maxsize=64)
+def _by_legs(mechanism: Mechanism) -> ByLegs | None:
+    """A machine as the kernels take it; None if its Jacobians do not follow from its legs.
+
+    They do if the pose determines all coordinates of the legs, and all motions of actuators move the end effector.
+    """
+    from ..kernels.platform.jacobians import new_jacobian_tables
+
+    table, counts = leg_table(mechanism), generic_of(mechanism).mobility
+    if not isinstance(table, LegTable) or len(table.redundant) or counts.internal or counts.uncontrolled:
+        return None
+    twists, actuators = units_of(mechanism)
+    rows, rank = int(table.task["rows"][0]), len(twists) - counts.platform
+    if not counts.platform > 0 or rank > rows:
+        return None
+    scratch = Scratch(new_jacobian_tables, rows, rank, len(twists), len(actuators))
+    units = actuators[:, None] / twists, twists[:, None] / actuators
+    return ByLegs(reading_table(table), reading_scratch(table), scratch, rows, units)
