@@ -9,9 +9,9 @@ import numpy as np
 
 import pfabrik as pf
 from closed_forms import Array, Struts
-from pfabrik.closure.solve import ClosureEngine
+from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.motion.displacements import rate_units
-from pfabrik.motion.first_order import actuated_columns
+from pfabrik.motion.joint_rates import actuated_columns
 from pfabrik.motion.singularities import measures
 from table import Row, cells, machine, table
 from timing import best_times, draw

@@ -11,7 +11,7 @@ import numpy as np
 import pfabrik as pf
 from closed_forms import Array, Struts
 from newton import StrutNewton
-from pfabrik.closure.solve import ClosureEngine
+from pfabrik.closure.closure_engine import ClosureEngine
 from table import Row
 from timing import best_times, draw
 from yardstick import one_core

@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 
 import oracles
 import pfabrik as pf
-from pfabrik.closure.solve import ClosureEngine
+from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.decomposition.leg_forms import RedundantJoint
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.engine import engine_of
 from pfabrik.errors import UnsupportedMechanism
 from pfabrik.files import loads
 from pfabrik.options import Options
-from pfabrik.platform.solve import LegsEngine
+from pfabrik.platform.legs_engine import LegsEngine
 
 RAILS = """
 schema = 1

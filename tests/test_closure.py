@@ -7,7 +7,7 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES
-from pfabrik.answers.limits import active_limits
+from pfabrik.answers.active_limits import active_limits
 from pfabrik.closure.close import HELD, close, closure_of, platform_poses
 from pfabrik.description.paths import independent_paths
 from pfabrik.motion.displacements import columns, displacements, gaps, stepped

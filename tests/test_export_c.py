@@ -24,7 +24,7 @@ from pfabrik.export.export_c import c_source
 from pfabrik.export.self_test import targets_around_home
 from pfabrik.export.wording import in_words
 from pfabrik.motion.displacements import columns
-from pfabrik.motion.limits import coned
+from pfabrik.motion.limited_coordinates import coned
 
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler here: neither gcc nor clang")

@@ -15,7 +15,7 @@ import oracles
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.errors import InvalidArgument
-from pfabrik.kernels.legs.poses import NOT_A_ROTATION
+from pfabrik.kernels.legs.complete_poses import NOT_A_ROTATION
 from pfabrik.tolerances import TOLERANCES
 
 CATALOGUE = ("five_bar", "stewart", "nrpm")

@@ -13,7 +13,7 @@ from pfabrik.cli import main
 from pfabrik.cli.info import chain_table, clean, vector
 from pfabrik.decomposition.decompose import beyond_positions
 from pfabrik.engine import engine_of as answering_engine
-from pfabrik.platform.solve import LegsEngine
+from pfabrik.platform.legs_engine import LegsEngine
 
 
 def printed(name: str) -> str:

@@ -19,10 +19,10 @@ import pfabrik as pf
 from machines import MACHINES
 from machines.trunks import TRUNKS
 from pfabrik.decomposition.plan import CompiledPlan, compile_plan
-from pfabrik.kernels import linear, rotations, vectors
+from pfabrik.kernels import linear, quaternions, vectors
 from pfabrik.kernels._jit import kernel
-from pfabrik.kernels.legs import poses
-from pfabrik.kernels.reaching import frames, restrict, solve
+from pfabrik.kernels.legs import complete_poses
+from pfabrik.kernels.reaching import moving_frames, restrict, solve
 from pfabrik.kernels.reaching import passes as reach
 from pfabrik.kernels.reaching import plan as P
 
@@ -55,13 +55,13 @@ def wrap(angle, centre):
 
 @kernel
 def difference(A, B, out):
-    rotations.difference(A, B, out)
+    quaternions.difference(A, B, out)
 
 
 @kernel
 def turn_pose(T, w):
-    poses.turn_pose(T, w)
-    poses.orthonormalise(T)
+    complete_poses.turn_pose(T, w)
+    complete_poses.orthonormalise(T)
 
 
 @kernel
@@ -76,7 +76,7 @@ def room(plan):
 
 @kernel
 def move_carriers(plan, now):
-    frames.move_carriers(plan, now)
+    moving_frames.move_carriers(plan, now)
 
 
 @kernel
@@ -90,7 +90,7 @@ def pass_once(plan, b, now, forward):
 @kernel
 def place_ends(plan, now):
     for c in range(plan.chains.shape[0]):
-        frames.place_ends(plan, c, now)
+        moving_frames.place_ends(plan, c, now)
 
 
 def triple(v: Any) -> tuple[float, float, float]:
@@ -208,7 +208,7 @@ def test_turn_pose_is_the_rotation_from_the_left(angle: float) -> None:
         expected = Rotation.from_rotvec(angle * axis).as_matrix() @ T[:3, :3]
         turn_pose(T, triple(angle * axis))
         np.testing.assert_allclose(T[:3, :3], expected, rtol=0, atol=4e-15)
-        np.testing.assert_allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), rtol=0, atol=poses.ROUNDED)
+        np.testing.assert_allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), rtol=0, atol=complete_poses.ROUNDED)
         np.testing.assert_array_equal(T[:3, 3], (1, 2, 3))
 
 
@@ -217,7 +217,7 @@ def test_a_pose_turned_many_times_stays_a_rotation() -> None:
     for _ in range(1000):
         turn_pose(T, (0.3, -0.2, 0.1))
     np.testing.assert_allclose(T[:3, :3], Rotation.from_rotvec([300, -200, 100]).as_matrix(), rtol=0, atol=1e-11)
-    np.testing.assert_allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), rtol=0, atol=poses.ROUNDED)
+    np.testing.assert_allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), rtol=0, atol=complete_poses.ROUNDED)
 
 
 # --- linear systems --------------------------------------------------------------------------------------------------

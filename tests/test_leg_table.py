@@ -23,7 +23,7 @@ from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
 from pfabrik.platform.answers import sides_at
 from pfabrik.platform.coordinates import read_coordinates
-from pfabrik.platform.solve import LegsEngine
+from pfabrik.platform.legs_engine import LegsEngine
 from pfabrik.platform.table import reading_scratch
 from pfabrik.platform.table import table_handle as legs_of
 

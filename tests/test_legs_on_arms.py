@@ -13,11 +13,11 @@ import pfabrik as pf
 from checks import excess_of_joints, gap_of_joints
 from machines import closure
 from pfabrik.closure.close import closure_of
-from pfabrik.closure.solve import ClosureEngine
+from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.engine import engine_of
 from pfabrik.options import Options
-from pfabrik.platform.solve import LegsEngine
+from pfabrik.platform.legs_engine import LegsEngine
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

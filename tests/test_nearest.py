@@ -18,13 +18,13 @@ from machines import closure, positions
 from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
 from pfabrik.closure.close import close, closure_of
+from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.closure.projection import projection_modes
-from pfabrik.closure.solve import ClosureEngine
 from pfabrik.decomposition.leg_table import leg_table
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.platform import rotation
-from pfabrik.platform.solve import LegsEngine
+from pfabrik.platform.legs_engine import LegsEngine
 from pfabrik.rotations import angles_between
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")

@@ -21,8 +21,8 @@ from pfabrik.kernels.platform import forward as F
 from pfabrik.kernels.platform import limits
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_involved
 from pfabrik.kernels.platform.nearest import new_nearest_scratch
-from pfabrik.kernels.platform.records import SETTINGS, Plan, PlatformObjective
 from pfabrik.kernels.platform.search import new_search_scratch
+from pfabrik.kernels.platform.search_records import SETTINGS, MultistartPlan, PlatformObjective
 from pfabrik.platform.along import stays_there
 from pfabrik.platform.table import kernel_table
 
@@ -177,7 +177,9 @@ def test_limits_are_weighed_in_more_motions_than_there_are_limits() -> None:
     table = leg_table(published.planar_arm())
     assert isinstance(table, LegTable)
     settings = np.zeros(1, SETTINGS)  # no steps: limits are weighed
-    plan = Plan(np.zeros(6), settings, np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), stays_there(table))
+    plan = MultistartPlan(
+        np.zeros(6), settings, np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), stays_there(table)
+    )
     scratch = new_nearest_scratch(kernel_table(table), plan)
     linear = scratch.search.first.linear
     n = len(linear.g)

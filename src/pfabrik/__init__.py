@@ -40,7 +40,7 @@ _NAMES = {
         "mobility",
         "singularity",
     ),
-    "answers.limits": ("ActiveLimit",),
+    "answers.active_limits": ("ActiveLimit",),
     "answers.margins": ("margins",),
     "answers.residual": ("closure_residual",),
     "answers.solution": ("Solution",),
@@ -95,7 +95,7 @@ if TYPE_CHECKING:
         mobility as mobility,
         singularity as singularity,
     )
-    from .answers.limits import ActiveLimit as ActiveLimit
+    from .answers.active_limits import ActiveLimit as ActiveLimit
     from .answers.margins import margins as margins
     from .answers.residual import closure_residual as closure_residual
     from .answers.solution import Solution as Solution

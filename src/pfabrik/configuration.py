@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .answers.solution import Solution
-from .answers.starts import joint_vectors
+from .answers.start_configuration import joint_vectors
 from .answers.status import Status
 from .closure.close import CLOSED, measure_configurations
 from .description.mechanism import Mechanism

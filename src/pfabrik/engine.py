@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TypeAlias
 
-from .closure.solve import ClosureEngine
+from .closure.closure_engine import ClosureEngine
 from .decomposition.decompose import positions_express
 from .decomposition.leg_table import LegTable, leg_table
 from .description.mechanism import Mechanism
 from .options import USUAL, Options
-from .platform.solve import LegsEngine
+from .platform.legs_engine import LegsEngine
 from .reaching.solve import ReachingEngine
 
 Engine: TypeAlias = LegsEngine | ClosureEngine

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .answers.starts import Start, start_of
+from .answers.start_configuration import Start, start_of
 from .arrays import Floats, Ints, shaped
 from .closure.parasitic import has_parasitic_motion
 from .decomposition.leg_forms import LegForm, Rod

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .answers.solution import Solution
-from .answers.starts import Start, start_of
+from .answers.start_configuration import Start, start_of
 from .arrays import Floats
 from .closure.assemble import forward_answers
 from .closure.close import measure_configurations

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .answers.answer import PoseRequest
+from .answers.answer_fields import PoseRequest
 from .answers.solution import Solution
-from .answers.starts import Start, start_of
+from .answers.start_configuration import Start, start_of
 from .closure.configurations import Configurations
 from .description.mechanism import Mechanism
 from .engine import inverse_engine_of

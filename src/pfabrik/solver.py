@@ -10,7 +10,7 @@ import numpy as np
 
 from .answers.differential import forward_jacobian
 from .answers.solution import Solution
-from .answers.starts import Start, start_of
+from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .arrays import Floats
 from .closure.configurations import new_rows
@@ -20,7 +20,7 @@ from .errors import InvalidArgument
 from .fk import Actuators, solve_fk
 from .ik import keeps_mode, solve_ik
 from .options import Options, checked_options
-from .platform.solve import LegsEngine
+from .platform.legs_engine import LegsEngine
 from .poses import DOUBLE
 from .targets import Target
 from .warm_up import warm_up

@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .answers.answer import PoseRequest
-from .answers.starts import Start, start_of
+from .answers.answer_fields import PoseRequest
+from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track, pace_of
 from .arrays import Floats

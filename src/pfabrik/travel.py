@@ -9,10 +9,10 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .answers.limits import ActiveLimit, active_limits
+from .answers.active_limits import ActiveLimit, active_limits
+from .answers.aligned_text import aligned, plain
 from .answers.solution import Solution, checked_solution
 from .answers.status import Status
-from .answers.table import aligned, plain
 from .answers.words import NO_FREEDOM, STRETCHED, short_names
 from .arrays import Floats, Mask
 from .closure.first_order import are_stretched

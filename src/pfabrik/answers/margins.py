@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays import Floats, shaped
 from ..description.mechanism_html import card
 from ..frozen import FrozenMapping
-from ..motion.limits import coned, ranges_of
+from ..motion.limited_coordinates import coned, ranges_of
 from ..tolerances import TOLERANCES
 from .solution import Solution, checked_solution
 

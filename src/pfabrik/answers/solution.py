@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidArgument
 from ..kernels.rows import REACHED
-from .answer import Answer
-from .notebook import answer_html
+from .answer_fields import Answer
+from .solution_html import answer_html
 from .status import Status
 from .words import as_sentence, causes, given_up
 

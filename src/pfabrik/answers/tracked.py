@@ -18,8 +18,8 @@ from ..errors import InvalidArgument
 from ..motion.displacements import actuator_units
 from ..poses import as_floats, between
 from ..tolerances import TOLERANCES
-from .answer import PoseRequest
-from .limits import ActiveLimit
+from .active_limits import ActiveLimit
+from .answer_fields import PoseRequest
 from .solution import Solution, as_plain
 from .status import Status
 

@@ -17,8 +17,8 @@ from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
-    from .answer import Answer
-    from .limits import ActiveLimit
+    from .active_limits import ActiveLimit
+    from .answer_fields import Answer
 
 
 STRETCHED, NO_FREEDOM = "the links are stretched out or folded", "the mechanism has no freedom that way"

@@ -6,7 +6,7 @@ import json
 
 import click
 
-from ..answers.table import aligned
+from ..answers.aligned_text import aligned
 from ..catalog import catalog as names
 from ..catalog import description
 

@@ -16,7 +16,7 @@ import numpy as np
 
 import pfabrik as pf
 
-from ..answers.table import aligned
+from ..answers.aligned_text import aligned
 from ..arrays import Floats
 from ..extras import require
 from ..telling import telling

@@ -13,7 +13,7 @@ import click
 
 import pfabrik as pf
 
-from ..answers.table import aligned
+from ..answers.aligned_text import aligned
 from ..decomposition.leg_table import leg_table, legs_answer
 from ..description.joint_types import KINDS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
-from ..answers.table import aligned
+from ..answers.aligned_text import aligned
 from ..catalog import catalog, catalog_file, template, templates, title
 from .mech import MECH
 from .outputs import OUTPUT, STANDARD, check_outputs, refuse_existing

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..answers.table import aligned, plain
+from ..answers.aligned_text import aligned, plain
 from ..answers.words import as_sentence, by_bound, exceeded, loop_gap
 from ..arrays import Floats
 from ..description.mechanism_html import bound_text

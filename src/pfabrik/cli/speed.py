@@ -9,7 +9,7 @@ import click
 
 import pfabrik as pf
 
-from ..answers.table import aligned, plain
+from ..answers.aligned_text import aligned, plain
 from .mech import MECH, load
 from .speeds import speed_limits, speed_option
 from .target import Triple, target_of, targeted

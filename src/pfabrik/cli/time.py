@@ -11,7 +11,7 @@ import click
 
 import pfabrik as pf
 
-from ..answers.table import aligned
+from ..answers.aligned_text import aligned
 from ..errors import counted
 from ..telling import telling
 from .finite import FINITE

@@ -14,7 +14,7 @@ import click
 
 import pfabrik as pf
 
-from ..answers.table import aligned
+from ..answers.aligned_text import aligned
 from ..checks import require_ending
 from ..extras import require
 from ..view.save_picture import PICTURES

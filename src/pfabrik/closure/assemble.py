@@ -18,7 +18,7 @@ from .close import CLOSED, Closing, Closure, close, closure_of, platform_poses
 from .configurations import Configurations
 from .descend import MOST_STEPS, nearest_actuators
 from .effort import descents_within
-from .starts import same_random_starts
+from .random_starts import same_random_starts
 
 CONTINUATION_STEPS = 8
 """Steps of a continuation from the actuator values of the start to the target values, if one step fails."""

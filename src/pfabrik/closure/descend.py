@@ -18,7 +18,7 @@ from .effort import steps_within
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
-    from ..kernels.closure.linearise import DescentScratch
+    from ..kernels.closure.linearise_loops import DescentScratch
 
 
 MOST_STEPS = 200
@@ -121,7 +121,7 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
 
 @lru_cache(maxsize=64)
 def _scratch(mechanism: Mechanism, whole: bool) -> Scratch[DescentScratch]:
-    from ..kernels.closure.linearise import new_descent_scratch
+    from ..kernels.closure.linearise_loops import new_descent_scratch
 
     return Scratch(new_descent_scratch, closure_of(mechanism, whole).loops)
 

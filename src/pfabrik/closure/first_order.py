@@ -13,7 +13,7 @@ from ..kernels.closure.loops import FirstOrder, FirstOrderPlan
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..motion.displacements import rate_units
-from ..motion.first_order import actuated_columns, graph_of
+from ..motion.joint_rates import actuated_columns, graph_of
 from ..motion.mobility import generic_of
 from ..motion.singularities import KINDS, Singularity, measures, singularity_of
 from ..tolerances import TOLERANCES

@@ -16,7 +16,7 @@ from .close import EVERYTHING_FREE, close, closure_of
 from .descend import MOST_STEPS, nearest_configurations
 from .effort import descents_within, starts_within
 from .parasitic import differences, follows_task, has_parasitic_motion
-from .starts import random_starts
+from .random_starts import random_starts
 
 SEED_DISTANCE, SEED_TURN = 0.5, 0.5
 """Distance [L] and rotation [rad] from home of the poses for which the first seeds are the nearest configurations."""

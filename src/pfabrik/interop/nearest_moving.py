@@ -25,7 +25,7 @@ from ..description.home_mobility import loop_conditions, unclear_conditions
 from ..description.joints import Joint
 from ..description.structure import Structure
 from ..motion.displacements import columns, displacements, joint_displacements, loop_errors, screws
-from ..motion.first_order import at_reference, graph_of, moved
+from ..motion.joint_rates import at_reference, graph_of, moved
 from ..rotations import from_rotvec
 from .digits import Rounding
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..closure.close import Closing, Closure, close, closure_of, platform_poses
-from ..closure.starts import random_starts
+from ..closure.random_starts import random_starts
 from ..description.mechanism import Mechanism
 from ..errors import ContinuumOfSolutions, InvalidArgument
 from ..fk import Actuators, as_values, solution_at

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
 from ..closure.close import HELD, Closing, Closure, close, platform_poses
-from ..closure.starts import random_starts
+from ..closure.random_starts import random_starts
 from ..description.joint_types import TASK_TURNS
 from ..description.task import task_of
 from ..errors import ContinuumOfWorkingModes

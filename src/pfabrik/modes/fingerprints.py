@@ -12,7 +12,7 @@ from ..closure.close import Closing, Closure, close
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..motion.displacements import centres, columns
-from ..motion.limits import within_turns
+from ..motion.limited_coordinates import within_turns
 from ..tolerances import TOLERANCES
 from .lists import ALONG
 

@@ -12,7 +12,7 @@ from ..arrays import Floats, Mask
 from ..description.joint_types import TASK_TURNS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM, Mechanism
 from ..tolerances import TOLERANCES
-from .first_order import first_order, right_singular
+from .joint_rates import first_order, right_singular
 from .mobility import generic_of
 from .walks import around_home
 

@@ -14,7 +14,7 @@ from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..description.mechanism_html import card
 from ..tolerances import TOLERANCES
-from .first_order import actuated_columns, first_order, right_singular
+from .joint_rates import actuated_columns, first_order, right_singular
 from .walks import around_home
 
 COUNTING, FEWEST = 4e9, 2

@@ -21,7 +21,7 @@ from ..description.mechanism_html import card
 from ..description.task import task_of
 from ..tolerances import TOLERANCES
 from .displacements import displacements
-from .first_order import actuated_columns, first_order, right_singular
+from .joint_rates import actuated_columns, first_order, right_singular
 from .mobility import Generic, generic_of
 
 KINDS = ("serial", "parallel", "constraint", "passive")

@@ -11,7 +11,7 @@ from ..description.home_mobility import column_joints, loop_conditions
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .displacements import gaps, loop_errors, screws
-from .first_order import actuated_columns, at_reference, first_order, graph_of, moved, right_singular
+from .joint_rates import actuated_columns, at_reference, first_order, graph_of, moved, right_singular
 
 SAMPLES, STEPS, STEP = 8, 3, 0.1
 """Number of walks from home to generic configurations, steps of each, and largest joint motion of a step [rad or L]."""

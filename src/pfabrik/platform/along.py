@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Records
 from ..decomposition.leg_table import LegTable
 from ..kernels.legs import records as K
-from ..kernels.platform.records import Along
+from ..kernels.platform.search_records import Along
 from ..tolerances import TOLERANCES
 
 

@@ -8,7 +8,7 @@ from ..arrays import Floats
 from ..closure.close import HELD, close, closure_of
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..motion.limits import within_turns
+from ..motion.limited_coordinates import within_turns
 from ..tolerances import TOLERANCES
 from .table import reading_scratch, reading_table
 

@@ -15,7 +15,7 @@ from ..closure.configurations import Configurations, new_rows, rows_at
 from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle
-from ..kernels.platform.records import Starts
+from ..kernels.platform.search_records import Starts
 from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
 from .nearest import nearest_actuators

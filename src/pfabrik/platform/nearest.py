@@ -20,7 +20,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
-from ..kernels.platform.records import PoseSolutions, Starts
+from ..kernels.platform.search_records import PoseSolutions, Starts
 from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION, PROJECTED, REACHED
 from ..options import Options
 from ..tolerances import TOLERANCES

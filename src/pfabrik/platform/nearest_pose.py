@@ -16,7 +16,7 @@ from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
-from ..kernels.platform.records import SETTINGS, Plan, PoseSolutions, Starts
+from ..kernels.platform.search_records import SETTINGS, MultistartPlan, PoseSolutions, Starts
 from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
@@ -86,7 +86,7 @@ class NearestPose:
             setting[name] = value
         setting["frame"] = BASE_AXES if is_fixed else setting["frame"]
         along = stays_there(table) if driven is not None else carriages_along(table)
-        self._plan = Handle(Plan(pose_weights, setting, *seeds, along))
+        self._plan = Handle(MultistartPlan(pose_weights, setting, *seeds, along))
         self._no_values = np.zeros((0, len(self._legs.record.driven)))
         self._pointing_search: NearestPose | None = None
         if n_cones < len(cones):

@@ -16,7 +16,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
-from ..kernels.platform.records import Starts
+from ..kernels.platform.search_records import Starts
 from ..kernels.rows import REACHED
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES

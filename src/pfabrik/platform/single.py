@@ -14,7 +14,7 @@ from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting
 from ..description.mechanism import Mechanism
 from ..kernels.handle import Handle, Scratch
-from ..kernels.platform.records import Starts
+from ..kernels.platform.search_records import Starts
 from ..kernels.rows import N_COUNTERS, Rows
 from .nearest_pose import home_start, no_starts
 from .table import legs_at_rest, local_table, search_table, table_handle

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from ..arrays import Records
-from ..closure.solve import STRANGE
+from ..closure.closure_engine import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting, at_rest
 from ..kernels.handle import Handle, Scratch

@@ -15,7 +15,7 @@ from ..closure.configurations import new_rows, put_rows, rows_at
 from ..closure.parasitic import is_flipped
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
-from ..kernels.platform.records import PoseSolutions, Starts
+from ..kernels.platform.search_records import PoseSolutions, Starts
 from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
 from ..options import Options

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..closure.close import Closing, close, closure_of
+from ..closure.closure_engine import ClosureEngine, start_coordinates, to_answers
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
 from ..closure.descend import clip_targets
 from ..closure.projection import ProjectionMode, held_parts, projection_modes
-from ..closure.solve import ClosureEngine, start_coordinates, to_answers
 from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import compile_plan
 from ..description.mechanism import Mechanism
@@ -25,10 +25,10 @@ from ..kernels.rows import FAILED, ITERATIONS, REACHED, ROUNDS
 from ..kernels.threads import in_blocks
 from ..options import Options
 from ..platform.answers import sides_at
-from ..platform.solve import LegsEngine
+from ..platform.legs_engine import LegsEngine
 from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
-from .positions import holding, new_pass_results, place, positions_of
+from .joint_positions import holding, new_pass_results, place, positions_of
 
 NEAR = 1e-3
 """Tolerance of the passes [L] if exact answers follow: loops are closed from there."""

@@ -14,7 +14,7 @@ from ..arrays import Floats
 from ..description.task import task_of
 from ..errors import InvalidArgument
 from ..motion.displacements import rate_units
-from ..motion.first_order import actuated_columns, first_order, right_singular
+from ..motion.joint_rates import actuated_columns, first_order, right_singular
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .time_path import limits_of

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..answers.solution import Solution
-from ..answers.starts import Start, joint_vectors, start_of
+from ..answers.start_configuration import Start, joint_vectors, start_of
 from ..arrays import Floats
 from ..checks import require_mapping
 from ..configuration import configuration

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
+from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, new_rows
-from ..closure.solve import ClosureEngine
 from ..kernels.rows import REACHED
 
 NEAR = 0.25

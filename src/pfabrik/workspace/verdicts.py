@@ -7,11 +7,11 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from ..answers.limits import active_limits
+from ..answers.active_limits import active_limits
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats, Ints, Mask
-from ..closure.solve import ClosureEngine
+from ..closure.closure_engine import ClosureEngine
 from ..configuration import configuration
 from ..decomposition.leg_table import LegTable, table_of_poses
 from ..description.mechanism import Mechanism

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 from ...arrays import Floats
 from .._jit import inlined, routine, search
+from ..quaternions import exponential, turn_about_z, turn_ball, yaw_of
 from ..references import opener
-from ..rotations import exponential, turn_about_z, turn_ball, yaw_of
-from .equations import (
+from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Layout, Loops
+from .normal_equations import (
     add_cones,
     add_paths,
     add_ranges,
@@ -25,7 +26,6 @@ from .equations import (
     pose_frame,
     turn_equations,
 )
-from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Layout, Loops
 from .path_kinematics import (
     LAYOUT,
     LOOPS,

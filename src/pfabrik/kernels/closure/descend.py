@@ -12,7 +12,7 @@ from ...arrays import Floats
 from .._jit import routine, search
 from ..free_motions import FreeMotions, project, put_multipliers, put_step, restoring_step
 from ..holding import limit_multipliers
-from ..rotations import turn_ball
+from ..quaternions import turn_ball
 from ..sqp import (
     CLOSED,
     LONGEST_STEP,
@@ -30,7 +30,7 @@ from ..sqp import (
     scale_objective,
     symmetrise,
 )
-from .linearise import (
+from .linearise_loops import (
     DescentScratch,
     add_anchors,
     add_cone,

@@ -14,8 +14,8 @@ import numpy as np
 
 from ...arrays import Floats
 from .._jit import routine, search
+from ..quaternions import turn_ball
 from ..references import opener
-from ..rotations import turn_ball
 from .loops import BALL, CONSTRAINT, PARALLEL, PASSIVE, SERIAL, FirstOrder, FirstOrderPlan, Loops
 from .path_kinematics import LAYOUT, LOOPS, Equations, State, end_path, new_equations, new_state, open_loops, walk_path
 

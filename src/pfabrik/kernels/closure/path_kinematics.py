@@ -9,8 +9,8 @@ import numpy as np
 
 from ...arrays import Floats
 from .._jit import inlined, routine
+from ..quaternions import difference, logarithm, rotate_by, turn_ball
 from ..references import opener
-from ..rotations import difference, logarithm, rotate_by, turn_ball
 from .loops import BALL, SLIDE, Closed, Layout, Loops
 
 

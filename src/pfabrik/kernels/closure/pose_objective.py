@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ...arrays import Floats
 from .._jit import routine
-from ..rotations import UPSIDE_DOWN, difference, yaw_difference
+from ..quaternions import UPSIDE_DOWN, difference, yaw_difference
 from ..vectors import Vec, cross, dot, norm, scale
 from .loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 

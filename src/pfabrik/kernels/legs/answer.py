@@ -10,16 +10,16 @@ import numpy as np
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import allocator, kernel, routine
 from ..linear import solve_spd
-from ..rotations import yaw_of
+from ..quaternions import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..vectors import copy_row, cross, dot, norm, put, scale, vec, wrap_into
+from .complete_poses import read_target, set_yaw, turn_pose
 from .endings import LEAST_MARGIN
 from .frames import new_frames, orienting_coordinate, place_redundant, q_redundant_of, redundant_slope, set_frames
+from .open_table import open_table
 from .pivots import any_across, pivot_rows, pivot_slopes, place_pivot
-from .poses import read_target, set_yaw, turn_pose
 from .records import N_VALUES, PIVOT, REDUNDANT, ROD, SHARED, Table
 from .rods import place_rod, rod_rows, rod_slopes
-from .table import open_table
 
 # Largest constraint of a completed pose, and of one that the task sets whole [L or rad]: solutions close to 1e-9, and
 # the closure residual of a loop may be a few times its constraint.

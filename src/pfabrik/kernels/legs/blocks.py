@@ -45,10 +45,10 @@ from .columns import (
     project_on_base_direction,
     project_on_platform_direction,
 )
+from .complete_poses import ROUNDED
 from .endings import LEAST_MARGIN
-from .poses import ROUNDED
+from .open_table import open_table
 from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, HINGE, NO_PROXIMAL, PLATFORM_END, Q_PROXIMAL, SHARED, SLIDE
-from .table import open_table
 
 TURN = 2.0 * math.pi
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
-from ..rotations import difference, turn_about_z, yaw_difference
+from ..quaternions import difference, turn_about_z, yaw_difference
 from ..vectors import angle_between, copy_row, scale, vec
 from .answer import KEPT, NEARLY_CLOSED, complete_pose, deviation, end_of_rows, new_completion, put_rows
+from .complete_poses import put_pose, read_target, tilt_to, turn_pose
 from .endings import pointing_error
-from .poses import put_pose, read_target, tilt_to, turn_pose
+from .open_table import open_table
 from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, CROSS, PIVOT, PLATFORM_END, PLATFORM_LINE, ROD, SLIDE, TRIPLE
-from .table import open_table
 
 PARTS, MORE_PARTS = 4, 16
 """Steps of the continuation from the start to a target, tried where a pose completed in one step is not feasible. The

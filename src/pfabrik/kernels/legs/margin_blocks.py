@@ -28,8 +28,8 @@ from .columns import (
     fill_poses,
 )
 from .feasibility import relative_margin
+from .open_table import open_table
 from .records import CARRIAGE, CRANK, HINGE, NO_PROXIMAL, SHARED, SLIDE
-from .table import open_table
 
 # Binding of a row that blocks cannot measure: its pose is still to be completed, or a rod there has no direction.
 UNKNOWN = -2

@@ -18,12 +18,12 @@ from ..legs.answer import (
     put_rows,
     write_answer,
 )
+from ..legs.complete_poses import read_target
 from ..legs.endings import LEAST_MARGIN
 from ..legs.feasibility import largest_constraint
 from ..legs.frames import set_frames
-from ..legs.poses import read_target
+from ..legs.open_table import open_table
 from ..legs.records import REDUNDANT, Table
-from ..legs.table import open_table
 from ..rows import PENDING, REACHED, UNSURE
 from ..vectors import copy_row
 from .equations import owner_of

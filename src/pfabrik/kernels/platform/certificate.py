@@ -51,8 +51,8 @@ from .equations import LegEvaluation, direction, evaluate_legs, has_proximal, le
 from .lagrangian import put_limited_gradient
 from .limits import AT_BASE_END, AT_PLATFORM_END, cone_slope, current_direction
 from .linearise import linearise
-from .records import PlatformObjective
 from .search import SearchScratch, put_objective
+from .search_records import PlatformObjective
 
 NEARER = 1e-7
 """Relative error of the squared distance up to which the end of a search counts as nearest."""

@@ -15,9 +15,9 @@ import numpy as np
 from ...arrays import Floats, Ints, Record
 from .._jit import kernel, routine
 from ..legs.answer import KEPT, deviation, excess_of, largest_entry
-from ..legs.poses import middle_of, orthonormalise
+from ..legs.complete_poses import middle_of, orthonormalise
+from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import PIVOT, Q_PROXIMAL, Table
-from ..legs.table import SAMPLE, open_table
 from ..linear import solve_spd, solve_square
 from ..references import opener
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
@@ -33,8 +33,8 @@ from .equations import (
     put_slopes,
 )
 from .limits import coordinate_slope, is_multiturn
-from .records import Starts
 from .search import copy_platform_state, move
+from .search_records import Starts
 from .spheres import Spheres, new_spheres, put_spheres, set_spheres
 from .starts import place_proximal, put_sides
 

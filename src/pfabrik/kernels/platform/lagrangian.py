@@ -13,8 +13,8 @@ from ..legs.records import SHARED, Table
 from ..sqp import PROBE, symmetrise
 from .equations import PlatformState, evaluate_leg, has_proximal, length_row, put_leg_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
-from .records import PlatformObjective
 from .search import SearchScratch, copy_platform_state, move, put_objective
+from .search_records import PlatformObjective
 
 
 @routine

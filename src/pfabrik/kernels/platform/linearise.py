@@ -11,8 +11,8 @@ from ..legs.records import Table
 from ..vectors import dot, vec
 from .equations import PlatformState, evaluate_legs, put_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
-from .records import PlatformObjective
 from .search import SearchScratch, put_objective
+from .search_records import PlatformObjective
 
 
 @routine

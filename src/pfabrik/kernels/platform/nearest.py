@@ -13,12 +13,12 @@ from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import limit_multipliers
 from ..legs.answer import deviation, excess_of
-from ..legs.poses import orthonormalise
+from ..legs.complete_poses import orthonormalise
+from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import REDUNDANT, Table
-from ..legs.table import SAMPLE, open_table
 from ..qp import QP, new_qp
+from ..quaternions import difference, yaw_difference
 from ..references import opener
-from ..rotations import difference, yaw_difference
 from ..rows import (
     CERTAIN,
     HOLD,
@@ -34,11 +34,11 @@ from ..rows import (
 from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global
-from .descend import descend
+from .descend_pose import descend
 from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
 from .linearise import linearise
-from .records import SETTINGS, Along, Plan, PlatformObjective, PoseSolutions, Starts
 from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch
+from .search_records import SETTINGS, Along, MultistartPlan, PlatformObjective, PoseSolutions, Starts
 from .starts import load_start, load_target, nearest_start, place_held, put_sides, take_along, way_along
 
 LARGEST_NUMBER = 1.7976931348623157e308
@@ -74,7 +74,7 @@ class NearestScratch(NamedTuple):
     natural_gradients: Floats  # (limits, n): inverse metric times the gradients of active limits
 
 
-def new_nearest_scratch(table: Table, plan: Plan) -> NearestScratch:
+def new_nearest_scratch(table: Table, plan: MultistartPlan) -> NearestScratch:
     """Allocate the scratch memory of one thread."""
     setting, starts = plan.settings[0], plan.poses.shape[0]
     search, best = new_search_scratch(table, setting["cones"]), new_platform_state(table.legs.shape[0])
@@ -87,7 +87,9 @@ def new_nearest_scratch(table: Table, plan: Plan) -> NearestScratch:
 
 
 _STAYS = Along(np.zeros((3, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
-_PLAN = Plan(np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), _STAYS)
+_PLAN = MultistartPlan(
+    np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), _STAYS
+)
 open_plan, open_scratch = opener(_PLAN), opener(new_nearest_scratch(SAMPLE, _PLAN))
 """The plan and scratch memory of `nearest_pose` at the addresses of their handles."""
 
@@ -376,7 +378,7 @@ def nearest_pose(
 
     Parameters
     ----------
-    machine, plan_address : addresses of the kernel table and of `Plan`.
+    machine, plan_address : addresses of the kernel table and of `MultistartPlan`.
     scratch_address : that of `NearestScratch`, allocated for both.
     targets, values : as in `PlatformObjective`.
     begins, q, sides : the own start of each row, or one for all, as in `Starts`; the seeds of the plan follow until

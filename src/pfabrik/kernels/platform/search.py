@@ -12,14 +12,14 @@ from .._jit import routine
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
-from ..legs.poses import turn_pose
+from ..legs.complete_poses import turn_pose
 from ..legs.records import Table
 from ..qp import QP, new_qp
 from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import copy_row, copy_table, wrap
 from .equations import LegEvaluation, PlatformState, count_unknowns, new_leg_evaluation, new_platform_state
 from .limits import coordinate_slope, is_multiturn
-from .records import PlatformObjective
+from .search_records import PlatformObjective
 
 NEAR, NEARBY, STEPS_AWAY = 0.3, 0.02, 3.0
 """Limits farther away than the first are left out of a programme [rad or L]. As steps shrink, so does this distance: to

@@ -8,15 +8,15 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import pose_gradient
+from ..legs.complete_poses import column, is_pose, middle_of, orthonormalise, set_yaw, turn_pose
 from ..legs.frames import ZERO, orienting_coordinate, place_redundant, q_redundant_of, set_frames
-from ..legs.poses import column, is_pose, middle_of, orthonormalise, set_yaw, turn_pose
 from ..legs.records import CRANK, Q_PROXIMAL, REDUNDANT, Table
 from ..legs.rods import solve_proximal
-from ..rotations import yaw_of
+from ..quaternions import yaw_of
 from ..vectors import Vec, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec, wrap
 from .equations import LegEvaluation, PlatformState, has_proximal, redundant_side
-from .records import STRETCHED, Along, Starts
 from .search import SearchScratch
+from .search_records import STRETCHED, Along, Starts
 
 BENT = 1e-2
 """Displacement of a proximal joint from its dead point where a search starts [L or rad]."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from .._jit import routine
-from ..legs.poses import orthonormalise, turn_pose
+from ..legs.complete_poses import orthonormalise, turn_pose
 from ..linear import solve_spd
 from ..vectors import Vec, add, along, cross, dot, move, norm, scale, sub, turn, vec
-from .frames import move_carriers
+from .moving_frames import move_carriers
 from .plan import SLIDE, TURN, Configuration, Plan
 
 # Two Gauss-Newton steps fit a trunk well enough for one pass; damped where a joint moves no branch joint.

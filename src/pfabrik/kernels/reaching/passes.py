@@ -6,7 +6,7 @@ from ...arrays import Records
 from .._jit import routine
 from ..vectors import Vec, along, dot, flatten, move, norm, put, sub, turn, vec
 from .fit import fit_trunk
-from .frames import move_carriers
+from .moving_frames import move_carriers
 from .plan import PLATFORM_CONE, Configuration, Plan, Settings
 from .restrict import NO_LENGTH, clamp_cone, clamp_stroke, cone_axis, restrict_step
 

@@ -8,7 +8,7 @@ from ...arrays import Floats
 from .._jit import allocator, routine, search
 from ..vectors import along, copy_row, copy_table, move, put, sub, vec
 from .fit import turn_to_fit
-from .frames import move_carriers, place_ends
+from .moving_frames import move_carriers, place_ends
 from .passes import reach_by_passes
 from .plan import TRANSLATES, TURNS, Configuration, PassResults, Plan, Seeds, Settings
 

@@ -6,7 +6,7 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
-from ..rotations import UPSIDE_DOWN, turn_about_z, yaw_of
+from ..quaternions import UPSIDE_DOWN, turn_about_z, yaw_of
 from ..vectors import Vec, cross, dot, norm, scale, turn, vec
 from .endings import LEAST_MARGIN, turned
 

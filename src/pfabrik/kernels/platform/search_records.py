@@ -66,7 +66,7 @@ class Along(NamedTuple):
     room: Floats  # (legs, 2): least and most coordinate of each [L]
 
 
-class Plan(NamedTuple):
+class MultistartPlan(NamedTuple):
     """Objective weights, settings and seeds of searches, common to all rows."""
 
     weights: Floats  # (6,): of the pose, as in `PoseObjective`

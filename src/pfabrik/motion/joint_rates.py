@@ -25,7 +25,7 @@ def actuated_columns(mechanism: Mechanism) -> list[int]:
 
 
 @dataclass(frozen=True)
-class Graph:
+class CycleBasis:
     """How twists and loop conditions sum up the screws, per column of q; locked joints have no part in them.
 
     Attributes
@@ -42,13 +42,13 @@ class Graph:
 
 
 @lru_cache(maxsize=64)
-def graph_of(mechanism: Structure) -> Graph:
+def graph_of(mechanism: Structure) -> CycleBasis:
     tree, owners = tree_of(mechanism), column_joints(mechanism)
     path = tree.paths[mechanism.end_effector_body][owners]
     orthonormal = np.linalg.qr(tree.loops.T)[0].T
     moves = column_moves(mechanism)
     loops, rates = tree.loops[:, owners] * moves, moves[:, None] * orthonormal_rates(mechanism)
-    return Graph(path * moves, loops, orthonormal[:, owners] * moves, rates)
+    return CycleBasis(path * moves, loops, orthonormal[:, owners] * moves, rates)
 
 
 def first_order(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:

@@ -14,7 +14,7 @@ from ..description.task import Weights, task_of
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.rows import FAILED, HOLD, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from ..motion.displacements import centres
-from ..motion.limits import within_turns
+from ..motion.limited_coordinates import within_turns
 from ..options import Options
 from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
@@ -34,7 +34,7 @@ from .effort import starts_within, steps_per_continuation_step, steps_within
 from .multistart import random_feasible
 from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
 from .projection import ProjectionMode, held_parts, project, projection_modes, projection_multipliers
-from .starts import random_coordinates
+from .random_starts import random_coordinates
 from .stretched import BentConfiguration
 
 CONTINUATION_STEPS = 8

@@ -12,7 +12,7 @@ from ..description.sketch import sketch
 from .words import as_sentence
 
 if TYPE_CHECKING:
-    from .answer import Answer
+    from .answer_fields import Answer
 
 
 def answer_html(answer: Answer, counts: dict[str, int]) -> str:

@@ -35,8 +35,8 @@ from ..vectors import wrap
 from .equations import PlatformState, close_rods
 from .lagrangian import lagrangian_hessian
 from .linearise import linearise
-from .records import PlatformObjective
 from .search import NEAR, NEARBY, STEPS_AWAY, SearchScratch, copy_platform_state, move, set_platform_users
+from .search_records import PlatformObjective
 
 HOPELESS = 8.0
 """A search is given up if its distance to the incumbent's objective exceeds the last predicted reduction by this

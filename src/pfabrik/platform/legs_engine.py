@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
 from ..closure.close import Closing, in_lengths
+from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
 from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import ProjectionMode
-from ..closure.solve import ClosureEngine
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.handle import Handle
-from ..kernels.platform.records import Starts
+from ..kernels.platform.search_records import Starts
 from ..kernels.rows import OPEN, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
 from ..motion.outward import centres_at

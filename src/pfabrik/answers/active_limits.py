@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..motion.displacements import rate_units
-from ..motion.limits import coned, ranges_of
+from ..motion.limited_coordinates import coned, ranges_of
 from ..tolerances import TOLERANCES
 
 

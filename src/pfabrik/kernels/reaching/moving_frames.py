@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...arrays import Floats
 from .._jit import routine
-from ..legs.poses import turn_pose
+from ..legs.complete_poses import turn_pose
 from ..vectors import Vec, add, along, move, put, rotate, scale, sub, turn, vec
 from .plan import TURN, Configuration, Plan
 

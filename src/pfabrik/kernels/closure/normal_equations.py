@@ -16,7 +16,7 @@ import math
 
 from ...arrays import Floats, Ints
 from .._jit import inlined, routine
-from ..rotations import UPSIDE_DOWN, difference, exponential
+from ..quaternions import UPSIDE_DOWN, difference, exponential
 from .loops import BALL, LOCKED, SLIDE, TARGET_AXES, ClosureProblem, Layout, Loops
 from .path_kinematics import Equations, State, compare_end, end_path, pose_cone, walk_path
 

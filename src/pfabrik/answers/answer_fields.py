@@ -27,7 +27,7 @@ from ..kernels.rows import (
     Rows,
 )
 from ..motion.displacements import columns, home_coordinates
-from .limits import ActiveLimit, active_limits, binding_limits, has_passive_limits, holding_limits
+from .active_limits import ActiveLimit, active_limits, binding_limits, has_passive_limits, holding_limits
 from .status import Status
 
 Held: TypeAlias = Literal["orientation", "position"] | None
