@@ -187,6 +187,8 @@ def test_the_solver_reaches_exactly_what_the_closed_form_reaches(name: str) -> N
 def test_the_forward_engine_returns_to_the_pose(name: str) -> None:
     """From actuators on a small ball about home to a pose, and back by the closed form."""
     mechanism = pf.load(name)
+    if pf.mobility(mechanism).redundancy:
+        pytest.skip("values drawn for more actuators than freedoms do not assemble")
     scale = [
         mechanism.characteristic_length if mechanism.joint(each).type == "prismatic" else 1.0
         for each in mechanism.actuator_names
