@@ -17,7 +17,9 @@ import pfabrik as pf
 from pfabrik.cli import main
 
 ROOT = Path(__file__).parents[1]
-PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *ROOT.glob("docs/**/*.md")])
+PAGES = sorted(
+    [*(ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")), *ROOT.glob("docs/**/*.md")]
+)
 EXAMPLES = sorted(ROOT.glob("examples/*.py"))
 FORMAT = ROOT / "docs" / "describing-a-mechanism.md"
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
@@ -78,6 +80,13 @@ def test_the_page_on_the_method_names_files_that_there_are() -> None:
     named = files_named(ROOT / "docs" / "how-it-works.md")
     assert len(named) > 15
     assert [name for name in named if not (ROOT / "src" / "pfabrik" / name).exists()] == []
+
+
+def test_the_page_for_contributors_names_files_that_there_are() -> None:
+    named = files_named(ROOT / "CONTRIBUTING.md")
+    assert len(named) > 15
+    missing = [name for name in named if not any((top / name).exists() for top in (ROOT, ROOT / "src" / "pfabrik"))]
+    assert missing == []
 
 
 @pytest.mark.parametrize("page", sorted(ROOT.glob("docs/**/*.md")), ids=lambda page: str(page.relative_to(ROOT)))
