@@ -49,7 +49,15 @@ def test_every_kernel_is_compiled_for_the_types_that_questions_have() -> None:
 
 def test_kernels_with_scratch_memory_of_their_caller_cannot_allocate() -> None:
     names = {kernel.py_func.__name__ for kernel, _ in ahead.KERNELS if not kernel.targetoptions["_nrt"]}
-    assert {"nearest_pose", "assemble", "evaluate_poses", "close", "nearest_configuration", "first_order"} == names
+    assert names == {
+        "nearest_pose",
+        "assemble",
+        "evaluate_poses",
+        "close",
+        "nearest_configuration",
+        "first_order",
+        "jacobians",
+    }
 
 
 def test_a_kernel_is_announced_when_it_is_compiled_and_not_when_it_is_loaded(tmp_path: Path) -> None:

@@ -462,7 +462,7 @@ class TestJacobiansOfLegs:
         machine = pf.load(name)
         solution = pf.solve_ik(machine, machine.home_pose if name != "g1_ankle" else drawn(machine, 1).pose[0])
         forward_jacobian(solution), inverse_jacobian(solution)
-        assert "coordinates" not in vars(solution._found)
+        assert "coordinates" not in vars(solution._configurations)
 
     @pytest.mark.parametrize("name", OF_LEGS)
     def test_forward_jacobian_is_the_slope_of_forward_kinematics(self, name):

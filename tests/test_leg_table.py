@@ -182,8 +182,8 @@ def test_a_start_keeps_its_working_mode(name: str) -> None:
     engine = engine_of(mechanism)
     assert isinstance(engine, LegsEngine)
     rows = new_rows(mechanism, len(near))
-    engine._reach(near, start._found, sides_at(mechanism, engine._table, start._found), True, rows)
-    behind = engine._joint_space.answer(near, start._found, Options(), keep_mode=True)
+    engine._reach(near, start._configurations, sides_at(mechanism, engine._table, start._configurations), True, rows)
+    behind = engine._joint_space.answer(near, start._configurations, Options(), keep_mode=True)
     assert (rows.status == pf.Status.REACHED).all()
     assert off(name, rows.actuators, behind.rows.actuators).max() <= 1e-9
     answers = pf.solve_ik(mechanism, near, start=start)

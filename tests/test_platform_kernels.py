@@ -23,7 +23,7 @@ from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_involv
 from pfabrik.kernels.platform.nearest import new_nearest_scratch
 from pfabrik.kernels.platform.search import new_search_scratch
 from pfabrik.kernels.platform.search_records import SETTINGS, MultistartPlan, PlatformObjective
-from pfabrik.platform.along import stays_there
+from pfabrik.platform.carriages import stays_there
 from pfabrik.platform.table import kernel_table
 
 pytestmark = [

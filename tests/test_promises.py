@@ -18,7 +18,7 @@ from pfabrik import Cone, Joint, Mechanism, Options, Status
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.errors import InvalidArgument
 from pfabrik.kernels.legs.records import CARRIAGE
-from pfabrik.platform.along import carriages_along
+from pfabrik.platform.carriages import carriages_along
 
 Z = (0.0, 0.0, 1.0)
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

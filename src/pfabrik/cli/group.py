@@ -92,11 +92,16 @@ def take_closed_places() -> None:
 def exit_code(run: Callable[[], Any]) -> int:
     """Run, and say how it went: the returned integer, or the code of the failure, which is told on stderr."""
     with Stops() as stops:
-        code = code_of(run, stops)
+        try:
+            code = code_of(run, stops)
+            stops.end()
+        except KeyboardInterrupt:  # raised again just as the command ended
+            stops.end()
+            code = stops.code
         if stops.number is not None:  # also where whoever was interrupted made nothing of it
             complain(stops.word)
             return stops.code
-    return code
+        return code
 
 
 def code_of(run: Callable[[], Any], stops: Stops) -> int:

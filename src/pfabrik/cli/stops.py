@@ -55,8 +55,12 @@ class Stops:
         self._unraisable, sys.unraisablehook = sys.unraisablehook, self._drop
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def end(self) -> None:
+        """Raise no more interruptions: all that is left is to say what became of the command."""
         self._over.set()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.end()
         if self._insisting is not None:
             self._insisting.join()
         for number, handler in self._before.items():

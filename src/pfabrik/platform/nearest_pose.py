@@ -20,7 +20,7 @@ from ..kernels.platform.search_records import SETTINGS, MultistartPlan, PoseSolu
 from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
 from ..kernels.threads import in_blocks
 from ..tolerances import TOLERANCES
-from .along import carriages_along, proximal_coordinates, stays_there
+from .carriages import carriages_along, proximal_coordinates, stays_there
 from .rotation import keeps_rotation, n_implied_rows, without_idle_legs
 from .table import OF_POINTING, search_table
 

@@ -20,7 +20,7 @@ from ..kernels.platform.search_records import Starts
 from ..kernels.rows import REACHED
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
-from .along import proximal_coordinates
+from .carriages import proximal_coordinates
 from .nearest_pose import NearestPose, home_start, no_starts
 from .rotation import constraints_at, keeps_rotation
 from .table import table_handle
