@@ -82,7 +82,7 @@ class SearchPlan(NamedTuple):
     length: float
     projections: tuple[ProjectionMode, ...]
     searches: tuple[NearestPose, ...]
-    fallback: NearestPose | None  # another projection, for legs that complete poses step by step
+    fallback: NearestPose | None  # another projection, if redundant joints follow step by step
 
 
 @lru_cache(maxsize=256)
@@ -105,7 +105,7 @@ def _search_plan(
     searches = tuple(_new_search(mechanism, table, projection, settings, seed_starts) for projection in projections)
     with_orientation = projection_modes(mechanism, "orientation", rotation_length)
     fallback = None
-    if table.is_completed and len(with_orientation) > 1:
+    if table.has_implicit_joints and len(with_orientation) > 1:
         fallback = (
             searches[-1]
             if len(projections) > 1
