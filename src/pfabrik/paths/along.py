@@ -52,7 +52,7 @@ def largest_tilts(solution: Solution) -> Extremes | None:
 
 
 def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
-    """Of every rod on a carrier its body and its line at home, and the carrier's body and how it moves the foot."""
+    """For every rod on a proximal joint: its body, its line at home, the body of the joint, and how it moves the base end."""
     table = leg_table(mechanism)
     found: list[tuple[str, Floats, str, Floats]] = []
     proximal: ElementaryJoint | None = None

@@ -1,4 +1,4 @@
-"""How carriages next to the base take a whole machine along: on rails it is the same machine anywhere."""
+"""Displacements of a whole machine by carriages next to the base: on rails it is the same machine anywhere."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..tolerances import TOLERANCES
 
 
 def proximal_coordinates(table: LegTable) -> Records:
-    """The coordinates of carriers among those known."""
+    """The coordinates of proximal joints among the known ones."""
     on_rods = table.legs["kind"][table.known["leg"]] == K.ROD
     return np.asarray(table.known[on_rods & (table.known["place"] == K.Q_PROXIMAL)])
 
@@ -69,7 +69,7 @@ def _carriages_to(legs: Records, k: int) -> list[int] | None:
 
 
 def _room(table: LegTable) -> Floats:
-    """The least and the most coordinate of each carrier, (legs, 2)."""
+    """The least and the most coordinate of each proximal or redundant joint, (legs, 2) [L or rad]."""
     room = np.tile([-np.inf, np.inf], (len(table.legs), 1))
     for proximal in np.concatenate([proximal_coordinates(table), table.redundant]):
         room[proximal["leg"]] = np.sort(proximal["sense"] * np.array([proximal["lo"], proximal["hi"]]))

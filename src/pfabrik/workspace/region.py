@@ -87,7 +87,7 @@ class Region:
     def shares(self) -> dict[tuple[str, str], float]:
         """(joint, bound) -> share of the border that this limit forms, the greatest first.
 
-        Both ranges of a joint that has two count together, as in `margins`, and all legs on one carrier.
+        Both ranges of a joint that has two count together, as in `margins`, and all legs on one proximal joint.
         """
         sizes, total = self._mesh.face_sizes, dict.fromkeys(self.limits, 0.0)
         for limit, size in zip(self.face_limit.tolist(), sizes.tolist(), strict=True):
