@@ -52,7 +52,7 @@ def largest_tilts(solution: Solution) -> Extremes | None:
 
 
 def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
-    """For every rod on a proximal joint: its body, its line at home, the body of the joint, and how it moves the base end."""
+    """Of every rod on a proximal joint: its body and line at home, the joint's body, the motion of the base end."""
     table = leg_table(mechanism)
     found: list[tuple[str, Floats, str, Floats]] = []
     proximal: ElementaryJoint | None = None
