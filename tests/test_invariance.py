@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik import Joint, Mechanism, Solution, Status
+from pfabrik.model import model_of
 from pfabrik.platform.seeds import seeds_of
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -250,7 +251,7 @@ def test_searches_start_from_the_same_places_however_a_machine_is_described(name
     """What is drawn is a leg's by where it is, and counts along its axis whichever way that is described."""
     original = machine(name)
     other, _ = relabelled(original, np.random.default_rng(0))
-    np.testing.assert_allclose(seeds_of(other).poses, seeds_of(original).poses, atol=1e-6)
+    np.testing.assert_allclose(seeds_of(model_of(other)).poses, seeds_of(model_of(original)).poses, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", NAMES)

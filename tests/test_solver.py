@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import copy
-import gc
 import pickle
-import weakref
 
 import numpy as np
 import pytest
@@ -13,10 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from pfabrik import Options, Status
-from pfabrik.decomposition.leg_table import LegTable, leg_table
-from pfabrik.engine import engine_of
 from pfabrik.errors import InvalidArgument
-from pfabrik.platform.table import local_table, table_handle
 
 MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]
 
@@ -155,25 +150,6 @@ def test_what_is_no_mechanism_or_no_single_start_is_refused() -> None:
     batch = pf.solve_ik(mechanism, np.tile(mechanism.home_pose, (2, 1, 1)))
     with pytest.raises(InvalidArgument, match="start: found batch shape"):
         pf.Solver(mechanism, start=batch)
-
-
-@pytest.mark.parametrize("started", [False, True])
-def test_what_kernels_are_given_is_kept_as_long_as_a_solver(started: bool) -> None:
-    """Kernels take an address: what it leads to must not go when a cache has forgotten the machine."""
-    engine_of.cache_clear()  # an engine of before may have been given what its cache has forgotten since
-    mechanism = pf.load("stewart")
-    home = mechanism.home_pose
-    solver = pf.Solver(mechanism, start=pf.solve_ik(mechanism, home) if started else None)
-    table = leg_table(mechanism)
-    assert isinstance(table, LegTable)
-    taken = local_table if started else table_handle
-    given = weakref.ref(taken(table))
-    solver.ik(home)
-    taken.cache_clear()
-    gc.collect()
-    assert given() is not None
-    assert solver.ik(home) == Status.REACHED and solver.fk(solver.actuators.copy()) == Status.REACHED
-    np.testing.assert_allclose(solver.pose, home, atol=1e-9 * mechanism.characteristic_length)
 
 
 @pytest.mark.parametrize("started", [False, True])

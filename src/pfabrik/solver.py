@@ -19,6 +19,7 @@ from .engine import inverse_engine_of
 from .errors import InvalidArgument
 from .fk import Actuators, solve_fk
 from .ik import keeps_mode, solve_ik
+from .model import model_of
 from .options import Options, checked_options
 from .platform.legs_engine import LegsEngine
 from .poses import DOUBLE
@@ -60,7 +61,7 @@ class Solver:
         self._start, begin = start, start_of(mechanism, start, ())
         warm_up(mechanism)
         self._engine = inverse_engine_of(mechanism, self.options)
-        self._rows, self._target = new_rows(mechanism, 1), np.eye(4)[None]
+        self._rows, self._target = new_rows(model_of(mechanism), 1), np.eye(4)[None]
         self._reach: Callable[[], int] | None = None
         self._assemble: Callable[[], int] | None = None
         if isinstance(self._engine, LegsEngine):

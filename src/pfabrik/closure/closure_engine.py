@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Mask
-from ..description.mechanism import Mechanism
-from ..description.task import Weights, task_of
+from ..derived import derived
+from ..description.task import Weights
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.rows import FAILED, HOLD, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
+from ..model import Model
+from ..motion.closure import Closure
 from ..motion.displacements import centres
 from ..motion.limited_coordinates import within_turns
 from ..options import Options
 from ..poses import are_poses, between, made_exact
 from ..tolerances import TOLERANCES
 from .assemble import assemble, forward_answers
-from .close import HELD, Closing, Closure, close, closure_of, measure_configurations, platform_poses
+from .close import HELD, Closing, close, measure_configurations, platform_poses
 from .configurations import (
     Configurations,
     coordinates_for,
@@ -63,18 +64,17 @@ STEPS = 30
 class ClosureEngine:
     """The engine that solves in joint coordinates."""
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
-        self._closure = closure_of(mechanism, whole=False)
+    def __init__(self, model: Model) -> None:
+        self.model, self._closure = model, model.path_closure
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Solve for targets (n, 4, 4) independently, from one start or one for each; INVALID where no pose."""
-        is_valid, begin = are_poses(targets), start_coordinates(self.mechanism, start)
+        is_valid, begin = are_poses(targets), start_coordinates(self.model, start)
         begin = begin[is_valid] if len(begin) > 1 else np.repeat(begin, is_valid.sum(), axis=0)
         exact, has_start = made_exact(targets[is_valid]), start is not None
-        return _answer(self._closure, exact, begin, options, keep_mode, has_start).scatter(is_valid)
+        return _answer(self.model, exact, begin, options, keep_mode, has_start).scatter(is_valid)
 
     def follow(
         self,
@@ -84,9 +84,9 @@ class ClosureEngine:
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Solve a path (n, 4, 4), each target from the answer before it, in its working mode."""
-        is_valid, begin = are_poses(targets), start_coordinates(self.mechanism, start)
+        is_valid, begin = are_poses(targets), start_coordinates(self.model, start)
         coordinates = [np.zeros((0, begin.shape[1]))]
-        rows, bent = new_rows(self.mechanism, int(is_valid.sum())), BentConfiguration(self.mechanism, options)
+        rows, bent = new_rows(self.model, int(is_valid.sum())), BentConfiguration(self.model, options)
         for i in steps_of(is_valid, on_progress):
             has_start = start is not None or len(coordinates) > 1
             answer = self._follow_one(made_exact(targets[i : i + 1]), begin, options, bent, has_start)
@@ -99,9 +99,9 @@ class ClosureEngine:
         self, target: Floats, begin: Floats, options: Options, bent: BentConfiguration, has_start: bool
     ) -> Configurations:
         """Solve one target of a path, also from the last bent configuration if links are stretched out."""
-        answer = _answer(self._closure, target, begin, options, True, has_start)
+        answer = _answer(self.model, target, begin, options, True, has_start)
         if bent.coordinates is not None:
-            bent_answer = _answer(self._closure, target, bent.coordinates, options, True, has_start)
+            bent_answer = _answer(self.model, target, bent.coordinates, options, True, has_start)
             answer = bent_answer if bent.is_preferred(target, answer.rows, bent_answer.rows) else answer
         bent.update(int(answer.rows.status[0]), begin, answer.coordinates)
         return answer
@@ -109,8 +109,8 @@ class ClosureEngine:
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Move as many configurations to targets (n, 4, 4) in their working modes; FAILED where not reached."""
         begin = start.coordinates
-        closing = _reach(self._closure, targets, begin, platform_poses(self.mechanism, begin), keep_mode=True)
-        rows = new_rows(self.mechanism, len(targets))
+        closing = _reach(self._closure, targets, begin, platform_poses(self.model.mechanism, begin), keep_mode=True)
+        rows = new_rows(self.model, len(targets))
         write_closing(self._closure, closing, rows)
         rows.status[:] = np.where(closing.feasible, REACHED, FAILED)
         return Configurations(rows, closing.coordinates)
@@ -120,87 +120,87 @@ class ClosureEngine:
 
         Cheaper than `advance` if many are not reached, for which `advance` tries continuation.
         """
-        closure, task, begin = self._closure, task_of(self.mechanism), start.coordinates
-        poses = targets if task.is_whole_pose else task.completed(targets, platform_poses(self.mechanism, begin))
+        closure, task, begin = self._closure, self._closure.task, start.coordinates
+        poses = targets if task.is_whole_pose else task.completed(targets, platform_poses(self.model.mechanism, begin))
         has_jumped = np.zeros(len(targets), bool)
-        held = HELD if follows_task(self.mechanism) else task.held
+        held = HELD if follows_task(closure) else task.held
         if held == HELD and not task.is_whole_pose:
-            free = task.held if has_parasitic_motion(self.mechanism) else HELD
+            free = task.held if has_parasitic_motion(closure) else HELD
             assembled = close(closure, begin, poses, platform=free, frame=task.frame, max_iterations=STEPS)
             has_jumped = differences(closure, assembled.poses, poses) > STRANGE
             poses = assembled.poses
         closing = _close_below(closure, begin, poses, held, STEPS)
-        rows = new_rows(self.mechanism, len(targets))
+        rows = new_rows(self.model, len(targets))
         write_closing(closure, closing, rows)
         rows.status[:] = np.where(closing.feasible & ~has_jumped, REACHED, FAILED)
         return Configurations(rows, closing.coordinates)
 
     def as_configurations(self, closing: Closing) -> Configurations:
         """The configurations of a closing; their status is PENDING."""
-        rows = new_rows(self.mechanism, len(closing.poses))
+        rows = new_rows(self.model, len(closing.poses))
         write_closing(self._closure, closing, rows)
         return Configurations(rows, closing.coordinates)
 
     def points(self, configurations: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
-        return centres(self.mechanism, configurations.coordinates)
+        return centres(self.model.mechanism, configurations.coordinates)
 
     def limit_multipliers(self, configurations: Configurations, targets: Floats, projection: ProjectionMode) -> Floats:
         """Multipliers of all limits at configurations that are projections of targets (n, 4, 4)."""
-        return projection_multipliers(self.mechanism, configurations.coordinates, targets, projection)
+        return projection_multipliers(self.model.closure, configurations.coordinates, targets, projection)
 
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """Solve for configurations with actuated values (n, n_a), from one start or one for each."""
-        coordinates = coordinates_for(self.mechanism, start, len(values))
-        closing = assemble(self.mechanism, coordinates, values, has_start=start is not None)
-        return forward_answers(self.mechanism, self.as_configurations(closing), closing, values, tolerance)
+        closure, coordinates = self.model.closure, coordinates_for(self.model, start, len(values))
+        closing = assemble(closure, coordinates, values, has_start=start is not None)
+        return forward_answers(closure, self.as_configurations(closing), closing, values, tolerance)
 
 
-def start_coordinates(mechanism: Mechanism, start: Configurations | None) -> Floats:
+def start_coordinates(model: Model, start: Configurations | None) -> Floats:
     """Joint coordinates of the start, (n, columns) or (1, columns).
 
     Loops that are on no path to the end effector are closed first, as the search does not move their joints.
     """
-    begin = joint_coordinates(mechanism, start)
-    if not _has_side_loops(mechanism):
+    begin = joint_coordinates(model, start)
+    if not _has_side_loops(model):
         return begin
-    closing = measure_configurations(mechanism, begin)
+    closing = measure_configurations(model, begin)
     infeasible = np.flatnonzero(~closing.feasible)
     if len(infeasible):
-        closure, poses, margin = closure_of(mechanism), closing.poses[infeasible], TOLERANCES.inside
+        closure, poses, margin = model.closure, closing.poses[infeasible], TOLERANCES.inside
         closing.put(infeasible, close(closure, begin[infeasible], poses, platform=HELD, limits=True, margin=margin))
     return closing.coordinates
 
 
 def _answer(
-    closure: Closure, targets: Floats, start: Floats, options: Options, keep_mode: bool, has_start: bool
+    model: Model, targets: Floats, start: Floats, options: Options, keep_mode: bool, has_start: bool
 ) -> Configurations:
     """Reach or project targets (n, 4, 4) from joint coordinates (n, columns)."""
-    mechanism = closure.mechanism
+    closure, mechanism = model.path_closure, model.mechanism
     closing = _reach(closure, targets, start, platform_poses(mechanism, start), keep_mode)
     holds = np.full(len(targets), HOLD_NOTHING)
     unsolved = np.flatnonzero(~closing.feasible)
     if len(unsolved):
-        stays = keep_mode or follows_task(mechanism)
+        stays = keep_mode or follows_task(closure)
         starts = [start[unsolved]] if stays else [start[unsolved], closing.coordinates[unsolved]]
         clipped = clip_targets(mechanism, targets[unsolved])
-        projections = projection_modes(mechanism, options.hold, options.rotation_length)
+        projections = projection_modes(closure, options.hold, options.rotation_length)
         projected = project(closure, clipped, starts, projections, seeds=not keep_mode, has_start=has_start)
-        errors = task_of(mechanism).errors(projected.closing.poses, targets[unsolved])
-        holds[unsolved] = held_parts(mechanism, projected.holds, *errors)
+        errors = model.task.errors(projected.closing.poses, targets[unsolved])
+        holds[unsolved] = held_parts(closure, projected.holds, *errors)
         closing.put(unsolved, projected.closing)
-    return to_answers(closure, closing, targets, holds, options)
+    return to_answers(model, closing, targets, holds, options)
 
 
-def to_answers(closure: Closure, closing: Closing, targets: Floats, holds: Ints, options: Options) -> Configurations:
+def to_answers(model: Model, closing: Closing, targets: Floats, holds: Ints, options: Options) -> Configurations:
     """The configurations of a closing as answers to targets (n, 4, 4): with holds, errors and status."""
-    mechanism = closure.mechanism
+    mechanism = model.mechanism
     within_turns(mechanism, closing.coordinates)
-    if _has_side_loops(mechanism):
-        closing = measure_configurations(mechanism, closing.coordinates)._replace(iterations=closing.iterations)
-    rows = new_rows(mechanism, len(targets))
-    write_closing(closure, closing, rows)
-    position, rotation = task_of(mechanism).errors(rows.poses, targets)
+    if _has_side_loops(model):
+        closing = measure_configurations(model, closing.coordinates)._replace(iterations=closing.iterations)
+    rows = new_rows(model, len(targets))
+    write_closing(model.path_closure, closing, rows)
+    position, rotation = model.task.errors(rows.poses, targets)
     rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR] = position, rotation
     rows.counters[:, HOLD] = holds
     is_near = (position <= (options.tolerance or TOLERANCES.position * mechanism.characteristic_length)) & (
@@ -210,11 +210,10 @@ def to_answers(closure: Closure, closing: Closing, targets: Floats, holds: Ints,
     return Configurations(rows, closing.coordinates)
 
 
-@lru_cache(maxsize=64)
-def _has_side_loops(mechanism: Mechanism) -> bool:
+@derived
+def _has_side_loops(model: Model) -> bool:
     """True if some loops are on no path from the base to the end effector."""
-    counts = [len(closure_of(mechanism, whole).loops.paths) for whole in (True, False)]
-    return counts[0] > counts[1]
+    return len(model.closure.loops.paths) > len(model.path_closure.loops.paths)
 
 
 def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_mode: bool) -> Closing:
@@ -224,8 +223,7 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
     ----------
     start, begin : joint coordinates (n, columns) of the start, and its platform poses (n, 4, 4).
     """
-    mechanism = closure.mechanism
-    task, follows = task_of(mechanism), follows_task(mechanism)
+    task, follows = closure.task, follows_task(closure)
     poses = targets if task.is_whole_pose else task.completed(targets, begin)
     rows = np.arange(len(targets))
     if follows:
@@ -247,10 +245,10 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
         if not is_pose_fixed:
             _search_from_nearby(closure, best, targets, task.held)
         _search_from_random(closure, best, rows, poses, held, is_pose_fixed=is_pose_fixed)
-    if not keep_mode and follows and (has_parasitic_motion(mechanism) or asks_too_much(mechanism)):
-        held = task.held if has_parasitic_motion(mechanism) else HELD
+    if not keep_mode and follows and (has_parasitic_motion(closure) or asks_too_much(closure)):
+        held = task.held if has_parasitic_motion(closure) else HELD
         _search_from_nearby(closure, best, targets, held)  # in other assembly modes, if this one does not reach
-        if asks_too_much(mechanism) or len(random_feasible(mechanism)[0]) < NEARBY:
+        if asks_too_much(closure) or len(random_feasible(closure)[0]) < NEARBY:
             completed = task.completed(targets, begin)
             _search_from_random(closure, best, np.arange(len(targets)), completed, held, is_pose_fixed=False)
     return best
@@ -258,8 +256,8 @@ def _reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep
 
 def _search_from_nearby(closure: Closure, best: Closing, targets: Floats, held: Weights) -> None:
     """Solve unsolved rows from the random feasible configurations whose end effectors are nearest to the targets."""
-    coordinates, poses = random_feasible(closure.mechanism)
-    task, unsolved = task_of(closure.mechanism), np.flatnonzero(~best.feasible)
+    coordinates, poses = random_feasible(closure)
+    task, unsolved = closure.task, np.flatnonzero(~best.feasible)
     distances = np.array(
         [_distances(closure, poses, np.repeat(targets[[row]], len(poses), axis=0)) for row in unsolved]
     )
@@ -310,8 +308,8 @@ def _complete_poses(closure: Closure, poses: Floats, start: Floats, begin: Float
 
     The resulting poses are complete; rows with open loops have none.
     """
-    task = task_of(closure.mechanism)
-    if not has_parasitic_motion(closure.mechanism):
+    task = closure.task
+    if not has_parasitic_motion(closure):
         return close(closure, start, poses, platform=HELD)
     best = close(closure, start, poses, platform=task.held, frame=task.frame)
     has_jumped = differences(closure, best.poses, poses) > STRANGE
@@ -331,7 +329,7 @@ def _close_below(
         start,
         poses,
         platform=held,
-        frame=BASE_AXES if held == HELD else task_of(closure.mechanism).frame,
+        frame=BASE_AXES if held == HELD else closure.task.frame,
         limits=limits,
         margin=TOLERANCES.inside,
         max_iterations=steps_within(closure, max_iterations),
@@ -345,7 +343,7 @@ def _continue_to(
 
     Rows in which a component that is not held jumps on the way are marked as open.
     """
-    task, present = task_of(closure.mechanism), begin
+    task, present = closure.task, begin
     max_iterations = steps_per_continuation_step(closure, 100, CONTINUATION_STEPS)
     if max_iterations == 0:
         return _close_below(closure, start, targets, held, 0 if limits else 100, limits=limits)
@@ -377,5 +375,5 @@ def _put_better_legs(closure: Closure, best: Closing, rows: NDArray[np.intp], tr
 
 def _distances(closure: Closure, poses: Floats, other_poses: Floats) -> Floats:
     """Distances between poses in the components of the task, (n,): lengths relative to L, angles in rad."""
-    position, rotation = task_of(closure.mechanism).errors(poses, other_poses)
+    position, rotation = closure.task.errors(poses, other_poses)
     return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, rotation))

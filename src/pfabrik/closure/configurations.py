@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
-from ..description.mechanism import Mechanism
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDING, RESIDUAL, Rows
-from .close import Closing, Closure, closure_of
+from ..model import Model
+from ..motion.closure import Closure
+from .close import Closing
 
 Places: TypeAlias = NDArray[np.intp] | slice
 """Indices of rows of a batch."""
@@ -24,13 +25,13 @@ STEPS_A_REPORT = 16
 """Steps along a path between two reports of progress."""
 
 
-def new_rows(mechanism: Mechanism, n: int) -> Rows:
+def new_rows(model: Model, n: int) -> Rows:
     """Allocate n results.
 
     All but the actuators, which callers keep, share one block of memory: allocators retain about as much as was freed
     at once, and requesting more, page by page, takes longer than solving.
     """
-    block, actuators = np.empty((25, n)), np.empty((n, len(mechanism.actuator_names)))
+    block, actuators = np.empty((25, n)), np.empty((n, len(model.mechanism.actuator_names)))
     block[16:] = 0.0
     counters, status = block[21:24].view(np.int64).reshape(n, N_COUNTERS), block[24].view(np.int64)
     status[:] = PENDING
@@ -147,12 +148,12 @@ def _blank(array: NDArray[Any], n: int) -> NDArray[Any]:
     return np.full((n, *array.shape[1:]), np.nan if array.dtype.kind == "f" else 0, array.dtype)
 
 
-def joint_coordinates(mechanism: Mechanism, start: Configurations | None) -> Floats:
+def joint_coordinates(model: Model, start: Configurations | None) -> Floats:
     """Joint coordinates of the start, (n, columns) or (1, columns), as deviations from home; zero without a start."""
-    return np.zeros((1, len(closure_of(mechanism).scale))) if start is None else start.coordinates
+    return np.zeros((1, len(model.mechanism.coordinates))) if start is None else start.coordinates
 
 
-def coordinates_for(mechanism: Mechanism, start: Configurations | None, n: int) -> Floats:
+def coordinates_for(model: Model, start: Configurations | None, n: int) -> Floats:
     """A copy of the joint coordinates of the start, one row for each of n targets, (n, columns)."""
-    coordinates = joint_coordinates(mechanism, start)
+    coordinates = joint_coordinates(model, start)
     return np.repeat(coordinates, 1 if start is not None and len(start) > 1 else n, axis=0)

@@ -14,13 +14,11 @@ from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
 from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import ProjectionMode
-from ..decomposition.leg_table import LegTable
-from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
 from ..kernels.rows import OPEN, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
+from ..model import Model
 from ..motion.outward import centres_at
 from ..options import Options
 from ..poses import are_poses
@@ -47,17 +45,17 @@ class LegsEngine:
     coordinates.
     """
 
-    def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
-        self.mechanism, self._table = mechanism, table
-        self._joint_space, self._single = ClosureEngine(mechanism), SingleTarget(mechanism, table)
-        self._single_forward = SingleAssembly(self.mechanism, table)
-        driven = table.driven
+    def __init__(self, model: Model) -> None:
+        self._model, self._table = model, model.legs
+        self._joint_space, self._single = ClosureEngine(model), SingleTarget(model)
+        self._single_forward = SingleAssembly(model)
+        driven = model.legs.driven
         self._turning = driven[(driven["turns"] == 1) & (driven["hi"] - driven["lo"] > 2.0 * np.pi)]
 
     @cached_property
     def _searches(self) -> bool:
         """True if unreached targets are searched for in the platform's pose, before joint coordinates."""
-        return not has_other_assemblies(self.mechanism)
+        return not has_other_assemblies(self._model.path_closure)
 
     def answer(
         self,
@@ -75,15 +73,15 @@ class LegsEngine:
         """
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
         start_sides = self._sides_of(start)
-        rows = self._single.new_rows() if is_one else new_rows(self.mechanism, len(targets))
+        rows = self._single.new_rows() if is_one else new_rows(self._model, len(targets))
         end_sides = start_sides.copy() if self._table.has_implicit_joints else start_sides
         if is_one and self._reach_one(targets, start, end_sides, keep_mode, rows):
-            mechanism, table = self.mechanism, self._table
-            start_coordinates = start_coordinates_of(mechanism, table, start, start_sides)
+            model = self._model
+            start_coordinates = start_coordinates_of(model, start, start_sides)
             platform = rows.poses, rows.actuators, end_sides
             return LegAnswers(
                 rows,
-                lambda places: joint_coordinates(mechanism, table, *platform, start_coordinates(slice(None)))[places],
+                lambda places: joint_coordinates(model, *platform, start_coordinates(slice(None)))[places],
                 end_sides,
             )
         n_unsolved, sides = self._reach(targets, start, start_sides, keep_mode, rows, is_tried=is_one)
@@ -93,7 +91,7 @@ class LegsEngine:
             q_proximal = np.empty_like(sides)
             q_proximal[:] = np.nan
             start_poses = self._single.home if start is None else start.rows.poses
-            request = Request(self.mechanism, self._table, options, keep_mode, nearby, start is not None)
+            request = Request(self._model, options, keep_mode, nearby, start is not None)
             unreached = Unreached(targets, start_poses, sides, q_proximal, rows)
             is_unsolved = rows.status != REACHED
             if start is not None and self._table.has_sides:
@@ -119,21 +117,19 @@ class LegsEngine:
                 return fallback
             put_rows(rows, unsolved, fallback.rows)
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides
-            sides[unsolved] = sides_at(self.mechanism, self._table, fallback)
+            sides[unsolved] = sides_at(self._model, fallback)
             if q_proximal is not None:
                 q_proximal[unsolved] = np.nan
         return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
 
     def _kept_projections(self, rows: Rows, fallback: Rows, options: Options) -> Mask:
         """The UNSURE projections to keep: the fallback neither reaches their targets nor comes nearer."""
-        length = options.rotation_length or self.mechanism.rotation_length
+        length = options.rotation_length or self._model.mechanism.rotation_length
         projected, other = (
             np.hypot(batch.measures[:, POSITION_ERROR], length * batch.measures[:, ROTATION_ERROR])
             for batch in (rows, fallback)
         )
-        nearer = (fallback.status == PROJECTED) & (
-            other < projected - TOLERANCES.position * self.mechanism.characteristic_length
-        )
+        nearer = (fallback.status == PROJECTED) & (other < projected - TOLERANCES.position * self._model.length)
         better = (fallback.status == REACHED) | (nearer & (fallback.holds >= rows.holds))
         return np.asarray((rows.status == UNSURE) & ~better)
 
@@ -147,7 +143,7 @@ class LegsEngine:
         if start is not None and len(self._turning):
             return None
         single, start_pose = self._single, self._single.home if start is None else start.rows.poses
-        sides = single.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        sides = single.home_sides if start is None else sides_at(self._model, start)
         return single.prepared(target, start_pose, sides, rows, nearby=keep_mode)
 
     def follow(
@@ -169,7 +165,7 @@ class LegsEngine:
 
     def _joined(self, answers: Sequence[Configurations], start: Configurations | None) -> Configurations:
         """Single answers as one batch; the first of them began at `start`."""
-        rows, n_legs = new_rows(self.mechanism, len(answers)), len(self._table.legs)
+        rows, n_legs = new_rows(self._model, len(answers)), len(self._table.legs)
         sides, q_proximal = (
             np.repeat(self._table.home_sides, len(answers), axis=0),
             np.full((len(answers), n_legs), np.nan),
@@ -202,11 +198,10 @@ class LegsEngine:
         fallback: Configurations | None,
     ) -> LegAnswers:
         """Rows as answers, from a start with the sides `start_sides`; the rows `unsolved` are those of the fallback."""
-        start_coordinates = start_coordinates_of(self.mechanism, self._table, start, start_sides)
+        start_coordinates = start_coordinates_of(self._model, start, start_sides)
         coordinates = partial(
             answer_coordinates,
-            self.mechanism,
-            self._table,
+            self._model,
             rows,
             sides,
             q_proximal,
@@ -222,13 +217,13 @@ class LegsEngine:
         Use the legs' closed forms where the start is non-singular and the pose fixes every coordinate; otherwise solve
         in joint space.
         """
-        mechanism, table, start_sides = self.mechanism, self._table, sides_at(self.mechanism, self._table, start)
-        rows, at_start = (new_rows(mechanism, len(targets)) for _ in range(2))
+        model, table, start_sides = self._model, self._table, sides_at(self._model, start)
+        rows, at_start = (new_rows(model, len(targets)) for _ in range(2))
         coordinates = start.coordinates.copy()
         _, sides = self._reach(targets, start, start_sides, True, rows)
         reached = np.flatnonzero(rows.status == REACHED)
         coordinates_reached = joint_coordinates(
-            mechanism, table, rows.poses[reached], rows.actuators[reached], sides[reached], coordinates[reached]
+            model, rows.poses[reached], rows.actuators[reached], sides[reached], coordinates[reached]
         )
         angles = table.limited["column"][table.limited["turns"] == 1]
         is_turned = (np.abs(coordinates_reached - coordinates[reached])[:, angles] > np.pi).any(axis=1)
@@ -252,7 +247,7 @@ class LegsEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         if not isinstance(answers, LegAnswers):
             return self._joint_space.points(answers)
-        centres = centres_at(self.mechanism, answers.rows.poses, answers.rows.actuators)
+        centres = centres_at(self._model.mechanism, answers.rows.poses, answers.rows.actuators)
         return centres if centres is not None else self._joint_space.points(answers)
 
     def limit_multipliers(self, answers: Configurations, targets: Floats, way: ProjectionMode) -> Floats:
@@ -261,11 +256,11 @@ class LegsEngine:
             return self._joint_space.limit_multipliers(answers, targets, way)
         has_proximal = np.isfinite(answers.q_proximal).all(axis=1)
         by_legs, by_joints = np.flatnonzero(has_proximal), np.flatnonzero(~has_proximal)
-        scale = 1.0 / self.mechanism.characteristic_length
+        scale = 1.0 / self._model.length
         solutions = Starts(
             in_lengths(answers.rows.poses[by_legs], scale), answers.q_proximal[by_legs], answers.sides[by_legs]
         )
-        weights = limit_multipliers(self.mechanism, self._table, targets[by_legs], solutions, way)
+        weights = limit_multipliers(self._model, targets[by_legs], solutions, way)
         all_weights = np.empty((len(targets), weights.shape[1]))
         all_weights[by_legs] = weights
         if len(by_joints):
@@ -280,9 +275,7 @@ class LegsEngine:
             rows.actuators[:] = values
             if self._single_forward.assemble(self._forward_start(start, start_sides), rows, solution):
                 return self._single_answer(rows, solution, start, start_sides)
-        rows, q_proximal, sides = forward_kinematics(
-            self.mechanism, self._table, values, start, start_sides, tolerance, outputs
-        )
+        rows, q_proximal, sides = forward_kinematics(self._model, values, start, start_sides, tolerance, outputs)
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved) == len(values):
             return self._joint_space.forward(values, start, tolerance)
@@ -298,7 +291,7 @@ class LegsEngine:
         With it what must be kept alive for the call: its start and its scratch memory.
         """
         start_handle = self._forward_start(start, self._sides_of(start))
-        scratch = Handle(new_scratch(self.mechanism, self._table))
+        scratch = Handle(new_scratch(self._model))
         return self._single_forward.prepared(start_handle, scratch, rows, self._single_forward.new_outputs()), (
             start_handle,
             scratch,
@@ -307,18 +300,16 @@ class LegsEngine:
     def _forward_start(self, start: Configurations | None, sides: Floats) -> Handle[Starts]:
         if start is None:
             return self._single_forward.home
-        return Handle(starts_at(self.mechanism, self._table, start.rows.poses, sides))
+        return Handle(starts_at(self._model, start.rows.poses, sides))
 
     def _starts_on_target(self, targets: Floats, poses: Floats) -> Mask:
         """True for rows whose start, one of as many poses or the only one, is on the target already, (n,).
 
         At a dead point closed forms may miss these targets; joint coordinates do not.
         """
-        task, poses = task_of(self.mechanism), np.broadcast_to(poses, targets.shape)
+        task, poses = self._model.task, np.broadcast_to(poses, targets.shape)
         position = np.where(task.axes, (targets - poses)[:, :3, 3], 0.0)
-        is_there = np.asarray(
-            np.abs(position).max(axis=1) <= TOLERANCES.position * self.mechanism.characteristic_length
-        )
+        is_there = np.asarray(np.abs(position).max(axis=1) <= TOLERANCES.position * self._model.length)
         if np.count_nonzero(is_there):
             _, rotation = task.errors(poses[is_there], targets[is_there])
             is_there[is_there] = rotation <= TOLERANCES.rotation
@@ -326,18 +317,18 @@ class LegsEngine:
 
     def _sides_of(self, start: Configurations | None) -> Floats:
         """The side of each leg at a start, (n or 1, legs)."""
-        return self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        return self._table.home_sides if start is None else sides_at(self._model, start)
 
     def _single_answer(
         self, rows: Rows, solution: AssemblyOutputs, start: Configurations | None, start_sides: Floats
     ) -> LegAnswers:
         """One assembled row as an answer, from a start with the sides `start_sides`."""
-        mechanism, table, q = self.mechanism, self._table, solution.q
-        start_coordinates = start_coordinates_of(mechanism, table, start, start_sides)
+        model, q = self._model, solution.q
+        start_coordinates = start_coordinates_of(model, start, start_sides)
         platform = rows.poses, rows.actuators, solution.sides
         return LegAnswers(
             rows,
-            lambda places: joint_coordinates(mechanism, table, *platform, start_coordinates(slice(None)), q)[places],
+            lambda places: joint_coordinates(model, *platform, start_coordinates(slice(None)), q)[places],
             solution.sides,
             q,
         )
@@ -373,7 +364,7 @@ class LegsEngine:
         -------
         The number of unsolved rows, and the sides of the answers with the coordinates of redundant joints.
         """
-        start_poses = self.mechanism.home_pose[None] if start is None else start.rows.poses
+        start_poses = self._model.mechanism.home_pose[None] if start is None else start.rows.poses
         legs = local_table(self._table) if keep_mode else table_handle(self._table)
         if self._table.has_implicit_joints:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
@@ -404,7 +395,7 @@ class LegsEngine:
     ) -> int:
         """Solve rows by moving the redundant joints, and write their coordinates; return the number of rows solved."""
         sides_before, unsolved = sides.copy(), np.flatnonzero(rows.status != REACHED)
-        moved, poses = move_redundant_joints(self.mechanism, self._table, targets, start_poses, sides, unsolved)
+        moved, poses = move_redundant_joints(self._model, targets, start_poses, sides, unsolved)
         if not len(moved):
             return 0
         block, start_poses = rows_at(rows, moved), poses
