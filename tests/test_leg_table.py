@@ -25,6 +25,7 @@ from pfabrik.options import Options
 from pfabrik.platform.answers import sides_at
 from pfabrik.platform.coordinates import read_coordinates
 from pfabrik.platform.legs_engine import LegsEngine
+from pfabrik.platform.reach import reach
 from pfabrik.platform.table import reading_scratch
 from pfabrik.platform.table import table_handle as legs_of
 
@@ -74,7 +75,7 @@ def both(name: str) -> tuple[np.ndarray, Any, Any]:
     assert isinstance(engine, LegsEngine)
     targets = targets_around_home(name, TARGETS, 0.25, 0.45)
     rows = new_rows(model_of(machine(name)), TARGETS)
-    engine._reach(targets, None, engine._table.home_sides, False, rows)
+    reach(engine._model, targets, None, engine._table.home_sides, False, rows)
     return targets, rows, engine._joint_space.answer(targets, None, Options(), keep_mode=False)
 
 
@@ -181,7 +182,7 @@ def test_a_start_keeps_its_working_mode(name: str) -> None:
     engine = engine_of(mechanism)
     assert isinstance(engine, LegsEngine)
     rows = new_rows(model_of(mechanism), len(near))
-    engine._reach(near, start._configurations, sides_at(engine._model, start._configurations), True, rows)
+    reach(engine._model, near, start._configurations, sides_at(engine._model, start._configurations), True, rows)
     behind = engine._joint_space.answer(near, start._configurations, Options(), keep_mode=True)
     assert (rows.status == pf.Status.REACHED).all()
     assert off(name, rows.actuators, behind.rows.actuators).max() <= 1e-9

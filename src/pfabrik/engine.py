@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 from .closure.closure_engine import ClosureEngine
+from .closure.engine_contract import Engine, InverseEngine
 from .decomposition.decompose import positions_express
 from .derived import derived
 from .description.mechanism import Mechanism
@@ -13,15 +12,13 @@ from .options import USUAL, Options
 from .platform.legs_engine import LegsEngine
 from .reaching.solve import ReachingEngine
 
-Engine: TypeAlias = LegsEngine | ClosureEngine
-
 
 def engine_of(mechanism: Mechanism) -> Engine:
     """The engine that solves a mechanism: closed forms if every chain is a leg that has one, else joint coordinates."""
     return _engine(model_of(mechanism))
 
 
-def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> Engine | ReachingEngine:
+def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> InverseEngine:
     """The engine that solves for targets.
 
     The paper's passes and its projection work on joint positions. They are used if the options ask for them and joint

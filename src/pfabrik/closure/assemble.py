@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..batch import put
 from ..derived import derived
 from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
 from ..motion.closure import Closure
@@ -91,7 +92,7 @@ def _assemble_elsewhere(closure: Closure, best: Closing, rows: NDArray[np.intp],
         scattered = _from_random_starts(closure, home[0][unsolved], poses[unsolved], values[unsolved])
         solutions.put_better(unsolved, scattered)
     reached = np.flatnonzero(solutions.feasible)
-    best.put(rows[reached], solutions, reached)
+    put(best, rows[reached], solutions, reached)
 
 
 @derived
@@ -129,7 +130,7 @@ def _from_random_starts(closure: Closure, coordinates: Floats, poses: Floats, va
         is_equal = np.abs(infeasibility - least) <= SAME * least
         better = np.flatnonzero(np.where(is_equal, distances < nearest, infeasibility < least))
         least[better], nearest[better] = infeasibility[better], distances[better]
-        best.put(better, trial, better)
+        put(best, better, trial, better)
     return best
 
 
@@ -176,7 +177,7 @@ def _project(
         trial = nearest_actuators(closure, start[0][pending], start[1][pending], clipped, steps)
         _put_nearer(closure, solutions, distances, pending, trial, values)
     feasible = np.flatnonzero(solutions.feasible)
-    best.put(rows[feasible], solutions, feasible)
+    put(best, rows[feasible], solutions, feasible)
 
 
 def _newton_ends(closure: Closure, values: Floats) -> Iterator[tuple[Floats, Floats]]:
@@ -193,7 +194,7 @@ def _put_nearer(
     errors = np.linalg.norm(actuator_errors(closure, trial.coordinates, values[rows]), axis=1)
     better = np.flatnonzero(trial.feasible & (errors < (1.0 - SAME) * distances[rows]))
     distances[rows[better]] = errors[better]
-    best.put(rows[better], trial, better)
+    put(best, rows[better], trial, better)
 
 
 def _clip_values(closure: Closure, coordinates: Floats, values: Floats) -> Floats:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Mask
+from ..batch import put, take
 from ..derived import derived
 from ..description.home_mobility import column_moves
 from ..description.mechanism import Mechanism
@@ -103,12 +104,7 @@ class Closing(NamedTuple):
     def put_better(self, places: NDArray[np.intp], trial: Closing) -> None:
         """Write the rows of a trial that are feasible, or less infeasible, at these places."""
         better = np.flatnonzero(trial.feasible | (trial.off.max(axis=1) < self.off[places].max(axis=1)))
-        self.put(places[better], trial, better)
-
-    def put(self, places: NDArray[np.intp], source: Closing, rows: Any = slice(None)) -> None:
-        """Write rows of another closing at these places."""
-        for array, source_array in zip(self, source, strict=True):
-            array[places] = source_array[rows]
+        put(self, places[better], trial, better)
 
 
 def close(
@@ -191,7 +187,7 @@ def _run(closure: Closure, locked: frozenset[int], problem: K.ClosureProblem, cl
 
     def run(block: slice) -> None:
         part = problem._replace(centres=problem.centres[block])
-        close_rows(machine, layout.address, scratch.address, part, K.Closed._make(array[block] for array in closed))
+        close_rows(machine, layout.address, scratch.address, part, take(closed, block))
 
     n = len(closed.poses)
     if n <= ROWS_A_BLOCK:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
+from ..batch import put, take
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDING, RESIDUAL, Rows
 from ..model import Model
 from ..motion.closure import Closure
@@ -36,17 +37,6 @@ def new_rows(model: Model, n: int) -> Rows:
     counters, status = block[21:24].view(np.int64).reshape(n, N_COUNTERS), block[24].view(np.int64)
     status[:] = PENDING
     return Rows(status, counters, block[:16].reshape(n, 4, 4), actuators, block[16:21].reshape(n, 5))
-
-
-def rows_at(rows: Rows, places: Any) -> Rows:
-    """The rows at some places: an integer array (copied), a mask (copied) or a slice (shared)."""
-    return Rows._make(array[places] for array in rows)
-
-
-def put_rows(rows: Rows, places: Any, source: Rows) -> None:
-    """Write rows at some places."""
-    for array, source_array in zip(rows, source, strict=True):
-        array[places] = source_array
 
 
 def steps_of(is_valid: Mask, on_progress: Callable[[int, int], None] | None) -> Iterator[int]:
@@ -112,21 +102,21 @@ class Configurations:
 
     def at(self, places: NDArray[np.intp]) -> Configurations:
         """The configurations at some places, copied."""
-        rows = Rows._make(np.ascontiguousarray(array[places]) for array in self.rows)
+        rows = take(self.rows, places)
         if self.were_given:
             return Configurations(rows, self.coordinates[places])
         return Configurations(rows, lambda selected: self.coordinates_at(places[selected]))
 
     def with_rows(self, places: NDArray[np.intp], source: Configurations) -> Configurations:
         """A copy with other configurations at some places."""
-        rows, coordinates = rows_at(self.rows, np.arange(len(self))), self.coordinates.copy()
-        put_rows(rows, places, source.rows)
+        rows, coordinates = take(self.rows, np.arange(len(self))), self.coordinates.copy()
+        put(rows, places, source.rows)
         coordinates[places] = source.coordinates
         return Configurations(rows, coordinates)
 
     def put(self, places: NDArray[np.intp], source: Configurations, rows: Mask) -> None:
         """Write some rows of other configurations at some places."""
-        put_rows(self.rows, places, rows_at(source.rows, rows))
+        put(self.rows, places, take(source.rows, rows))
         if self.were_given:
             self.coordinates[places] = source.coordinates[rows]
 
@@ -137,7 +127,7 @@ class Configurations:
         n = len(mask)
         rows = Rows._make(_blank(array, n) for array in self.rows)
         rows.status[:] = INVALID
-        put_rows(rows, mask, self.rows)
+        put(rows, mask, self.rows)
         coordinates = _blank(self.coordinates, n)
         coordinates[mask] = self.coordinates
         return Configurations(rows, coordinates)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats
+from ..batch import take
 from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, SIGHT, Closed, Objective, PoseObjective
 from ..kernels.handle import Scratch
@@ -111,7 +112,7 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
     multipliers = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
 
     def run(block: slice) -> None:
-        results = Closed._make(array[block] for array in closed)
+        results = take(closed, block)
         pose = objective.pose._replace(targets=objective.pose.targets[block])
         part = objective._replace(pose=pose, anchors=objective.anchors[block])
         nearest_configuration(closure.machine.address, scratch.address, part, results, multipliers[block])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats, Mask
+from ..batch import take
 from ..derived import derived
 from ..kernels.closure.loops import FirstOrder, FirstOrderPlan
 from ..kernels.handle import Scratch
@@ -73,7 +74,7 @@ def _first_order(model: Model, q: Floats, *, whole: bool) -> FirstOrder:
     scratch = _scratch(model, whole)
 
     def run(block: slice) -> None:
-        own = FirstOrder._make(each[block] for each in found)
+        own = take(found, block)
         first_order(closure.machine.address, scratch.address, plan, coordinates[block], own)
 
     in_blocks(run, n, ROWS_A_BLOCK)

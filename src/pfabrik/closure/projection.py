@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Mask
+from ..batch import put
 from ..derived import derived
 from ..description.task import Weights
 from ..kernels.closure.loops import LOCKED
@@ -201,7 +202,7 @@ def _release_holds(
         closure, targets[far], [start[far] for start in starts], projections[-1:], seeds=False, has_start=True
     )
     is_nearer = released.distances <= (1.0 + SAME) * free.distances(closure, poses[far], targets[far])
-    best.closing.put(far[is_nearer], released.closing, is_nearer)
+    put(best.closing, far[is_nearer], released.closing, is_nearer)
     best.distances[far[is_nearer]] = released.distances[is_nearer]
     best.holds[far[is_nearer]] = released.holds[is_nearer]
 
@@ -222,7 +223,7 @@ def _put_nearer(
     is_better = distances < (1.0 - SAME) * least
     agrees = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)
     best.distances[rows[is_better]], best.holds[rows[is_better]] = distances[is_better], projection.hold
-    best.closing.put(rows[is_better], trial, is_better)
+    put(best.closing, rows[is_better], trial, is_better)
     return np.where(is_better, 1, agreements + agrees)
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.configurations import Configurations, Places, put_rows, rows_at
+from ..batch import put, take
+from ..closure.configurations import Configurations, Places
 from ..kernels.legs import records as K
 from ..kernels.rows import Rows
 from ..model import Model
@@ -55,8 +56,8 @@ class LegAnswers(Configurations):
         """A copy with the rows at some places replaced by others; coordinates are still computed on access."""
         if not isinstance(others, LegAnswers):
             return super().with_rows(places, others)
-        rows, sides = rows_at(self.rows, np.arange(len(self))), self.sides.copy()
-        put_rows(rows, places, others.rows)
+        rows, sides = take(self.rows, np.arange(len(self))), self.sides.copy()
+        put(rows, places, others.rows)
         sides[places] = others.sides
         q_proximal = np.full(sides.shape, np.nan) if self.q_proximal is None else self.q_proximal.copy()
         q_proximal[places] = np.nan if others.q_proximal is None else others.q_proximal

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
+from ..batch import put
 from ..closure.close import HELD, close
 from ..decomposition.leg_table import LegTable
 from ..model import Model
@@ -68,7 +69,7 @@ def _closed(closure: Closure, poses: Floats, actuators: Floats, start: Floats) -
         closure.put_actuators(restarts, actuators[unsolved])
         candidate = close(closure, restarts, poses[unsolved], locked=locked, platform=platform)
         is_better = candidate.gap < closing.gap[unsolved]
-        closing.put(unsolved[is_better], candidate, is_better)
+        put(closing, unsolved[is_better], candidate, is_better)
     return closing.coordinates
 
 

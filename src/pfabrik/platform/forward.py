@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..batch import take, take_each
 from ..closure.assemble import NOISE, is_over_determined
-from ..closure.configurations import Configurations, new_rows, rows_at
+from ..closure.configurations import Configurations, new_rows
 from ..derived import derived
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
@@ -102,7 +103,7 @@ def _assemble_missed(
         return
     outputs, values_here = [rows.status, nearest_values, *solution, rows.measures], values[places]
     block = [array[places] for array in outputs]
-    _assemble(model, starts.of(places), other_starts(model), [values_here, *block])
+    _assemble(model, take_each(starts, places), other_starts(model), [values_here, *block])
     is_reached = block[0] == REACHED
     for array, block_array in zip(outputs, block, strict=True):
         array[places[is_reached]] = block_array[is_reached]
@@ -121,13 +122,13 @@ def _project_elsewhere(
     tolerance: float,
 ) -> None:
     """Project rows from seeds too; rows that have their values then replace their outputs."""
-    block = rows_at(rows, places)
+    block = take(rows, places)
     block_solution = Starts(block.poses, solution.q[places], solution.sides[places])
     block.actuators[:] = values[places]
     _project(
         model,
         wanted_values[places],
-        starts.of(places),
+        take_each(starts, places),
         np.arange(len(places)),
         block,
         block_solution,
@@ -165,10 +166,10 @@ def _project(
 
     The search takes angles modulo whole turns. Rows whose nearest turn is out of range stay PENDING.
     """
-    block_starts = starts.of(places)
+    block_starts = take_each(starts, places)
     nearest = nearest_actuators(model, values[places], block_starts, seeds=anywhere)
     solved = np.flatnonzero(np.isfinite(nearest.distances))
-    nearest, places = nearest.at(solved), places[solved]
+    nearest, places = take(nearest, solved), places[solved]
     block_values, actuators, measures = rows.actuators[places], nearest.actuators, nearest.measures
     measures[:, [POSITION_ERROR, ROTATION_ERROR]] = 0.0
     is_turned = np.zeros(len(places), bool)
@@ -199,7 +200,7 @@ def _assemble(model: Model, starts: Starts, other_starts: Starts, arrays: Sequen
     legs, scratch, others_handle = search_table(model.legs), scratch_of(model), Handle(other_starts)
 
     def run(block: slice) -> None:
-        block_starts, (values, *outputs) = Handle(starts.of(block)), (array[block] for array in arrays)
+        block_starts, (values, *outputs) = Handle(take_each(starts, block)), (array[block] for array in arrays)
         assemble(legs.address, scratch.address, values, block_starts.address, others_handle.address, *outputs)
 
     in_blocks(run, len(arrays[0]), ROWS_A_BLOCK)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Records
+from ..batch import put, take, take_each
 from ..closure.close import in_lengths
 from ..closure.projection import SAME, ProjectionMode, projection_modes
 from ..decomposition.leg_table import LegTable
@@ -64,9 +65,9 @@ def nearest_poses(
             n_unsolved = search.fill(targets, starts, solution)
             continue
         is_unsolved = solution.distances == np.inf
-        block = solution.at(is_unsolved)
-        n_unsolved = search.fill(targets[is_unsolved], starts.of(is_unsolved), block)
-        solution.put(is_unsolved, block)
+        block = take(solution, is_unsolved)
+        n_unsolved = search.fill(targets[is_unsolved], take_each(starts, is_unsolved), block)
+        put(solution, is_unsolved, block)
     if has_start and len(later) and _may_be_too_far(plan, targets, starts, solution):
         _release(plan, targets, starts, solution)
     if plan.fallback is not None:
@@ -109,6 +110,19 @@ def _search_plan(
     return SearchPlan(model, projections, searches, fallback)
 
 
+def endings(
+    model: Model, options: Options, target: Floats, starts: Starts, *, keep_mode: bool
+) -> list[tuple[ProjectionMode, PoseSolutions]]:
+    """Where the search of each projection ends from each start alone, for one target (1, 4, 4) [length]."""
+    tolerances = options.tolerance, options.rotation_tolerance
+    plan = _search_plan(model, options.hold, options.rotation_length, *tolerances, False, keep_mode)
+    targets = np.repeat(target, len(starts.poses), axis=0)
+    return [
+        (projection, search.find(targets, starts))
+        for projection, search in zip(plan.projections, plan.searches, strict=True)
+    ]
+
+
 def _new_search(
     model: Model,
     projection: ProjectionMode,
@@ -130,11 +144,11 @@ def _reach_by_fallback(search: NearestPose, targets: Floats, starts: Starts, sol
     rows_to_try = (is_uncertain & (solution.distances < np.inf)).nonzero()[0]
     if not len(rows_to_try):
         return
-    block = solution.at(rows_to_try)
-    search.fill(targets[rows_to_try], starts.of(rows_to_try), block)
+    block = take(solution, rows_to_try)
+    search.fill(targets[rows_to_try], take_each(starts, rows_to_try), block)
     is_reached = (block.status == REACHED) & (block.distances < np.inf)
     block.counters[:, HOLD] = HOLD_NOTHING
-    solution.put(rows_to_try[is_reached], block.at(is_reached))
+    put(solution, rows_to_try[is_reached], take(block, is_reached))
 
 
 def _may_be_too_far(plan: SearchPlan, targets: Floats, starts: Starts, solution: PoseSolutions) -> bool:
@@ -167,10 +181,10 @@ def _release(plan: SearchPlan, targets: Floats, starts: Starts, solution: PoseSo
     far = far[holding.is_too_far(closure, solution.distances[far], start_poses[far], targets[far])]
     if not len(far):
         return
-    block = solution.at(far)
-    plan.searches[-1].fill(targets[far], starts.of(far), block)
+    block = take(solution, far)
+    plan.searches[-1].fill(targets[far], take_each(starts, far), block)
     is_nearer = block.distances <= (1.0 + SAME) * free.distances(closure, start_poses[far], targets[far])
-    solution.put(far[is_nearer], block.at(is_nearer))
+    put(solution, far[is_nearer], take(block, is_nearer))
 
 
 def limit_multipliers(model: Model, targets: Floats, configurations: Starts, projection: ProjectionMode) -> Floats:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats, Records
+from ..batch import put, take, take_each
 from ..closure.close import in_lengths
 from ..decomposition.leg_table import LegTable
 from ..derived import derived
@@ -123,9 +124,10 @@ class NearestPose:
             is_missed = (solution.measures[:, LIMIT_EXCESS] > TOLERANCES.limit) & (solution.distances < np.inf)
             if np.count_nonzero(is_missed):
                 solution.status[is_missed] = PENDING
-                block_values, block = None if values is None else values[is_missed], solution.at(is_missed)
-                n_unsolved += self._pointing_search.fill(targets[is_missed], starts.of(is_missed), block, block_values)
-                solution.put(is_missed, block)
+                block_values, block = None if values is None else values[is_missed], take(solution, is_missed)
+                starts_here = take_each(starts, is_missed)
+                n_unsolved += self._pointing_search.fill(targets[is_missed], starts_here, block, block_values)
+                put(solution, is_missed, block)
         return n_unsolved
 
     def weigh(self, targets: Floats, configurations: Starts) -> Floats:
@@ -145,7 +147,7 @@ class NearestPose:
 
         def run(block: slice) -> int:
             block_values = values[block] if len(values) else values
-            outputs = *starts.of(block), *solution.at(block), weights[block]
+            outputs = *take_each(starts, block), *take(solution, block), weights[block]
             return kernel(legs, plan, scratch.address, targets[block], block_values, *outputs)
 
         return sum(in_blocks(run, len(targets), ROWS_A_BLOCK))

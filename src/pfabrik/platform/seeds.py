@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..batch import take
 from ..closure.close import in_lengths
 from ..closure.configurations import new_rows
 from ..closure.parasitic import is_flipped
@@ -87,7 +88,7 @@ def seeds_of_other_assemblies(model: Model) -> Starts:
         rows.measures,
     )
     error = np.abs(in_lengths(rows.poses, 1.0 / length) - seeds.poses).max(axis=(1, 2))
-    return seeds.at(np.flatnonzero((rows.status != REACHED) | (error > TOLERANCES.same_mode)))
+    return take(seeds, np.flatnonzero((rows.status != REACHED) | (error > TOLERANCES.same_mode)))
 
 
 def _random_feasible(model: Model, rng: np.random.Generator, n: int, radius: float) -> Starts:
@@ -117,7 +118,7 @@ def _random_feasible(model: Model, rng: np.random.Generator, n: int, radius: flo
     solution = nearest_pose.find(targets, Starts(poses, q, sides))
     is_usable = np.isfinite(solution.distances) & ~is_flipped(model.path_closure, solution.poses)
     solution.poses[:] = in_lengths(solution.poses, 1.0 / model.length)
-    return Starts(*solution[1:4]).at(np.flatnonzero(is_usable))
+    return take(Starts(*solution[1:4]), np.flatnonzero(is_usable))
 
 
 def _far_apart(given: Starts, drawn: Starts, most: int) -> Starts:
@@ -132,7 +133,7 @@ def _far_apart(given: Starts, drawn: Starts, most: int) -> Starts:
         is_rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < SEEDS_PER_MODE
         chosen.append(int(np.where(is_rare & (distances > 0.0), distances + RARE_BONUS, distances).argmax()))
         distances = np.minimum(distances, _distances_from(candidates, chosen[-1]))
-    return Starts._make(array[chosen] for array in candidates)
+    return take(candidates, chosen)
 
 
 def _distances_from(starts: Starts, k: int) -> Floats:

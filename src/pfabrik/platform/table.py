@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from ..arrays import Records
-from ..closure.closure_engine import STRANGE
+from ..closure.target_closing import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting, at_rest
 from ..derived import derived

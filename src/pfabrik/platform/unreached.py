@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
+from ..batch import put, take
 from ..closure.close import in_lengths
-from ..closure.configurations import new_rows, put_rows, rows_at
+from ..closure.configurations import new_rows
 from ..closure.parasitic import is_flipped
 from ..decomposition.leg_table import LegTable
 from ..kernels.platform.search_records import PoseSolutions, Starts
@@ -57,12 +58,12 @@ class Unreached(NamedTuple):
         """A part of the batch: copied, or views where `places` is a slice."""
         start_poses = self.start_poses if len(self.start_poses) == 1 else self.start_poses[places]
         arrays = self.targets[places], start_poses, self.sides[places], self.q_proximal[places]
-        return Unreached(*arrays, rows_at(self.rows, places))
+        return Unreached(*arrays, take(self.rows, places))
 
     def put(self, places: Mask | NDArray[np.intp], block: Unreached) -> None:
         """Write the outputs of a part of the batch."""
         self.sides[places], self.q_proximal[places] = block.sides, block.q_proximal
-        put_rows(self.rows, places, block.rows)
+        put(self.rows, places, block.rows)
 
     def answer(self, mask: Mask, answer: Callable[[Unreached], None]) -> None:
         """Call `answer` on the masked rows and store its outputs; no copy is made where these are all rows."""
@@ -95,7 +96,7 @@ def answer_unreached(request: Request, unreached: Unreached) -> None:
     if request.keep_mode or not table.has_sides:
         _answer_completed(request, unreached)
     else:
-        unreached.answer(_reach_otherwise(table, unreached), partial(_answer_completed, request))
+        unreached.answer(reach_in_other_modes(table, unreached), partial(_answer_completed, request))
 
 
 def _answer_completed(request: Request, unreached: Unreached) -> None:
@@ -105,12 +106,12 @@ def _answer_completed(request: Request, unreached: Unreached) -> None:
         return
     seeds = seeds_of_other_assemblies(request.model)
     if len(seeds.poses):
-        unreached.answer(_reach_from_seeds(seeds, request, unreached), partial(_project, request))
+        unreached.answer(reach_from_seeds(seeds, request, unreached), partial(_project, request))
     else:
         _project(request, unreached)
 
 
-def _reach_otherwise(table: LegTable, unreached: Unreached) -> Mask:
+def reach_in_other_modes(table: LegTable, unreached: Unreached) -> Mask:
     """Answer rows in other working modes; return the mask of rows still to be projected.
 
     Rows with a leg at a dead point are not among these: closed forms are too inexact there, and another engine answers.
@@ -133,7 +134,7 @@ def _reach_otherwise(table: LegTable, unreached: Unreached) -> Mask:
     return np.asarray(status == PENDING)
 
 
-def _reach_from_seeds(seeds: Starts, request: Request, unreached: Unreached) -> Mask:
+def reach_from_seeds(seeds: Starts, request: Request, unreached: Unreached) -> Mask:
     """Answer rows in other assemblies, completed from the nearest seed that leads to one; return the unsolved mask."""
     length, legs, k = request.model.length, table_handle(request.model.legs), len(seeds.poses)
     poses = in_lengths(seeds.poses, length)

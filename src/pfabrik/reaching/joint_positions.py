@@ -7,6 +7,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..arrays import Floats
+from ..batch import put
 from ..closure.close import HELD, Closing, close, platform_poses
 from ..decomposition.plan import CompiledPlan, compile_plan
 from ..derived import derived
@@ -73,7 +74,7 @@ def place(closure: Closure, compiled: CompiledPlan, begin: Floats, results: P.Pa
         turns = np.where(closure.idle, 0.0, rng.uniform(-np.pi, np.pi, begin.shape[1]) * closure.turning)
         trial = close(closure, begin[unsolved] + turns, poses[unsolved], platform=platform, centres=centres[unsolved])
         is_better = _misfit(trial) < _misfit(placed)[unsolved]
-        placed.put(unsolved[is_better], trial, is_better)
+        put(placed, unsolved[is_better], trial, is_better)
     return placed
 
 

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..batch import put, take
 from ..closure.close import Closing, close
-from ..closure.closure_engine import ClosureEngine, start_coordinates, to_answers
-from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
+from ..closure.closure_engine import start_coordinates, to_answers
+from ..closure.configurations import Configurations, new_rows, steps_of
 from ..closure.descend import clip_targets
+from ..closure.engine_contract import Engine, InverseEngine
 from ..closure.projection import ProjectionMode, held_parts, projection_modes
 from ..decomposition.plan import compile_plan
 from ..derived import derived
@@ -24,7 +26,6 @@ from ..kernels.threads import in_blocks
 from ..model import Model
 from ..options import Options
 from ..platform.answers import sides_at
-from ..platform.legs_engine import LegsEngine
 from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
 from .joint_positions import holding, new_pass_results, place, positions_of
@@ -38,7 +39,7 @@ STEPS = 8
 ROWS_A_BLOCK = 64
 
 
-class ReachingEngine:
+class ReachingEngine(InverseEngine):
     """The paper's method, for mechanisms whose chains can be expressed by joint positions.
 
     Passes bring the ends of chains to the target, or else move the target; from there the loops are closed exactly.
@@ -46,7 +47,7 @@ class ReachingEngine:
     which the passes end in no feasible configuration.
     """
 
-    def __init__(self, model: Model, exact: LegsEngine | ClosureEngine) -> None:
+    def __init__(self, model: Model, exact: Engine) -> None:
         self._model, self.mechanism, self._exact = model, model.mechanism, exact
         self._compiled, self._held = compile_plan(model.mechanism), holding(model.mechanism)
 
@@ -87,9 +88,9 @@ class ReachingEngine:
         for i in steps_of(is_valid, on_progress):
             answer = self.answer(targets[i : i + 1], previous, options, keep_mode=True)
             previous = Configurations(answer.rows, answer.coordinates)
-            put_rows(rows, slice(i, i + 1), previous.rows)
+            put(rows, slice(i, i + 1), previous.rows)
             coordinates[i] = previous.coordinates[0]
-        return Configurations(rows_at(rows, is_valid), coordinates[is_valid]).scatter(is_valid)
+        return Configurations(take(rows, is_valid), coordinates[is_valid]).scatter(is_valid)
 
     def _by_passes(
         self, targets: Floats, start: Configurations | None, options: Options, keep_mode: bool
@@ -156,7 +157,7 @@ class ReachingEngine:
             if not self.mechanism.end_effector_is_joint:
                 fitted.poses[:] = revised.poses
             fitted.poses[:, :3, 3] = revised.poses[:, :3, 3]
-            placed.put(unsolved, fitted)
+            put(placed, unsolved, fitted)
             rounds = results.rounds[unsolved] + revised.rounds
             for array, revised_array in zip(results, revised, strict=True):
                 array[unsolved] = revised_array
@@ -183,8 +184,8 @@ class ReachingEngine:
         results = new_pass_results(self._compiled, len(targets))
 
         def run(block: slice) -> None:
-            block_seeds = P.Seeds._make(array[block] for array in seeds)
-            block_results = P.PassResults._make(array[block] for array in results)
+            block_seeds = take(seeds, block)
+            block_results = take(results, block)
             solve_by_passes(self._compiled.plan, targets[block], block_seeds, settings, block_results)
 
         in_blocks(run, len(targets), ROWS_A_BLOCK)
