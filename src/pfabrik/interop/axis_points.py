@@ -55,23 +55,20 @@ def meetings_of(axes: Sequence[Axis], bundles: Sequence[Bundle], slack: float) -
 
 def _on_one_line(axes: Sequence[Axis], bundle: Bundle, slack: float) -> Iterator[Meeting]:
     """Lines along one direction: of parallel axes, and of centres of balls."""
-    own = [index for index in bundle.members if axes[index].at is not None]
-    balls = [index for index, axis in enumerate(axes) if axis.along is None]
-    left = own + balls
-    while left:
-        first, left = left[0], left[1:]
-        begin, rounding = axes[first].at, axes[first].rounding
+    candidates = [*bundle.members, *(index for index, axis in enumerate(axes) if axis.along is None)]
+    pending = {index: at for index in candidates if (at := axes[index].at) is not None}
+    while pending:
+        first, begin = next(iter(pending.items()))
         members = [first]
-        for index in left:
-            offset = axes[index].at - begin  # type: ignore[operator]
-            arm = abs(float(offset @ bundle.along))
-            off = np.linalg.norm(offset - (offset @ bundle.along) * bundle.along)
-            each = axes[index].rounding
-            if off <= rounding.length + each.length + bundle.bound * arm + slack and arm + off > slack:
+        for index, at in pending.items():
+            along = float((at - begin) @ bundle.along)
+            off = np.linalg.norm(at - begin - along * bundle.along)
+            rounding = axes[first].rounding.length + axes[index].rounding.length + bundle.bound * abs(along)
+            if off <= rounding + slack and abs(along) + off > slack:
                 members.append(index)
-        left = [index for index in left if index not in members]
+        pending = {index: at for index, at in pending.items() if index not in members}
         if len({axes[index].joint for index in members}) > 1:
-            yield Meeting(frozenset(members), np.asarray(begin), bundle.along)
+            yield Meeting(frozenset(members), begin, bundle.along)
 
 
 def _in_one_point(axes: Sequence[Axis], slack: float) -> Iterator[Meeting]:

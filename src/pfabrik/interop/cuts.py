@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..description.graph import edges_of, spanning_tree
 from ..description.joints import Joint
 from ..description.structure import Structure
+from .names import unique
 
 CUT_AS_THEY_ARE = ("spherical", "fixed")
 """Joint types that an equality of a simulation model stands for: two points, or two frames, that stay together."""
@@ -59,16 +60,6 @@ def cut_tree(mechanism: Structure) -> CutTree:
             parent, body = joint.connects
             branches.append(Branch(joint, parent, unique(f"{body}:{joint.name}", taken), twin_of=body))
     return CutTree(tuple(branches), tuple(cuts))
-
-
-def unique(name: str, taken: set[str]) -> str:
-    """The name, or the name with a number if it is taken; it counts as taken from now on."""
-    free, number = name, 1
-    while free in taken:
-        number += 1
-        free = f"{name}_{number}"
-    taken.add(free)
-    return free
 
 
 def _ease_of_cutting(joint: Joint) -> int:

@@ -15,7 +15,8 @@ from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..motion.displacements import columns
-from .cuts import Branch, CutTree, unique
+from .cuts import Branch, CutTree
+from .names import unique
 from .physics import Physics
 
 REFERENCE_POINT = "reference_point"
