@@ -9,8 +9,7 @@ from .assembling import Imported, assemble
 from .mjcf_reading import from_mjcf
 from .mjcf_writing import to_mjcf
 from .notes import Note
-from .open_loops import Loop
-from .opened import OpenMechanism
+from .opened import Loop, OpenMechanism
 from .urdf_reading import from_urdf
 from .verifying import AgainstOriginal, Verification, verify
 from .xml_reading import kind_of

@@ -21,8 +21,7 @@ from ..tolerances import TOLERANCES
 from .closing import CLOSED, ClosedHome, OpenLoops, bounds, close_home
 from .digits import worst
 from .notes import Note, noting
-from .open_loops import ROWS
-from .opened import OpenMechanism
+from .opened import ROWS, OpenMechanism
 from .simplify import combined, merged_balls, merged_bodies, with_cones
 from .straighten import straighten
 

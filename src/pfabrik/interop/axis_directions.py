@@ -44,6 +44,22 @@ class Axis:
     def __post_init__(self) -> None:
         self.along = self.given
 
+    @property
+    def point(self) -> Floats:
+        """The point on it [length], of a hinge or ball."""
+        return np.asarray(self.at)
+
+    def error_at(self, point: Floats) -> float:
+        """How far rounding puts it off at a point, at most [length]."""
+        arm = 0.0 if self.along is None else abs(float((point - self.point) @ self.along))
+        return self.rounding.length + self.rounding.angle * arm
+
+    def is_through(self, point: Floats, bound: float) -> bool:
+        """True if it is at a point up to its rounding and a bound [length]."""
+        offset = point - self.point
+        distance = np.linalg.norm(offset if self.along is None else np.cross(self.along, offset))
+        return bool(distance <= self.error_at(point) + bound)
+
     def turn_to(self, direction: Floats) -> None:
         """Turn it to a direction, or to the opposite one if that is nearer."""
         if self.along is not None:

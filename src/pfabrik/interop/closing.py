@@ -17,8 +17,7 @@ from ..description.structure import Structure
 from ..motion.displacements import displacements, home_coordinates, rate_units, screws, stepped
 from ..rotations import angles_and_sines, square_to
 from ..tolerances import TOLERANCES
-from .open_loops import Loop
-from .opened import OpenMechanism
+from .opened import Loop, OpenMechanism
 
 STEPS = 200
 """Most steps of one attempt; a dozen are usual."""

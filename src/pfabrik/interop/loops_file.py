@@ -25,7 +25,7 @@ from ..description.form_faults import is_numbers, key_faults, shown
 from ..errors import Fault, InvalidArgument, InvalidMechanism, near_miss
 from ..extras import require
 from .digits import Rounding, digits_of, worst
-from .open_loops import Loop, LoopType, frame_along
+from .opened import Loop, LoopType, frame_along
 from .xml_reading import fault, require_file
 
 LARGEST = 1_000_000

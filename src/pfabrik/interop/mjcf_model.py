@@ -13,11 +13,10 @@ from ..arrays import Floats
 from ..description.joints import Joint
 from .compiled_model import CompiledModel
 from .couplings import Coupling
-from .digits import Rounding, worst
-from .mjcf_digits import ModelDigits
+from .digits import ModelDigits, Rounding, worst
 from .names import unique
 from .notes import Note
-from .open_loops import Loop
+from .opened import Loop
 from .xml_reading import fault
 
 

@@ -16,7 +16,7 @@ from .mjcf_model import MjcfModel
 from .mjcf_plain import plain_model, transmission_text
 from .mjcf_writing import NOTE
 from .notes import Note, noting
-from .open_loops import loops_by_name
+from .opened import loops_by_name
 from .robots import Robot, mechanism_of
 from .xml_reading import read_xml
 

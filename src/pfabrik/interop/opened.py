@@ -2,13 +2,85 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
 from ..description.joints import Cone, Joint, Vector
 from ..description.structure import Structure
+from ..errors import InvalidArgument
+from ..rotations import square_to
+from ..tolerances import TOLERANCES
 from .digits import Rounding
-from .open_loops import Loop
+from .names import unique
+from .notes import Note
+
+LoopType = Literal["spherical", "revolute", "fixed"]
+ROWS: dict[LoopType, int] = {"spherical": 3, "revolute": 5, "fixed": 6}
+"""Joint types that may close a loop, and the number of conditions of each."""
+
+CLOSING = re.compile(r"(closing_.+)_([12])")
+"""The name of a frame that meets another: the loop's name, and which of its two sides it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A joint that closes a loop, described on each of its two bodies, as long as they are apart.
+
+    Attributes
+    ----------
+    type : "spherical" where two points are to meet, "revolute" where also two axes are, "fixed" where two frames are.
+    connects : the two bodies.
+    points : the point on each, (2, 3) [length], in base coordinates, where the joints are at their home values.
+    frames : the frame on each, (2, 3, 3), likewise; of a hinge, the third column is the axis. None for a ball.
+    """
+
+    name: str
+    type: LoopType
+    connects: tuple[str, str]
+    points: ArrayLike
+    frames: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        place = f"loop '{self.name}'"
+        if self.type not in ROWS:
+            raise InvalidArgument(f"{place}: type", repr(self.type), f"one of {', '.join(ROWS)}")
+        _set(self, "points", self.points, (2, 3), place)
+        if self.type != "spherical":
+            _set(self, "frames", self.frames, (2, 3, 3), place)
+
+    @property
+    def at(self) -> Floats:
+        """The point on each body, (2, 3) [length]."""
+        return np.asarray(self.points)
+
+    @property
+    def turned(self) -> Floats:
+        """The frame on each body, (2, 3, 3); of a ball, those of the base."""
+        return np.asarray([np.eye(3), np.eye(3)] if self.frames is None else self.frames)
+
+
+def _set(loop: Loop, name: str, value: object, shape: tuple[int, ...], place: str) -> None:
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise InvalidArgument(f"{place}: {name}", f"shape {array.shape}", f"finite numbers of shape {shape}")
+    array.setflags(write=False)
+    object.__setattr__(loop, name, array)
+
+
+def frame_along(axis: Floats) -> Floats:
+    """A frame (3, 3) whose third column is along an axis (3,) of any length but zero."""
+    across = square_to(axis)[0]
+    third = axis / np.linalg.norm(axis)
+    return np.column_stack([across, np.cross(third, across), third])
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,3 +114,56 @@ class OpenMechanism:
         reference = (0.0, 0.0, 0.0) if self.reference_point is None else self.reference_point
         body = self.end_effector if self.end_effector in bodies else self.base
         return Structure(self.name, self.joints, body, reference, self.base, self.length_unit)
+
+
+def loops_by_name(
+    places: Mapping[str, tuple[str, Floats]], known: Sequence[Loop], taken: Iterable[str], notes: list[Note]
+) -> list[Loop]:
+    """The loops of frames called `closing_<name>_1` and `closing_<name>_2`, as drawings are exported; new ones only.
+
+    They are balls, or hinges where there are frames of the same names with `_z` behind them, off along the axis.
+
+    Parameters
+    ----------
+    places : frame -> its body, and where it is.
+    known : loops that the file describes otherwise, active or not.
+    taken : names that loops must not have.
+    """
+    sides: dict[str, dict[str, str]] = {}
+    for frame in places:
+        match = CLOSING.fullmatch(frame)
+        if match:
+            sides.setdefault(match[1], {})[match[2]] = frame
+    single = tuple(frame for pair in sides.values() if len(pair) == 1 for frame in pair.values())
+    if single:
+        notes.append(Note("a closing frame without the other one closes no loop", single))
+    names, loops = set(taken), []
+    for name, pair in sides.items():
+        if len(pair) == 2:
+            loop = _loop_between(unique(name, names), (pair["1"], pair["2"]), places)
+            loops += [] if any(_is_same(loop, other) for other in known) else [loop]
+    for kind, plural in (("spherical", "balls"), ("revolute", "hinges")):
+        of_kind = tuple(loop.name for loop in loops if loop.type == kind)
+        if of_kind:
+            notes.append(Note(f"loops that closing frames tell of, as {plural}", of_kind))
+    return loops
+
+
+def _loop_between(name: str, frames: tuple[str, str], places: Mapping[str, tuple[str, Floats]]) -> Loop:
+    """The loop of two frames: a hinge where both have another one along its axis, else a ball."""
+    bodies = (places[frames[0]][0], places[frames[1]][0])
+    points = np.array([places[frame][1] for frame in frames])
+    ends = [places.get(f"{frame}_z", places[frame])[1] for frame in frames]
+    axes = np.array(ends) - points
+    if not np.linalg.norm(axes, axis=1).all():
+        return Loop(name, "spherical", bodies, points)
+    return Loop(name, "revolute", bodies, points, np.array([frame_along(axis) for axis in axes]))
+
+
+def _is_same(loop: Loop, other: Loop) -> bool:
+    """True if two loops join the same two bodies at the same place on each."""
+    points = dict(zip(other.connects, other.at, strict=True))
+    return set(points) == set(loop.connects) and all(
+        np.linalg.norm(points[body] - point) <= TOLERANCES.file_gap
+        for body, point in zip(loop.connects, loop.at, strict=True)
+    )

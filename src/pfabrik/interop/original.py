@@ -18,9 +18,8 @@ from ..files.units import metres_of
 from ..rotations import angles_between
 from ..tolerances import TOLERANCES
 from .compiled_model import CompiledModel
-from .digits import worst
+from .digits import ModelDigits, worst
 from .loops_file import read_loops
-from .mjcf_digits import ModelDigits
 from .mjcf_plain import plain_model
 from .urdf_links import read_links
 from .urdf_plain import plain_robot

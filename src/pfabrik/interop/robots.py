@@ -22,8 +22,7 @@ from .digits import Rounding, worst
 from .driving import Rates, require_drives, with_actuators
 from .names import unique
 from .notes import Note
-from .open_loops import Loop
-from .opened import OpenMechanism
+from .opened import Loop, OpenMechanism
 from .simplify import merged_bodies, merged_pair, prune
 from .tasks import with_task
 

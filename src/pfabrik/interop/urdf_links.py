@@ -59,21 +59,22 @@ class UrdfJoint:
     def elementary(self) -> list[tuple[str, JointType, Floats | None]]:
         """Names, types and axes (3,), in the joint's frame, of the joints that it is, from its parent to its child."""
         x, y, z = np.eye(3)
+        letters = {"X": x, "Y": y, "Z": z}
+        parts: list[tuple[str, JointType, Floats | None]]
         if self.type == "FIXED":
-            return [(self.name, "fixed", None)]
-        if self.type == "SPHERICAL":
-            return [(self.name, "spherical", None)]
-        if self.type == "FLOATING":
-            slides = [(f"{self.name}_{letter}", axis) for letter, axis in zip("xyz", (x, y, z), strict=True)]
-            return [*((name, "prismatic", axis) for name, axis in slides), (self.name, "spherical", None)]
-        if self.type.startswith("UJOINT_"):
-            axes = {"X": x, "Y": y, "Z": z}
-            return [(f"{self.name}_{letter}", "revolute", axes[letter]) for letter in self.type[-2:]]
-        if self.type == "PLANAR":
+            parts = [("", "fixed", None)]
+        elif self.type == "SPHERICAL":
+            parts = [("", "spherical", None)]
+        elif self.type == "FLOATING":
+            parts = [("_x", "prismatic", x), ("_y", "prismatic", y), ("_z", "prismatic", z), ("", "spherical", None)]
+        elif self.type.startswith("UJOINT_"):
+            parts = [(f"_{letter}", "revolute", letters[letter]) for letter in self.type[-2:]]
+        elif self.type == "PLANAR":
             first, second = square_to(self.axis)
-            slides = [(f"{self.name}_x", first), (f"{self.name}_y", second)]
-            return [*((name, "prismatic", axis) for name, axis in slides), (self.name, "revolute", self.axis)]
-        return [(self.name, "prismatic" if self.type == "PRISMATIC" else "revolute", self.axis)]
+            parts = [("_x", "prismatic", first), ("_y", "prismatic", second), ("", "revolute", self.axis)]
+        else:
+            parts = [("", "prismatic" if self.type == "PRISMATIC" else "revolute", self.axis)]
+        return [(self.name + suffix, kind, axis) for suffix, kind, axis in parts]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .driving import Rates
 from .loops_file import LoopsFile, placed_loops, read_loops, roundings_of_loops
 from .notes import Note, noting
-from .open_loops import loops_by_name
+from .opened import loops_by_name
 from .robots import Robot, mechanism_of
 from .urdf_links import UrdfJoint, UrdfLinks, numbers_in, read_links
 from .xml_reading import read_xml
