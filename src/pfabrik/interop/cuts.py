@@ -1,4 +1,4 @@
-"""Bodies as a tree: which joints lead to a body each, and which are cut, because they close loops."""
+"""Bodies as a tree: the joints that lead to a body each, and those that are cut because they close loops."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class Branch:
 
     Attributes
     ----------
-    forward : whether the joint leads from its first body to its second.
-    twin_of : the body that this one doubles, where the joint closes a loop and no equality stands for it; else None.
+    forward : True if the joint leads from its first body to its second.
+    double_of : the body that this one doubles, where the joint closes a loop and no equality stands for it; else None.
     """
 
     joint: Joint
     parent: str
     body: str
     forward: bool = True
-    twin_of: str | None = None
+    double_of: str | None = None
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class CutTree:
 
     Attributes
     ----------
-    cuts : the joints that an equality stands for. Other joints that close loops lead to a twin of their second body.
+    cuts : the joints that an equality stands for. Other joints that close loops lead to a double of their second body.
     """
 
     branches: tuple[Branch, ...]
@@ -47,18 +47,18 @@ def cut_tree(mechanism: Structure) -> CutTree:
     """The tree of a mechanism's bodies; balls are cut first, and motors last."""
     worst_first = edges_of(sorted(mechanism.joints, key=_ease_of_cutting))
     closing = {worst_first[index].joint for index in spanning_tree(worst_first, mechanism.base).closing}
-    kept = [joint for joint in mechanism.joints if joint not in closing]
+    uncut = [joint for joint in mechanism.joints if joint not in closing]
     branches: list[Branch] = []
-    for index, forward in spanning_tree(edges_of(kept), mechanism.base).steps:
-        parent, body = kept[index].connects if forward else kept[index].connects[::-1]
-        branches.append(Branch(kept[index], parent, body, forward))
+    for index, forward in spanning_tree(edges_of(uncut), mechanism.base).steps:
+        parent, body = uncut[index].connects if forward else uncut[index].connects[::-1]
+        branches.append(Branch(uncut[index], parent, body, forward))
     cuts, taken = [], {*mechanism.bodies}
     for joint in mechanism.joints:
         if joint in closing and joint.type in CUT_AS_THEY_ARE:
             cuts.append(joint)
         elif joint in closing:
             parent, body = joint.connects
-            branches.append(Branch(joint, parent, unique(f"{body}:{joint.name}", taken), twin_of=body))
+            branches.append(Branch(joint, parent, unique(f"{body}:{joint.name}", taken), double_of=body))
     return CutTree(tuple(branches), tuple(cuts))
 
 

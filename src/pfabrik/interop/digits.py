@@ -16,23 +16,23 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 
 FEWEST = 4
-"""Significant digits from which a number was rounded: what people type in full (`0.25`) rarely has more than three."""
+"""Significant digits from which a number was rounded: one typed in full (`0.25`) rarely has more than three."""
 
 HALF = 0.5
 """Units of its last digit by which rounding changes a number at most."""
 
 STRAIGHT = 1e-12
-"""How far from a coordinate axis, or from no rotation, what a file gives in whole numbers is at most."""
+"""Distance from a coordinate axis, or from no rotation, up to which a file gives it in whole numbers."""
 
 
 class Rounding(NamedTuple):
-    """How far from what was meant the digits of a file put a joint at most: its point [length], its axis [rad]."""
+    """The largest error that the digits of a file put on a joint: on its point [length] and its axis [rad]."""
 
     length: float
     angle: float
 
     def on(self, offset: ArrayLike, length: float, angle: float) -> Rounding:
-        """Of what is placed on a body so rounded, at an offset (3,) from its origin, with its own digits."""
+        """The rounding of something on a body of this rounding, at an offset (3,), with a length and an angle more."""
         arm = float(np.linalg.norm(offset))
         return Rounding(self.length + self.angle * arm + length, self.angle + angle)
 
@@ -48,13 +48,13 @@ def worst(roundings: Iterable[Rounding]) -> Rounding:
 
 @dataclass(frozen=True)
 class Digits:
-    """How numbers of one kind were rounded: to significant digits, or to decimals (`decimals` is then not None)."""
+    """The rounding of numbers of one kind: to significant digits, or to decimals (`decimals` is then not None)."""
 
     significant: int = 17
     decimals: int | None = None
 
     def errors(self, values: ArrayLike, fewest: int | None = None) -> Floats:
-        """By how much rounding changed numbers at most, in their shape.
+        """The largest error of numbers from their rounding, in their shape.
 
         Parameters
         ----------
@@ -72,14 +72,14 @@ class Digits:
         else:
             places = self.significant - 1 - math.floor(math.log10(abs(value)))
         if fewest is not None:
-            own = _shape(repr(value))
-            if own is not None and own[0] >= fewest:
-                places = own[1]
+            shape = _shape(repr(value))
+            if shape is not None and shape[0] >= fewest:
+                places = shape[1]
         return HALF * 10.0 ** -min(places, 300)
 
 
 def digits_of(texts: Iterable[str], fewest: int = FEWEST - 1) -> Digits:
-    """How the numbers in some texts, with blanks between them, were rounded.
+    """The rounding of the numbers in some texts, with blanks between them.
 
     The number of digits that most long numbers have: significant ones, or, if more of them agree in these, decimals.
     Numbers that are all short are taken as rounded if some have `fewest` significant digits, else as exact.
@@ -111,7 +111,7 @@ def _shape(word: str) -> tuple[int, int] | None:
 
 
 class ModelDigits:
-    """The roundings of a compiled model, from the numbers in its text; lengths in metres."""
+    """The roundings of a compiled model, from the numbers in its text [m, rad]; `bodies` has those of all bodies."""
 
     def __init__(self, plain: ET.Element, model: Any) -> None:
         self.model = model
@@ -125,25 +125,25 @@ class ModelDigits:
             self.bodies.append(self._placed(parent, model.body_pos[index], self._turned(model.body_quat[index])))
 
     def joint(self, index: int) -> Rounding:
-        """Of a joint of the model."""
+        """The rounding of a joint."""
         is_skew = np.abs(self.model.jnt_axis[index]).max() < 1.0 - STRAIGHT
         body = self.bodies[self.model.jnt_bodyid[index]]
         return self._placed(body, self.model.jnt_pos[index], self._axis if is_skew else 0.0)
 
     def site(self, index: int) -> Rounding:
-        """Of a site."""
+        """The rounding of a site."""
         body = self.bodies[self.model.site_bodyid[index]]
         return self._placed(body, self.model.site_pos[index], self._turned(self.model.site_quat[index]))
 
     def anchor(self, body: int, offset: ArrayLike, is_computed: bool) -> Rounding:
-        """Of a point of a body, at an offset (3,); that of the second body of an equality is computed by MuJoCo."""
+        """The rounding of a point on a body, at an offset (3,); MuJoCo computes that on an equality's second body."""
         return self.bodies[body].on(offset, 0.0, 0.0) if is_computed else self._placed(self.bodies[body], offset, 0.0)
 
     def _placed(self, body: Rounding, offset: ArrayLike, angle: float) -> Rounding:
         return body.on(offset, float(np.linalg.norm(self._length.errors(offset))), angle)
 
     def _turned(self, quat: Floats) -> float:
-        """Of the rotation of a body or site in its parent [rad]."""
+        """The error of the rotation of a body or site in its parent [rad]."""
         if abs(quat[0]) >= 1.0 - STRAIGHT:
             return 0.0
         return max(self._turn, 2.0 * float(np.linalg.norm(self._quat.errors(quat))))
@@ -155,7 +155,7 @@ def _texts(plain: ET.Element, *keys: str) -> Iterator[str]:
 
 
 def _turns(plain: ET.Element) -> Iterator[float]:
-    """By how much rounding turned what is turned in each other way than by a quaternion, at most [rad]."""
+    """Yield the errors of rotations that are given otherwise than by a quaternion [rad]."""
     compiler = plain.find("compiler")
     radian = compiler is not None and compiler.get("angle") == "radian"
     unit, fewest = (1.0, FEWEST - 1) if radian else (np.pi / 180.0, FEWEST)
@@ -170,7 +170,7 @@ def _turns(plain: ET.Element) -> Iterator[float]:
 
 
 def _of_vectors(texts: list[str]) -> Iterator[float]:
-    """By how much rounding turned directions that are given in texts [rad]."""
+    """Yield the errors of directions that are given in texts [rad]."""
     digits = digits_of(texts)
     for vector in map(_numbers, texts):
         if np.count_nonzero(vector) > 1:

@@ -1,4 +1,4 @@
-"""The bodies of a MuJoCo model: where they are, what joints they hang on, what they weigh, and what is seen of them."""
+"""The bodies of a MuJoCo model, with their joints, masses, sites and what is drawn of them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REFERENCE_POINT = "reference_point"
 """Name of the site that targets place."""
 
 WORLD = "world"
-"""What MuJoCo calls the body that rests."""
+"""MuJoCo's name of the body that rests."""
 
 THICKNESS = 0.015
 """Radius of what is drawn of a link [L]."""
@@ -31,7 +31,7 @@ THICKNESS = 0.015
 
 @dataclass(frozen=True)
 class Names:
-    """Names of the sites of a model, but for those at the centres of joints on their first bodies: the joints' own.
+    """Names of the sites of a model, but for those at joint centres on first bodies, which have the joints' names.
 
     Attributes
     ----------
@@ -111,8 +111,8 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
     if joint.type == "spherical":
         yield {"name": joint.name, "type": "ball"} | as_attributes(physics.joint(True, False))
         return
-    own = mechanism.coordinates[columns(mechanism)[joint.name]]
-    for each in own if branch.forward else reversed(own):
+    coordinates = mechanism.coordinates[columns(mechanism)[joint.name]]
+    for each in coordinates if branch.forward else reversed(coordinates):
         turning = each.kind == "angle"
         unit = 1.0 if turning else metres
         attributes = {
