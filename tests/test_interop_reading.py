@@ -52,7 +52,7 @@ def agrees(found: Imported, model: Model, body: str, off: Sequence[Sequence[floa
 
 FIVE_BAR = """
 <mujoco model="five bar">
-  <compiler angle="degree"/>
+  <compiler angle="degree" boundmass="1" boundinertia="1"/>
   <default><joint damping="0.1"/>
     <default class="arm"><joint axis="0 1 0" range="-80 80" limited="true"/></default></default>
   <asset><mesh name="m" file="nowhere.stl"/><material name="red"/></asset>
@@ -89,11 +89,9 @@ def test_a_loop_between_sites_is_closed_and_all_that_is_left_out_is_named() -> N
     assert chains(found) == ["R*-R", "R*-R-S"]
     for name in ("geom (2)", "mesh (1)", "cable", "winch", "eL", "finger = 1 qL", "finger", "jointpos"):
         assert name in notes_of(found), name
-    stripped = FIVE_BAR.replace('<geom type="mesh" mesh="m"/>', "").replace('<mesh name="m" file="nowhere.stl"/>', "")
-    light = stripped.replace("<body name", "<body gravcomp='1' name").replace(
-        '<compiler angle="degree"/>', '<compiler angle="degree" boundmass="1" boundinertia="1"/>'
-    )
-    held = Model.of(light.replace('<joint joint1="finger" joint2="qL" polycoef="0 1 0 0 0"/>', ""), finger=0.0)
+    text = FIVE_BAR.replace('<joint joint1="finger" joint2="qL" polycoef="0 1 0 0 0"/>', "")
+    text = text.replace('<geom type="mesh" mesh="m"/>', "").replace('<mesh name="m" file="nowhere.stl"/>', "")
+    held = Model.of(text, finger=0.0)
     agrees(found, held, "fore_left", [(0.2, 0.1), (-0.3, 0.2), (0.1, -0.4)])
 
 
@@ -379,47 +377,29 @@ def test_actuators_come_in_the_order_of_the_file_as_fast_as_it_says() -> None:
     assert (found.joint("last").max_speed, found.joint("last").max_acceleration) == (None, 7.0)
 
 
-def test_a_delta_with_balls_that_a_second_file_describes(tmp_path: Path) -> None:
-    """In the convention of Gepetto's examples: frames by name, joints that are something else than URDF can say.
+def with_frame(urdf: str, name: str, parent: str, at: Sequence[float]) -> str:
+    """A frame on a link, as exports have it."""
+    joint = f'<joint name="{name}_frame" type="fixed"><parent link="{parent}"/><child link="{name}"/>'
+    origin = f'<origin xyz="{" ".join(map(repr, at))}"/></joint>'
+    return urdf.replace("</robot>", f'<link name="{name}"/>{joint}{origin}</robot>')
 
-    A tree with five cuts, open by 4 mm; a rod carries the plate."""
-    parts, loops, frames, balls = ['<link name="frame"/><link name="plate"/>'], [], [], ["held"]
 
-    def joint(name: str, kind: str, parent: str, child: str, xyz: Sequence[float], more: str = "") -> str:
-        origin = f'<origin xyz="{" ".join(repr(float(value)) for value in xyz)}" {more}'
-        return f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{origin}</joint>'
-
-    for index, angle in enumerate(np.radians([0, 120, 240])):
-        cos, sin = np.cos(angle), np.sin(angle)
-        crank = f'rpy="0 0 {angle}"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
-        parts.append(f'<link name="arm{index}"/>')
-        parts.append(joint(f"q{index}", "revolute", "frame", f"arm{index}", (0.06 * cos, 0.06 * sin, 0), crank))
-        for name, shift in ((f"{index}a", -0.03), (f"{index}b", 0.03)):
-            parts.append(f'<link name="rod{name}"/>')
-            parts.append(joint(f"b{name}", "continuous", f"arm{index}", f"rod{name}", (0.1, shift, 0), "/>"))
-            balls.append(f"b{name}")
-            plate = (0.1 * cos - shift * sin - 0.1, 0.1 * sin + shift * cos + 0.03, 0.004)
-            if name == "0a":
-                parts.append(joint("held", "continuous", "rod0a", "plate", (-0.06, 0, -0.2), "/>"))
-                continue
-            loops.append((f"rod{name}", "plate", (-0.06, 0.0, -0.2), plate))
-            frames.append([f"loop{name}A", f"f{name}B"])  # a joint for its frame, and a link
-            for side, body, at in (("A", f"rod{name}", (-0.06, 0.0, -0.2)), ("B", "plate", plate)):
-                parts.append(f'<link name="f{name}{side}"/>')
-                parts.append(joint(f"loop{name}{side}", "fixed", body, f"f{name}{side}", at, "/>"))
-    urdf = f'<robot name="delta">{"".join(parts)}</robot>'
+def test_balls_and_frames_that_a_second_file_names(tmp_path: Path) -> None:
+    """In the convention of Gepetto's examples: frames by a joint or link, joints that URDF has no word for."""
+    framed = with_frame(with_frame(URDF, "left", "l2", TIP_L), "right", "r2", TIP_R)
     gepetto = {
-        "closed_loop": frames,
-        "type": ["3d"] * 5,
-        "name_mot": ["q0", "q1", "q2"],
-        "joint_name": balls,
-        "joint_type": ["SPHERICAL"] * 7,
+        "closed_loop": [["left_frame", "right"]],
+        "type": ["3d"],
+        "name_mot": ["motor_l", "motor_r"],
+        "joint_name": ["elbow_l"],
+        "joint_type": ["SPHERICAL"],
     }
-    found = from_urdf(urdf, yaml_file(tmp_path, gepetto), end_effector="plate", task=["x", "y", "z"], fixed=[])
-    assert found.gap == pytest.approx(0.004)
-    assert pf.mobility(found.mechanism).platform == 3
-    spec = urdf.replace('type="continuous"', 'type="spherical"')  # which MuJoCo's reader takes for a ball
-    agrees(found, in_mujoco(spec, loops), "plate", [(0.1, -0.1, 0.2), (0.3, 0.25, 0.2), (-0.2, 0.1, 0.1)], 1e-11)
+    found = from_urdf(framed, yaml_file(tmp_path, gepetto), end_effector="r2", task=["x", "z"], fixed=[])
+    assert found.gap == pytest.approx(np.hypot(0.002, 0.0035))
+    assert chains(found) == ["R*-R", "R*-S-S"]
+    spherical = URDF.replace('name="elbow_l" type="continuous"', 'name="elbow_l" type="spherical"')  # a ball of MuJoCo
+    model = in_mujoco(spherical, [("l2", "r2", TIP_L, TIP_R)])
+    agrees(found, model, "r2", [(0.2, 0.1), (-0.3, 0.2), (0.1, -0.3)], tolerance=1e-11)
 
 
 def test_what_is_wrong_with_a_description_is_told_in_one_go() -> None:
@@ -462,6 +442,25 @@ def test_an_open_machine_in_python_is_assembled_within_its_ranges() -> None:
     assert pf.solve_fk(found.mechanism, [0.0])
     with pytest.raises(InvalidArgument, match="points"):
         Loop("D", "spherical", ("rod", "b"), [[0, 0, 0]])
+
+
+MOVING_FREELY = """<robot name="free"><link name="base"/><link name="table"/><link name="arm"/><link name="rod"/>
+    <joint name="planar" type="planar"><parent link="base"/><child link="table"/><axis xyz="0 0.6 0.8"/>
+        <origin xyz="0.1 0 0" rpy="0.3 -0.2 0.5"/></joint>
+    <joint name="turn" type="continuous"><parent link="table"/><child link="arm"/><axis xyz="0 1 0"/></joint>
+    <joint name="floating" type="floating"><parent link="base"/><child link="rod"/><origin rpy="0.2 0 1"/></joint>
+    </robot>"""
+
+
+def test_joints_of_several_freedoms_are_led_to_answers_in_the_original_too(tmp_path: Path) -> None:
+    """A table in its plane with an arm, and a rod that floats but for its weld to the arm."""
+    (tmp_path / "robot.urdf").write_text(MOVING_FREELY)
+    loops = {"loops": [{"type": "weld", "links": ["arm", "rod"], "at": [[0.2, 0, 0], [0, 0, 0]]}]}
+    drives = ["planar_x", "planar_y", "planar", "turn"]
+    found = from_urdf(tmp_path / "robot.urdf", loops, end_effector="rod", actuated=drives)
+    checked = verify(found.mechanism, poses=3, original=tmp_path / "robot.urdf", loops=loops)
+    assert checked.poses == 3 and checked.original
+    assert checked.original.position_difference <= 1e-9
 
 
 # Files that mean harm.
@@ -737,13 +736,6 @@ def test_the_command_says_what_it_noted_before_it_refuses(tmp_path: Path) -> Non
     code, out, err = run("import", str(tmp_path / "winch.xml"), "--end-effector", "b")
     assert (code, out) == (2, "")
     assert "note: tendons are left out: cable" in err and "--actuated" in err and "qa, qb" in err
-
-
-def with_frame(urdf: str, name: str, parent: str, at: Sequence[float]) -> str:
-    """A frame on a link, as exports have it."""
-    joint = f'<joint name="{name}_frame" type="fixed"><parent link="{parent}"/><child link="{name}"/>'
-    origin = f'<origin xyz="{" ".join(map(repr, at))}"/></joint>'
-    return urdf.replace("</robot>", f'<link name="{name}"/>{joint}{origin}</robot>')
 
 
 def test_frames_that_are_called_closing_close_loops_as_a_second_file_does() -> None:
