@@ -15,10 +15,11 @@ from ..description.home_mobility import column_joints
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
+from ..description.structure import Structure
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
 from ..motion.displacements import centres, columns, displacements, screws
 from ..tolerances import TOLERANCES
-from .closing import CLOSED, ClosedHome, OpenLoops, bounds, close_home
+from .closing import CLOSED, ClosedHome, OpenLoops, close_home
 from .digits import worst
 from .notes import Note, noting
 from .opened import ROWS, OpenMechanism
@@ -69,11 +70,11 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
 def _assembled(opened: OpenMechanism, notes: list[Note]) -> Imported:
     """Close the loops, make the geometry exact, then merge joints."""
     loops = OpenLoops(opened)
-    gap = loops.gap(np.zeros(loops.n_coordinates))
+    gap = loops.gap(np.zeros(len(loops.low)))
     home, opened = _closed_home(opened, loops, notes)
     _note_gaps(opened, loops, gap, home, notes)
-    joints = [*_moved_joints(opened, home), *_closing_joints(loops, home)]
-    reference = _moved_reference(opened, home)
+    joints = [*_moved_joints(opened, loops.tree, home), *_closing_joints(loops, home)]
+    reference = _moved_reference(opened, loops.tree, home)
     slack = max(home.gap, CLOSED) if gap > CLOSED else 0.0
     rigid, _ = merged_bodies(merged_balls(joints), opened.base, opened.end_effector)
     exact = straighten(rigid, opened, reference, slack, notes)
@@ -83,16 +84,15 @@ def _assembled(opened: OpenMechanism, notes: list[Note]) -> Imported:
 
 def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> tuple[ClosedHome, OpenMechanism]:
     """Home with closed loops, and the machine without the ranges that cannot be kept there."""
-    low, high = bounds(opened)
-    owners = column_joints(loops.tree)
-    is_driven = np.array([joint.actuated for joint in opened.joints])[owners]
-    outside = _outside(opened, np.zeros(len(owners)))
+    low, high = loops.low, loops.high
+    is_driven = np.array([joint.actuated for joint in opened.joints])[column_joints(loops.tree)]
+    outside = _outside(loops, np.zeros_like(low))
     if outside:
         notes.append(Note("home was outside the range, and is moved into it", tuple(outside)))
     rounding = _rounding(opened, loops)
     largest = max(rounding, TOLERANCES.file_gap)
     homes = [close_home(loops, ~is_driven | (low > 0.0) | (high < 0.0), low, high)]
-    everything = np.ones(len(owners), bool)
+    everything = np.ones_like(is_driven)
     if homes[-1].gap > max(rounding, CLOSED):  # motors are not moved for what rounding leaves
         homes.append(close_home(loops, everything, low, high))
     if min(home.gap for home in homes) > largest:
@@ -100,18 +100,17 @@ def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> 
     best = next((home for home in homes if home.gap <= CLOSED), min(homes, key=lambda home: home.gap))
     if best.gap > largest:
         raise InvalidMechanism(_faults(opened, loops, best, largest))
-    beyond = _outside(opened, best.q)
+    beyond = _outside(loops, best.q)
     if beyond:
         notes.append(Note("home is outside the range, which is left out", tuple(sorted(beyond))))
     joints = [dataclasses.replace(each, range=None) if each.name in beyond else each for each in opened.joints]
     return best, dataclasses.replace(opened, joints=tuple(joints))
 
 
-def _outside(opened: OpenMechanism, q: Floats) -> list[str]:
+def _outside(loops: OpenLoops, q: Floats) -> list[str]:
     """Names of the joints that are beyond their ranges."""
-    tree, (low, high) = opened.tree(), bounds(opened)
-    beyond = (q < low - TOLERANCES.home_slack) | (q > high + TOLERANCES.home_slack)
-    return [joint.name for joint in opened.joints if beyond[columns(tree)[joint.name]].any()]
+    beyond = (q < loops.low - TOLERANCES.home_slack) | (q > loops.high + TOLERANCES.home_slack)
+    return [joint.name for joint in loops.tree.joints if beyond[columns(loops.tree)[joint.name]].any()]
 
 
 def _rounding(opened: OpenMechanism, loops: OpenLoops) -> float:
@@ -123,7 +122,7 @@ def _rounding(opened: OpenMechanism, loops: OpenLoops) -> float:
 def _faults(opened: OpenMechanism, loops: OpenLoops, home: ClosedHome, largest: float) -> list[Fault]:
     """The loops that stay open, the worst first."""
     unit, faults = opened.length_unit, []
-    openings = zip(loops.openings(np.zeros(loops.n_coordinates)), loops.openings(home.q), strict=True)
+    openings = zip(loops.openings(np.zeros_like(loops.low)), loops.openings(home.q), strict=True)
     for loop, (before, after) in zip(opened.loops, openings, strict=True):
         distance, angle = (float(np.linalg.norm(part)) for part in after)
         if max(distance, angle) > largest:
@@ -159,9 +158,9 @@ def _implied(loops: OpenLoops, home: ClosedHome) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _moved_joints(opened: OpenMechanism, home: ClosedHome) -> list[Joint]:
+def _moved_joints(opened: OpenMechanism, tree: Structure, home: ClosedHome) -> list[Joint]:
     """The tree's joints where they are at the closed home, which is their home from now on."""
-    tree, q = opened.tree(), home.q[None]
+    q = home.q[None]
     points, directions, moved = centres(tree, q), screws(tree, q)[0], []
     for joint in opened.joints:
         span, kind = columns(tree)[joint.name], KINDS[joint.type]
@@ -185,9 +184,9 @@ def _closing_joints(loops: OpenLoops, home: ClosedHome) -> list[Joint]:
     ]
 
 
-def _moved_reference(opened: OpenMechanism, home: ClosedHome) -> Floats | None:
+def _moved_reference(opened: OpenMechanism, tree: Structure, home: ClosedHome) -> Floats | None:
     """The reference point at the closed home; None for a joint end effector."""
-    bodies = displacements(opened.tree(), home.q[None])
+    bodies = displacements(tree, home.q[None])
     if opened.reference_point is None or opened.end_effector not in bodies:
         return None
     motion = bodies[opened.end_effector][0]

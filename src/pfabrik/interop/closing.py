@@ -52,13 +52,16 @@ class OpenLoops:
 
     Attributes
     ----------
+    tree : the joints alone.
+    low, high : bounds of the tree's coordinates as deviations from home, (c,) [rad or length]; infinite without any.
     length : the radius around all joints and loops [length], the L of gaps here.
     """
 
     def __init__(self, opened: OpenMechanism) -> None:
         self.loops = opened.loops
         self.tree: Structure = opened.tree()
-        self.n_coordinates = len(column_joints(self.tree))
+        limits = np.reshape([each.limits for each in self.tree.coordinates], (-1, 2)).T
+        self.low, self.high = limits - home_coordinates(self.tree)
         self.length = _radius(opened)
         self._paths = {body: path[column_joints(self.tree)] for body, path in tree_of(self.tree).paths.items()}
         self._relative_length = self.length / self.tree.characteristic_length
@@ -83,7 +86,7 @@ class OpenLoops:
         """Loop errors (rows,) [L and rad], and their slopes by the rates of `screws` (rows, c)."""
         bodies, twists = displacements(self.tree, q[None]), screws(self.tree, q[None])[0]
         twists = np.concatenate([twists[:, :3], twists[:, 3:] / self._relative_length], axis=1)
-        errors, slopes = [np.zeros(0)], [np.zeros((0, self.n_coordinates))]
+        errors, slopes = [np.zeros(0)], [np.zeros((0, len(self.low)))]
         for loop in self.loops:
             points, frames = _sides(loop, bodies)
             turning, moving = [], []
@@ -174,10 +177,3 @@ def _descend(loops: OpenLoops, q: Floats, free: Mask, low: Floats, high: Floats)
         if STALLED < remaining < 1.0:
             break
     return ClosedHome(q, loops.gap(q))
-
-
-def bounds(opened: OpenMechanism) -> tuple[Floats, Floats]:
-    """Bounds of all coordinates as deviations from home, (c,) each; infinite where there are none."""
-    tree = opened.tree()
-    low, high = np.reshape([each.limits for each in tree.coordinates], (-1, 2)).T - home_coordinates(tree)
-    return low, high
