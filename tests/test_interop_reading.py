@@ -124,9 +124,8 @@ def test_names_that_do_not_exist_come_with_those_that_do() -> None:
 
 
 def test_lengths_are_in_the_unit_asked_for() -> None:
-    small = from_mjcf(FIVE_BAR, base="frame", end_effector="fore_left", length_unit="mm")
-    assert small.mechanism.length_unit == "mm"
-    assert small.mechanism.joint("tip").at == pytest.approx((0, 0, 300))
+    small = from_mjcf(FIVE_BAR, base="frame", end_effector="fore_left", length_unit="mm").mechanism
+    assert (small.length_unit, small.joint("tip").at) == ("mm", pytest.approx((0, 0, 300)))
 
 
 # An ankle: two hinges on one body, a connect between bodies, a rod with a ball and a spin of its own, a range off home.
@@ -716,26 +715,23 @@ def test_a_factor_of_a_coupling_counts_from_where_its_joints_count() -> None:
     assert f"qb = {-3 * np.radians(10):.6g} + 3 qa" in notes_of(found)
 
 
-def test_a_machine_without_drives_is_refused_with_the_cause_the_flag_and_the_candidates() -> None:
+def test_a_machine_without_drives_is_refused_with_the_cause_the_flag_and_the_candidates(tmp_path: Path) -> None:
     through = GEARS.format(equality="", actuator='<motor name="winch" tendon="cable"/>')
     with pytest.raises(InvalidMechanism) as caught:
         from_mjcf(through, end_effector="b")
     assert "winch (through tendon cable)" in str(caught.value)
     assert "`actuated` (--actuated A,B,...), from the base outward: qa, qb" in str(caught.value)
     assert any("tendons are left out: cable" in note for note in caught.value.__notes__)
+    (tmp_path / "winch.xml").write_text(through)
+    code, out, err = run("import", str(tmp_path / "winch.xml"), "--end-effector", "b")
+    assert (code, out) == (2, "")
+    assert "note: tendons are left out: cable" in err and "(--actuated A,B,...)" in err
     with pytest.raises(InvalidMechanism, match="the model has no actuators"):
         from_mjcf(GEARS.format(equality="", actuator=""), end_effector="b")
     with pytest.raises(InvalidMechanism, match="drives elsewhere only: shoulder"):
         from_urdf(MIMIC.replace("mimic", "x"), base="arm", end_effector="fore")
     with pytest.raises(InvalidMechanism, match="no transmission"):
         from_urdf(MIMIC.replace("transmission", "x").replace("mimic", "x"), end_effector="fore")
-
-
-def test_the_command_says_what_it_noted_before_it_refuses(tmp_path: Path) -> None:
-    (tmp_path / "winch.xml").write_text(GEARS.format(equality="", actuator='<motor name="winch" tendon="cable"/>'))
-    code, out, err = run("import", str(tmp_path / "winch.xml"), "--end-effector", "b")
-    assert (code, out) == (2, "")
-    assert "note: tendons are left out: cable" in err and "--actuated" in err and "qa, qb" in err
 
 
 def test_frames_that_are_called_closing_close_loops_as_a_second_file_does() -> None:
