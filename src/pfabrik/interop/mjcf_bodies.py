@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..description.home_mobility import universal_axes
+from ..description.joint_coordinates import JointCoordinate
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
@@ -53,6 +54,11 @@ def names_of(mechanism: Mechanism, tree: CutTree) -> Names:
 def vector(values: Floats) -> str:
     """Numbers as an attribute, each the shortest that reads back as it is."""
     return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def si_unit(coordinate: JointCoordinate, metres: float) -> float:
+    """The unit of a coordinate [rad or m]."""
+    return 1.0 if coordinate.kind == "angle" else metres
 
 
 def as_attributes(values: Mapping[str, float]) -> dict[str, str]:
@@ -113,8 +119,7 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
         return
     coordinates = mechanism.coordinates[columns(mechanism)[joint.name]]
     for each in coordinates if branch.forward else reversed(coordinates):
-        turning = each.kind == "angle"
-        unit = 1.0 if turning else metres
+        turning, unit = each.kind == "angle", si_unit(each, metres)
         attributes = {
             "name": each.name,
             "type": "hinge" if turning else "slide",

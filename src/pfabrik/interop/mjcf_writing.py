@@ -16,7 +16,7 @@ from ..files.units import metres_of
 from ..poses import as_floats
 from ..whole_files import whole_path
 from .cuts import CutTree, cut_tree
-from .mjcf_bodies import Names, as_attributes, bodies, names_of, vector
+from .mjcf_bodies import Names, as_attributes, bodies, names_of, si_unit, vector
 from .physics import STEP, Physics, physics
 
 NOTE = "pfabrik."
@@ -86,7 +86,7 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
     root.append(bodies(mechanism, tree, names, metres, physics))
     root.append(_equalities(tree, names, physics))
     root.append(_servos(mechanism, metres, physics))
-    home = " ".join(repr(value) for value in _home(mechanism, metres))
+    home = " ".join(repr(float(drive.home) * si_unit(drive, metres)) for drive in mechanism.drives)
     ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="home", ctrl=home)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
@@ -115,7 +115,7 @@ def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[
             rates = getattr(drive.joint, key)
             rate = rates[drive.place] if isinstance(rates, tuple) else rates
             if rate is not None:
-                yield f"{key}.{drive.name}", repr(rate * (1.0 if drive.kind == "angle" else metres))
+                yield f"{key}.{drive.name}", repr(rate * si_unit(drive, metres))
     for joint in mechanism.joints:
         if joint.cone is not None:
             cone = joint.cone
@@ -140,15 +140,8 @@ def _servos(mechanism: Mechanism, metres: float, physics: Physics) -> ET.Element
     """A position servo for every actuated coordinate."""
     actuator = ET.Element("actuator")
     for drive in mechanism.drives:
-        turning = drive.kind == "angle"
-        gains = as_attributes(physics.servo(turning))
+        gains = as_attributes(physics.servo(drive.kind == "angle"))
         servo = ET.SubElement(actuator, "position", {"name": drive.name, "joint": drive.name, **gains})
         if np.isfinite(drive.limits).all():
-            servo.set("ctrlrange", vector(np.array(drive.limits) * (1.0 if turning else metres)))
+            servo.set("ctrlrange", vector(np.array(drive.limits) * si_unit(drive, metres)))
     return actuator
-
-
-def _home(mechanism: Mechanism, metres: float) -> Iterator[float]:
-    """The actuated coordinates at home [rad or m]."""
-    for drive in mechanism.drives:
-        yield float(drive.home) * (1.0 if drive.kind == "angle" else metres)

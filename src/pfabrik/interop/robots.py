@@ -226,10 +226,7 @@ def _opened(
 def _in_unit(joint: Joint, metres: float) -> Joint:
     """A joint in the unit of the mechanism."""
     changes: dict[str, Any] = {"at": None if joint.at is None else np.array(joint.at) / metres}
-    if joint.type != "prismatic":
-        return dataclasses.replace(joint, **changes)
-    changes |= {"home": np.divide(joint.home, metres)}
-    for name in ("range", "max_speed"):
-        value = getattr(joint, name)
-        changes[name] = None if value is None else np.divide(value, metres)
+    if joint.type == "prismatic":
+        changes["home"] = np.divide(joint.home, metres)
+        changes["range"] = None if joint.range is None else np.divide(joint.range, metres)
     return dataclasses.replace(joint, **changes)
