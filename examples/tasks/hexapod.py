@@ -1,10 +1,11 @@
 """A hexapod: its pivot, its travel, its workspace.
 
-For a Stewart platform with six struts whose length is driven. You learn where the tool may turn, how far it may go, and what stops it.
+For a Stewart platform with six struts whose length is driven. You learn where the tool may turn, how far it may go, and
+what stops it.
 """
 
-# Describe the machine by one pair of legs; it stands for three. `base` and `platform` are the centres of the joints at home, `stroke` is the
-# shortest and the longest strut between them.
+# Describe the machine by one pair of legs; it stands for three. `base` and `platform` are the centres of the joints at
+# home, `stroke` is the shortest and the longest strut between them.
 import numpy as np
 
 import pfabrik as pf
@@ -28,8 +29,8 @@ print(answer.status.name, answer.actuators.round(2))
 
 # ## Another pivot
 #
-# The platform turns about its reference point. To turn about the tip of a tool 60 mm above the platform, put the reference point there. It
-# is a part of the description, and everything else stays.
+# The platform turns about its reference point. To turn about the tip of a tool 60 mm above the platform, put the
+# reference point there. It is a part of the description, and everything else stays.
 with_tool = pf.Mechanism(
     "hexapod with tool", machine.joints, "platform", reference_point=machine.reference_point + np.array([0, 0, 60])
 )
