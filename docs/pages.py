@@ -3,8 +3,8 @@
     python docs/pages.py              # writes docs/tasks/*.md and their pictures
     python docs/pages.py hexapod      # one of them
 
-A program is prose and code: its docstring has the title and the first lines, comments at the margin that stand alone are
-paragraphs, what is between them is code. Under each piece of code stands what it printed, and the pictures that it saved.
+A program is prose and code. Its docstring has the title and the first lines. Comments at the margin that stand alone
+are paragraphs, what is between them is code. Under each piece of code stands what it printed, and what it drew.
 """
 
 from __future__ import annotations
