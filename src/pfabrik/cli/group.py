@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 import click
 
 from ..errors import PfabrikError, near_miss
+from .printing import complain
 from .stops import Stops
 
 WRONG_INPUT = 2
@@ -127,12 +128,6 @@ def code_of(run: Callable[[], Any], stops: Stops) -> int:
         where = f"{error.filename}: " if error.filename else ""
         complain(f"{where}{error.strerror or error}")
     return WRONG_INPUT
-
-
-def complain(message: str) -> None:
-    """Each line of `message` on stderr, marked as ours."""
-    for line in message.splitlines() or ["failed without a message"]:
-        click.echo(f"pfabrik: {line}", err=True)
 
 
 @contextmanager
