@@ -69,7 +69,7 @@ class Reach:
 
     @property
     def why(self) -> str:
-        """What stops it, in a few words for a table; empty if nothing does."""
+        """The cause of the stop in a few words, for a table; empty if nothing stops it."""
         return IN_SHORT.get(self.cause, "the task") if self.cause else short_names(self.stopped_by)
 
 

@@ -75,7 +75,7 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
 
 
 def as_object(model: Imported, text: str) -> dict[str, object]:
-    """What was found, and the text of the mechanism file."""
+    """An imported mechanism's name, gap and notes, and the text of its file."""
     return {
         "name": model.mechanism.name,
         "gap": model.gap,

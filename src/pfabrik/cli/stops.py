@@ -44,7 +44,7 @@ class Stops:
 
     @property
     def word(self) -> str:
-        """What became of the command."""
+        """The end of the command in one word."""
         return "interrupted" if self.number in (None, signal.SIGINT) else "terminated"
 
     def __enter__(self) -> Stops:
@@ -93,7 +93,7 @@ class Stops:
 
 
 def _is_cleaning_up() -> bool:
-    """Whether what runs was called because of an interruption."""
+    """True if the running code handles an interruption."""
     error = sys.exception()
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
