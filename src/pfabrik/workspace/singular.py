@@ -126,7 +126,7 @@ def singularity_map(
     resolution: float | None = None,
     on_progress: OnProgress | None = None,
 ) -> SingularityMap | SingularityTrack:
-    """How near to singular a mechanism is over a workspace, or along a path, and where it is.
+    """Measures of nearness to singularities over a workspace, or along a path, and the loci of singularities.
 
     Parameters
     ----------

@@ -216,7 +216,7 @@ def _coordinate_names(joint: str) -> tuple[str, ...]:
 
 
 def _is_about(joint: str, asked: Sequence[str] | None, fixed: Mapping[str, float], orientation: Any) -> bool:
-    """Whether a question is about the coordinates of the joint that carries the end effector."""
+    """True if a question is about the coordinates of the joint that carries the end effector."""
     if asked is None:
         return orientation is None and not set(fixed) & {*POSITIONS, *TURNS}
     return all(name.startswith(f"{joint}[") for name in asked)

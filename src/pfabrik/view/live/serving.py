@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import viser
 
 DISTANCE = 2.1
-"""How far the camera is from the middle of the machine, in radii of it."""
+"""Distance of the camera from the middle of the machine, in radii of the machine."""
 
 SEEN_FROM = np.array([0.5, -0.8, 0.35]) / np.linalg.norm([0.5, -0.8, 0.35])
 
