@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have: MECH, numbers, a target, what an answer out of reach keeps."""
+"""Arguments and options that several commands have: MECH, numbers, a target, projection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``pfabrik check``: is this mechanism file right?"""
+"""``pfabrik check``: the faults of a mechanism file, and remarks on it."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def as_object(model: Imported, text: str) -> dict[str, object]:
 def imported(
     file: Path, loops: Path | None, configuration: str, unit: str, fixed: list[str] | None, **choices: Any
 ) -> Imported:
-    """The mechanism in a file, whose first element tells its kind."""
+    """The mechanism in a file, whose kind follows from its first element."""
     choices |= {"fixed": fixed or (), "length_unit": unit}
     if pf.interop.kind_of(file) == "urdf":
         if configuration != "qpos0":

@@ -1,4 +1,4 @@
-"""Answers for people: what became of a question, poses, actuators, all modes; angles in degrees."""
+"""Answers for people: status, poses, actuators, margins, all modes; angles in degrees."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def pose_header(mechanism: pf.Mechanism) -> list[str]:
 
 
 def actuator_table(solution: pf.Solution, values: Floats | None) -> str:
-    """The actuator values, those asked for where they were not reached, and the limits."""
+    """The actuator values, the target values if they are not reached, and the limits."""
     shown = readouts(solution.mechanism)
     low, high = ([bound_text(readout.limits[side]) for readout in shown] for side in (0, 1))
     columns = {"actuator": [readout.name for readout in shown], "value": in_units(shown, solution.actuators)}

@@ -1,4 +1,4 @@
-"""``pfabrik speed``: how fast the platform may move at a pose, and which actuator limits it; the option ``--speed``."""
+"""``pfabrik speed``: the highest speeds of the platform at a pose, and the actuators that limit them; ``--speed``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signals that end a command: nothing half-written stays behind, and the exit code is the one that shells know."""
+"""Signals that end a command: no half-written file stays behind, and the exit code is the one that shells know."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Stops:
         return self
 
     def end(self) -> None:
-        """Raise no more interruptions: all that is left is to say what became of the command."""
+        """Raise no more interruptions: only the end of the command is still to be reported."""
         self._over.set()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:

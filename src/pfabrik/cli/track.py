@@ -117,7 +117,7 @@ def blocks_of(
 ) -> tuple[Iterable[paths.Path], int | None]:
     """The parts of a path, all in one if it is wanted whole, and how many targets there are, where that is known.
 
-    What can be read twice is checked to its end before anything is answered; the rest part by part.
+    A path that can be read twice is checked to its end before the first answer; others part by part.
     """
     from ..paths.path import joined
 

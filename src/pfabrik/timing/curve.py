@@ -11,7 +11,6 @@ from ..arrays import Floats
 from ..kernels.timing import second_derivatives
 from ..motion.displacements import actuator_units
 from ..poses import between
-from ..rotations import angles_between
 
 FINEST, FEWEST = 20_000, 2
 """Grid points that a path is given at least, and each of its steps: that speeds are kept between them too costs less
@@ -68,11 +67,6 @@ class Curve:
         poses = between(self.poses[place], self.poses[place + 1], shares)
         poses[:, :3, 3] = self.at(s)[0][:, self.n_actuators :]
         return poses
-
-    def turning(self) -> Floats:
-        """Rotation of the platform per length s after each step, (k,) [rad per unit of s]."""
-        rates = angles_between(self.poses[:-1, :3, :3], self.poses[1:, :3, :3]) / np.diff(self.s)
-        return np.append(rates, rates[-1:])
 
     def step_of(self, s: Floats) -> np.ndarray:
         """The row of the track at, or before, s (n,)."""

@@ -131,7 +131,7 @@ class _Shares:
             remaining = remaining - np.outer(remaining @ axis, axis)
 
     def weights(self, rates: Floats) -> Floats:
-        """The weights of the actuators, (n_a,), by which rates, in shares of the limits, (n_a,), take the most."""
+        """The weights (n_a,) with the largest weighted sum of actuator rates (n_a,), in shares of the limits."""
         target, is_stuck = np.append(rates, 0.0), False
         rounded = ROUNDED * np.abs(target).max()
         while True:
@@ -158,7 +158,7 @@ class _Shares:
 
 
 def _fastest(twist: Floats, rates: Floats, shares: _Shares, names: tuple[str, ...]) -> PlatformSpeed:
-    """The highest speed along or about an axis, by the rates it asks for, in shares of the limits; NaN for none."""
+    """The highest speed along or about an axis, from actuator rates in shares of the limits; NaN if it cannot move."""
     kind = "along" if twist[:3].any() else "about"
     x, y, z = (twist[:3] if kind == "along" else twist[3:]).tolist()
     if np.isnan(rates).any():
@@ -182,7 +182,7 @@ def _translations(inverse: Floats, forward: Floats, sizes: Floats) -> Floats:
 
 
 def _slowest(free: Floats, inverse: Floats, shares: _Shares) -> Floats | None:
-    """Of the unit vectors that these (m, 3) span, the translation that takes the largest share, as a twist.
+    """The unit translation in the span of `free` (m, 3) that takes the largest share, as a twist; None without any.
 
     Shares are convex: in a cone of m directions a linear function with the same values at these is no less, nor is the
     largest of their values where it is scaled to the plane through these. The cone is halved if that is more than has

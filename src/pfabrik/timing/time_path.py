@@ -1,4 +1,4 @@
-"""The fastest speed along a given path."""
+"""`time_path`: the fastest timing of a path."""
 
 from __future__ import annotations
 

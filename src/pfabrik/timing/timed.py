@@ -54,7 +54,7 @@ class Timed:
 
     @property
     def duration(self) -> float:
-        """Of the whole path [s]."""
+        """Duration of the whole path [s]."""
         return float(self.times[-1])
 
     @property
@@ -129,5 +129,5 @@ class Timed:
             axes.set_ylabel(label)
         axes.set_xlabel("time [s]")
         axes.legend(ncols=3, fontsize="small")
-        found: Figure = figure
-        return found
+        drawn: Figure = figure
+        return drawn

@@ -131,17 +131,17 @@ class _Film:
         self._artists: list[Any] = []
 
     def show(self, step: int) -> None:
-        """The machine at a step, the whole path asked for, and the path taken so far."""
+        """Draw the machine at a step, the whole target path, and the path achieved so far."""
         for artist in self._artists:
             artist.remove()
         track, canvas = self._track, self._canvas
         self._artists = draw_machine(canvas, self._skeletons[step])
         taken = track.pose[: step + 1, :3, 3]
-        asked = track.targets[:, :3, 3]
+        targets = track.targets[:, :3, 3]
         self._artists += [
-            canvas.line(asked, color=ASKED, linestyle="--", linewidth=1.2, zorder=20),
+            canvas.line(targets, color=ASKED, linestyle="--", linewidth=1.2, zorder=20),
             canvas.line(taken, color=ACHIEVED, linewidth=1.8, zorder=21),
-            canvas.line(asked[step][None], marker="x", color=ASKED, markersize=6, zorder=22),
+            canvas.line(targets[step][None], marker="x", color=ASKED, markersize=6, zorder=22),
         ]
         colour = ACHIEVED if track.status[step] == Status.REACHED else HELD
         self._caption.set(text=_caption(track[step], step, len(track)), color=colour)
@@ -150,5 +150,5 @@ class _Film:
 def _caption(solution: Solution, step: int, steps: int) -> str:
     """Which step it is, what became of it, and what holds it back."""
     held = short_names(solution._limits[0])
-    told = as_sentence(solution).partition(";")[0]
-    return f"step {step + 1} of {steps}: {told}\n{held or ' '}"
+    status = as_sentence(solution).partition(";")[0]
+    return f"step {step + 1} of {steps}: {status}\n{held or ' '}"

@@ -50,7 +50,7 @@ def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
 
     Returns
     -------
-    dict : axes by what they show: "along" [length], and "about" [deg]; those that were asked for.
+    dict : axes by what they show: "along" [length] and "about" [deg], if there are such directions.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
 
 
 def _rows(reaches: Sequence[Reach]) -> list[list[Reach]]:
-    """Reaches in rows: one for each direction, with its opposite where that was asked for too."""
+    """Reaches in rows: one for each direction, with its opposite if that is one of them too."""
     rows: list[list[Reach]] = []
     for reach in reaches:
         for row in rows:

@@ -8,10 +8,10 @@ if TYPE_CHECKING:
     from .region import Region
 
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#f0e442", "#332288", "#882255")
-"""Of the limits that form most of the border. Colour-blind people can tell them apart (Okabe and Ito; two by Tol)."""
+"""Colours of the limits that form most of the border, distinct for colour-blind people (Okabe and Ito; two by Tol)."""
 
 REST = "#b0b0b0"
-"""Of all other limits together."""
+"""Colour of all other limits together."""
 
 
 class Group(NamedTuple):
@@ -44,8 +44,8 @@ def groups_of(region: Region) -> list[Group]:
         copies = sorted(joint[len(stem) :] for joint, _ in limits)
         label = f"{stem}{', '.join(copies)} {bound}".strip() + ", actuated" * actuated
         groups.append(_group(region, label, colour, limits))
-    rest = [limit for _, limits in order[len(COLOURS) :] for limit in limits]
-    return [*groups, _group(region, f"{len(rest)} other limits", REST, rest)] if rest else groups
+    others = [limit for _, limits in order[len(COLOURS) :] for limit in limits]
+    return [*groups, _group(region, f"{len(others)} other limits", REST, others)] if others else groups
 
 
 def is_actuated(region: Region, joint: str) -> bool:

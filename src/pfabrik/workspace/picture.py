@@ -167,7 +167,7 @@ def _smooth(normals: Floats, faces: Ints, n: int) -> Floats:
 
 
 def _loops(segments: Ints) -> list[list[int]]:
-    """Closed ways along segments (f, 2), each by the places it leads over."""
+    """Closed loops of segments (f, 2), each as the places that it passes."""
     following: dict[int, list[int]] = {}
     for start, end in segments.tolist():
         following.setdefault(start, []).append(end)

@@ -81,7 +81,7 @@ def refined(lattice: Lattice, levels: int, reach: int) -> Refined:
     Parameters
     ----------
     levels : how often the first cells are halved.
-    reach : how many of the first cells it is looked for to each side of the start, before anything is found.
+    reach : number of the first cells to each side of the start in the first grid.
     """
     cells = _first(lattice, levels, reach)
     within: list[Cells] = []

@@ -39,7 +39,7 @@ class Region:
 
     @cached_property
     def face_limit(self) -> Ints:
-        """The limit of most of its vertices."""
+        """The limit of most vertices of each face, (f,)."""
         limits = self._mesh.limits[self.faces]
         most = np.where((limits[:, 1:2] == limits[:, 2:]).any(axis=1), limits[:, 1], limits[:, 0])
         most.setflags(write=False)
@@ -57,18 +57,18 @@ class Region:
 
     @property
     def size_unit(self) -> str:
-        """Such as "mm³", or "rad² mm"."""
+        """Unit of `size`, such as "mm³", or "rad² mm"."""
         counts = {unit: self.units.count(unit) for unit in sorted(set(self.units), reverse=True)}
         return " ".join(unit + EXPONENTS[count] for unit, count in counts.items())
 
     @property
     def volume(self) -> float:
-        """Of three coordinates [`size_unit`]."""
+        """Volume over three coordinates [`size_unit`]."""
         return self._size_of(3, "volume")
 
     @property
     def area(self) -> float:
-        """Of two coordinates [`size_unit`]."""
+        """Area over two coordinates [`size_unit`]."""
         return self._size_of(2, "area")
 
     def _size_of(self, d: int, what: str) -> float:

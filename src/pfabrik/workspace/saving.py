@@ -1,4 +1,4 @@
-"""Workspaces as files: a mesh for other programs, or all that is known of it."""
+"""Workspaces as files: a mesh for other programs, or all arrays."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def save(region: Region, path: str | PathLike[str]) -> None:
-    """Write a workspace in the format that the ending says; the file is there whole, or not at all."""
+    """Write a workspace in the format of the ending; the file appears whole, or not at all."""
     content = _FORMATS[require_ending(path, ENDINGS)](region)
     with whole_path(path) as part:
         part.write_bytes(content)

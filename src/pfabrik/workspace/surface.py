@@ -161,7 +161,7 @@ def _vertices(lattice: Lattice, ends: Ints, width: int) -> tuple[Floats, Ints, I
 def crossings(
     measure: Measure, inner: Floats, outer: Floats, inside: Floats, outside: Floats, close: float
 ) -> tuple[Floats, Ints]:
-    """The last points within on the ways from points within to points beyond, (n, d), and what is exceeded next, (n,).
+    """The last points within on lines from points within to points beyond, (n, d), and the limits exceeded next, (n,).
 
     Parameters
     ----------

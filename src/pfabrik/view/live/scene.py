@@ -79,8 +79,8 @@ class Scene:
         self._lines.batched_positions, self._lines.batched_wxyzs = positions, turns
         self._lines.batched_scales, self._lines.batched_colors = scales, colours
         corners = (part.corners for part in skeleton.parts if len(part.corners) >= 3)
-        for face, own in zip(self._faces, corners, strict=True):
-            face.vertices = fan(own / self._length)[0]
+        for face, face_corners in zip(self._faces, corners, strict=True):
+            face.vertices = fan(face_corners / self._length)[0]
         for kind, joints in self._joints.items():
             marks = _of_kind(skeleton, kind)
             joints.batched_positions, joints.batched_colors = self._places(marks), _colours(marks)
@@ -88,9 +88,8 @@ class Scene:
         self._name(skeleton)
 
     def show_path(self, track: Track) -> None:
-        """The path that was asked for, and the one that was taken."""
-        ways = (("asked", track.targets, ASKED), ("taken", track.pose, ACHIEVED))
-        for name, poses, colour in ways:
+        """Show the target path and the achieved path."""
+        for name, poses, colour in (("asked", track.targets, ASKED), ("taken", track.pose, ACHIEVED)):
             places = (poses[:, :3, 3] / self._length).astype(np.float32)
             places = places[np.isfinite(places).all(axis=1)]
             if len(places) > 1:
@@ -163,8 +162,8 @@ class Scene:
         along = lines[:, 1] - lines[:, 0]
         lengths = np.linalg.norm(along, axis=1)
         scales = np.stack([radii, radii, np.maximum(lengths, 1e-9)], axis=1)
-        found = (lines.mean(axis=1), upright_to(along), scales)
-        middles, turns, scales = (each.astype(np.float32) for each in found)
+        placements = (lines.mean(axis=1), upright_to(along), scales)
+        middles, turns, scales = (values.astype(np.float32) for values in placements)
         return middles, turns, scales, np.array(colours, np.uint8)
 
     def _name(self, skeleton: Skeleton) -> None:
