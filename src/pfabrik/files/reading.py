@@ -154,16 +154,16 @@ def _joint_fields(table: Any, step: ChainJoint | None, angle_unit: str) -> Any:
 def _expanded(table: Table, patterns: Sequence[Pattern], legs: Sequence[Leg], faults: list[Fault]) -> Mechanism:
     """The mechanism of all copies and legs. If it is not clear what is copied, or where legs are, only faults of single
     joints are searched for."""
-    unclear = any(map(_hides_joints, faults))
+    is_unclear = any(map(_hides_joints, faults))
     base, end_effector = table.get("base", "base"), cast(str, table.get("end_effector"))
-    placed, found = _placed(base, end_effector, patterns, legs)
-    faults = merged(faults, found)
+    placed, leg_faults = _placed(base, end_effector, patterns, legs)
+    faults = merged(faults, leg_faults)
     joints = (*patterns, *(Pattern(each.joint) for each in placed))
     layout = Patterns(joints, base, end_effector)
-    if not unclear and not found:
+    if not is_unclear and not leg_faults:
         misfits = faults_of_legs(list(_misfits(layout)), len(patterns), placed)
-        unclear, faults = bool(misfits), [*faults, *misfits]
-    if unclear or found:
+        is_unclear, faults = bool(misfits), [*faults, *misfits]
+    if is_unclear or leg_faults:
         alone = [fault for index, each in enumerate(joints) for fault in joint_faults(f"joint[{index}]", each.joint)]
         raise InvalidMechanism(merged(faults, faults_of_legs(alone, len(patterns), placed)))
     return _built(table, layout, placed, faults)

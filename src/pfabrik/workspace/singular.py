@@ -154,15 +154,15 @@ def singularity_map(
     step = _step(over, resolution)
     places = _places(over, step)
     with telling("singularities", on_progress) as tell:
-        reached, found, signs = _measured(over, places * step + question.space.start, tell)
+        reached, measures, signs = _measured(over, places * step + question.space.start, tell)
     places = places[reached]
-    signed = np.where(np.isnan(signs), 1.0, signs) * np.asarray(found.parallel)
+    signed = np.where(np.isnan(signs), 1.0, signs) * np.asarray(measures.parallel)
     vertices, faces = _locus(places, signed)
     return SingularityMap(
         workspace=over,
         step=step,
         points=places * step + question.space.start,
-        measures=found,
+        measures=measures,
         signs=signs,
         parts=_parts(places, signed),
         locus_vertices=vertices * step + question.space.start,

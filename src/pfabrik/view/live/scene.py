@@ -35,7 +35,7 @@ GIZMO = 0.35
 """Size of the handles to drag [L]."""
 
 PLAIN: dict[str, Any] = {"lod": "off", "cast_shadow": False, "receive_shadow": False}
-"""Of many small meshes: what computers without a graphics card would spend most of their time on."""
+"""Settings of many small meshes that save the time of computers without a graphics card."""
 
 MACHINE = "/machine"
 
@@ -97,7 +97,7 @@ class Scene:
                 self._scene.add_line_segments(f"{MACHINE}/path/{name}", segments, rgb(colour), thickness=2.0)
 
     def show_border(self, patches: Sequence[Patch]) -> None:
-        """The border of a workspace, in place of the one before."""
+        """Show the border of a workspace, in place of the one before."""
         self.hide_border()
         for place, patch in enumerate(patches):
             name, corners = f"{MACHINE}/workspace/{place}", (patch.corners / self._length).astype(np.float32)
@@ -110,7 +110,7 @@ class Scene:
             self._border.append(self._scene.add_mesh_simple(name, corners.reshape(-1, 3), faces, **style))
 
     def hide_border(self) -> None:
-        """Take the border away."""
+        """Hide the border."""
         for part in self._border:
             part.remove()
         self._border = []

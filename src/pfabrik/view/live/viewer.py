@@ -1,4 +1,4 @@
-"""`view`: a machine in the browser, to drag, to drive, and to see what stops it."""
+"""`view`: a machine in the browser, to drag and to drive, with the limits that stop it."""
 
 from __future__ import annotations
 
@@ -258,6 +258,6 @@ class Viewer:
             return self._stage.page()
 
     def _send(self, client: Any) -> None:
-        """The page as a download."""
+        """Send the page as a download."""
         if client is not None:
             client.send_file_download(f"{self.mechanism.name}.html", self._page().encode())
