@@ -30,10 +30,9 @@ from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import template, templates
 from pfabrik.cli import main, outputs
 from pfabrik.cli.group import exit_code
-from pfabrik.cli.outputs import ignores_case
+from pfabrik.cli.outputs import ignores_case, new_folder
 from pfabrik.cli.report import describe_modes
 from pfabrik.cli.stops import AGAIN
-from pfabrik.cli.whole import new_folder
 from pfabrik.description.rod_lengths import uneven_rods
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy
@@ -1019,7 +1018,7 @@ def test_what_stood_in_the_output_stays_when_the_work_fails(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pfabrik.cli.track_rows.TrackRows.write", interrupted)
+    monkeypatch.setattr("pfabrik.cli.track_report.TrackRows.write", interrupted)
     assert run("track", "five_bar", "path.csv", "-o", "answers.csv").exit_code == 130
     assert (tmp_path / "answers.csv").read_text() == "precious"
     assert set(os.listdir(tmp_path)) == {"path.csv", "answers.csv"}
