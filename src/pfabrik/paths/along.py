@@ -56,17 +56,17 @@ def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
     table = leg_table(mechanism)
     found: list[tuple[str, Floats, str, Floats]] = []
     proximal: ElementaryJoint | None = None
-    for form in table.forms if isinstance(table, LegTable) else ():
+    for form, record in zip(table.forms, table.legs, strict=True) if isinstance(table, LegTable) else ():
         if not isinstance(form, Rod):
             continue
-        proximal = proximal if form.is_shared else form.proximal
+        if not form.is_shared:
+            proximal, first = form.proximal, record
         if proximal is None or form.slide is not None or not form.base_ending.elements:
             continue
-        turns = proximal.kind == "R"
-        motion = np.cross(proximal.axis, form.base_end - proximal.point) if turns else proximal.axis
-        found.append(
-            (form.base_ending.elements[-1].outward, form.platform_end - form.base_end, proximal.outward, motion)
-        )
+        axis = motion = first["proximal_axis"]
+        if proximal.kind == "R":
+            motion = np.cross(axis, record["base_end_point"] - first["proximal_point"])
+        found.append((form.base_ending.elements[-1].outward, record["line"], proximal.outward, motion))
     return found
 
 
