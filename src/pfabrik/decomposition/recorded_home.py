@@ -7,7 +7,7 @@ from ..description.home_mobility import ends_of_default_axes
 from ..description.joint_coordinates import JointCoordinate
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
-from .tape import Scalar, Tape, Vector, norm, square_to
+from .tape import Scalar, Tape, Vector, length, square_to
 
 
 class RecordedHome:
@@ -44,7 +44,7 @@ class RecordedHome:
         """The axis of a revolute, prismatic or cylindrical joint."""
         if joint.along is None:
             return self._given_axis(joint, 0)
-        return self._span_along(joint) / norm(self._span_along(joint))
+        return _direction(self._span_along(joint) / length(self._span_along(joint)))
 
     def universal_axes(self, joint: Joint) -> tuple[Vector, Vector]:
         """The two axes of a universal joint, as of `home_mobility.universal_axes`."""
@@ -61,7 +61,7 @@ class RecordedHome:
     def coordinate(self, coordinate: JointCoordinate) -> Scalar:
         """The value of a coordinate [length or rad]."""
         if coordinate.joint.along is not None:
-            return norm(self._span_along(coordinate.joint))
+            return length(self._span_along(coordinate.joint))
         return self.tape.scalar(AT_POINTS + 9 * len(self._numbers) + coordinate.column)
 
     @property
@@ -70,8 +70,15 @@ class RecordedHome:
 
     def _given_axis(self, joint: Joint, which: int) -> Vector:
         place = AT_POINTS + 3 * len(self._numbers) + 6 * self._numbers[joint.name]
-        return self.tape.vector(place + 3 * which)
+        return _direction(self.tape.vector(place + 3 * which))
 
     def _span_along(self, joint: Joint) -> Vector:
         start, end = self.mechanism.ends_along(joint)
         return self.centre(end) - self.centre(start)
+
+
+def _direction(axis: Vector) -> Vector:
+    """An axis. That it is not zero is a decision: so it is with other numbers too, or the axis is none."""
+    if not axis @ axis > 0.0:
+        raise ValueError("an axis without a direction")
+    return axis

@@ -178,6 +178,11 @@ def norm(a: Vector) -> Scalar:
     return Scalar(a.tape, a.tape.perform(K.NORM, a.place))
 
 
+def length(a: Vector) -> Scalar:
+    """The norm of a vector however long or short it is, as of one in a mechanism's own unit."""
+    return Scalar(a.tape, a.tape.perform(K.LENGTH, a.place))
+
+
 def area(a: Vector, b: Vector) -> Scalar:
     """Area between two vectors; of unit vectors, the sine of the angle between them."""
     return norm(cross(a, b))
@@ -185,7 +190,7 @@ def area(a: Vector, b: Vector) -> Scalar:
 
 def square_to(a: Vector) -> tuple[Vector, Vector]:
     """Two unit vectors square to a vector, and to each other."""
-    place = a.tape.perform(K.SQUARE, a.place)
+    place = a.tape.perform(K.SQUARE, a.place, length(a).place)
     return Vector(a.tape, place), Vector(a.tape, place + 3)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 from typing import NamedTuple
 
 import numpy as np
@@ -93,7 +94,7 @@ def with_geometry(mechanism: Mechanism, geometry: Geometry) -> Mechanism:
     return with_numbers(mechanism, numbers_with(mechanism, geometry))
 
 
-_FIELDS = ("name", "end_effector", "base", "length_unit", "angle_unit", "task")
+_FIELDS = tuple(each.name for each in fields(Mechanism) if each.name not in ("joints", "reference_point"))
 _KEPT = ("bodies", "end_effector_is_joint", "end_effector_body", "whole_task", "actuator_names", "coordinate_names")
 """What is derived from a description without its numbers."""
 

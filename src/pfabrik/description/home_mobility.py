@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats
-from ..kernels.tape import SQUARE, V_SUBTRACT, result
+from ..kernels.tape import LENGTH, SQUARE, V_SUBTRACT, result
 from ..tolerances import TOLERANCES
 from .graph import next_joints, steps_from_base, tree_of
 from .joint_types import KINDS
@@ -156,7 +156,7 @@ def universal_axes(mechanism: Structure, joint: Joint) -> Floats:
         return np.asarray(joint.axes)
     ends, is_forward = ends_of_default_axes(mechanism, joint)
     lines = [result(V_SUBTRACT, end.at or (), joint.at or ()) for end in ends if end.at != joint.at]
-    normals = np.reshape(result(SQUARE, lines[0]), (2, 3)) if lines else np.eye(3)[:2]
+    normals = np.reshape(result(SQUARE, lines[0], result(LENGTH, lines[0])), (2, 3)) if lines else np.eye(3)[:2]
     return np.asarray(normals if is_forward else normals[::-1])
 
 

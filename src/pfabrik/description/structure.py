@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import UnknownName
-from ..kernels.tape import NORM, V_DIVIDE, V_SUBTRACT, result
+from ..kernels.tape import LENGTH, V_DIVIDE, V_SUBTRACT, result
 from .coercion import items, numbers, text, texts
 from .enclosing import enclosing_radius
 from .joint_coordinates import JointCoordinate
@@ -189,7 +189,7 @@ class Structure:
         """
         joint = self.joint(name)
         if joint.along is not None:
-            return result(NORM, self._span_along(joint))[0]
+            return result(LENGTH, self._span_along(joint))[0]
         return (0.0,) * len(KINDS[joint.type].coordinates) if joint.type in ("spherical", "fixed") else joint.home
 
     def home_axis(self, name: str) -> Vector:
@@ -202,7 +202,7 @@ class Structure:
         if joint.along is None:
             return cast(Vector, joint.axis)
         span = self._span_along(joint)
-        return cast(Vector, tuple(result(V_DIVIDE, span, result(NORM, span))))
+        return cast(Vector, tuple(result(V_DIVIDE, span, result(LENGTH, span))))
 
     def _span_along(self, joint: Joint) -> list[float]:
         """From the joint of `along` on the first body to that on the second, at home [length]."""

@@ -18,11 +18,15 @@ AT_MOST, BELOW, SAME = range(8, 11)
 # Of vectors a and b: a + b, a - b, number a times b, a divided by number b (0 where b is), the larger and the smaller
 # of each two components, a x b.
 V_ADD, V_SUBTRACT, V_SCALE, V_DIVIDE, V_MAXIMUM, V_MINIMUM, CROSS = range(11, 18)
-# Of vectors a and b: a . b, |a|, the largest component of a; two unit vectors square to a, and to each other.
-DOT, NORM, LARGEST, SQUARE = range(18, 22)
+# Of vectors a and b, and a number b: a . b; |a|; |a| without over- or underflow; the largest component of a; two unit
+# vectors square to a, whose length is b, and to each other.
+DOT, NORM, LENGTH, LARGEST, SQUARE = range(18, 23)
 
-SIZES = (*(1,) * 11, *(3,) * 7, 1, 1, 1, 6)
+SIZES = (*(1,) * 11, *(3,) * 7, 1, 1, 1, 1, 6)
 """How many values the result of each operation is."""
+
+SMALL, LARGE = 1e-100, 1e100
+"""Numbers between which squares, and sums of them, neither over- nor underflow."""
 
 DECISIONS = (AT_MOST, BELOW, SAME)
 
@@ -31,7 +35,7 @@ def perform(operation: int, values: Any, a: int, b: int, out: int) -> None:
     """Perform one step: operands at `a` and `b` among the values, its result at `out`.
 
     Unit vectors square to v are the last two rows of I - t w w^T, the reflection that turns v into the x axis: with
-    s = -sign(v_x) |v|, w = (1, v_y / (v_x - s), v_z / (v_x - s)) and t = (s - v_x) / s.
+    s = -sign(v_x) |v|, w = (1, v_y / (v_x - s), v_z / (v_x - s)) and t = (s - v_x) / s. Of no length, v is that axis.
     """
     if operation == DOT:
         values[out] = values[a] * values[b] + values[a + 1] * values[b + 1] + values[a + 2] * values[b + 2]
@@ -87,11 +91,15 @@ def perform(operation: int, values: Any, a: int, b: int, out: int) -> None:
         is_same = values[a] == values[b] and values[a + 1] == values[b + 1] and values[a + 2] == values[b + 2]
         values[out] = 1.0 if is_same else 0.0
     elif operation == SQUARE:
-        x, y, z = values[a], values[a + 1], values[a + 2]
-        s = -math.copysign(math.sqrt(x * x + y * y + z * z), x)
-        u, w, t = y / (x - s), z / (x - s), (s - x) / s
+        x, s = values[a], -math.copysign(values[b], values[a])
+        u, w, t = (values[a + 1] / (x - s), values[a + 2] / (x - s), (s - x) / s) if s != 0.0 else (0.0, 0.0, 0.0)
         values[out], values[out + 1], values[out + 2] = -t * u, 1.0 - t * u * u, -t * u * w
         values[out + 3], values[out + 4], values[out + 5] = -t * w, -t * u * w, 1.0 - t * w * w
+    elif operation == LENGTH:
+        size = max(abs(values[a]), abs(values[a + 1]), abs(values[a + 2]))
+        unit = 1.0 if SMALL < size < LARGE or size == 0.0 else size
+        x, y, z = values[a] / unit, values[a + 1] / unit, values[a + 2] / unit
+        values[out] = unit * math.sqrt(x * x + y * y + z * z)
 
 
 def result(operation: int, a: Any, b: Any = ()) -> list[float]:
