@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from functools import partial
 
@@ -10,6 +11,10 @@ import numpy as np
 import pfabrik as pf
 from closed_forms import Array, Struts
 from pfabrik.closure.closure_engine import ClosureEngine
+from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.decomposition.leg_table import _table as leg_table_of
+from pfabrik.decomposition.rewritten import rewritten
+from pfabrik.description.geometry import geometry_of, numbers_with, with_geometry
 from pfabrik.motion.displacements import rate_units
 from pfabrik.motion.joint_rates import actuated_columns
 from pfabrik.motion.singularities import measures
@@ -101,6 +106,30 @@ def first_order(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     yield Row("6-UPS, one solve_ik and margins", 20, margins / 20)
 
 
+def other_geometries(name: str, what: str, rng: np.random.Generator, runs: int) -> Iterator[Row]:
+    """Another geometry, ready to answer; next to the same machine made anew."""
+    mechanism, geometry = pf.load(name), geometry_of(pf.load(name))
+    table, offsets = leg_table(mechanism), rng.normal(size=(20, 3)) * 1e-3 * mechanism.characteristic_length
+    moved = [geometry._replace(points=geometry.points + offset) for offset in offsets]
+    made = [with_geometry(mechanism, each) for each in moved]
+    assert isinstance(table, LegTable)
+
+    def anew(like: pf.Mechanism) -> object:
+        return leg_table_of(dataclasses.replace(like))
+
+    numbers, records, description, machines = best_times(
+        10 * runs,
+        each(partial(numbers_with, mechanism), *moved),
+        each(lambda other: rewritten(table, numbers_with(mechanism, other)), *moved),
+        each(partial(with_geometry, mechanism), *moved),
+        each(anew, *made),
+    )
+    n, baseline = len(moved), "the mechanism made anew, and its table"
+    yield Row(f"{what}, leg table of another geometry", n, records / n, baseline, machines / n)
+    both = records + description - numbers
+    yield Row(f"{what}, leg table and mechanism of another geometry", n, both / n, baseline, machines / n)
+
+
 def calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     mechanism = pf.load("stewart")
     struts, targets = Struts(mechanism), near(mechanism, rng)
@@ -111,6 +140,8 @@ def calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
         yield from questions(name, what, rng, runs)
         yield from out_of_reach(name, what, rng, min(runs, 5))
     yield from first_order(rng, runs)
+    for name, what in (("stewart", "6-UPS"), ("servo_hexapod", "6-RUS"), ("delta", "delta"), ("nrpm", "NRPM")):
+        yield from other_geometries(name, what, rng, runs)
 
 
 if __name__ == "__main__":
