@@ -41,7 +41,7 @@ class LegTable:
 
     Attributes
     ----------
-    forms : the form of each leg.
+    forms : the form of each leg, with the numbers of the home that it was read at.
     limited : every coordinate that has a range.
     driven : every actuator; its column is that of its value.
     known : every coordinate that legs have in closed form; its column is that among all joint coordinates.

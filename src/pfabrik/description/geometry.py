@@ -21,8 +21,8 @@ __all__ = ["Geometry", "geometry_of", "home_numbers", "numbers_with", "with_geom
 class Geometry(NamedTuple):
     """Where the joints of a mechanism are at home, in base coordinates, in the order of its joints.
 
-    What follows from other numbers is told, but not read by `with_geometry`: axis and home of a prismatic joint that is
-    `along` two others, axes of a universal joint that are left out, and the reference point of a joint end effector.
+    Values that follow from others are included, but `with_geometry` ignores them: axis and home of a prismatic joint
+    that is `along` two others, axes of a universal joint that are left out, the reference point of a joint end effector.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ def numbers_with(mechanism: Mechanism, geometry: Geometry) -> Floats:
 
     n_joints = len(mechanism.joints)
     at_axes, at_home = AT_POINTS + 3 * n_joints, AT_POINTS + 9 * n_joints
-    numbers = np.empty(at_home + len(mechanism.coordinates))
+    numbers = np.empty(at_home + len(mechanism.coordinate_names))
     numbers[AT_REFERENCE:AT_POINTS] = geometry.reference_point
     numbers[AT_POINTS:at_axes].reshape(n_joints, 3)[:] = geometry.points
     numbers[at_axes:at_home].reshape(n_joints, 2, 3)[:] = geometry.axes
