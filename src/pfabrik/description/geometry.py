@@ -22,7 +22,7 @@ class Geometry(NamedTuple):
     """Where the joints of a mechanism are at home, in base coordinates, in the order of its joints.
 
     Values that follow from others are included, but `with_geometry` ignores them: axis and home of a prismatic joint
-    that is `along` two others, axes of a universal joint that are left out, the reference point of a joint end effector.
+    that is `along` two others, axes of a universal joint that are left out, a joint end effector's reference point.
 
     Attributes
     ----------
