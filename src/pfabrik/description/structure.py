@@ -98,11 +98,12 @@ class Structure:
         """The coordinates of all joints, in the order of `coordinate_names`."""
         found: list[JointCoordinate] = []
         for joint in self.joints:
-            homes = np.ravel(self.home_coordinate(joint.name)).tolist()
+            home = self.home_coordinate(joint.name)
+            homes = home if isinstance(home, tuple) else (home,)
             names = [joint.name] if len(homes) == 1 else [f"{joint.name}[{place}]" for place in range(len(homes))]
             found += [
-                JointCoordinate(name, joint, place, len(found) + place, home)
-                for place, (name, home) in enumerate(zip(names, homes, strict=True))
+                JointCoordinate(name, joint, place, len(found) + place, value)
+                for place, (name, value) in enumerate(zip(names, homes, strict=True))
             ]
         return tuple(found)
 
