@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from functools import partial
 
@@ -10,7 +11,8 @@ import numpy as np
 import pfabrik as pf
 from closed_forms import Array, Struts
 from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.model import model_of
+from pfabrik.description.geometry import geometry_of
+from pfabrik.model import Model, model_of
 from pfabrik.motion.displacements import rate_units
 from pfabrik.motion.joint_rates import actuated_columns
 from pfabrik.motion.singularities import measures
@@ -102,6 +104,30 @@ def first_order(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     yield Row("6-UPS, one solve_ik and margins", 20, margins / 20)
 
 
+def other_geometries(name: str, what: str, rng: np.random.Generator, runs: int) -> Iterator[Row]:
+    """Another geometry, its table of legs, and its first answer; next to the same machine made anew."""
+    mechanism = pf.load(name)
+    model, points, target = model_of(mechanism), geometry_of(mechanism).points, mechanism.home_pose.copy()
+    moved = [points + offset for offset in rng.normal(size=(20, 3)) * 1e-3 * mechanism.characteristic_length]
+    made = [model.with_geometry(points=each).mechanism for each in moved]
+
+    def anew(like: pf.Mechanism) -> object:
+        return Model(dataclasses.replace(like)).legs
+
+    def first(other: Array) -> object:
+        return pf.solve_ik(model.with_geometry(points=other).mechanism, target)
+
+    records, answers, machines = best_times(
+        10 * runs,
+        each(lambda other: model.with_geometry(points=other).legs, *moved),
+        each(first, *moved),
+        each(anew, *made),
+    )
+    n, baseline = len(moved), "the mechanism made anew, and its table"
+    yield Row(f"{what}, leg table of another geometry", n, records / n, baseline, machines / n)
+    yield Row(f"{what}, another geometry and its first solve_ik", n, answers / n, baseline, machines / n)
+
+
 def calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     mechanism = pf.load("stewart")
     struts, targets = Struts(mechanism), near(mechanism, rng)
@@ -112,6 +138,8 @@ def calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
         yield from questions(name, what, rng, runs)
         yield from out_of_reach(name, what, rng, min(runs, 5))
     yield from first_order(rng, runs)
+    for name, what in (("stewart", "6-UPS"), ("servo_hexapod", "6-RUS"), ("delta", "delta"), ("nrpm", "NRPM")):
+        yield from other_geometries(name, what, rng, runs)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from functools import cached_property, lru_cache
 
+from .arrays import Floats
 from .decomposition.elementary_joints import NoLeg
 from .decomposition.leg_table import LegTable, leg_table
+from .decomposition.rewritten import rewritten
+from .description.geometry import Geometry, geometry_of, home_numbers, numbers_with, with_numbers
 from .description.mechanism import Mechanism
 from .description.task import Task, task_of
 from .motion.closure import Closure, closure_of
@@ -15,15 +18,51 @@ class Model:
     """A machine, with what the solvers derive from its description, each computed once and when it is needed.
 
     Rooms above add what they derive by functions of a model, marked `derived`.
-
-    Attributes
-    ----------
-    mechanism : its description.
-    length : the characteristic length L.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism, self.length = mechanism, mechanism.characteristic_length
+        self.mechanism, self._like, self._numbers = mechanism, mechanism, home_numbers(mechanism)
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The description."""
+        mechanism = with_numbers(self._like, self._numbers)
+        mechanism.__dict__["_model"] = self
+        return mechanism
+
+    @property
+    def length(self) -> float:
+        """The characteristic length L."""
+        return float(self._numbers[0])
+
+    def with_geometry(
+        self,
+        points: Floats | None = None,
+        axes: Floats | None = None,
+        home: Floats | None = None,
+        reference_point: Floats | None = None,
+    ) -> Model:
+        """The machine with other numbers, unchecked: no fault of theirs is found, nor a lack of freedom.
+
+        Answers are those of a machine made anew, to the last bit. Legs are read anew only where a decision by which
+        they were read comes out otherwise.
+
+        Parameters
+        ----------
+        points, axes, home, reference_point : as of `description.geometry.Geometry`; what is left out stays.
+        """
+        given = {"points": points, "axes": axes, "home": home, "reference_point": reference_point}
+        geometry = self._geometry._replace(**{name: array for name, array in given.items() if array is not None})
+        model = object.__new__(Model)
+        model._like, model._numbers = self._like, numbers_with(self._like, geometry)
+        table = rewritten(self.legs, model._numbers) if self.has_legs else None
+        if table is not None:
+            model._legs = table
+        return model
+
+    @cached_property
+    def _geometry(self) -> Geometry:
+        return geometry_of(self.mechanism)
 
     @cached_property
     def task(self) -> Task:

@@ -11,6 +11,7 @@ from ..batch import put
 from ..derived import derived
 from ..kernels.rows import FAILED, HOLD, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from ..model import Model
+from ..motion.closure import Closure
 from ..motion.displacements import centres
 from ..motion.limited_coordinates import within_turns
 from ..options import Options
@@ -39,7 +40,11 @@ class ClosureEngine(Engine):
     """The engine that solves in joint coordinates."""
 
     def __init__(self, model: Model) -> None:
-        self.model, self._closure = model, model.path_closure
+        self.model = model
+
+    @property
+    def _closure(self) -> Closure:
+        return self.model.path_closure
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool

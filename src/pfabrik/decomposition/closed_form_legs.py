@@ -21,14 +21,10 @@ from dataclasses import replace
 from functools import partial
 from itertools import pairwise, product
 
-import numpy as np
-
-from ..arrays import Floats
 from ..description.graph import Step
-from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
 from .decompose import Part, Split, SubChain
-from .elementary_joints import HAS_LOOP, NO_AXIS, ElementaryJoint, NoLeg, are_parallel, area, elementary_joints
+from .elementary_joints import HAS_LOOP, ElementaryJoint, NoLeg, are_parallel, elementary_joints
 from .leg_forms import (
     Ending,
     EndingKind,
@@ -40,12 +36,14 @@ from .leg_forms import (
     closed_form_coordinates,
     keeps_from_spinning,
 )
+from .recorded_home import RecordedHome
+from .tape import Vector, area, cross, largest, norm, spread
 
 MOST_HINGES, MOST_REDUNDANT = 3, 3
 """Hinges of the largest ending, and redundant joints of a chain."""
 
 
-def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
+def legs_of_chain(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...]:
     """The legs of a sub-chain: one, or one for each of its branches.
 
     Raises
@@ -55,13 +53,13 @@ def legs_of_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
     if not chain.parts:
         raise NoLeg("has no joints")
     if chain.trunk:
-        return _branched(mechanism, chain)
+        return _branched(home, chain)
     loops = [part for part in chain.parts if not isinstance(part, Step)]
     if not loops:
-        return _leg(elementary_joints(mechanism, chain.steps))
+        return _leg(elementary_joints(home, chain.steps))
     split = loops[0]
     if len(loops) == 1 and isinstance(split, Split) and split.parallelogram is not None and split.parallelogram.pinned:
-        return _with_parallelogram(mechanism, chain, split)
+        return _with_parallelogram(home, chain, split)
     raise NoLeg(HAS_LOOP)
 
 
@@ -75,10 +73,10 @@ def placed_on(redundant_joint: RedundantJoint | None, legs: Sequence[LegForm]) -
     return tuple(placed.values())
 
 
-def _branched(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
+def _branched(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...]:
     """Rods on one proximal joint, or on redundant joints."""
-    trunk = elementary_joints(mechanism, chain.trunk)
-    first_branch, *other_branches = (elementary_joints(mechanism, branch) for branch in chain.branches)
+    trunk = elementary_joints(home, chain.trunk)
+    first_branch, *other_branches = (elementary_joints(home, branch) for branch in chain.branches)
     if any(element.kind == "P" for element in first_branch):
         return _on_redundant(trunk, (first_branch, *other_branches), is_reversed=False)
     if len(trunk) != 1:
@@ -97,8 +95,7 @@ def _are_alike(rods: Sequence[Rod]) -> bool:
     As long as the platform does not turn, they share the dead points of their proximal joint. Other rods have dead
     points of their own, at which the others determine the joint: no other working mode is beyond.
     """
-    lines = [rod.platform_end - rod.base_end for rod in rods]
-    return bool(np.ptp(lines, axis=0).max() <= TOLERANCES.nearly_implied)
+    return spread([rod.platform_end - rod.base_end for rod in rods]) <= TOLERANCES.nearly_implied
 
 
 def _on_redundant(
@@ -118,15 +115,13 @@ def _on_redundant(
     return (*redundant, *placed_on(redundant[-1], rods))
 
 
-def _with_parallelogram(mechanism: Mechanism, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
+def _with_parallelogram(home: RecordedHome, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
     """A pinned parallelogram between two parallel hinges: its outer body turns as its inner one does."""
     place = chain.parts.index(split)
     before, after = (
-        elementary_joints(mechanism, _steps_of(parts)) for parts in (chain.parts[:place], chain.parts[place + 1 :])
+        elementary_joints(home, _steps_of(parts)) for parts in (chain.parts[:place], chain.parts[place + 1 :])
     )
-    (inner, outer), (inner_beside, outer_beside) = (
-        elementary_joints(mechanism, _steps_of(path)) for path in split.ways
-    )
+    (inner, outer), (inner_beside, outer_beside) = (elementary_joints(home, _steps_of(path)) for path in split.ways)
     reasons = []
     for is_reversed in (False, True):
         if is_reversed:
@@ -278,11 +273,18 @@ def _pivot(elements: list[ElementaryJoint], n_proximal: int, is_reversed: bool) 
     ending = _ending(elements[len(slides) :])
     if n_proximal or [element.kind for element in elements[: len(slides)]] != ["P"] * len(slides) or ending is None:
         raise NoLeg("no pivot")
-    if len(slides) > 3 or (
-        slides and np.linalg.svd([element.axis for element in slides])[1].min() < TOLERANCES.alignment
-    ):
+    if not _are_independent([slide.axis for slide in slides]):
         raise NoLeg("slides that are not independent")
     return (Pivot(slides, ending, is_reversed),)
+
+
+def _are_independent(axes: Sequence[Vector]) -> bool:
+    """True if directions span a space of as many dimensions: by their area, or volume."""
+    if len(axes) < 2:
+        return True
+    if len(axes) == 2:
+        return area(*axes) > TOLERANCES.alignment
+    return len(axes) == 3 and abs(cross(axes[0], axes[1]) @ axes[2]) > TOLERANCES.alignment
 
 
 def rigid_rod(elements: list[ElementaryJoint]) -> Rod:
@@ -322,7 +324,7 @@ def _rod(proximal: ElementaryJoint | None, elements: list[ElementaryJoint], is_r
 def _ending(elements: Sequence[ElementaryJoint]) -> Ending | None:
     """Items as an ending; None where they do not meet in a point."""
     if not elements:
-        return Ending("weld", (), NO_AXIS)
+        return Ending("weld", (), None)
     if [element.kind for element in elements] == ["S"]:
         return Ending("ball", tuple(elements), elements[0].point)
     if any(element.kind != "R" for element in elements) or len(elements) > MOST_HINGES:
@@ -332,16 +334,16 @@ def _ending(elements: Sequence[ElementaryJoint]) -> Ending | None:
     if any(are_parallel(*pair) for pair in pairwise(elements)):
         return None
     centre = _crossing(elements[0], elements[1])
-    off = max(area(centre - element.point, element.axis) for element in elements)
+    off = largest(area(centre - element.point, element.axis) for element in elements)
     kind: EndingKind = "cross" if len(elements) == 2 else "triple"
     return Ending(kind, tuple(elements), centre) if off <= TOLERANCES.implied else None
 
 
-def _crossing(first: ElementaryJoint, second: ElementaryJoint) -> Floats:
+def _crossing(first: ElementaryJoint, second: ElementaryJoint) -> Vector:
     """The point of the first of two axes that is nearest to the second."""
-    normal = np.cross(first.axis, second.axis)
-    along = np.cross(second.point - first.point, second.axis) @ normal / (normal @ normal)
-    return np.asarray(first.point + along * first.axis)
+    normal = cross(first.axis, second.axis)
+    along = cross(second.point - first.point, second.axis) @ normal / (normal @ normal)
+    return first.point + first.axis * along
 
 
 def _checked_rod(
@@ -352,10 +354,10 @@ def _checked_rod(
     is_reversed: bool,
 ) -> Rod:
     start, end = _ends(base_end, platform_end)
-    line = end - start
-    if np.linalg.norm(line) <= TOLERANCES.alignment:
+    length = norm(end - start)
+    if length <= TOLERANCES.alignment:
         raise NoLeg("a rod of no length")
-    line /= np.linalg.norm(line)
+    line = (end - start) / length
     if any(element.kind == "S" or area(element.axis, line) > TOLERANCES.implied for element in middle):
         raise NoLeg("a joint between the ends of its rod that is not along it")
     slides, twists = ([_along(element, line) for element in middle if element.kind == kind] for kind in "PR")
@@ -375,31 +377,36 @@ def _checked_rod(
     return Rod(proximal, base_end, slide, twist, platform_end, start, end, is_reversed)
 
 
-def _along(element: ElementaryJoint, line: Floats) -> ElementaryJoint:
+def _along(element: ElementaryJoint, line: Vector) -> ElementaryJoint:
     """A slide or hinge with its axis in the direction of a line parallel to it."""
     return element if element.axis @ line > 0.0 else replace(element, axis=-element.axis, sense=-element.sense)
 
 
-def _is_singular(axes: Sequence[Floats], line: Floats) -> bool:
+def _is_singular(axes: Sequence[Vector], line: Vector) -> bool:
     """True if hinges, in order from their body, cannot turn a line in all directions near home."""
     if len(axes) == 1:
         return area(axes[0], line) <= TOLERANCES.alignment
-    return bool(abs(np.cross(axes[0], line) @ axes[1]) <= TOLERANCES.alignment)
+    return abs(cross(axes[0], line) @ axes[1]) <= TOLERANCES.alignment
 
 
-def _ends(base_end: Ending, platform_end: Ending) -> tuple[Floats, Floats]:
+def _ends(base_end: Ending, platform_end: Ending) -> tuple[Vector, Vector]:
     """The two ends of a rod; on a single hinge, the point nearest to the other end."""
+    start, end = base_end.centre, platform_end.centre
+    assert start is not None
+    assert end is not None
     if base_end.kind == "hinge" and platform_end.kind == "hinge":
         first, second = base_end.elements[0], platform_end.elements[0]
-        if are_parallel(first, second):
-            return first.point + first.axis * (first.axis @ (second.point - first.point)), second.point
-        return _crossing(first, second), _crossing(second, first)
+        return (_foot(first, end), end) if are_parallel(first, second) else _nearest(first, second)
     if base_end.kind == "hinge":
-        element = base_end.elements[0]
-        return element.point + element.axis * (
-            element.axis @ (platform_end.centre - element.point)
-        ), platform_end.centre
-    if platform_end.kind == "hinge":
-        element = platform_end.elements[0]
-        return base_end.centre, element.point + element.axis * (element.axis @ (base_end.centre - element.point))
-    return base_end.centre, platform_end.centre
+        return _foot(base_end.elements[0], end), end
+    return start, _foot(platform_end.elements[0], start) if platform_end.kind == "hinge" else end
+
+
+def _foot(hinge: ElementaryJoint, point: Vector) -> Vector:
+    """The point of a hinge's axis that is nearest to a point."""
+    return hinge.point + hinge.axis * (hinge.axis @ (point - hinge.point))
+
+
+def _nearest(first: ElementaryJoint, second: ElementaryJoint) -> tuple[Vector, Vector]:
+    """The points of two axes that are nearest to each other."""
+    return _crossing(first, second), _crossing(second, first)

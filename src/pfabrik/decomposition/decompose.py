@@ -13,6 +13,7 @@ from .graph_blocks import TIP, Block, blocks_between, graph_of, is_connected, is
 from .joint_nodes import NotExpressible
 from .parallelograms import Parallelogram, parallelogram_of
 from .positions import BranchForm, express_branch, express_trunk
+from .recorded_home import RecordedHome
 
 
 @dataclass(frozen=True)
@@ -133,28 +134,32 @@ def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
 
     Source: the paper's TDS. Which chains positions can express: `decomposition.positions`.
     """
-    graph = graph_of(checked_mechanism(mechanism))
+    chains = sub_chains(RecordedHome(checked_mechanism(mechanism)))
+    return tuple(_express(mechanism, chain) if chain.reason is None else chain for chain in chains)
+
+
+def sub_chains(home: RecordedHome) -> tuple[SubChain, ...]:
+    """The sub-chains of a mechanism, not yet expressed in positions."""
+    graph = graph_of(home.mechanism)
     groups = components(graph.edges, graph.base, graph.end)
     on_base = (group for group in groups if any(graph.base in edge.bodies for edge in group))
-    return tuple(_sub_chain(mechanism, group, graph.base, graph.end) for group in on_base)
+    return tuple(_sub_chain(home, group, graph.base, graph.end) for group in on_base)
 
 
-def _sub_chain(mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str) -> SubChain:
+def _sub_chain(home: RecordedHome, edges: Sequence[Edge], base: str, end: str) -> SubChain:
     """The sub-chain of connected edges, at least one of them on the base."""
     if not is_connected(edges, base, end):
         return SubChain(tuple(Step(edge.joint) for edge in edges), "does not lead to the end effector")
-    parts = parts_between(mechanism, edges, base, end)
-    if not is_tree(edges, base, end):
-        return SubChain(parts, "has a loop of its own")
-    return _express(mechanism, SubChain(parts, None))
+    parts = parts_between(home, edges, base, end)
+    return SubChain(parts, None if is_tree(edges, base, end) else "has a loop of its own")
 
 
-def parts_between(mechanism: Mechanism, edges: Sequence[Edge], start: str, goal: str) -> tuple[Part, ...]:
+def parts_between(home: RecordedHome, edges: Sequence[Edge], start: str, goal: str) -> tuple[Part, ...]:
     """The parts between two bodies, in series."""
-    return tuple(_part(mechanism, block) for block in blocks_between(edges, start, goal))
+    return tuple(_part(home, block) for block in blocks_between(edges, start, goal))
 
 
-def _part(mechanism: Mechanism, block: Block) -> Part:
+def _part(home: RecordedHome, block: Block) -> Part:
     """A single joint; parallel paths, each decomposed again; or a mesh, if paths share joints."""
     steps = tuple(Step(edge.joint, edge.bodies[0] == block.inward, TIP in edge.bodies) for edge in block.edges)
     if len(steps) == 1:
@@ -162,9 +167,9 @@ def _part(mechanism: Mechanism, block: Block) -> Part:
     groups = components(block.edges, block.inward, block.outward)
     if len(groups) == 1:
         return Mesh(steps)
-    parts = tuple(parts_between(mechanism, group, block.inward, block.outward) for group in groups)
+    parts = tuple(parts_between(home, group, block.inward, block.outward) for group in groups)
     joints = [[step.joint for step in _steps(group)] for group in parts]
-    return Split(parts, parallelogram_of(joints, mechanism.characteristic_length))
+    return Split(parts, parallelogram_of(joints, home))
 
 
 def _express(mechanism: Mechanism, chain: SubChain) -> SubChain:

@@ -6,19 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import numpy as np
-
-from ..arrays import Floats
 from ..description.graph import Step
-from ..description.home_mobility import universal_axes
 from ..description.joints import Joint
-from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
+from .recorded_home import RecordedHome
+from .tape import Vector, area
 
 Kind = Literal["R", "P", "S"]
-
-NO_AXIS = np.zeros(3)
-
 
 HAS_LOOP = "has a loop of its own"
 
@@ -29,7 +23,7 @@ class NoLeg(Exception):
 
 @dataclass(frozen=True, eq=False)
 class ElementaryJoint:
-    """A hinge (R), slide (P) or ball (S) on a path from the base outward; lengths in L.
+    """A hinge (R), slide (P) or ball (S) on a path from the base outward; lengths in L; numbers are on a tape.
 
     Attributes
     ----------
@@ -39,8 +33,8 @@ class ElementaryJoint:
     """
 
     kind: Kind
-    axis: Floats
-    point: Floats
+    axis: Vector
+    point: Vector
     joint: Joint
     place: int
     sense: float
@@ -53,12 +47,12 @@ class ElementaryJoint:
         return replace(self, sense=-self.sense, inward=self.outward, outward=self.inward)
 
 
-def elementary_joints(mechanism: Mechanism, steps: Sequence[Step]) -> list[ElementaryJoint]:
+def elementary_joints(home: RecordedHome, steps: Sequence[Step]) -> list[ElementaryJoint]:
     """The joints of a path as hinges, slides and balls; slides before hinges that turn about their direction.
 
     A joint cut at the end effector is a point: a ball without coordinates.
     """
-    elements = [element for step in steps for element in _of_step(mechanism, step)]
+    elements = [element for step in steps for element in _of_step(home, step)]
     for last in range(1, len(elements)):
         i = last
         while i and _swaps(elements[i - 1], elements[i]):
@@ -67,20 +61,19 @@ def elementary_joints(mechanism: Mechanism, steps: Sequence[Step]) -> list[Eleme
     return elements
 
 
-def _of_step(mechanism: Mechanism, step: Step) -> list[ElementaryJoint]:
-    joint, length = step.joint, mechanism.characteristic_length
-    point = np.zeros(3) if joint.at is None else np.array(joint.at) / length
+def _of_step(home: RecordedHome, step: Step) -> list[ElementaryJoint]:
+    joint, point = step.joint, home.point(step.joint)
     bodies = joint.connects if step.forward else joint.connects[::-1]
 
-    def element(kind: Kind, axis: Floats, place: int = 0) -> ElementaryJoint:
+    def element(kind: Kind, axis: Vector, place: int = 0) -> ElementaryJoint:
         return ElementaryJoint(kind, axis, point, joint, place, step.sign, *bodies)
 
     if step.ends or joint.type == "spherical":
-        return [element("S", NO_AXIS)]
+        return [element("S", home.vector(0.0, 0.0, 0.0))]
     if joint.type == "universal":
-        elements = [element("R", axis, place) for place, axis in enumerate(universal_axes(mechanism, joint))]
+        elements = [element("R", axis, place) for place, axis in enumerate(home.universal_axes(joint))]
         return elements if step.forward else elements[::-1]
-    axis = np.array(mechanism.home_axis(joint.name))
+    axis = home.axis(joint)
     if joint.type == "cylindrical":
         elements = [element("R", axis, 0), element("P", axis, 1)]
         return elements if step.forward else elements[::-1]
@@ -94,7 +87,3 @@ def _swaps(inner: ElementaryJoint, outer: ElementaryJoint) -> bool:
 
 def are_parallel(first: ElementaryJoint, second: ElementaryJoint) -> bool:
     return area(first.axis, second.axis) <= TOLERANCES.implied
-
-
-def area(a: Floats, b: Floats) -> float:
-    return float(np.linalg.norm(np.cross(a, b)))

@@ -12,19 +12,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..description.graph import Edge, Step, components
-from ..description.mechanism import Mechanism
 from .closed_form_legs import legs_of_chain, placed_on, rigid_rod
 from .decompose import SubChain, parts_between
 from .elementary_joints import HAS_LOOP, ElementaryJoint, NoLeg, elementary_joints
 from .graph_blocks import graph_of
 from .leg_forms import LegForm, RedundantJoint
+from .recorded_home import RecordedHome
 
 MEETING, MOST_REDUNDANT = 3, 4
 """Least joints of an intermediate platform, and most redundant joints of a sub-chain: searches fail on linkages with
 more."""
 
 
-def legs_of_sub_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
+def legs_of_sub_chain(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...]:
     """The legs of a sub-chain, and the redundant joints that they are on.
 
     Raises
@@ -32,18 +32,18 @@ def legs_of_sub_chain(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, .
     NoLeg : it has none; the text says why.
     """
     try:
-        return legs_of_chain(mechanism, chain)
+        return legs_of_chain(home, chain)
     except NoLeg as reason:
-        if str(reason) != HAS_LOOP or mechanism.end_effector_is_joint:
+        if str(reason) != HAS_LOOP or home.mechanism.end_effector_is_joint:
             raise
-    return _legs_between(mechanism, chain)
+    return _legs_between(home, chain)
 
 
-def _legs_between(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
-    graph, names = graph_of(mechanism), frozenset(chain.joints)
+def _legs_between(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...]:
+    graph, names = graph_of(home.mechanism), frozenset(chain.joints)
     edges = [edge for edge in graph.edges if edge.joint.name in names]
-    below, base, edges = _redundant_in_series(mechanism, edges, graph.base)
-    above, edges = _intermediate_platforms(mechanism, edges, base, graph.end, below[-1] if below else None)
+    below, base, edges = _redundant_in_series(home, edges, graph.base)
+    above, edges = _intermediate_platforms(home, edges, base, graph.end, below[-1] if below else None)
     if not below and not above:
         raise NoLeg(HAS_LOOP)
     if len(below) + len(above) > MOST_REDUNDANT:
@@ -55,28 +55,28 @@ def _legs_between(mechanism: Mechanism, chain: SubChain) -> tuple[LegForm, ...]:
         if len(ends) != 2:
             raise NoLeg(HAS_LOOP)
         inner, outer = ends
-        sub_chain = SubChain(parts_between(mechanism, group, inner, outer), None)
+        sub_chain = SubChain(parts_between(home, group, inner, outer), None)
         if inner == base:
-            chain_legs = legs_of_chain(mechanism, sub_chain)
+            chain_legs = legs_of_chain(home, sub_chain)
             redundant_joint = above.get(outer, below[-1] if below else None)
             legs += placed_on(redundant_joint, [leg for leg in chain_legs if not leg.is_reversed])
             legs += _from_platform(below, above.get(outer), [leg for leg in chain_legs if leg.is_reversed])
         elif all(isinstance(part, Step) for part in sub_chain.parts):
-            legs += _rod_between(above.get(inner), above[outer], elementary_joints(mechanism, sub_chain.steps))
+            legs += _rod_between(above.get(inner), above[outer], elementary_joints(home, sub_chain.steps))
         else:
             raise NoLeg(HAS_LOOP)
     return tuple(legs)
 
 
 def _redundant_in_series(
-    mechanism: Mechanism, edges: Sequence[Edge], base: str
+    home: RecordedHome, edges: Sequence[Edge], base: str
 ) -> tuple[list[RedundantJoint], str, list[Edge]]:
     """The hinges and slides that all paths from the base pass first, the body beyond, and the remaining edges."""
     redundant: list[RedundantJoint] = []
     remaining = list(edges)
     while True:
         base_edges = [edge for edge in remaining if base in edge.bodies]
-        elements = _elements_of_edge(mechanism, base_edges[0], base) if len(base_edges) == 1 else []
+        elements = _elements_of_edge(home, base_edges[0], base) if len(base_edges) == 1 else []
         if not _is_redundant(elements):
             return redundant, base, remaining
         redundant.append(RedundantJoint(elements[0], is_reversed=False, on=redundant[-1] if redundant else None))
@@ -85,7 +85,7 @@ def _redundant_in_series(
 
 
 def _intermediate_platforms(
-    mechanism: Mechanism, edges: Sequence[Edge], base: str, end: str, below: RedundantJoint | None
+    home: RecordedHome, edges: Sequence[Edge], base: str, end: str, below: RedundantJoint | None
 ) -> tuple[dict[str, RedundantJoint], list[Edge]]:
     """Redundant joints from the platform to intermediate platforms, by the body that each moves; remaining edges."""
     paths: dict[str, tuple[tuple[Edge, str], ...]] = {end: ()}
@@ -97,7 +97,7 @@ def _intermediate_platforms(
                 body in edge.bodies
                 and next_body != base
                 and next_body not in paths
-                and _is_redundant(_elements_of_edge(mechanism, edge, body))
+                and _is_redundant(_elements_of_edge(home, edge, body))
             ):
                 paths[next_body] = (*paths[body], (edge, next_body))
                 bodies.append(next_body)
@@ -109,16 +109,16 @@ def _intermediate_platforms(
         previous, on = end, below
         for edge, next_body in paths[body]:
             if next_body not in redundant:
-                element = _elements_of_edge(mechanism, edge, previous)[0]
+                element = _elements_of_edge(home, edge, previous)[0]
                 redundant[next_body] = RedundantJoint(element, is_reversed=False, at_platform_end=True, on=on)
                 remaining.remove(edge)
             previous, on = next_body, redundant[next_body]
     return redundant, remaining
 
 
-def _elements_of_edge(mechanism: Mechanism, edge: Edge, body: str) -> list[ElementaryJoint]:
+def _elements_of_edge(home: RecordedHome, edge: Edge, body: str) -> list[ElementaryJoint]:
     """The elementary joints of an edge, passed from one of its bodies."""
-    return elementary_joints(mechanism, [Step(edge.joint, edge.bodies[0] == body)])
+    return elementary_joints(home, [Step(edge.joint, edge.bodies[0] == body)])
 
 
 def _is_redundant(elements: Sequence[ElementaryJoint]) -> bool:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from ..arrays import Floats
 from ..kernels.legs import records as K
 from .elementary_joints import ElementaryJoint
+from .tape import Vector
 
 EndingKind = Literal["weld", "hinge", "cross", "triple", "ball"]
 
@@ -17,12 +17,12 @@ EndingKind = Literal["weld", "hinge", "cross", "triple", "ball"]
 class Ending:
     """An end of a rod: its elementary joints, in the order in which the leg is read, and the point where they meet.
 
-    The point of a single hinge is its joint's centre.
+    The point of a single hinge is its joint's centre; a weld has none.
     """
 
     kind: EndingKind
     elements: tuple[ElementaryJoint, ...]
-    centre: Floats
+    centre: Vector | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,8 @@ class Rod:
     slide: ElementaryJoint | None
     twist: ElementaryJoint | None
     platform_ending: Ending
-    base_end: Floats
-    platform_end: Floats
+    base_end: Vector
+    platform_end: Vector
     is_reversed: bool
     is_shared: bool = False
     beside: tuple[ElementaryJoint, ...] = ()

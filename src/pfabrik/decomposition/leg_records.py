@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from itertools import accumulate, pairwise
+from itertools import accumulate, zip_longest
 
 import numpy as np
 
-from ..arrays import Floats, Records
-from ..description.mechanism import Mechanism
+from ..arrays import Records
 from ..kernels.legs import records as K
-from ..rotations import square_to
+from ..tolerances import TOLERANCES
 from .elementary_joints import ElementaryJoint
-from .leg_forms import KeptAxis, LegForm, Pivot, RedundantJoint, Rod, keeps_from_spinning
+from .leg_forms import Ending, KeptAxis, LegForm, Pivot, RedundantJoint, Rod, keeps_from_spinning
+from .recorded_home import RecordedHome
+from .recording import Fields, RecordedRecords
+from .tape import Scalar, Vector, angle_of, area, cross, largest, norm, sign, square_to
 
 _ENDINGS = {"weld": K.WELD, "hinge": K.HINGE, "cross": K.CROSS, "triple": K.TRIPLE, "ball": K.BALL}
 _PROXIMAL = {"R": K.CRANK, "P": K.CARRIAGE}
 
 
-def leg_records(mechanism: Mechanism, forms: Sequence[LegForm]) -> Records:
+def leg_records(home: RecordedHome, forms: Sequence[LegForm]) -> RecordedRecords:
     """A record of `LEG` for each leg."""
-    legs = np.array([_record(mechanism, form) for form in forms], K.LEG).reshape(-1)
+    fields = [_fields(home, form) | _orienting(form, after) for form, after in zip_longest(forms, forms[1:])]
+    recorded = RecordedRecords.of(fields, K.LEG)
+    legs = recorded.records
     _put_frames(legs, forms)
-    _put_orienting(legs, forms)
     counts = row_counts(legs)
     legs["first_row"] = [0, *accumulate(counts)][:-1]
     legs["has_rows"] = _has_rows(legs, counts)
-    return legs
+    return recorded
 
 
 def row_counts(legs: Records) -> list[int]:
@@ -83,130 +85,172 @@ def _put_frames(legs: Records, forms: Sequence[LegForm]) -> None:
     )
 
 
-def _put_orienting(legs: Records, forms: Sequence[LegForm]) -> None:
-    """Mark the redundant joints that orient the rod after them, with the side that they take at home."""
-    for k, (form, after) in enumerate(pairwise(forms)):
-        if isinstance(form, RedundantJoint) and form.orients and isinstance(after, Rod):
-            across = np.cross(form.element.axis, after.base_ending.elements[0].axis)
-            legs["orients"][k] = 1
-            if form.element.kind == "R":
-                legs["side"][k] = -math.copysign(1.0, across @ (after.platform_end - form.element.point))
+def _orienting(form: LegForm, after: LegForm | None) -> Fields:
+    """Fields of a redundant joint that orients the rod after it: the side that it takes at home."""
+    if not (isinstance(form, RedundantJoint) and form.orients and isinstance(after, Rod)):
+        return {}
+    if form.element.kind != "R":
+        return {"orients": 1}
+    across = cross(form.element.axis, after.base_ending.elements[0].axis)
+    return {"orients": 1, "side": -sign(across @ (after.platform_end - form.element.point))}
 
 
-def _record(mechanism: Mechanism, form: LegForm) -> Records:
+def _fields(home: RecordedHome, form: LegForm) -> Fields:
     if isinstance(form, Rod):
-        return _rod_record(mechanism, form)
+        return _rod_fields(home, form)
     if isinstance(form, RedundantJoint):
-        return _redundant_record(mechanism, form)
-    return _pivot_record(mechanism, form) if isinstance(form, Pivot) else _kept_axis_record(form)
+        return _redundant_fields(home, form)
+    return _pivot_fields(home, form) if isinstance(form, Pivot) else _kept_axis_fields(form)
 
 
-def _platform_point(mechanism: Mechanism, point: Floats, is_reversed: bool) -> Floats:
+def _platform_point(home: RecordedHome, point: Vector, is_reversed: bool) -> Vector:
     """A platform end at home, in the frame that `kernels.legs.frames` maps from [L]."""
-    reference = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
-    return point if is_reversed else point - reference
+    return point if is_reversed else point - home.reference_point
 
 
-def _axes(elements: Sequence[ElementaryJoint]) -> Floats:
-    axes = np.zeros((3, 3))
-    for place, element in enumerate(elements):
-        axes[place] = element.axis
-    return axes
+def _axes(ending: Ending, order: int = 1) -> list[Vector]:
+    """The hinges of an ending, in their order or (-1) the reverse one."""
+    return [] if ending.kind == "ball" else [element.axis for element in ending.elements[::order]]
 
 
-def _pivot_record(mechanism: Mechanism, pivot: Pivot) -> Records:
-    record = np.zeros((), K.LEG)
+def _pivot_fields(home: RecordedHome, pivot: Pivot) -> Fields:
     kind = pivot.ending.kind
-    centre = pivot.ending.centre
-    if not pivot.ending.elements:
-        centre = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
-    axes = np.eye(3) if kind == "weld" else _axes(pivot.ending.elements)
-    record["kind"], record["reversed"], record["base_end"] = K.PIVOT, pivot.is_reversed, _ENDINGS[kind]
-    record["base_end_point"], record["platform_end_point"] = (
-        centre,
-        _platform_point(mechanism, centre, pivot.is_reversed),
-    )
-    record["base_end_axes"], n_slides = axes, len(pivot.slides)
-    record["slides"] = n_slides
-    directions = np.array([element.axis for element in pivot.slides]).reshape(-1, 3)
-    record["slide_rows"][:n_slides] = np.linalg.pinv(directions.T) if n_slides else 0.0
-    record["fixed_rows"][: 3 - n_slides] = np.linalg.svd(directions)[2][n_slides:] if n_slides else np.eye(3)
-    _put_axis_rows(record, kind, axes)
+    centre = home.reference_point if pivot.ending.centre is None else pivot.ending.centre
+    axes = _unit_vectors(home) if kind == "weld" else _axes(pivot.ending)
+    slides = [element.axis for element in pivot.slides]
+    fields: Fields = {
+        "kind": K.PIVOT,
+        "reversed": pivot.is_reversed,
+        "slides": len(slides),
+        "base_end": _ENDINGS[kind],
+        "base_end_point": centre,
+        "platform_end_point": _platform_point(home, centre, pivot.is_reversed),
+        "base_end_axes": axes,
+        "slide_rows": _inverse_rows(slides),
+        "fixed_rows": _rows_square_to(slides) if slides else _unit_vectors(home),
+    }
     if kind == "triple":
-        record["side"] = _home_side(axes, axes[2])
-    return record
+        fields["side"] = _home_side(axes, axes[2])
+    return fields | _axis_rows(kind, axes)
 
 
-def _kept_axis_record(form: KeptAxis) -> Records:
-    """The record of a pivot with three slides, whose hinge is the axis."""
-    record = np.zeros((), K.LEG)
-    record["kind"], record["base_end"], record["slides"] = K.PIVOT, K.HINGE, 3
-    record["base_end_axes"][0] = form.ending.elements[0].axis
-    _put_axis_rows(record, "hinge", record["base_end_axes"])
-    return record
+def _kept_axis_fields(form: KeptAxis) -> Fields:
+    """The fields of a pivot with three slides, whose hinge is the axis."""
+    axes = [form.ending.elements[0].axis]
+    fields: Fields = {"kind": K.PIVOT, "base_end": K.HINGE, "slides": 3, "base_end_axes": axes}
+    return fields | _axis_rows("hinge", axes)
 
 
-def _redundant_record(mechanism: Mechanism, form: RedundantJoint) -> Records:
-    record, point = np.zeros((), K.LEG), form.element.point
-    record["kind"], record["reversed"], record["at_platform_end"] = K.REDUNDANT, form.is_reversed, form.at_platform_end
-    record["proximal"], record["proximal_axis"] = _PROXIMAL[form.element.kind], form.element.axis
-    record["proximal_point"] = _platform_point(mechanism, point, form.is_reversed) if form.at_platform_end else point
-    return record
+def _redundant_fields(home: RecordedHome, form: RedundantJoint) -> Fields:
+    element = form.element
+    return {
+        "kind": K.REDUNDANT,
+        "reversed": form.is_reversed,
+        "at_platform_end": form.at_platform_end,
+        "proximal": _PROXIMAL[element.kind],
+        "proximal_axis": element.axis,
+        "proximal_point": _platform_point(home, element.point, form.is_reversed or not form.at_platform_end),
+    }
 
 
-def _put_axis_rows(record: Records, kind: str, axes: Floats) -> None:
+def _unit_vectors(home: RecordedHome) -> list[Vector]:
+    return [home.vector(1.0, 0.0, 0.0), home.vector(0.0, 1.0, 0.0), home.vector(0.0, 0.0, 1.0)]
+
+
+def _inverse_rows(axes: Sequence[Vector]) -> list[Vector]:
+    """Rows that give a displacement's components along independent axes: the pseudoinverse of these as columns."""
+    if len(axes) == 1:
+        return [axes[0] / (axes[0] @ axes[0])]
+    if len(axes) == 2:
+        a, b, normal = *axes, cross(*axes)
+        return [cross(b, normal) / (normal @ normal), cross(normal, a) / (normal @ normal)]
+    if len(axes) == 3:
+        a, b, c = axes
+        volume = cross(a, b) @ c
+        return [cross(b, c) / volume, cross(c, a) / volume, cross(a, b) / volume]
+    return []
+
+
+def _rows_square_to(axes: Sequence[Vector]) -> list[Vector]:
+    """Unit vectors square to one or more independent axes, and to each other."""
+    if len(axes) == 1:
+        return [*square_to(axes[0])]
+    return [cross(*axes) / area(*axes)] if len(axes) == 2 else []
+
+
+def _axis_rows(kind: str, axes: Sequence[Vector]) -> Fields:
     pairs = _axis_pairs(kind, axes)
-    record["axis_rows"], record["upright"] = len(pairs), {"hinge": 1, "weld": 3}.get(kind, 0)
-    for row, (kept, moved) in enumerate(pairs):
-        record["kept"][row], record["moved"][row], record["value"][row] = kept, moved, kept @ moved
+    return {
+        "axis_rows": len(pairs),
+        "upright": {"hinge": 1, "weld": 3}.get(kind, 0),
+        "kept": [kept for kept, _ in pairs],
+        "moved": [moved for _, moved in pairs],
+        "value": [kept @ moved for kept, moved in pairs],
+    }
 
 
-def _axis_pairs(kind: str, axes: Floats) -> list[tuple[Floats, Floats]]:
+def _axis_pairs(kind: str, axes: Sequence[Vector]) -> list[tuple[Vector, Vector]]:
     """Pairs of directions, on base and platform, whose angle is constant."""
-    x, y, z = axes
     if kind == "cross":
-        return [(x, y)]
+        return [(axes[0], axes[1])]
     if kind == "hinge":
-        return [(across, x) for across in square_to(x)]
-    return [(x, y), (y, z), (z, x)] if kind == "weld" else []
+        return [(across, axes[0]) for across in square_to(axes[0])]
+    return [(axes[0], axes[1]), (axes[1], axes[2]), (axes[2], axes[0])] if kind == "weld" else []
 
 
-def _home_side(axes: Floats, line: Floats) -> float:
+def _home_side(axes: Sequence[Vector], line: Vector) -> Scalar:
     """The side of two crossed hinges at home; its sign as of `kernels.legs.endings.aim`."""
-    return -math.copysign(1.0, axes[0] @ np.cross(axes[1], line))
+    return -sign(axes[0] @ cross(axes[1], line))
 
 
-def _rod_record(mechanism: Mechanism, rod: Rod) -> Records:
-    record = np.zeros((), K.LEG)
-    line = rod.platform_end - rod.base_end
-    length = np.linalg.norm(line)
-    line = line / length
-    record["kind"], record["reversed"] = K.ROD, rod.is_reversed
-    record["base_end_point"], record["length"], record["line"] = rod.base_end, length, line
-    record["platform_end_point"] = _platform_point(mechanism, rod.platform_end, rod.is_reversed)
-    record["slides"] = rod.slide is not None
+def _rod_fields(home: RecordedHome, rod: Rod) -> Fields:
+    length = norm(rod.platform_end - rod.base_end)
+    line = (rod.platform_end - rod.base_end) / length
+    twists = keeps_from_spinning(rod)
+    fields: Fields = {
+        "kind": K.ROD,
+        "reversed": rod.is_reversed,
+        "base_end_point": rod.base_end,
+        "length": length,
+        "line": line,
+        "platform_end_point": _platform_point(home, rod.platform_end, rod.is_reversed),
+        "slides": rod.slide is not None,
+        "twists": twists,
+        "proximal": K.SHARED if rod.is_shared else K.NO_PROXIMAL,
+    }
     for end, ending, order in (("base_end", rod.base_ending, 1), ("platform_end", rod.platform_ending, -1)):
-        axes = _axes(ending.elements[::order])
-        record[end], record[f"{end}_axes"] = _ENDINGS[ending.kind], axes
-        record[f"{end}_side"] = _home_side(axes, line) if ending.kind == "cross" else 0.0
-    record["twists"] = keeps_from_spinning(rod)
-    base_axis, platform_axis = rod.base_ending.elements[-1].axis, rod.platform_ending.elements[0].axis
-    cosine = base_axis @ platform_axis - (line @ base_axis) * (line @ platform_axis)
-    record["twist"] = math.atan2(line @ np.cross(base_axis, platform_axis), cosine)
-    record["proximal"] = K.SHARED if rod.is_shared else K.NO_PROXIMAL
+        axes = _axes(ending, order)
+        fields |= {end: _ENDINGS[ending.kind], f"{end}_axes": axes}
+        if ending.kind == "cross":
+            fields |= {
+                f"{end}_side": _home_side(axes, line),
+                f"{end}_aimed": twists or not _points_anywhere(axes, line),
+            }
+    if twists:
+        fields["twist"] = _twist(rod.base_ending.elements[-1].axis, rod.platform_ending.elements[0].axis, line)
     if rod.proximal is not None:
-        _put_proximal(record, rod.proximal, rod.base_end, line)
-    return record
+        fields |= _proximal_fields(rod.proximal, rod.base_end, line)
+    return fields
 
 
-def _put_proximal(record: Records, proximal: ElementaryJoint, base_end: Floats, line: Floats) -> None:
-    axis = proximal.axis
-    record["proximal"], record["proximal_axis"] = _PROXIMAL[proximal.kind], axis
-    motion = axis
+def _points_anywhere(axes: Sequence[Vector], line: Vector) -> bool:
+    """True if two crossed hinges are square to each other, and the inner one to its rod."""
+    return largest([abs(axes[1] @ axes[0]), abs(axes[1] @ line)]) <= TOLERANCES.alignment
+
+
+def _twist(base_axis: Vector, platform_axis: Vector, line: Vector) -> Scalar:
+    """The angle between two axes about a line."""
+    cosine = base_axis @ platform_axis - (line @ base_axis) * (line @ platform_axis)
+    return angle_of(line @ cross(base_axis, platform_axis), cosine)
+
+
+def _proximal_fields(proximal: ElementaryJoint, base_end: Vector, line: Vector) -> Fields:
+    axis = motion = proximal.axis
+    fields: Fields = {"proximal": _PROXIMAL[proximal.kind], "proximal_axis": axis}
     if proximal.kind == "R":
         point = proximal.point + axis * (axis @ (base_end - proximal.point))
-        record["proximal_point"], record["crank"] = point, base_end - point
-        record["crank_across"] = motion = np.cross(axis, base_end - point)
+        motion = cross(axis, base_end - point)
+        fields |= {"proximal_point": point, "crank": base_end - point, "crank_across": motion}
     # the side at home: of a carriage q = middle + side root, of a crank q = atan2(B, A) + side acos(...); its sign
     # is opposite to that of the base end's motion along the rod
-    record["side"] = -1.0 if line @ motion >= 0.0 else 1.0
+    return fields | {"side": -sign(line @ motion + 0.0)}

@@ -5,22 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import add
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats, Records
 from ..description.graph import cone_line
+from ..description.joint_coordinates import deviations
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
-from .decompose import decompose
+from .decompose import sub_chains
 from .elementary_joints import ElementaryJoint, NoLeg
 from .intermediate_platforms import legs_of_sub_chain
 from .leg_forms import LegForm, RedundantJoint, Rod, closed_form_coordinates
 from .leg_records import leg_records, row_counts
+from .recorded_home import RecordedHome
+from .recording import Fields, RecordedRecords, Recording
+from .tape import area, largest, sign
 
 NO_PATH = "does not lead to the end effector"
 """The reason of a sub-chain that is on no path to the end effector."""
@@ -35,13 +41,14 @@ class LegTable:
 
     Attributes
     ----------
-    forms : the form of each leg.
+    forms : the form of each leg, with the numbers of the home that it was read at.
     limited : every coordinate that has a range.
     driven : every actuator; its column is that of its value.
     known : every coordinate that legs have in closed form; its column is that among all joint coordinates.
     aimed : `legs`, set to compute the angles of all endings, which reading `known` takes.
     task : one record.
     limits : (joint, bound) of the limits, those of `limited` (two each), then those of `cones`.
+    recording : how the records were computed; None of a part of a table.
     """
 
     forms: tuple[LegForm, ...]
@@ -53,6 +60,7 @@ class LegTable:
     known: Records
     task: Records
     limits: tuple[tuple[str, str], ...]
+    recording: Recording | None = None
 
     @cached_property
     def home_sides(self) -> Floats:
@@ -133,55 +141,58 @@ def leg_table(mechanism: Mechanism) -> LegTable:
     ------
     NoLeg : some chain is no leg in closed form; the text says why.
     """
-    forms = _forms(mechanism)
-    legs = leg_records(mechanism, forms)
+    home = RecordedHome(mechanism)
+    forms = _forms(home)
+    recorded_legs = leg_records(home, forms)
+    legs = recorded_legs.records
     coordinates = [
         (leg, element, place) for leg, form in enumerate(forms) for element, place in closed_form_coordinates(form)
     ]
     _require_all(mechanism, {(element.joint.name, element.place) for _, element, _ in coordinates})
-    known = np.array([_coordinate(mechanism, *coordinate) for coordinate in coordinates], K.COORDINATE)
+    known = RecordedRecords.of([_coordinate(home, *coordinate) for coordinate in coordinates], K.COORDINATE)
     joints = [element.joint for _, element, _ in coordinates]
-    limited = known[[joint.range is not None for joint in joints]]
+    limited = known.chosen([joint.range is not None for joint in joints])
     drives = {drive.column: number for number, drive in enumerate(mechanism.drives)}
-    driven = known[[column in drives for column in known["column"].tolist()]]
-    driven["column"] = [drives[column] for column in driven["column"].tolist()]
+    driven = known.chosen([column in drives for column in known.records["column"].tolist()])
+    driven.records["column"] = [drives[column] for column in driven.records["column"].tolist()]
     cone_joints = [joint for joint in mechanism.joints if joint.cone is not None]
-    cones = np.array([_cone(mechanism, forms, joint) for joint in cone_joints], K.CONE)
-    by_leg = np.argsort(cones["leg"], kind="stable")
-    cones, cone_joints = cones[by_leg], [cone_joints[place] for place in by_leg]
-    cones["leader"] = np.argmax(cones["half_angle"] == cones["half_angle"][:, None], axis=1) if len(cones) else 0
-    aimed = _aimed(legs, known)
+    by_leg = sorted(((_cone(home, forms, joint), joint) for joint in cone_joints), key=lambda each: each[0]["leg"])
+    cones = RecordedRecords.of([fields for fields, _ in by_leg], K.CONE)
+    half_angles = cones.records["half_angle"]
+    cones.records["leader"] = np.argmax(half_angles == half_angles[:, None], axis=1) if len(half_angles) else 0
     limits = [(joint.name, bound) for joint in joints if joint.range is not None for bound in ("min", "max")]
-    limits += [(joint.name, "cone") for joint in cone_joints]
-    task = _task(mechanism, legs)
-    legs = _aimed(legs, np.concatenate([limited, driven]))
-    return LegTable(tuple(forms), legs, aimed, limited, cones, driven, known, task, tuple(limits))
+    limits += [(joint.name, "cone") for _, joint in by_leg]
+    parts = {
+        "legs": recorded_legs._replace(records=_aimed(legs, np.concatenate([limited.records, driven.records]))),
+        "aimed": recorded_legs._replace(records=_aimed(legs, known.records)),
+        "limited": limited,
+        "cones": cones,
+        "driven": driven,
+        "known": known,
+        "task": _task(home, legs),
+    }
+    arrays = {name: part.records for name, part in parts.items()}
+    return LegTable(tuple(forms), **arrays, limits=tuple(limits), recording=Recording(home.tape, **parts))
 
 
-def _forms(mechanism: Mechanism) -> list[LegForm]:
+def _forms(home: RecordedHome) -> list[LegForm]:
     """The legs of all sub-chains."""
     forms: list[LegForm] = []
-    for chain in decompose(mechanism):
+    for chain in sub_chains(home):
         if chain.reason == NO_PATH:
             raise NoLeg(f"sub-chain {chain} {NO_PATH}")
         try:
-            forms += legs_of_sub_chain(mechanism, chain)
+            forms += legs_of_sub_chain(home, chain)
         except NoLeg as reason:
             raise NoLeg(f"sub-chain {chain}: {reason}") from None
     return forms
 
 
 def _aimed(legs: Records, coordinates: Records) -> Records:
-    """Legs set to compute the angles of endings that have one of the coordinates, or keep a rod from spinning.
-
-    Also of crossed hinges that are not square to each other, or to the rod, and so cannot point it anywhere: only their
-    angles show if they reach.
-    """
+    """Legs set to compute the angles of endings that have one of the coordinates too."""
     legs = legs.copy()
     for end, start in (("base_end", K.BASE_END), ("platform_end", K.PLATFORM_END)):
-        outer, inner = legs[f"{end}_axes"][:, 0], legs[f"{end}_axes"][:, 1]
-        deviation = np.maximum(np.abs((inner * outer).sum(axis=1)), np.abs((inner * legs["line"]).sum(axis=1)))
-        is_aimed = ((legs["twists"] == 1) | (deviation > TOLERANCES.alignment)) & (legs[end] == K.CROSS)
+        is_aimed = legs[f"{end}_aimed"] == 1
         is_aimed[coordinates["leg"][(coordinates["place"] >= start) & (coordinates["place"] < start + 3)]] = True
         legs[f"{end}_aimed"] = is_aimed & (legs["kind"] == K.ROD)
     return legs
@@ -196,29 +207,30 @@ def _require_all(mechanism: Mechanism, available: set[tuple[str, int]]) -> None:
             raise NoLeg(f"joint {joint.name} has a motor or a limit that no closed form gives")
 
 
-def _coordinate(mechanism: Mechanism, leg: int, element: ElementaryJoint, place: int) -> tuple[float, ...]:
-    """A record of `COORDINATE`, its column that among all joint coordinates."""
+def _coordinate(home: RecordedHome, leg: int, element: ElementaryJoint, place: int) -> Fields:
+    """Fields of a `COORDINATE`, its column that among all joint coordinates."""
     key = element.joint.name, element.place
-    coordinate = next(c for c in mechanism.coordinates if (c.joint.name, c.place) == key)
-    unit = 1.0 if coordinate.kind == "angle" else mechanism.characteristic_length
-    return (
-        leg,
-        place,
-        coordinate.column,
-        int(coordinate.joint.type in ("revolute", "cylindrical") and coordinate.kind == "angle"),
-        element.sense,
-        *coordinate.room(unit),
-        coordinate.home,
-        unit,
-    )
+    coordinate = next(c for c in home.mechanism.coordinates if (c.joint.name, c.place) == key)
+    unit = home.scalar(1.0) if coordinate.kind == "angle" else home.length
+    lo, hi = deviations(coordinate.bounds, home.coordinate(coordinate), unit)
+    return {
+        "leg": leg,
+        "place": place,
+        "column": coordinate.column,
+        "turns": coordinate.joint.type in ("revolute", "cylindrical") and coordinate.kind == "angle",
+        "sense": element.sense,
+        "lo": lo,
+        "hi": hi,
+        "home": home.coordinate(coordinate),
+        "unit": unit,
+    }
 
 
-def _cone(mechanism: Mechanism, forms: Sequence[LegForm], joint: Joint) -> tuple[object, ...]:
-    """A record of `CONE`: at an end of a rod, about its line, fixed to the body that the end is on."""
+def _cone(home: RecordedHome, forms: Sequence[LegForm], joint: Joint) -> dict[str, Any]:
+    """Fields of a `CONE`: at an end of a rod, about its line, fixed to the body that the end is on."""
     reason = f"the cone of joint {joint.name} does not limit a rod's line against what its end is on"
     assert joint.cone is not None
-    start, end = cone_line(mechanism, joint)
-    length = mechanism.characteristic_length
+    start, end = cone_line(home.mechanism, joint)
     for leg, form in enumerate(forms):
         if not isinstance(form, Rod):
             continue
@@ -230,34 +242,40 @@ def _cone(mechanism: Mechanism, forms: Sequence[LegForm], joint: Joint) -> tuple
             if not elements_here:
                 continue
             body = elements_here[-1].outward if at_platform_end else elements_here[0].inward
-            ends = np.array([start.at, end.at]) / length
+            ends = home.point(start), home.point(end)
             line = form.platform_end - form.base_end
-            distances = [np.linalg.norm(np.cross(point - form.base_end, line)) for point in ends]
+            distance = largest(area(point - form.base_end, line) for point in ends)
             is_outermost = (
                 elements_here[-1] is ending.elements[-1] if at_platform_end else elements_here[0] is ending.elements[0]
             )
             other_joints = {element.joint.name for element in form.elements} - {joint.name}
             if (
                 joint.cone.fixed_to != body
-                or max(distances) > TOLERANCES.implied
+                or distance > TOLERANCES.implied
                 or not is_outermost
                 or end.name not in other_joints
             ):
                 raise NoLeg(reason)
-            sense = math.copysign(1.0, (ends[1] - ends[0]) @ line)
             half_angle = joint.cone.half_angle
-            least = math.cos(half_angle + TOLERANCES.limit)
-            return leg, place, tuple(sense * np.array(joint.cone.axis)), half_angle, least, 0
+            return {
+                "leg": leg,
+                "place": place,
+                "axis": home.vector(*joint.cone.axis) * sign((ends[1] - ends[0]) @ line),
+                "half_angle": half_angle,
+                "least_cosine": math.cos(half_angle + TOLERANCES.limit),
+            }
     raise NoLeg(reason)
 
 
-def _task(mechanism: Mechanism, legs: Records) -> Records:
-    task, description = np.zeros(1, K.TASK), task_of(mechanism)
-    task["length"] = mechanism.characteristic_length
-    task["reference"] = np.asarray(mechanism.reference_point) / mechanism.characteristic_length
-    points = mechanism.platform_points
-    if len(points):
-        task["centre"] = points.mean(axis=0) / mechanism.characteristic_length - task["reference"]
+def _task(home: RecordedHome, legs: Records) -> RecordedRecords:
+    mechanism, description = home.mechanism, task_of(home.mechanism)
+    recorded: Fields = {"length": home.length, "reference": home.reference_point}
+    on_platform = [joint for joint in mechanism.joints if mechanism.end_effector in joint.connects]
+    centres = [home.centre(joint) for joint in on_platform if joint.at is not None]
+    if centres:
+        recorded["centre"] = reduce(add, centres) / len(centres) / home.length - home.reference_point
+    recorded_task = RecordedRecords.of([recorded], K.TASK)
+    task = recorded_task.records
     task["axes"], task["rotations"] = description.axes, description.rotations
     task["unset"] = 0 if mechanism.end_effector_is_joint else 6 - sum(description.axes) - description.rotations
     if mechanism.end_effector_is_joint:  # it has no orientation: home's
@@ -266,4 +284,4 @@ def _task(mechanism: Mechanism, legs: Records) -> Records:
     redundant = legs[(legs["kind"] == K.REDUNDANT) & (legs["mirror_of"] < 0)]
     task["redundant"] = len(redundant) if redundant["has_rows"].any() else 0
     task["implicit"] = bool((redundant["has_rows"] & (redundant["orients"] == 0)).any())
-    return task
+    return recorded_task

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from ..arrays import Floats
 from ..description.joints import Joint
 from ..tolerances import TOLERANCES
+from .recorded_home import RecordedHome
+from .tape import Vector, area, largest, norm
 
 
 @dataclass(frozen=True)
@@ -36,13 +35,12 @@ class Parallelogram:
         return self.rods[0] + self.rods[1]
 
 
-def parallelogram_of(paths: Sequence[Sequence[Joint]], length: float) -> Parallelogram | None:
+def parallelogram_of(paths: Sequence[Sequence[Joint]], home: RecordedHome) -> Parallelogram | None:
     """The parallelogram that the paths between two bodies form at home, or None.
 
     Parameters
     ----------
     paths : the joints of each path, from the inner body outward.
-    length : characteristic length of the mechanism [length]; tolerances are relative to it.
     """
     if len(paths) != 2 or any(len(path) != 2 for path in paths):
         return None
@@ -50,28 +48,23 @@ def parallelogram_of(paths: Sequence[Sequence[Joint]], length: float) -> Paralle
     if not (types == {"revolute"} or types <= {"universal", "spherical"}):
         return None
     pinned = types == {"revolute"}
-    axis = np.array(paths[0][0].axis) if pinned else np.zeros(3)
-    if pinned and any(_area(np.array(joint.axis), axis) > TOLERANCES.alignment for path in paths for joint in path):
+    axis = home.axis(paths[0][0]) if pinned else home.vector(0.0, 0.0, 0.0)
+    if pinned and any(area(home.axis(joint), axis) > TOLERANCES.alignment for path in paths for joint in path):
         return None
-    (a, b), (c, d) = ([_across(np.array(joint.at), axis) for joint in path] for path in paths)
+    (a, b), (c, d) = ([_across(home.centre(joint), axis) for joint in path] for path in paths)
     rod, side = b - a, c - a
-    if np.linalg.norm((d - c) - rod) > TOLERANCES.alignment * length or not _spans(rod, side):
+    if norm((d - c) - rod) > home.length * TOLERANCES.alignment or not _spans(rod, side):
         return None
     (inner, outer), (inner_beside, outer_beside) = paths
     rods = ((inner.name, outer.name), (inner_beside.name, outer_beside.name))
-    return Parallelogram(rods, float(np.linalg.norm(rod)), float(np.linalg.norm(side)), pinned)
+    return Parallelogram(rods, norm(rod).value, norm(side).value, pinned)
 
 
-def _across(point: Floats, axis: Floats) -> Floats:
+def _across(point: Vector, axis: Vector) -> Vector:
     """A point without its component along an axis: where on its axis a pin is does not matter."""
-    return np.asarray(point - (point @ axis) * axis)
+    return point - axis * (point @ axis)
 
 
-def _area(a: Floats, b: Floats) -> float:
-    """Area between two vectors; of unit vectors, the sine of the angle between them."""
-    return float(np.linalg.norm(np.cross(a, b)))
-
-
-def _spans(rod: Floats, side: Floats) -> bool:
+def _spans(rod: Vector, side: Vector) -> bool:
     """True if two sides are not parallel: a flat parallelogram may open into one whose rods cross."""
-    return _area(rod, side) > TOLERANCES.alignment * max(float(rod @ rod), float(side @ side))
+    return area(rod, side) > largest([rod @ rod, side @ side]) * TOLERANCES.alignment

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats
 from ..derived import derived
-from ..rotations import square_to
+from ..kernels.tape import LENGTH, SQUARE, V_SUBTRACT, result
 from ..tolerances import TOLERANCES
 from .graph import next_joints, steps_from_base, tree_of
 from .joint_types import KINDS
@@ -154,14 +154,21 @@ def universal_axes(mechanism: Structure, joint: Joint) -> Floats:
     """
     if joint.axes is not None:
         return np.asarray(joint.axes)
+    ends, is_forward = ends_of_default_axes(mechanism, joint)
+    lines = [result(V_SUBTRACT, end.at or (), joint.at or ()) for end in ends if end.at != joint.at]
+    normals = np.reshape(result(SQUARE, lines[0], result(LENGTH, lines[0])), (2, 3)) if lines else np.eye(3)[:2]
+    return np.asarray(normals if is_forward else normals[::-1])
+
+
+def ends_of_default_axes(mechanism: Structure, joint: Joint) -> tuple[list[Joint], bool]:
+    """The joints to which the line of a universal joint may be that its default axes are square to, by precedence.
+
+    Also whether the first of these axes is that of the joint's first body.
+    """
     steps = steps_from_base(mechanism)
     inward, outward = sorted(joint.connects, key=lambda body: steps.get(body, 0))
     sides = [next_joints(mechanism.joints, joint, body) for body in (outward, inward)]
-    lines = [
-        np.asarray(ends[0].at) - np.asarray(joint.at) for ends in sides if len(ends) == 1 and ends[0].at != joint.at
-    ]
-    normals = square_to(lines[0]) if lines else np.eye(3)[:2]
-    return np.asarray(normals if joint.connects[0] == inward else normals[::-1])
+    return [ends[0] for ends in sides if len(ends) == 1], joint.connects[0] == inward
 
 
 def joint_screws(mechanism: Structure, joint: Joint, point: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -51,6 +52,15 @@ class JointCoordinate:
 
     def room(self, unit: float) -> Range:
         """Its bounds as deviations from home, in a unit [length or rad], with room for answers that are put inside."""
-        low, high = ((bound - self.home) / unit for bound in self.bounds)
-        lacking = max(TOLERANCES.inside - 0.5 * (high - low), 0.0)
-        return low - lacking, high + lacking
+        low, high = deviations(self.bounds, self.home, unit)
+        return low, high
+
+
+def deviations(bounds: Range, home: Any, unit: Any) -> tuple[Any, Any]:
+    """Bounds as deviations from home, in a unit [length or rad], with room for answers that are put inside.
+
+    Home and unit are numbers, or recorded as `decomposition.tape` does, and so then are the deviations.
+    """
+    low, high = ((bound - home) / unit for bound in bounds)
+    lacking = max(TOLERANCES.inside - 0.5 * (high - low), 0.0)
+    return low - lacking, high + lacking

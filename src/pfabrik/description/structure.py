@@ -12,7 +12,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import UnknownName
-from .coercion import items, numbers, text, texts, unit_vector
+from ..kernels.tape import LENGTH, V_DIVIDE, V_SUBTRACT, result
+from .coercion import items, numbers, text, texts
 from .enclosing import enclosing_radius
 from .joint_coordinates import JointCoordinate
 from .joint_types import KINDS, TASK_COORDINATES, WHOLE_TASK
@@ -97,11 +98,12 @@ class Structure:
         """The coordinates of all joints, in the order of `coordinate_names`."""
         found: list[JointCoordinate] = []
         for joint in self.joints:
-            homes = np.ravel(self.home_coordinate(joint.name)).tolist()
+            home = self.home_coordinate(joint.name)
+            homes = home if isinstance(home, tuple) else (home,)
             names = [joint.name] if len(homes) == 1 else [f"{joint.name}[{place}]" for place in range(len(homes))]
             found += [
-                JointCoordinate(name, joint, place, len(found) + place, home)
-                for place, (name, home) in enumerate(zip(names, homes, strict=True))
+                JointCoordinate(name, joint, place, len(found) + place, value)
+                for place, (name, value) in enumerate(zip(names, homes, strict=True))
             ]
         return tuple(found)
 
@@ -188,7 +190,7 @@ class Structure:
         """
         joint = self.joint(name)
         if joint.along is not None:
-            return math.dist(*self._centres_along(joint))
+            return result(LENGTH, self._span_along(joint))[0]
         return (0.0,) * len(KINDS[joint.type].coordinates) if joint.type in ("spherical", "fixed") else joint.home
 
     def home_axis(self, name: str) -> Vector:
@@ -200,15 +202,20 @@ class Structure:
         joint = self.joint(name)
         if joint.along is None:
             return cast(Vector, joint.axis)
-        start, end = self._centres_along(joint)
-        return cast(Vector, unit_vector(tuple(b - a for a, b in zip(start, end, strict=True))))
+        span = self._span_along(joint)
+        return cast(Vector, tuple(result(V_DIVIDE, span, result(LENGTH, span))))
 
-    def _centres_along(self, joint: Joint) -> tuple[Vector, Vector]:
-        """Centres of the two joints of `along`: of the one on the first body, then of the one on the second."""
+    def _span_along(self, joint: Joint) -> list[float]:
+        """From the joint of `along` on the first body to that on the second, at home [length]."""
+        start, end = self.ends_along(joint)
+        return result(V_SUBTRACT, cast(Vector, end.at), cast(Vector, start.at))
+
+    def ends_along(self, joint: Joint) -> tuple[Joint, Joint]:
+        """The two joints of `along`: the one on the first body, then the one on the second."""
         first, second = (self.joint(name) for name in joint.along or ())
         if joint.connects[0] not in first.connects or joint.connects[1] not in second.connects:
             first, second = second, first
-        return cast(Vector, first.at), cast(Vector, second.at)
+        return first, second
 
     def _end_effector_joint(self) -> Joint | None:
         """The joint that the end effector is named after, whatever else may be wrong with the description."""

@@ -174,11 +174,10 @@ def _rod_numbers(rod: Rod, record: Record, length: float) -> dict[str, Number]:
     }
     numbers["length"] = record["length"] * length
     if rod.proximal is not None:
-        start = record["proximal_point"] if record["proximal"] == K.CRANK else rod.base_end
         numbers |= {
             "axis": record["proximal_axis"],
             "side": record["side"],
-            "reach": (rod.platform_end - start) * length,
+            "reach": (record["crank"] + record["length"] * record["line"]) * length,
         }
         fields = {"centre": "proximal_point", "crank": "crank", "across": "crank_across"}
         numbers |= {name: record[field] * length for name, field in fields.items()}

@@ -57,17 +57,17 @@ def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
     model = model_of(mechanism)
     rods: list[tuple[str, Floats, str, Floats]] = []
     proximal: ElementaryJoint | None = None
-    for form in model.legs.forms if model.has_legs else ():
+    for form, record in zip(model.legs.forms, model.legs.legs, strict=True) if model.has_legs else ():
         if not isinstance(form, Rod):
             continue
-        proximal = proximal if form.is_shared else form.proximal
+        if not form.is_shared:
+            proximal, first = form.proximal, record
         if proximal is None or form.slide is not None or not form.base_ending.elements:
             continue
-        turns = proximal.kind == "R"
-        motion = np.cross(proximal.axis, form.base_end - proximal.point) if turns else proximal.axis
-        rods.append(
-            (form.base_ending.elements[-1].outward, form.platform_end - form.base_end, proximal.outward, motion)
-        )
+        axis = motion = first["proximal_axis"]
+        if proximal.kind == "R":
+            motion = np.cross(axis, record["base_end_point"] - first["proximal_point"])
+        rods.append((form.base_ending.elements[-1].outward, record["line"], proximal.outward, motion))
     return rods
 
 

@@ -48,7 +48,10 @@ class LegsEngine(Engine):
     def __init__(self, model: Model) -> None:
         self._model, self._table = model, model.legs
         self._joint_space, self._single = ClosureEngine(model), SingleTarget(model)
-        self._single_forward = SingleAssembly(model)
+
+    @cached_property
+    def _single_forward(self) -> SingleAssembly:
+        return SingleAssembly(self._model)
 
     @cached_property
     def _searches(self) -> bool:

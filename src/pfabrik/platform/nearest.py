@@ -313,5 +313,6 @@ def _split_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
         records = {name: array[(array["leg"] >= k) & (array["leg"] < end)] for name, array in records.items()}
         for array in records.values():
             array["leg"] -= k
-        parts.append((replace(table, forms=table.forms[k:end], legs=part_legs, **records), slice(k, end)))
+        part = replace(table, forms=table.forms[k:end], legs=part_legs, recording=None, **records)
+        parts.append((part, slice(k, end)))
     return tuple(parts)
