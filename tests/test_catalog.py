@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import checks
-import oracles_by_leg as by_leg
+import oracles
 import pfabrik as pf
 from machines.published import PUBLISHED, moved_from_home
 from oracles import search
@@ -196,8 +196,8 @@ def test_what_is_called_out_of_reach_is(name: str, count: int) -> None:
 
 def reached_in_closed_form(mechanism: Mechanism, targets: Array) -> NDArray[np.bool_] | None:
     """Which targets (n, 4, 4) a closed form reaches, (n,); None without one."""
-    for solve_ik in (by_leg.solve_ik, geometric.solve_ik):
-        with suppress(by_leg.Unsuitable, geometric.NoClosedForm):
+    for solve_ik in (oracles.solve_ik, geometric.solve_ik):
+        with suppress(oracles.NoClosedForm, geometric.NoClosedForm):
             return np.asarray(solve_ik(mechanism, targets).reached)
     return None
 

@@ -301,7 +301,7 @@ def test_a_start_far_away_keeps_its_working_mode_as_a_path_does(count: int) -> N
 def arm_with_tool(tip: str) -> Mechanism:
     """An arm placed by the hinge of a tool that hangs on it alone."""
     joints = [
-        *chain(1, *closure._ARM, end="hand"),
+        *chain(1, *closure.ARM, end="hand"),
         joint(tip, "tip", ("hand", "tool"), (300, 0, 340), Z, range=(-0.5, 0.5)),
     ]
     return Mechanism("arm with a tool", joints, "tip")

@@ -71,99 +71,7 @@ def is_same_pose(mechanism: pf.Mechanism, found: np.ndarray, expected: np.ndarra
     return np.maximum(away, np.abs(found[..., :3, :3] - expected[..., :3, :3]).max(axis=(-1, -2))) <= atol
 
 
-# --- the oracles themselves ------------------------------------------------------------------------------------------
-
-
-def test_oracle_planar_3rpr_has_as_many_roots_as_its_sextic() -> None:
-    """f is a trigonometric polynomial of degree three: its roots are those of a sextic on the unit circle."""
-    rng = np.random.default_rng(1)
-    counts = []
-    for _ in range(60):
-        geometry = assembly.Planar3RPR(*rng.uniform([2, 2, 0.3, 3, -1, 3], [4, 4, 2.5, 6, 2, 6]))
-        p = geometry.lengths(*rng.uniform([-3, -2, -2], [3, 4, 4]))
-        samples = geometry.f(2 * np.pi * np.arange(16) / 16, p)
-        harmonics = np.fft.fft(samples) / 16
-        assert np.abs(harmonics[4:13]).max() <= 1e-12 * np.abs(harmonics).max()
-        roots = np.roots([harmonics[k] for k in (3, 2, 1, 0, -1, -2, -3)])
-        real = np.sort(np.angle(roots[np.abs(np.abs(roots) - 1) < 1e-8]))
-        np.testing.assert_allclose(geometry.roots(p), real, atol=1e-6)
-        for solution in geometry.solutions(p):
-            np.testing.assert_allclose(geometry.lengths(*solution), p, atol=1e-9)
-        counts.append(len(real))
-    assert {2, 4} <= set(counts)
-
-
-@pytest.mark.parametrize("case", ["sauer_fig1_15", "sauer_p2_5"])
-def test_oracle_planar_3rpr_finds_the_published_poses(case: str) -> None:
-    geometry = assembly.Planar3RPR(**PUBLISHED[case]["geometry"])
-    np.testing.assert_allclose(geometry.solutions(PUBLISHED[case]["p"]), PUBLISHED[case]["poses_theta_x_y"], atol=1e-12)
-
-
-def test_oracle_planar_3rpr_finds_two_positions_at_one_angle() -> None:
-    """Level, the platform's and the base's corners lie on parallel lines: f touches zero there, and y may be either."""
-    geometry = assembly.Planar3RPR(L2=5.0, L3=3.0, gamma=0.4, x1=2.0, x2=5 * np.cos(0.4) - 2, y2=5 * np.sin(0.4))
-    found = geometry.solutions(geometry.lengths(0.0, 1.0, 2.0))
-    for expected in ((0.0, 1.0, 2.0), (0.0, 1.0, -2.0)):
-        assert min(np.abs(np.subtract(each, expected)).max() for each in found) <= 1e-6
-
-
-@pytest.mark.parametrize("transition, below, above", PUBLISHED["sauer_intervals"]["transitions_p2_from_to"])
-def test_oracle_planar_3rpr_counts_change_at_the_published_transitions(
-    transition: float, below: int, above: int
-) -> None:
-    geometry = assembly.Planar3RPR(**PUBLISHED["sauer_p2_5"]["geometry"])
-    for p2, count in ((transition - 3e-6, below), (transition + 3e-6, above)):
-        assert len(geometry.solutions([5, p2, 3])) == count
-
-
-def test_oracle_five_bar_tips_are_a_forearm_from_both_elbows() -> None:
-    mechanism = machine("five_bar")
-    tips = assembly.five_bar_tips(mechanism, [0.0, 0.0])
-    assert len(tips) == 2
-    assert min(np.linalg.norm(tip - mechanism.reference_point) for tip in tips) <= 1e-12 * 200
-    assert assembly.five_bar_tips(mechanism, np.radians([60.0, -60.0])) == []
-
-
-def test_oracle_three_spheres_meet_in_two_points_at_their_radii() -> None:
-    radii = np.linalg.norm(published.TRIPOD_FEET - published.TRIPOD_TIP, axis=1)
-    found = assembly.spheres_meet(published.TRIPOD_FEET, radii)
-    assert len(found) == 2
-    for point in found:
-        np.testing.assert_allclose(np.linalg.norm(published.TRIPOD_FEET - point, axis=1), radii)
-    assert assembly.spheres_meet(published.TRIPOD_FEET, [10.0, 10.0, 10.0]) == []
-
-
-def test_oracle_six_struts_agree_with_a_solver_of_other_hands() -> None:
-    for case in ("gsp_mathworks_home", "gsp_linuxcnc_home"):
-        geometry, lengths = PUBLISHED[case]["geometry"], PUBLISHED[case]["L"]
-        ours, hits = assembly.gough_modes(geometry["base"], geometry["platform"], lengths)
-        theirs = assembly.gough_modes_by_least_squares(geometry["base"], geometry["platform"], lengths)
-        assert len(ours) == len(theirs) == 8
-        assert hits.min() >= 20
-        for pose in theirs:
-            assert np.abs(ours - pose).max(axis=(1, 2)).min() <= 1e-7
-
-
-def test_oracle_six_struts_finds_all_40_of_dietmaiers_postures() -> None:
-    found, _ = assembly.gough_modes(
-        published.DIETMAIER_BASE, published.DIETMAIER_PLATFORM, published.DIETMAIER_LENGTHS, starts=8000
-    )
-    assert len(found) == 40
-    lengths = oracles.leg_lengths(published.DIETMAIER_BASE, published.DIETMAIER_PLATFORM, found)
-    np.testing.assert_allclose(lengths, np.tile(published.DIETMAIER_LENGTHS, (40, 1)), atol=1e-11)
-
-
-@pytest.mark.parametrize("row", PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"])
-def test_oracle_3rps_finds_the_published_pose(row: list[float]) -> None:
-    geometry = PUBLISHED["rps_leeshah"]["geometry"]
-    pose, lengths = lee_shah_pose(row), row[5:]
-    azimuth = np.radians(geometry["azimuth_deg"])
-    tops = geometry["platform_radius"] * np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=1)
-    tops = tops @ pose[:3, :3].T + pose[:3, 3]
-    side = np.sqrt(3.0) * geometry["platform_radius"]
-    found = assembly.rps_tops(geometry["base_radius"], side, lengths)
-    assert min(np.abs(each - tops).max() for each in found) <= 1e-8
-    assert len(found) % 2 == 0  # each has its mirror image below the base
+# --- the check of joints ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["stewart", "nrpm", "five_bar", "tripod_rps", "hexaglide", "planar_rrr"])
@@ -182,11 +90,6 @@ def test_the_check_of_joints_accepts_home_and_notices_one_wrong_joint(name: str)
 
 
 # --- closed forms and published answers ------------------------------------------------------------------------------
-
-
-def lee_shah_pose(row: list[float]) -> np.ndarray:
-    a, b, pz, px, py = row[:5]
-    return pf.pose([px, py, pz], rotation=Rotation.from_euler("ZYZ", [a, b, -a]))
 
 
 @pytest.mark.parametrize("p, rpy, lengths", PUBLISHED["gsp_conroy"]["rows_p_rpy_L"])
@@ -219,7 +122,7 @@ def test_published_parasitic_motion_of_a_3rps_from_its_leg_lengths(row: list[flo
     mechanism = published.rps(geometry["base_radius"], geometry["platform_radius"], 200.0)
     answer = pf.solve_fk(mechanism, row[5:])
     assert answer.status is Status.REACHED
-    np.testing.assert_allclose(answer.pose, lee_shah_pose(row), rtol=0, atol=1e-7)
+    np.testing.assert_allclose(answer.pose, published.lee_shah_pose(row), rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("case", ["sauer_fig1_15", "sauer_p2_5"])
@@ -495,7 +398,7 @@ def test_elbows_too_far_apart_come_together() -> None:
     assert_feasible(mechanism, asked, answer)
     y, z = np.meshgrid(np.linspace(-150.1, 150, 121), np.linspace(0.1, 250, 101))
     targets = oracles.poses(np.stack([0 * y.ravel(), y.ravel(), z.ravel()], axis=1))
-    inside = targets[oracles.reachable(mechanism, targets)]
+    inside = targets[oracles.margin(mechanism, targets) >= 0]
     nearest = np.linalg.norm(oracles.actuators(mechanism, inside) - asked, axis=1).min()
     assert np.linalg.norm(answer.actuators - asked) <= 1.05 * nearest
 

@@ -188,8 +188,8 @@ def test_another_working_mode_is_used_where_only_it_keeps_the_limits() -> None:
     """An elbow range that contains home, not home's bend at the target, but the mirrored one."""
     machine = pf.load("five_bar").without_limits().with_limits(p2=np.radians((-100.0, 140.0)))
     target = np.subtract(machine.reference_point, (0.0, 5.0, 75.0))
-    modes = oracles.working_mode_margins(machine, oracles.poses(target[None]))[0]
-    assert modes[0] < 0 < modes.max()
+    modes = oracles.working_modes(machine, target)
+    assert modes.margins[0] < 0 < modes.margins.max()
     assert pf.solve_ik(machine, target)
     kept = pf.solve_ik(machine, target, options=pf.Options(working_mode="keep"))
     assert kept.status is pf.Status.PROJECTED

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import oracles_by_leg as by_leg
+import oracles
 import pfabrik as pf
 from machines import closure, tripod_rps
 from pfabrik import Joint, Mechanism, Solution, Status
@@ -53,7 +53,7 @@ def test_closed_forms_reach_all_the_way_and_no_farther(name: str) -> None:
     for ray, far in zip(rays, distances, strict=True):
         steps = np.append(np.linspace(0.0, far, 100, endpoint=False), (far - beside, far + beside))
         way = np.array(mechanism.reference_point) + np.outer(steps, ray / np.linalg.norm(ray))
-        reached = by_leg.solve_ik(mechanism, way).reached
+        reached = oracles.solve_ik(mechanism, way).reached
         np.testing.assert_array_equal(reached, [True] * 101 + [False])
 
 

@@ -13,7 +13,7 @@ import pytest
 
 import checks
 import machines
-import oracles_by_leg as by_leg
+import oracles
 import pfabrik as pf
 from machines import closure
 from oracles import assembly
@@ -396,7 +396,7 @@ def test_what_no_arm_is_long_enough_for_has_no_modes(name: str, position: tuple)
 @pytest.mark.parametrize("name", ["stewart", "rps"])
 def test_a_strut_has_a_mode_however_far_and_exceeds_its_stroke(name: str, away: float) -> None:
     modes = pf.working_modes(pf.load(name), (0, 0, away))
-    assert len(modes) == len(by_leg.working_modes(pf.load(name), (0, 0, away)).actuators) > 0
+    assert len(modes) == len(oracles.working_modes(pf.load(name), (0, 0, away)).actuators) > 0
     assert all(mode.status == Status.EXCEEDED for mode in modes)
 
 

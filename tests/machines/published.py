@@ -29,6 +29,13 @@ def moved_from_home(pose: Array, home_pose: Array) -> Array:
     return result
 
 
+def lee_shah_pose(row: Sequence[float]) -> Array:
+    """The pose of a 3-RPS in a row of Lee and Shah's table: two angles, then z, x and y."""
+    a, b, pz, px, py = row[:5]
+    turn = Rotation.from_euler("ZYZ", [a, b, -a]).as_matrix()
+    return np.block([[turn, np.array([[px], [py], [pz]])], [np.zeros(3), 1.0]])
+
+
 # --- planar ----------------------------------------------------------------------------------------------------------
 
 
