@@ -254,28 +254,12 @@ def test_a_file_begins_with_a_line_that_says_what_the_machine_is(name: str) -> N
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_saved_machine_is_the_same(name: str, tmp_path: object) -> None:
-    path = f"{tmp_path}/{name}.toml"
-    pf.save(machine(name), path)
-    assert pf.load(path) == machine(name)
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_machines_have_the_freedoms_that_the_literature_counts(name: str) -> None:
     counted = pf.mobility(machine(name))
     assert (counted.platform, counted.mobility) == FREEDOMS[name]
     assert counted.uncontrolled == 0
     assert counted.over_constraints == OVER_CONSTRAINTS.get(name, 0)
     assert counted.internal == (6 if name == "nrpm" else 0)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_home_is_reached_and_is_where_the_file_says(name: str) -> None:
-    mechanism = machine(name)
-    home = pf.solve_ik(mechanism, mechanism.home_pose)
-    assert home.status is Status.REACHED
-    expected = [mechanism.home_coordinate(actuator) for actuator in mechanism.actuator_names]
-    np.testing.assert_allclose(home.actuators, expected, atol=1e-9 * mechanism.characteristic_length)
 
 
 # Published numbers

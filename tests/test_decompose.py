@@ -409,41 +409,6 @@ def test_sub_chains_come_in_the_order_of_their_first_joints(name: str, seed: int
     assert firsts == sorted(firsts)
 
 
-def swapped(joint: Joint) -> Joint:
-    """The same joint seen from its other body: an axis coordinate changes sign, a distance does not."""
-    changes: dict[str, object] = {"connects": joint.connects[::-1]}
-    if joint.type in ("revolute", "prismatic") and joint.along is None:
-        changes["home"] = -joint.home
-        changes["range"] = joint.range and (-joint.range[1], -joint.range[0])
-    return dataclasses.replace(joint, **changes)
-
-
-@pytest.mark.parametrize("name", NOTATION)
-def test_a_joint_described_the_other_way_around_flips_its_coordinate_and_nothing_else(name: str) -> None:
-    original = machine(name)
-    rng = np.random.default_rng(5)
-    length = original.characteristic_length
-    targets = [
-        pf.pose(original.reference_point + 0.1 * length * rng.normal(size=3), rotvec=0.1 * rng.normal(size=3))
-        for _ in range(2 if INTERPRETED else 10)
-    ]
-    expected = pf.solve_ik(original, targets)
-    for every in (1, 2, 3):
-        chosen = {joint.name for joint in original.joints[::every]}
-        other = dataclasses.replace(original, joints=[swapped(j) if j.name in chosen else j for j in original.joints])
-        answer = pf.solve_ik(other, targets)
-        signs = [-1 if a in chosen and original.joint(a).along is None else 1 for a in original.actuator_names]
-        np.testing.assert_array_equal(answer.status, expected.status)
-        np.testing.assert_allclose(answer.pose, expected.pose, rtol=0, atol=1e-9 * length)
-        # at the border of a workspace a pose exact to 1e-9 L leaves its joints known to the root of that
-        known = np.where(expected.status == pf.Status.REACHED, 1e-9, np.sqrt(1e-9))[:, None] * length
-        if name == "serial_spherical":  # more freedoms than its task asks for
-            continue
-        assert (np.abs(answer.actuators - expected.actuators * signs) <= known).all()
-        for joint, points in expected.points.items():
-            assert (np.abs(answer.points[joint] - points) <= known).all()
-
-
 def hexapod_with(*wrist: Joint) -> Mechanism:
     """Six struts; the joints of each at the platform are those given, numbered, at its upper end."""
     joints = []

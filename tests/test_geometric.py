@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import pickle
 import re
 from collections.abc import Callable
@@ -17,6 +16,7 @@ from scipy.spatial.transform import RigidTransform
 
 import oracles
 import pfabrik as pf
+from checks import INTERPRETED, home_values
 from paper import geometric
 from paper.geometric import NoClosedForm, arms, facts, targets
 from paper.geometric.topologies import TOPOLOGIES, closed_form
@@ -24,7 +24,6 @@ from pfabrik import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument
 from pfabrik.tolerances import TOLERANCES
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
 EXAMPLES = {"R*-R-R": "five_bar", "U-P*-S": "stewart", "R*-P*-[U-P*-S, U-P*-S]": "nrpm"}
@@ -153,7 +152,7 @@ def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(started: bool
     column, every_arm = mechanism.actuator_names.index, oracles.arms(mechanism)
     sides = [np.linspace(*j.range, arms.CANDIDATES_A_SIDE) for j in (every_arm[0].hinge, every_arm[0].slide)]
     grid = np.stack(np.meshgrid(*sides, indexing="ij")).reshape(2, -1).T  # the arms are alike
-    starts = np.tile(oracles.home_values(mechanism), (len(wanted), 1))
+    starts = np.tile(home_values(mechanism), (len(wanted), 1))
     if started:
         rng = np.random.default_rng(4)
         for arm in every_arm:

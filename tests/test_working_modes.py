@@ -497,13 +497,6 @@ def test_without_a_seed_the_answer_is_the_mode_of_home(name: str) -> None:
     assert answer
     assert apart(answer, pf.working_modes(mechanism, here)[0]) <= 1e-6
 
-    make, here, _ = SEEDED[name]
-    free = make().without_limits()
-    modes = pf.working_modes(free, here)
-    wrong = max(modes, key=lambda mode: apart(mode, modes[0]))
-    home = np.array([np.ravel(free.home_coordinate(each))[0] for each in free.actuator_names])
-    del wrong, home
-
 
 def barred(name: str) -> tuple[pf.Mechanism, object]:
     """A machine with one limit, that bars the mode of home from a target but leaves another; the target."""

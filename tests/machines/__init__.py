@@ -1,5 +1,12 @@
-"""Machines for tests, here those that positions express; `closure` has others, `published` those of the literature."""
+"""Machines for tests: what positions express, what they do not (`closure`), trees, and those of the literature."""
 
+from collections.abc import Callable
+from functools import cache, partial
+
+from pfabrik import Mechanism, catalog, load
+
+from .closure import MACHINES as CLOSED
+from .closure import ON_ARMS, coaxial_rrr
 from .positions import (
     MACHINES,
     hexaglide,
@@ -13,12 +20,30 @@ from .positions import (
     tripod_prs,
     tripod_rps,
 )
+from .trunks import TRUNKS
+
+EVERY: dict[str, Callable[[], Mechanism]] = {
+    **{name: partial(load, name) for name in catalog()},
+    **{f"positions.{name}": make for name, make in MACHINES.items()},
+    **{f"closure.{name}": make for name, make in (CLOSED | ON_ARMS | {"coaxial_rrr": coaxial_rrr}).items()},
+}
+"""Every machine of the catalogue and of the tests but trees."""
+
+
+@cache
+def machine(name: str) -> Mechanism:
+    """A machine by its name in `EVERY`, or in `MACHINES` or `TRUNKS`; made once."""
+    return (TRUNKS | MACHINES | EVERY)[name]()
+
 
 __all__ = [
+    "EVERY",
     "MACHINES",
+    "TRUNKS",
     "hexaglide",
     "hexapod_rus",
     "hexapod_ups",
+    "machine",
     "mixed",
     "planar",
     "ring",

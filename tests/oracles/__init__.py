@@ -7,9 +7,20 @@ target, `search` a blind search for a configuration that has a pose, `annuli` ar
 """
 
 from .arms import ACCURACY, arms
-from .ik import Answer, WorkingModes, home_values, solve_ik, working_modes
+from .ik import Answer, WorkingModes, solve_ik, working_modes
 from .rods import NoClosedForm
-from .targets import actuators, edge, inside_targets, leg_lengths, margin, poses, random_targets
+from .targets import (
+    actuators,
+    any_targets,
+    any_values,
+    edge,
+    inside_targets,
+    leg_lengths,
+    margin,
+    poses,
+    random_targets,
+    targets_about,
+)
 from .turns import Array
 
 __all__ = [
@@ -19,14 +30,16 @@ __all__ = [
     "NoClosedForm",
     "WorkingModes",
     "actuators",
+    "any_targets",
+    "any_values",
     "arms",
     "edge",
-    "home_values",
     "inside_targets",
     "leg_lengths",
     "margin",
     "poses",
     "random_targets",
     "solve_ik",
+    "targets_about",
     "working_modes",
 ]

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from checks import home_values
 from pfabrik import Mechanism
 from pfabrik.poses import as_poses
 from pfabrik.tolerances import TOLERANCES
@@ -47,17 +48,12 @@ def plan_of(mechanism: Mechanism) -> Plan:
     driven = [leg.actuated for leg in legs]
     columns = [-1 if joint is None else mechanism.actuator_names.index(joint.name) for joint in driven]
     require(set(range(len(mechanism.actuator_names))) <= set(columns), "an actuator is in no leg")
-    home, sides = home_values(mechanism)[0], []
+    home, sides = home_values(mechanism), []
     for leg, column in zip(legs, columns, strict=True):
         values = [_try_leg(mechanism, leg, mechanism.home_pose[None], side)[0][0] for side in leg.sides]
         apart = [_apart(mechanism, leg, value - home[column]) for value in values]
         sides.append(leg.sides[1] if len(leg.sides) == 2 and apart[1] < apart[0] - TOLERANCES.same_mode else 1.0)
     return Plan(mechanism, legs, completion_of(mechanism, legs), tuple(columns), tuple(sides))
-
-
-def home_values(mechanism: Mechanism) -> Array:
-    """Actuated coordinates at home, (1, n_a)."""
-    return np.array([[mechanism.home_coordinate(name) for name in mechanism.actuator_names]], dtype=float)
 
 
 def _try_leg(mechanism: Mechanism, leg: Leg, poses: Array, side: float) -> tuple[Array, Array, Array]:

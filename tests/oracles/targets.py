@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from checks import actuator_units, home_values
 from pfabrik import Mechanism
+from pfabrik.description.task import task_of
 
 from .arms import redundant_actuators, redundant_margin
 from .ik import solve_ik
@@ -99,3 +101,35 @@ def leg_lengths(base: Array, platform: Array, targets: Array) -> Array:
     """Distances (n, k) from base points (k, 3) to platform points (k, 3) given in platform coordinates."""
     moved = np.einsum("nij,kj->nki", targets[:, :3, :3], platform) + targets[:, None, :3, 3]
     return np.linalg.norm(moved - base, axis=2)
+
+
+def any_values(mechanism: Mechanism, n: int, share: float = 1.0, seed: int = 0) -> np.ndarray:
+    """Actuator values within a share of their ranges, from home, (n, n_a)."""
+    rng, home = np.random.default_rng(seed), home_values(mechanism)
+    reach = np.where([drive.kind == "angle" for drive in mechanism.drives], 1.5, 0.4) * actuator_units(mechanism)
+    ranges = [None if "[" in name else mechanism.joint(name).range for name in mechanism.actuator_names]
+    low, high = np.transpose([own or (h - r, h + r) for own, h, r in zip(ranges, home, reach, strict=True)])
+    return home + share * (rng.uniform(low, high, (n, len(home))) - home)
+
+
+def any_targets(mechanism: Mechanism, n: int, seed: int = 0) -> np.ndarray:
+    """Poses (n, 4, 4) near and far, up to 1e150 L, turned by any angle, some on joint centres, the last one home."""
+    rng, length = np.random.default_rng(seed), mechanism.characteristic_length
+    targets = np.tile(np.eye(4), (n, 1, 1))
+    away = length * rng.choice([0, 1e-6, 0.05, 0.3, 1, 10, 1e3, 1e6, 1e150], (n, 1))
+    turn = rng.choice([0, 1e-6, 0.05, 0.4, 3], (n, 1))
+    targets[:, :3, 3] = mechanism.reference_point + away * rng.normal(size=(n, 3))
+    targets[:, :3, :3] = Rotation.from_rotvec(turn * rng.uniform(-1, 1, (n, 3))).as_matrix()
+    for row, centre in enumerate([each.at for each in mechanism.joints if each.at is not None][: n // 4]):
+        targets[row, :3, 3] = centre
+    targets[-1] = mechanism.home_pose
+    return targets
+
+
+def targets_about(mechanism: Mechanism, rng: np.random.Generator, n: int, shift: float, turn: float) -> Array:
+    """Poses (n, 4, 4) up to so far from home on each axis that counts [L and rad]."""
+    poses, counting = np.tile(mechanism.home_pose, (n, 1, 1)), np.array(task_of(mechanism).axes)
+    poses[:, :3, 3] += rng.uniform(-shift, shift, (n, 3)) * mechanism.characteristic_length * counting
+    if not mechanism.end_effector_is_joint:
+        poses[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-turn, turn, (n, 3))).as_matrix() @ poses[:, :3, :3]
+    return poses
