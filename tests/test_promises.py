@@ -16,7 +16,6 @@ from checks import excess_of_joints, gap_of_joints
 from machines import closure
 from pfabrik import Cone, Joint, Mechanism, Options, Status
 from pfabrik.decomposition.leg_table import LegTable, leg_table
-from pfabrik.errors import InvalidArgument
 from pfabrik.kernels.legs.records import CARRIAGE
 from pfabrik.platform.carriages import carriages_along
 
@@ -269,21 +268,6 @@ def test_a_forked_child_solves_batches_too() -> None:
     child.start()
     child.join(60)
     assert child.exitcode == 0
-
-
-def test_what_is_no_mechanism_and_what_are_no_options_are_named() -> None:
-    machine = pf.load("stewart")
-    for call in (
-        lambda: pf.solve_ik("stewart", machine.home_pose),
-        lambda: pf.solve_ik(machine, machine.home_pose, options={"hold": None}),
-        lambda: Options(exact="no"),
-        lambda: Options(tolerance=True),
-        lambda: Options(max_iterations=True),
-        lambda: Options(rotation_tolerance=None),
-    ):
-        with pytest.raises(InvalidArgument):
-            call()
-    assert Options(max_iterations=np.int64(5), tolerance=np.float32(0.5)) != Options()
 
 
 @pytest.mark.parametrize(
