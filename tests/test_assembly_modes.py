@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from itertools import combinations
 
@@ -12,12 +11,12 @@ import pytest
 import checks
 import oracles
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import planar, published
 from machines.published import PUBLISHED
 from oracles import assembly
 from pfabrik.errors import MobilityWarning, PfabrikError
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 SAUER = assembly.Planar3RPR(**PUBLISHED["sauer_p2_5"]["geometry"])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import suppress
 from functools import cache
 
@@ -14,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import checks
 import oracles
 import pfabrik as pf
+from checks import INTERPRETED
 from machines.published import PUBLISHED, moved_from_home
 from oracles import search
 from paper import geometric
@@ -21,7 +21,6 @@ from pfabrik import Mechanism, Solution, Status
 from pfabrik.catalog import catalog_file, description
 
 Array = NDArray[np.float64]
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 KEPT = 1e-9  # what a result promises, of L or in radians
 NAMES = pf.catalog()
 
@@ -297,16 +296,6 @@ def test_the_delta_sinks_by_the_published_amount_for_one_degree() -> None:
     assert mechanism.home_pose[2, 3] == pytest.approx(-96.859, abs=1e-3)
     sunk = pf.solve_fk(mechanism, np.radians([1.0, 1.0, 1.0])).pose[2, 3] - mechanism.home_pose[2, 3]
     assert sunk == pytest.approx(-1.992, abs=1.5e-3)
-
-
-@pytest.mark.parametrize("row", PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"])
-def test_the_3rps_shifts_sideways_as_lee_and_shah_say(row: list[float]) -> None:
-    azimuth, tilt, height = row[:3]
-    about_z = Rotation.from_rotvec([0, 0, azimuth])
-    turn = about_z * Rotation.from_rotvec([0, tilt, 0]) * about_z.inv()
-    found = pf.solve_ik(machine("rps"), pf.pose([*row[3:5], height], rotation=turn))
-    assert found
-    np.testing.assert_allclose(found.actuators, row[5:], atol=1e-6)
 
 
 @pytest.mark.parametrize(

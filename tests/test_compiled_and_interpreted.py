@@ -17,13 +17,13 @@ import pytest
 from numba.core.caching import NullCache
 
 import pfabrik as pf
+from checks import INTERPRETED
 from copied import copied
 from machines import MACHINES
 from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels import _jit, ahead
 from pfabrik.kernels.reaching.solve import solve_by_passes
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 TESTS = Path(__file__).parent
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 FEW = ("five_bar", "nrpm", "hexapod_rus", "serial_spherical", "serial_arm")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +11,13 @@ from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from machines import MACHINES, planar, ring
+from checks import INTERPRETED
+from machines import MACHINES, planar, ring, struts
 from pfabrik import Cone, Joint, Mechanism
 from pfabrik.cli import main
 from pfabrik.decomposition.plan import compile_plan
 from pfabrik.errors import UnsupportedMechanism
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
 NOTATION = {
@@ -43,28 +42,14 @@ def machine(name: str) -> Mechanism:
     return MACHINES[name]() if name in MACHINES else pf.load(name)
 
 
-def strut(number: int | str, foot: object, head: object) -> list[Joint]:
-    """A U-P*-S leg from base to platform."""
-    return [
-        Joint(f"A{number}", "universal", ("base", f"c{number}"), at=foot),
-        Joint(
-            f"B{number}", "prismatic", (f"c{number}", f"r{number}"), along=(f"A{number}", f"C{number}"), actuated=True
-        ),
-        Joint(f"C{number}", "spherical", (f"r{number}", "platform"), at=head),
-    ]
-
-
-def struts(count: int) -> list[Joint]:
-    feet, heads = (
-        ring(100, 0, [60 * i + 5 * (i % 2) for i in range(count)]),
-        ring(60, 150, [60 * i for i in range(count)]),
-    )
-    return [joint for i in range(count) for joint in strut(i + 1, feet[i], heads[i])]
+def some_struts(count: int) -> list[Joint]:
+    feet = ring(100, 0, [60 * i + 5 * (i % 2) for i in range(count)])
+    return struts(feet, ring(60, 150, [60 * i for i in range(count)]))
 
 
 def with_leg(*leg: Joint) -> Mechanism:
     """Five struts, and the leg in question as the sixth."""
-    return Mechanism("five struts and another leg", [*struts(5), *leg], "platform", (0, 0, 150))
+    return Mechanism("five struts and another leg", [*some_struts(5), *leg], "platform", (0, 0, 150))
 
 
 def last_chain(*leg: Joint) -> pf.SubChain:
@@ -133,7 +118,7 @@ def test_fixed_joints_weld_bodies_into_one() -> None:
         Joint("weld2", "fixed", ("rod", "r1"), at=(80, 0, 75)),
         Joint("weld3", "fixed", ("platform", "head"), at=(60, 0, 150)),
     ]
-    plain = struts(6)
+    plain = some_struts(6)
     plain[1] = dataclasses.replace(plain[1], along=None, axis=(-40, 0, 150))
     renamed = {"A1": ("foot", "c1"), "C1": ("rod", "head")}
     joints = [dataclasses.replace(j, connects=renamed.get(j.name, j.connects)) for j in plain]
@@ -272,7 +257,7 @@ def with_spindle(driven: bool) -> Mechanism:
         )
         for name, height in (("bearing", 140), ("spindle", 160))
     ]
-    return Mechanism("with spindle", [*struts(6), *bearings], "platform", (0, 0, 150))
+    return Mechanism("with spindle", [*some_struts(6), *bearings], "platform", (0, 0, 150))
 
 
 def test_a_tool_on_the_platform_and_a_gripper_on_the_tip_belong_to_no_chain() -> None:

@@ -13,7 +13,7 @@ from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from machines import MACHINES, planar, ring
+from machines import MACHINES, planar, redescribed, ring, struts
 from pfabrik import Joint, Mechanism, Solution
 from pfabrik.answers.differential import Mobility, forward_jacobian, inverse_jacobian, mobility, singularity
 from pfabrik.closure.configurations import Configurations, new_rows
@@ -89,14 +89,7 @@ def five_bar(first: float, second: float, bend: float) -> Mechanism:
 
 def hexapod(bases, tops, lower="universal") -> Mechanism:
     """Struts between points, U-P-S or S-P-S."""
-    joints = []
-    for i, (a, c) in enumerate(zip(bases, tops, strict=True)):
-        joints += [
-            Joint(f"A{i}", lower, ("base", f"c{i}"), at=a),
-            Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"C{i}"), actuated=True),
-            Joint(f"C{i}", "spherical", (f"r{i}", "platform"), at=c),
-        ]
-    return Mechanism("hexapod", joints, "platform", np.mean(tops, axis=0))
+    return Mechanism("hexapod", struts(bases, tops, lower), "platform", np.mean(tops, axis=0))
 
 
 def fichter(turned: float) -> Mechanism:
@@ -138,24 +131,6 @@ def guarded_rpr(elbow: float) -> Mechanism:
         Joint("G3", "revolute", ("lower", "platform"), at=(40, 20, 0), axis=Z),
     ]
     return Mechanism("guarded", joints, "platform", (0, 0, 0))
-
-
-def changed(machine: Mechanism, place: Callable, turn: Callable, scale: float = 1.0, order=None) -> Mechanism:
-    """The same machine elsewhere, in another unit, with its joints in another order."""
-    joints = []
-    for joint in machine.without_limits().joints:
-        joints.append(
-            dataclasses.replace(
-                joint,
-                at=None if joint.at is None else place(joint.at),
-                axis=None if joint.axis is None else turn(joint.axis),
-                axes=None if joint.axes is None else tuple(map(turn, joint.axes)),
-                home=joint.home * scale if joint.type == "prismatic" else joint.home,
-            )
-        )
-    joints = joints if order is None else [joints[k] for k in order]
-    point = None if machine.end_effector_is_joint else place(machine.reference_point)
-    return Mechanism(machine.name, joints, machine.end_effector, point)
 
 
 def residual(machine: Mechanism, q: np.ndarray) -> np.ndarray:
@@ -503,7 +478,7 @@ class TestJacobiansOfLegs:
         machine, outer = hexapod(bases, tops), np.array([0.6, 0.0, 0.8])
         joints = [
             dataclasses.replace(joint, axes=(outer, np.cross(outer, tops[0] - bases[0])))
-            if joint.name == "A0"
+            if joint.name == "A1"
             else joint
             for joint in machine.joints
         ]
@@ -691,11 +666,10 @@ class TestSingularity:
         machine = EVERY[name]().without_limits()
         plain = at_home(machine)
         shift = 5 * machine.characteristic_length * np.array([1, -2, 1])
-        order = np.random.default_rng(0).permutation(len(machine.joints))
         others = [
-            changed(machine, lambda at: 1000 * np.array(at), np.array, scale=1000.0),
-            changed(machine, lambda at: TURN @ at + shift, lambda axis: TURN @ axis),
-            changed(machine, np.array, np.array, order=order),
+            redescribed.scaled(machine, 1000.0),
+            redescribed.moved(machine, TURN, shift),
+            redescribed.relabelled(machine, np.random.default_rng(0))[0],
         ]
         for other, turn in zip(others, (np.eye(3), TURN, np.eye(3)), strict=True):
             near = at_home(other)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from checks import INTERPRETED, actuator_units, assert_feasible, assert_honest, home_values, pose_errors
-from machines import EVERY, closure, machine
+from machines import EVERY, closure, machine, redescribed
 from oracles import any_targets, any_values, targets_about
 from pfabrik import Mechanism, Options, Status
 from pfabrik.closure.close import closure_of
@@ -143,8 +143,11 @@ def test_rows_that_are_none_are_named_or_marked_and_spoil_nothing(name: str) -> 
 @pytest.mark.parametrize("name", [each for each in closure.MACHINES if each not in ("agile_eye", "slider")])
 def test_how_a_machine_is_described_does_not_change_what_it_reaches(name: str, change: str) -> None:
     mechanism, factor = machine(f"closure.{name}"), {"smaller": 1e-3, "larger": 1e6}.get(change, 1.0)
-    changes = {"reversed": closure.reversed_joints, "shuffled": closure.shuffled}
-    other = changes[change](mechanism) if change in changes else closure.scaled(mechanism, factor)
+    others = {
+        "reversed": redescribed.reversed_joints,
+        "shuffled": lambda machine: redescribed.relabelled(machine, np.random.default_rng(0), swaps=0.0)[0],
+    }
+    other = others.get(change, lambda machine: redescribed.scaled(machine, factor))(mechanism)
     reached = pf.solve_fk(mechanism, any_values(mechanism, 2, 0.4)).pose
     targets = np.concatenate([reached, any_targets(mechanism, 3, seed=3)])
     moved = targets.copy()

@@ -6,7 +6,6 @@ longer than all else, so `make test` runs them as plain Python, and a campaign c
 
 from __future__ import annotations
 
-import os
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +15,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import MACHINES
 from machines.trunks import TRUNKS
 from pfabrik.decomposition.plan import CompiledPlan, compile_plan
@@ -26,7 +26,6 @@ from pfabrik.kernels.reaching import moving_frames, restrict, solve
 from pfabrik.kernels.reaching import passes as reach
 from pfabrik.kernels.reaching import plan as P
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = [
     pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),
     *([] if INTERPRETED else [pytest.mark.campaign]),

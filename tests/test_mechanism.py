@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from pfabrik.answers.differential import mobility
 from pfabrik.description.enclosing import enclosing_radius
 from pfabrik.description.graph import cone_line
-from pfabrik.description.home_mobility import end_effector_freedom, universal_axes
+from pfabrik.description.home_mobility import universal_axes
 from pfabrik.description.joint_types import JOINT_TYPES, KINDS
 from pfabrik.description.mechanism import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
@@ -200,31 +200,6 @@ class TestLimits:
 
 
 class TestFreedom:
-    def test_hexapod_has_six_freedoms_and_none_when_locked(self):
-        machine = stewart()
-        assert mobility(machine).mobility == 6
-        assert end_effector_freedom(machine, frozenset()) == 6
-        struts = [drive.column for drive in machine.drives]
-        assert end_effector_freedom(machine, frozenset(struts)) == 0
-        assert end_effector_freedom(machine, frozenset(struts[1:])) == 1
-
-    def test_struts_between_spherical_joints_spin_without_moving_the_platform(self):
-        joints = [
-            dataclasses.replace(joint, type="spherical") if joint.type == "universal" else joint for joint in hexapod()
-        ]
-        machine = Mechanism("6-SPS", joints, "platform", (0, 0, 150))
-        assert mobility(machine).mobility == 12
-        assert end_effector_freedom(machine, frozenset()) == 6
-
-    def test_five_bar_moves_in_its_plane(self):
-        machine = Mechanism("5", five_bar(), "tip")
-        assert mobility(machine).mobility == 2
-        assert end_effector_freedom(machine, frozenset()) == 2
-
-    def test_slider_crank_has_one_freedom(self):
-        machine = Mechanism("s", slider(), "block", (3, 0, 0))
-        assert mobility(machine).mobility == end_effector_freedom(machine, frozenset()) == 1
-
     def test_cylindrical_and_fixed_joints_count_two_and_none(self):
         joints = [
             Joint("c", "cylindrical", ("base", "arm"), at=(0, 0, 0), axis=Z),

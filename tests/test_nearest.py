@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from checks import excess_of_joints, excess_of_points, gap_of_joints, gap_of_points
-from machines import closure
+from checks import INTERPRETED, excess_of_joints, excess_of_points, gap_of_joints, gap_of_points
+from machines import closure, five_bar
 from oracles import targets_about
 from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
@@ -25,7 +24,6 @@ from pfabrik.engine import engine_of
 from pfabrik.platform.legs_engine import LegsEngine
 from pfabrik.rotations import angles_between
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 FEASIBLE = 1e-9
 """What loops may be open, and limits exceeded, as every answer promises [L or rad]."""
 SAME = 1e-6
@@ -655,18 +653,12 @@ NEARER = 1e-9
 
 def unlimited_five_bar(base: float, inner: float, outer: float) -> Mechanism:
     """A 5-bar without limits: feet at +- base / 2, links of these lengths, elbows out."""
-    tip, joints = np.array([0.03 * base, 0.75 * (inner + outer)]), []
-    for side, name in ((-1.0, "1"), (1.0, "2")):
-        foot = np.array([side * base / 2, 0.0])
+    tip, feet, elbows = np.array([0.03 * base, 0.75 * (inner + outer)]), np.array([[-1.0, 0], [1, 0]]) * base / 2, []
+    for side, foot in zip((-1.0, 1.0), feet, strict=True):
         away = np.linalg.norm(tip - foot)
         turn = np.arctan2(*(tip - foot)[::-1]) - side * np.arccos((inner**2 + away**2 - outer**2) / (2 * inner * away))
-        elbow = foot + inner * np.array([np.cos(turn), np.sin(turn)])
-        joints += [
-            Joint(f"A{name}", "revolute", ("base", f"a{name}"), at=(*foot, 0), axis=(0, 0, 1), actuated=True),
-            Joint(f"B{name}", "revolute", (f"a{name}", f"c{name}"), at=(*elbow, 0), axis=(0, 0, 1)),
-        ]
-    joints.append(Joint("tip", "revolute", ("c1", "c2"), at=(*tip, 0), axis=(0, 0, 1)))
-    return Mechanism("unlimited 5-bar", joints, "tip")
+        elbows.append(foot + inner * np.array([np.cos(turn), np.sin(turn)]))
+    return five_bar(feet, elbows, tip)
 
 
 def nearest_of_rings(targets: np.ndarray, feet: np.ndarray, radii: tuple[float, float]) -> np.ndarray:

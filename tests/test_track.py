@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import pickle
 from typing import Any
 
@@ -13,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 import checks
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import MACHINES
 from pfabrik import Joint, Mechanism, Options, Status
 from pfabrik.errors import InvalidArgument
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 STEPS = 60 if INTERPRETED else 360
 CIRCLES = {"five_bar": (200.0, 60.0), "stewart": (220.0, 60.0), "nrpm": (200.0, 100.0)}
 """Height and radius of the circle in the plane x = 0 that each catalogue file names as its test path."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import replace
 from typing import Any
 
@@ -13,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 import oracles
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import closure, tripod_rps
 from pfabrik import Joint, Mechanism, Solution, Status
 from pfabrik.tolerances import TOLERANCES
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 BESIDE = 1e-8
 """How far before the end must be reached, and after it must not [L or rad]: it is told to 1e-9, closed forms tell
 limits to 1e-9, and a way may meet a limit at a slant."""

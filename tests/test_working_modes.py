@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import pickle
 from collections.abc import Sequence
 from itertools import combinations, product
@@ -15,13 +14,13 @@ import checks
 import machines
 import oracles
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import closure
 from oracles import assembly
 from pfabrik import Status
 from pfabrik.errors import ContinuumOfSolutions, PfabrikError
 
 Z = (0.0, 0.0, 1.0)
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 MOST = 512 if INTERPRETED else 40_000  # starts
 
 

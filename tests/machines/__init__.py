@@ -9,6 +9,7 @@ from .closure import MACHINES as CLOSED
 from .closure import ON_ARMS, coaxial_rrr
 from .positions import (
     MACHINES,
+    five_bar,
     hexaglide,
     hexapod_rus,
     hexapod_ups,
@@ -17,6 +18,7 @@ from .positions import (
     ring,
     serial_planar,
     serial_spherical,
+    struts,
     tripod_prs,
     tripod_rps,
 )
@@ -40,6 +42,7 @@ __all__ = [
     "EVERY",
     "MACHINES",
     "TRUNKS",
+    "five_bar",
     "hexaglide",
     "hexapod_rus",
     "hexapod_ups",
@@ -49,6 +52,7 @@ __all__ = [
     "ring",
     "serial_planar",
     "serial_spherical",
+    "struts",
     "tripod_prs",
     "tripod_rps",
 ]

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from pfabrik import Cone, Joint, Mechanism
 from pfabrik.description.home_mobility import universal_axes
 
-from .positions import ring
+from .positions import five_bar, ring
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TURNS = (0.0, 120.0, 240.0)
@@ -307,11 +307,7 @@ def five_bar_with_tool() -> Mechanism:
 
 
 def five_bar_with_limited_tip() -> Mechanism:
-    joints = [joint("R", "tip", ("c1", "c2"), (0, 130, 0), Z, range=(-0.5, 0.3))]
-    for leg, sign in ((2, 1), (1, -1)):
-        joints.insert(0, joint("R", f"B{leg}", (f"a{leg}", f"c{leg}"), (120 * sign, 60, 0), Z))
-        joints.insert(0, joint("R*", f"A{leg}", ("base", f"a{leg}"), (50 * sign, 0, 0), Z))
-    return Mechanism("5-bar with a limited tip", joints, "tip")
+    return five_bar([(-50, 0), (50, 0)], [(-120, 60), (120, 60)], (0, 130), tip=(-0.5, 0.3))
 
 
 ARM = (
@@ -431,63 +427,6 @@ MACHINES: dict[str, Callable[[], Mechanism]] = {
     "slider": slider,
     "crooked": crooked_upr,
 }
-
-
-# --- the same machine, described otherwise ---------------------------------------------------------------------------
-
-
-def reversed_joints(mechanism: Mechanism) -> Mechanism:
-    """Every joint described from its other body; coordinates change sign."""
-    return _with_joints(mechanism, [_reversed(each) for each in mechanism.joints])
-
-
-def _reversed(each: Joint) -> Joint:
-    changes: dict[str, Any] = {"connects": each.connects[::-1]}
-    if each.along is None and each.type not in ("spherical", "fixed"):
-        swap = slice(None, None, -1 if each.type == "universal" else 1)
-        home = -np.ravel(each.home)[swap]
-        changes["home"] = tuple(home) if len(home) > 1 else float(home[0])
-        if each.range is not None:
-            pairs = -np.reshape(each.range, (-1, 2))[swap, ::-1]
-            changes["range"] = tuple(map(tuple, pairs)) if len(pairs) > 1 else tuple(pairs[0])
-    if each.axes is not None:
-        changes["axes"] = each.axes[::-1]
-    return dataclasses.replace(each, **changes)
-
-
-def shuffled(mechanism: Mechanism, seed: int = 0) -> Mechanism:
-    """Joints in another order, bodies with other names."""
-    rng = np.random.default_rng(seed)
-    names = {body: f"body{k}" for k, body in enumerate(rng.permutation(mechanism.bodies).tolist())}
-    joints = []
-    for each in mechanism.joints:
-        cone = each.cone and dataclasses.replace(each.cone, fixed_to=names[each.cone.fixed_to])
-        joints.append(dataclasses.replace(each, connects=tuple(names[b] for b in each.connects), cone=cone))
-    end = names.get(mechanism.end_effector, mechanism.end_effector)
-    order = [joints[k] for k in rng.permutation(len(joints))]
-    return Mechanism(mechanism.name, order, end, mechanism.reference_point, base=names[mechanism.base])
-
-
-def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
-    """All lengths in another unit."""
-    joints = [_scaled(each, factor) for each in mechanism.joints]
-    return _with_joints(mechanism, joints, tuple(factor * np.array(mechanism.reference_point)))
-
-
-def _scaled(each: Joint, factor: float) -> Joint:
-    changes: dict[str, Any] = {} if each.at is None else {"at": tuple(factor * np.array(each.at))}
-    if each.type == "prismatic":
-        changes["home"] = factor * each.home
-        changes["range"] = each.range and tuple(factor * np.array(each.range))
-    if each.type == "cylindrical":
-        changes["home"] = (each.home[0], factor * each.home[1])
-        changes["range"] = each.range and (each.range[0], tuple(factor * np.array(each.range[1])))
-    return dataclasses.replace(each, **changes)
-
-
-def _with_joints(mechanism: Mechanism, joints: list[Joint], reference: Any = None) -> Mechanism:
-    point = mechanism.reference_point if reference is None else reference
-    return Mechanism(mechanism.name, joints, mechanism.end_effector, point, base=mechanism.base)
 
 
 def scara(task: Sequence[str] | None = ("x", "y", "z", "yaw")) -> Mechanism:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,32 @@ def _pairs(spread: float) -> list[float]:
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
+
+
+def struts(feet: Sequence[Point], heads: Sequence[Point], lower: str = "universal", **drive: Any) -> list[Joint]:
+    """Driven struts U-P-S (or S-P-S) from base to platform, numbered from 1."""
+    joints = []
+    for i, (foot, head) in enumerate(zip(feet, heads, strict=True), 1):
+        joints += [
+            Joint(f"A{i}", lower, ("base", f"c{i}"), at=foot),  # type: ignore[arg-type]
+            Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"C{i}"), actuated=True, **drive),
+            Joint(f"C{i}", "spherical", (f"r{i}", "platform"), at=head),
+        ]
+    return joints
+
+
+def five_bar(feet: Sequence[Point], elbows: Sequence[Point], at: Point, **limits: Any) -> Mechanism:
+    """A 5-bar in the plane z = 0 (points of two numbers), driven at its feet A1 and A2; ranges by name."""
+    z, joints = (0, 0, 1), []
+    for i, (foot, elbow) in enumerate(zip(feet, elbows, strict=True), 1):
+        joints += [
+            Joint(
+                f"A{i}", "revolute", ("base", f"a{i}"), at=(*foot, 0), axis=z, actuated=True, range=limits.get(f"A{i}")
+            ),
+            Joint(f"B{i}", "revolute", (f"a{i}", f"c{i}"), at=(*elbow, 0), axis=z, range=limits.get(f"B{i}")),
+        ]
+    joints.append(Joint("tip", "revolute", ("c1", "c2"), at=(*at, 0), axis=z, range=limits.get("tip")))
+    return Mechanism("5-bar", joints, "tip", task=limits.get("task"))
 
 
 def hexapod_ups(stroke: tuple[float, float] = (150.0, 260.0)) -> Mechanism:

@@ -14,6 +14,8 @@ from scipy.spatial.transform import Rotation
 from oracles import assembly
 from pfabrik import Joint, Mechanism
 
+from .positions import struts
+
 Array = NDArray[np.float64]
 
 PUBLISHED: dict[str, Any] = json.loads(
@@ -137,14 +139,8 @@ def gough(base: Any, platform: Any, home_pose: Array, name: str = "6-UPS") -> Me
 
     The library counts rotations from home: see `moved_from_home`.
     """
-    joints = []
-    for i, (a, b) in enumerate(zip(np.array(base, float), np.array(platform, float), strict=True), 1):
-        joints += [
-            Joint(f"A{i}", "universal", ("base", f"cylinder{i}"), at=a),
-            Joint(f"B{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), along=(f"A{i}", f"C{i}"), actuated=True),
-            Joint(f"C{i}", "spherical", (f"rod{i}", "platform"), at=home_pose[:3, :3] @ b + home_pose[:3, 3]),
-        ]
-    return Mechanism(name, joints, "platform", tuple(home_pose[:3, 3]))
+    heads = np.array(platform, float) @ home_pose[:3, :3].T + home_pose[:3, 3]
+    return Mechanism(name, struts(np.array(base, float), heads), "platform", tuple(home_pose[:3, 3]))
 
 
 def published_gough(case: str, p: Sequence[float]) -> Mechanism:
