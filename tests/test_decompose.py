@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from checks import INTERPRETED
-from machines import MACHINES, planar, ring, struts
+from machines import MACHINES, closure, planar, ring, struts
 from pfabrik import Cone, Joint, Mechanism
 from pfabrik.cli import main
 from pfabrik.decomposition.plan import compile_plan
@@ -271,74 +271,45 @@ def test_a_motor_that_no_chain_contains_is_named() -> None:
         compile_plan(with_spindle(driven=True))
 
 
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 FOOT, KNEE, HEAD = (-50, -80, 0), (-80, -70, 70), (-30, -50, 150)
 UP = np.subtract(HEAD, FOOT)
 
+AXES = ((1, 0, 0), (0, 1, 0))
 BEYOND_POSITIONS = {
-    "revolute on a moving link": (
-        "B",
-        Joint("A", "revolute", ("base", "k"), at=FOOT, axis=(1, 0, 0)),
-        Joint("B", "revolute", ("k", "r"), at=KNEE, axis=(0, 0, 1)),
-        Joint("C", "spherical", ("r", "platform"), at=HEAD),
-    ),
-    "cylindrical joint": (
-        "B",
-        Joint("A", "universal", ("base", "k"), at=FOOT),
-        Joint("B", "cylindrical", ("k", "r"), at=KNEE, axis=UP),
-        Joint("C", "spherical", ("r", "platform"), at=HEAD),
-    ),
-    "two prismatic joints in a row": (
-        "D",
-        Joint("A", "universal", ("base", "k"), at=FOOT),
-        Joint("B", "prismatic", ("k", "m"), axis=UP),
-        Joint("D", "prismatic", ("m", "r"), axis=UP, actuated=True),
-        Joint("C", "spherical", ("r", "platform"), at=HEAD),
-    ),
-    "prismatic joint aside of its neighbours": (
-        "B",
-        Joint("A", "universal", ("base", "k"), at=FOOT),
-        Joint("B", "prismatic", ("k", "r"), axis=(0, 0, 1), actuated=True),
-        Joint("C", "spherical", ("r", "platform"), at=HEAD),
-    ),
-    "prismatic joint that carries the platform": (
-        "B",
-        Joint("A", "spherical", ("base", "k"), at=FOOT),
-        Joint("B", "prismatic", ("k", "platform"), axis=UP, actuated=True),
-    ),
-    "universal joint with ranges": (
-        "A",
-        Joint("A", "universal", ("base", "k"), at=FOOT, axes=((1, 0, 0), (0, 1, 0)), range=((-1, 1), (-1, 1))),
-        Joint("B", "prismatic", ("k", "r"), axis=UP, actuated=True),
-        Joint("C", "spherical", ("r", "platform"), at=HEAD),
-    ),
-    "universal joint below a branching body": (
-        "A",
-        Joint("A", "universal", ("base", "k"), at=FOOT),
-        Joint("B", "spherical", ("k", "platform"), at=HEAD),
-        Joint("C", "spherical", ("k", "platform"), at=KNEE),
-    ),
+    "revolute on a moving link": (2, ("R", FOOT, X), ("R", KNEE, Z), ("S", HEAD)),
+    "cylindrical joint": (2, ("U", FOOT), ("C", KNEE, UP), ("S", HEAD)),
+    "two prismatic joints in a row": (3, ("U", FOOT), ("P", None, UP), ("P*", None, UP), ("S", HEAD)),
+    "prismatic joint aside of its neighbours": (2, ("U", FOOT), ("P*", None, Z), ("S", HEAD)),
+    "prismatic joint that carries the platform": (2, ("S", FOOT), ("P*", None, UP)),
+    "universal joint with ranges": (1, ("U", FOOT, AXES, {"range": ((-1, 1),) * 2}), ("P*", None, UP), ("S", HEAD)),
     "cone that turns with a link of unknown twist": (
-        "C",
-        Joint("A", "universal", ("base", "k"), at=FOOT),
-        Joint("C", "spherical", ("k", "r"), at=KNEE, cone=Cone((1, 0, 0), 2.0, "k")),
-        Joint("D", "spherical", ("r", "platform"), at=HEAD),
+        2, ("U", FOOT), ("S", KNEE, None, {"cone": Cone((1, 0, 0), 2.0, "6.1")}), ("S", HEAD)
     ),
-}
+}  # fmt: skip
+"""Legs, and the place of the joint that positions do not express."""
 
 
 @pytest.mark.parametrize("name", BEYOND_POSITIONS)
 def test_a_chain_that_needs_more_than_positions_names_the_joint_and_the_reason(name: str) -> None:
-    culprit, *leg = BEYOND_POSITIONS[name]
-    mechanism = with_leg(*leg)
-    *others, chain = pf.decompose(mechanism)
+    place, *steps = BEYOND_POSITIONS[name]
+    mechanism, culprit = with_leg(*closure.chain(6, *steps)), f"{steps[place - 1][0][0]}6.{place}"
+    *others, last = pf.decompose(mechanism)
     assert [serves(each) for each in others] == ["reaching"] * 5
-    assert serves(chain) == "closure"
-    assert culprit in chain.reason.replace(",", " ").split()
+    assert serves(last) == "closure"
+    assert culprit in last.reason.replace(",", " ").split()
     with pytest.raises(UnsupportedMechanism) as caught:
         compile_plan(mechanism)
-    assert chain.reason in str(caught.value)
-    assert str(chain) in str(caught.value)
+    assert last.reason in str(caught.value)
+    assert str(last) in str(caught.value)
     assert pf.solve_ik(mechanism, mechanism.home_pose)
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_a_universal_joint_below_a_branching_body_is_named() -> None:
+    branch = [closure.joint("U", "A", ("base", "k"), FOOT), closure.joint("S", "B", ("k", "platform"), HEAD)]
+    chain = last_chain(*branch, closure.joint("S", "C", ("k", "platform"), KNEE))
+    assert serves(chain) == "closure" and "A" in chain.reason.replace(",", " ").split()
 
 
 def test_two_universal_joints_carry_orientation() -> None:
@@ -416,9 +387,6 @@ def turning(name: str, *axes: tuple[float, float, float]) -> Joint:
     if len(axes) == 1:
         return Joint(name, "revolute", ("", ""), axis=axes[0])
     return Joint(name, "universal", ("", ""), axes=axes or None)
-
-
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -18,12 +18,10 @@ from pfabrik import Joint, Mechanism, Solution
 from pfabrik.answers.differential import Mobility, forward_jacobian, inverse_jacobian, mobility, singularity
 from pfabrik.closure.configurations import Configurations, new_rows
 from pfabrik.closure.first_order import forward_map, inverse_map, singularities, units_of
-from pfabrik.description.graph import tree_of
-from pfabrik.description.home_mobility import column_joints
 from pfabrik.errors import InvalidArgument
 from pfabrik.kernels.handle import Handle
 from pfabrik.kernels.platform.jacobians import jacobians, new_jacobian_tables
-from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units, screws
+from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units
 from pfabrik.motion.mobility import generic_of
 from pfabrik.motion.singularities import KINDS, measures
 from pfabrik.tolerances import TOLERANCES
@@ -165,18 +163,6 @@ def driven(machine: Mechanism, q: np.ndarray, values: np.ndarray) -> np.ndarray:
     return solved(errors, q, units)
 
 
-def conditions_and_twist(machine: Mechanism, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the loops ask to vanish (6 loops, c) and the twist of the end effector (6 or 3, c), by joint rates, in L."""
-    tree, owners = tree_of(machine), column_joints(machine)
-    present = screws(machine, q)[0]
-    present[:, 3:] += np.cross(present[:, :3], end_effector_pose(machine, q)[0, :3, 3] / machine.characteristic_length)
-    twist = (present * tree.paths[machine.end_effector_body][owners][:, None]).T
-    rows = twist[3:] if machine.end_effector_is_joint else np.concatenate([twist[3:], twist[:3]])
-    return np.concatenate(
-        [np.zeros((0, len(owners))), *((present * loop[owners][:, None]).T for loop in tree.loops)]
-    ), rows
-
-
 def drives(machine: Mechanism) -> list[int]:
     return [columns(machine)[each].start for each in machine.actuator_names]
 
@@ -294,18 +280,6 @@ class TestJacobians:
                 expected = velocity if machine.end_effector_is_joint else np.concatenate([velocity, angular])
                 scale = np.abs(forward[row, :, k]).max()
                 assert forward[row, :, k] == pytest.approx(expected, abs=1e-6 * scale)
-
-    @pytest.mark.parametrize("name", CONTROLLED)
-    def test_forward_jacobian_is_what_the_loops_make_of_actuator_rates(self, name):
-        """The rates of all joints by SciPy's null space of the loops' conditions on the tree's screws."""
-        machine, q = closed(name)
-        units = rate_units(machine)[drives(machine)]
-        for row, found in zip(q, forward_map(machine, q), strict=True):
-            conditions, twist = conditions_and_twist(machine, row[None])
-            motions = null_space(conditions, rcond=1e-7)
-            expected = twist @ motions @ np.linalg.pinv(motions[drives(machine)], rcond=1e-7) / units
-            expected[:3] *= machine.characteristic_length
-            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
     @pytest.mark.parametrize("name", ["hexapod_ups", "hexapod_rus", "hexaglide", "stewart"])
     def test_jacobians_of_six_freedoms_and_six_actuators_are_inverse(self, name):

@@ -97,21 +97,6 @@ def test_what_neither_task_nor_legs_tell_stays_where_it_was(name: str, task: str
 
 
 @pytest.mark.parametrize("name", TURNS)
-def test_forward_kinematics_returns_what_inverse_kinematics_was_given(name: str) -> None:
-    mechanism = machine(name)
-    answers = pf.solve_ik(mechanism, targets(mechanism, 40, 0.1, 0.2, TURNS[name]))
-    reached = [each for each in answers if each]
-    back = pf.solve_fk(mechanism, np.array([each.actuators for each in reached]))
-    assert (np.asarray(back.status) == pf.Status.REACHED).all()
-    assert gap_of_joints(mechanism, back).max() <= 1e-9
-    off = np.abs(back.pose - np.array([each.pose for each in reached])).max(axis=(1, 2))
-    assert (off <= 1e-7 * mechanism.characteristic_length).mean() >= 0.9  # others are assemblies of their own
-    for each in reached[:5]:
-        there = pf.solve_fk(mechanism, each.actuators, start=each)
-        np.testing.assert_allclose(there.pose, each.pose, atol=1e-7 * mechanism.characteristic_length)
-
-
-@pytest.mark.parametrize("name", TURNS)
 def test_along_a_path_nothing_leaps_and_a_start_may_be_a_joint_vector(name: str) -> None:
     mechanism, length = machine(name), machine(name).characteristic_length
     end = targets(mechanism, 1, 0.05, 0.15, TURNS[name])[0]

@@ -210,13 +210,6 @@ def test_where_the_reference_point_is_does_not_change_what_is_held(name: str) ->
     np.testing.assert_allclose(others.position_error[held] / near.characteristic_length, away, atol=1e-6)
 
 
-@pytest.mark.parametrize(("name", "hold"), CASES)
-def test_special_targets_have_feasible_answers(name: str, hold: str | None) -> None:
-    mechanism = pf.load(name)
-    targets = special_targets(mechanism)
-    check_feasible(mechanism, targets, pf.solve_ik(mechanism, targets, options=Options(hold=hold)))
-
-
 IN_A_PLANE = {"five_bar": (0.0, 1.0, 1.0), "rrr": (1.0, 1.0, 0.0), "rpr": (1.0, 1.0, 0.0)}
 """Directions in which machines move that cannot in others."""
 
