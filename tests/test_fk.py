@@ -150,7 +150,7 @@ def assert_round_trip(mechanism: pf.Mechanism, targets: np.ndarray, least: float
     reached = pf.solve_ik(mechanism, targets)
     assert reached
     back = pf.solve_fk(mechanism, reached.actuators)
-    assert_feasible(mechanism, reached.actuators, back)
+    assert_feasible(mechanism, back)
     same = is_same_pose(mechanism, back.pose, reached.pose)
     assert same.mean() >= least
     rng = np.random.default_rng(5)
