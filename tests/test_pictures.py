@@ -207,8 +207,8 @@ def test_what_cannot_be_drawn_is_refused() -> None:
             pf.plot(shown)  # type: ignore[arg-type]
     with pytest.raises(InvalidArgument, match="two-dimensional axes"):
         pf.plot(mechanism, Figure().add_subplot())
-    with pytest.raises(UnknownName, match="did you mean 'P1'"):
-        pf.plot(mechanism, names=["PP1"])
+    with pytest.raises(UnknownName, match="did you mean 'A1'"):
+        pf.plot(mechanism, names=["AA1"])
     with pytest.raises(InvalidArgument, match="no direction"):
         pf.plot_travel(pf.Travel(batch[0], ()))
     with pytest.raises(InvalidArgument, match="expected a Track"):
