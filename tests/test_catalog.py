@@ -14,6 +14,7 @@ import checks
 import oracles
 import pfabrik as pf
 from checks import INTERPRETED
+from machines import machine
 from machines.published import PUBLISHED, moved_from_home
 from oracles import search
 from paper import geometric
@@ -54,11 +55,6 @@ FREEDOMS = {
 OVER_CONSTRAINTS = {"five_bar": 3, "rrr": 6, "rpr": 6, "prr": 6, "agile_eye": 6, "orthoglide": 12}
 """Loop conditions that follow from others: three of every planar or spherical loop, such as the Orthoglide's three
 parallelograms; and three more there, because three legs hold two rotations each. None elsewhere."""
-
-
-@cache
-def machine(name: str) -> Mechanism:
-    return pf.load(name)
 
 
 def drawn_actuators(mechanism: Mechanism, count: int, seed: int) -> Array:
@@ -117,15 +113,6 @@ def pose_errors(mechanism: Mechanism, poses: Array, targets: Array) -> Array:
     return np.max([off[:, 0], *(np.linalg.norm(counted[name], axis=1) for name in mechanism.task)], axis=0)
 
 
-def assert_feasible(mechanism: Mechanism, solution: Solution) -> None:
-    assert np.isfinite(solution.pose).all()
-    assert np.isfinite(solution.actuators).all()
-    assert (solution.status <= Status.PROJECTED).all()
-    assert pf.closure_residual(solution).max() <= KEPT * mechanism.characteristic_length
-    assert checks.gap_of_joints(mechanism, solution).max() <= 2 * KEPT
-    assert checks.excess_of_joints(mechanism, solution).max() <= 2 * KEPT
-
-
 # Any target: half of the rows anywhere, half where a feasible configuration puts the end effector
 
 FEW, MANY = (2 if INTERPRETED else 100), 2000
@@ -166,7 +153,7 @@ def at_bounds(name: str, count: int) -> tuple[Array, Solution]:
 @pytest.mark.parametrize("name", NAMES)
 def test_limits_are_kept_and_loops_closed_for_any_target(name: str, count: int) -> None:
     for found in (anywhere(name, count)[1], assembled(name, count), inside(name, count)[1], at_bounds(name, count)[1]):
-        assert_feasible(machine(name), found)
+        checks.assert_feasible(machine(name), found)
 
 
 @pytest.mark.parametrize("count", COUNTS)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from machines import MACHINES as REACHING_MACHINES
-from machines.closure import MACHINES as CLOSURE_MACHINES
+from machines import machine
 from pfabrik import Mechanism, Solution, Status
 from pfabrik.description.joint_types import KINDS
 
@@ -24,11 +23,6 @@ NAMES = (
     "mixed",
     "serial_spherical",
 )
-
-
-def machine(name: str) -> Mechanism:
-    made = REACHING_MACHINES | CLOSURE_MACHINES
-    return made[name]() if name in made else pf.load(name)
 
 
 def near_home(mechanism: Mechanism, n: int = 3) -> Solution:

@@ -344,7 +344,7 @@ def off_plane(compiled: CompiledPlan, nodes: np.ndarray) -> float:
 def test_a_pass_outward_starts_at_the_base_and_keeps_lengths_planes_rails_and_ranges(name: str) -> None:
     machine = MACHINES[name]() if name in MACHINES else pf.load(name)
     if name == "tripod_rps":  # a platform's cone may contradict the hinge's plane
-        machine = machine.with_limits(S1=None, S2=None, S3=None)
+        machine = machine.with_limits(C1=None, C2=None, C3=None)
     compiled = compile_plan(machine)
     rng = np.random.default_rng(10)
     length = compiled.plan.length

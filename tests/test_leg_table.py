@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from machines import closure
+from machines import closure, machine
 from pfabrik.closure.configurations import new_rows
 from pfabrik.decomposition.leg_table import LegTable, leg_table, table_of_poses
 from pfabrik.description.task import task_of
@@ -30,11 +30,6 @@ SERVED = [name for name in pf.catalog() if isinstance(table_of_poses(pf.load(nam
 IN_FRONT = [name for name in SERVED if isinstance(engine_of(pf.load(name)), LegsEngine)]
 COMPLETED = [name for name in IN_FRONT if leg_table(pf.load(name)).task["unset"][0]]
 TARGETS = 300
-
-
-@lru_cache
-def machine(name: str) -> pf.Mechanism:
-    return pf.load(name)
 
 
 def table(name: str) -> LegTable:

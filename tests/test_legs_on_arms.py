@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from checks import excess_of_joints, gap_of_joints
-from machines import closure
+from machines import closure, machine
 from pfabrik.closure.close import closure_of
 from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.decomposition.leg_table import LegTable, leg_table
@@ -34,11 +33,6 @@ TURNS = {
     "6-RRPS": ANY,
 }
 """About which axes a platform can turn."""
-
-
-@lru_cache
-def machine(name: str) -> pf.Mechanism:
-    return closure.ON_ARMS[name]()
 
 
 def targets(mechanism: pf.Mechanism, n: int, shift: float, turn: float, about: tuple[int, ...]) -> np.ndarray:

@@ -34,8 +34,8 @@ EVERY: dict[str, Callable[[], Mechanism]] = {
 
 @cache
 def machine(name: str) -> Mechanism:
-    """A machine by its name in `EVERY`, or in `MACHINES` or `TRUNKS`; made once."""
-    return (TRUNKS | MACHINES | EVERY)[name]()
+    """A machine by its name in `EVERY`, or in one of the tables; made once."""
+    return (TRUNKS | CLOSED | ON_ARMS | MACHINES | EVERY)[name]()
 
 
 __all__ = [
